@@ -9,8 +9,9 @@ ASK_AGAIN_S = 0.1
 
 
 def follows_crystal(board: Board) -> bool:
-    """Ask the board until its clock is locked to the crystal or the crystal's start-up time is over; return the last
-    status. Raise as `Board.status` does.
+    """Ask the board until its clock is locked to the crystal or the start-up time is over; return whether it is locked.
+
+    Raise as `Board.status` does.
     """
     while True:
         status = board.status()

@@ -18,9 +18,7 @@ changing = partial(raised_as, Fault)  # while the board is being changed, a refu
 
 
 def configured_board(config: SensorsConfig) -> BoardSection:
-    """Return the configuration's section board. Raise Refused `no_board_section` if every sensor has a port of its
-    own.
-    """
+    """Return the section board. Raise Refused `no_board_section` if every sensor has a port of its own."""
     if config.board is None:
         raise Refused(
             "no_board_section",
@@ -50,9 +48,7 @@ def sensor_entry(identity: BoardIdentity, name: str, section: ConfiguredSensor) 
 
 
 def find_sensor(identity: BoardIdentity, name: str, section: ConfiguredSensor) -> SensorInfo:
-    """Return the board's entry for a configured sensor that answers. Raise Refused `sensor_missing`,
-    `sensor_mismatch`.
-    """
+    """Return the board's entry for a sensor that answers. Raise Refused `sensor_missing`, `sensor_mismatch`."""
     info = sensor_entry(identity, name, section)
     if info.present:
         return info
@@ -101,8 +97,7 @@ def refuse_other_sensor(
 ) -> None:
     """Raise Refused `another_sensor`, `another_range` unless a calibration fits the configured sensor and its range.
 
-    `calibration` names the calibration in the message; `part`, `serial_number` and `range_deg_s` are those it was made
-    for.
+    `calibration` names the calibration in the message; it was made for `part`, `serial_number` and `range_deg_s`.
     """
     if (part, serial_number) != (section.part, section.serial_number):
         raise Refused(

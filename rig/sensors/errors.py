@@ -1,7 +1,7 @@
-"""How a sensor on a port of its own says no."""
+"""The error of a sensor on a port of its own."""
 
 from rig.errors import ProblemError
 
 
 class SensorError(ProblemError):
-    """Something such a sensor or the line to it will not or cannot do (`no_kvh`, `kvh_axes_not_identity`, …)."""
+    """An error of such a sensor or of its line (`no_kvh`, `kvh_axes_not_identity`, …)."""

@@ -1,4 +1,4 @@
-"""A device's own port from its opening to its end: who reads it, what went wrong first, how long nothing has come."""
+"""A device's own port from opening to close: its reader thread, its first fault, and its silence."""
 
 import threading
 import time
@@ -9,11 +9,11 @@ from typing import Protocol
 
 from firmware_host.serial_port import SerialPort, why_closed
 from rig.sensors.errors import SensorError
-from rig.sensors.silence import USUAL, Patience, Silence
+from rig.sensors.silence import USUAL, Patience, PortSilence
 
 
-class Port(Protocol):
-    """An open port; `read` returns what came within `READ_TIMEOUT_S`. OSError for all that goes wrong."""
+class DevicePort(Protocol):
+    """An open port; `read` returns the data received within `READ_TIMEOUT_S`. All errors are OSErrors."""
 
     def read(self) -> bytes: ...
     def write(self, data: bytes) -> None: ...
@@ -21,49 +21,49 @@ class Port(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Faults:
-    """What is raised of a device when its port has closed, when it sends no more, when a consumer of it has failed.
+class PortFaults:
+    """The errors of a device if its port has closed, if it is silent, or if a consumer of its data has failed.
 
-    Each is complete but for the end of what it says: why, or for how long.
+    Each lacks only the end of its message: the reason, or the duration.
     """
 
     closed: SensorError
     silent: SensorError
     not_taken: SensorError
 
-    def of(self, error: Exception) -> SensorError:
-        """The fault that an error of the port or of a consumer is."""
+    def complete(self, error: Exception) -> SensorError:
+        """Return the fault for an error of the port or of a consumer, with the reason."""
         if isinstance(error, SensorError):
             return error
         if isinstance(error, OSError):
-            return _ended(self.closed, f": {error}")
-        return _ended(self.not_taken, f": {error!r}")
+            return _complete_error(self.closed, f": {error}")
+        return _complete_error(self.not_taken, f": {error!r}")
 
 
 class OwnPort:
-    """An open port and the thread that reads it until `close`; what each read brought goes to `take`, with when.
+    """An open port and the thread that reads it until `close`; `take` gets the data of each read and its time.
 
-    `news` is held while something is taken, and notified of it. What ends the reading early is the `fault`, be it the
-    port's OSError, a SensorError, or whatever a consumer raised.
+    `news` is locked during `take`, and notified after it. The first error that ends the reading becomes the `fault`:
+    the port's OSError, a SensorError, or an error of a consumer.
     """
 
     def __init__(
         self,
-        port: Port,
+        port: DevicePort,
         name: str,
-        faults: Faults,
+        faults: PortFaults,
         take: Callable[[bytes, float], None],
         *,
         patience: Patience = USUAL,
         farewell: Callable[[], None] = lambda: None,
     ) -> None:
-        """`name` is the port's; `farewell` is called when it closes, while it can still be written to."""
+        """Prepare the reader of the port called `name`; `farewell` runs at the close, while the port is still open."""
         self.news = threading.Condition()
-        self.silence = Silence()
+        self.silence = PortSilence()
         self.fault: SensorError | None = None
         self._port, self._faults, self._take, self._farewell = port, faults, take, farewell
         self._patience = patience
-        self._most_silent_s: float | None = None  # while it streams
+        self._most_silent_s: float | None = None  # set while it streams
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"reader of {name}", daemon=True)
 
@@ -77,24 +77,24 @@ class OwnPort:
         return self._most_silent_s is not None
 
     def stream(self, more_s: float = 0.0) -> None:
-        """Take a silence from now on for a fault, when it is longer than patience has it by `more_s`."""
+        """Treat a silence from now on as a fault, if it is longer than `Patience.silent_s` plus `more_s`."""
         with self.news:
-            self._most_silent_s, self.silence = self._patience.silent_s + more_s, Silence()
+            self._most_silent_s, self.silence = self._patience.silent_s + more_s, PortSilence()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raises what went wrong meanwhile, a silence while it streams too.
+        """Raise the fault of the meantime, also a silence of a stream.
 
-        `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
+        `clock_s` is the present time of another instrument's clock, if any: a silence must also be as long by that.
         """
         if self.fault is not None:
             raise self.fault
         with self.news:
-            silent_s = self.silence.seen_by(clock_s)
+            silent_s = self.silence.measure_s(clock_s)
         if self._most_silent_s is not None and silent_s > self._most_silent_s:
-            raise _ended(self._faults.silent, f" for {silent_s:.1f} s")
+            raise _complete_error(self._faults.silent, f" for {silent_s:.1f} s")
 
     def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        """Whether it was so in time. Raises what went wrong meanwhile."""
+        """Wait until a condition holds; return whether it did in time. Raise the fault of the meantime."""
         with self.news:
             done = self.news.wait_for(lambda: until() or self.fault is not None, timeout_s)
             if self.fault is not None:
@@ -102,14 +102,14 @@ class OwnPort:
             return done
 
     def write(self, data: bytes) -> None:
-        """Send. Raises SensorError, as of a port that closed."""
+        """Send data. Raise SensorError as for a port that closed."""
         try:
             self._port.write(data)
         except OSError as error:
-            raise self._faults.of(error) from error
+            raise self._faults.complete(error) from error
 
     def close(self) -> None:
-        """Says farewell, ends the thread and closes the port. May be called twice."""
+        """Run the farewell, end the thread and close the port. May be called twice."""
         if self._closing.is_set():
             return
         with suppress(SensorError):
@@ -123,33 +123,33 @@ class OwnPort:
             while not self._closing.is_set():
                 self._take(self._port.read(), time.monotonic())
         except Exception as error:  # a failing consumer must reach the caller, not end in a dead thread
-            self.fault = self._faults.of(error)
+            self.fault = self._faults.complete(error)
         with self.news:
             self.news.notify_all()
 
 
-def opened(
+def open_device_port(
     port: str,
     baud: int,
-    by: Callable[[str, int], Port] = SerialPort,
+    open_port: Callable[[str, int], DevicePort] = SerialPort,
     *,
-    where: str = "",
-    named_by: str = "its name",
-) -> Port:
-    """The port, open. Raises SensorError `no_port`; `where` is whose it is, `named_by` what says which."""
+    owner: str = "",
+    setting: str = "its name",
+) -> DevicePort:
+    """Open a port. Raise SensorError `no_port`; the message names its `owner` and the `setting` that selects it."""
     try:
-        return by(port, baud)
+        return open_port(port, baud)
     except OSError as error:
         raise SensorError(
             "no_port",
-            f"{where}the port {port} does not open: {why_closed(port, error)}",
-            f"Check {named_by} and the cable, and that no other program has the port",
+            f"{owner}the port {port} does not open: {why_closed(port, error)}",
+            f"Check {setting} and the cable, and that no other program has the port",
         ) from error
 
 
 @contextmanager
-def closed_on_failure(close: Callable[[], None]) -> Iterator[None]:
-    """A `with` block that sets something up, which `close` undoes where that fails."""
+def closing_on_failure(close: Callable[[], None]) -> Iterator[None]:
+    """Call `close` if the block, which sets something up, fails."""
     try:
         yield
     except BaseException:
@@ -157,5 +157,5 @@ def closed_on_failure(close: Callable[[], None]) -> Iterator[None]:
         raise
 
 
-def _ended(error: SensorError, end: str) -> SensorError:
+def _complete_error(error: SensorError, end: str) -> SensorError:
     return SensorError(error.name, error.what + end, error.remedy)

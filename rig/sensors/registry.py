@@ -1,4 +1,4 @@
-"""The sensors that have a port of their own: by part, what makes a configured one a source of samples."""
+"""The sensors with a port of their own, by part."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
@@ -17,61 +17,62 @@ from rig.sensors.source import OnSamples, SampleSource
 Sections = Mapping[str, SensorSection]
 
 
-class Instrument(SampleSource, Protocol):
+class SensorSource(SampleSource, Protocol):
     """A sensor that is a source by itself."""
 
     @property
     def corrected(self) -> Mapping[str, str]:
-        """Settings in its memory that were not as the run needs them: name → what was there."""
+        """The settings in its memory that were corrected, with their former values."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
-    """What can be done with the sensors of a part at one port, by their names and sections; errors are SensorErrors.
+class PartKind:
+    """The operations on the sensors of a part at one port, by their names and sections; errors are SensorErrors.
 
-    `connect` sets them up, for who takes their samples, which `describe` describes of each; `look` only looks: yields
-    what is there and what is wrong.
+    - `connect`: returns a context manager of their source, set up, which passes their samples on.
+    - `describe`: returns the description of a sensor's samples.
+    - `look`: yields their state and their problems, and changes nothing.
     """
 
-    connect: Callable[[Sections, OnSamples], AbstractContextManager[Instrument]]
+    connect: Callable[[Sections, OnSamples], AbstractContextManager[SensorSource]]
     describe: Callable[[str, SensorSection], RecordedSensor]
     look: Callable[[Sections], Iterator[str | SensorError]]
 
 
-def _alone(
-    connect: Callable[[str, SensorSection, OnSamples], AbstractContextManager[Instrument]],
+def _single_sensor_kind(
+    connect: Callable[[str, SensorSection, OnSamples], AbstractContextManager[SensorSource]],
     describe: Callable[[str, SensorSection], RecordedSensor],
     look: Callable[[str, SensorSection], Iterator[str | SensorError]],
-) -> Kind:
-    """The kind of a part that has its port for itself."""
+) -> PartKind:
+    """Return the kind of a part with one sensor at its port."""
 
     def only(sections: Sections) -> tuple[str, SensorSection]:
-        (one,) = sections.items()
-        return one
+        (item,) = sections.items()
+        return item
 
-    return Kind(
+    return PartKind(
         lambda sections, on_samples: connect(*only(sections), on_samples),
         describe,
         lambda sections: look(*only(sections)),
     )
 
 
-OWN_PORT: Mapping[str, Kind] = MappingProxyType(
+OWN_PORT: Mapping[str, PartKind] = MappingProxyType(
     {
-        "kvh1775": _alone(kvh1775.kvh1775, kvh1775.describe, kvh1775.look),
-        "lines": _alone(lines.lines, lines.describe, lines.look),
-        "mavlink": Kind(mavlink.mavlink, mavlink.describe, mavlink.look),
+        "kvh1775": _single_sensor_kind(kvh1775.kvh1775, kvh1775.describe, kvh1775.look),
+        "lines": _single_sensor_kind(lines.lines, lines.describe, lines.look),
+        "mavlink": PartKind(mavlink.mavlink, mavlink.describe, mavlink.look),
     }
 )
 
 
-def by_port(sensors: Sections) -> Iterator[tuple[str, Kind, Sections]]:
-    """Sensors with a port of their own, together by port: the port, what can be done with them, their sections."""
-    at: dict[str, dict[str, SensorSection]] = {}
+def by_port(sensors: Sections) -> Iterator[tuple[str, PartKind, Sections]]:
+    """Yield the sensors with a port of their own, grouped by port: the port, their kind, their sections."""
+    sections_by_port: dict[str, dict[str, SensorSection]] = {}
     for name, section in sensors.items():
         if section.own_port is not None:
-            at.setdefault(section.own_port[1], {})[name] = section
-    for port, sections in at.items():
+            sections_by_port.setdefault(section.own_port[1], {})[name] = section
+    for port, sections in sections_by_port.items():
         (first, *_) = sections.values()
         yield port, OWN_PORT[first.part], sections

@@ -1,4 +1,4 @@
-"""Where samples come from: whatever has a port of its own, be it a board with several sensors or one instrument."""
+"""The protocol of a source of samples: a board with several sensors, or one instrument with a port of its own."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
@@ -7,22 +7,22 @@ from numpy.typing import NDArray
 
 from rig.data.recording.recorded_sensor import RecordedSensor
 
-# A sensor's name, and samples (n,) of the type its description says; called on the source's thread.
+# A sensor's name, and samples (n,) of the type in its description; called on the source's thread.
 OnSamples = Callable[[str, NDArray[Any]], None]
 
 
 class SampleSource(Protocol):
-    """Connected and set up, and silent until `start`. Errors are ProblemErrors, by name."""
+    """A connected source, set up, and silent until `start`. Its errors are ProblemErrors, by name."""
 
     @property
     def sensors(self) -> Mapping[str, RecordedSensor]:
-        """What it streams, by the sensors' names."""
+        """The sensors that it streams, by name."""
         ...
 
     def start(self) -> None:
-        """Start to hand every sample on, those of each sensor numbered from 0."""
+        """Start to pass on every sample, numbered from 0 for each sensor."""
         ...
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raises what went wrong meanwhile; a silence must be as long by the clock that shows `clock_s`, if any."""
+        """Raise errors of the meantime; a silence must also be as long by the clock that shows `clock_s`, if any."""
         ...

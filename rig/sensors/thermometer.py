@@ -1,4 +1,4 @@
-"""The temperatures of one stream, some of which the source may not provide."""
+"""The temperatures of one stream, with gaps if the source does not provide them."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 
-LONGEST_WITHOUT_S = 10.0  # for which the last temperature stands for those that are not provided
+LONGEST_WITHOUT_S = 10.0  # longest use of the last temperature in place of missing ones
 
 
 @dataclass(slots=True)
 class Thermometer:
-    """The thermometer of a sensor that sends `rate_hz` samples a second; messages name it as `where` says.
+    """The thermometer of a sensor with `rate_hz` samples a second; `where` names it in messages.
 
     `last_c` is the last temperature that the source provided, NaN before the first.
     """
@@ -28,12 +28,12 @@ class Thermometer:
         return bool(np.isfinite(self.last_c))
 
     def read(self, temperatures_c: Array) -> Array:
-        """Return temperatures (n,), each that is NaN replaced by the last one before it, NaN before the first.
+        """Return temperatures (n,) with each NaN replaced by the last value before it, NaN before the first.
 
-        Raises SensorError `temperature_lost` if the source has provided none for `LONGEST_WITHOUT_S`.
+        Raise SensorError `temperature_lost` if the source has provided none for `LONGEST_WITHOUT_S`.
         """
-        given = np.flatnonzero(np.isfinite(temperatures_c))
-        self._missing = len(temperatures_c) - 1 - int(given[-1]) if len(given) else self._missing + len(temperatures_c)
+        valid = np.flatnonzero(np.isfinite(temperatures_c))
+        self._missing = len(temperatures_c) - 1 - int(valid[-1]) if len(valid) else self._missing + len(temperatures_c)
         if self._missing > LONGEST_WITHOUT_S * self.rate_hz:
             raise SensorError(
                 "temperature_lost",

@@ -9,8 +9,7 @@ from rig.motion.steps import Motion
 
 
 class Turner(Protocol):
-    """A connected turner, at rest in its initial pose until `take_control`, and stopped again at the end of its `with`
-    block.
+    """A connected turner, at rest until `take_control`, and stopped again at the end of its `with` block.
 
     The time of its states is the reference of a recording, which gets every state in order. A failure stops the turner
     first; then every method raises `Fault` by name, or `Refused` while nothing has moved. `move` and `rest` call

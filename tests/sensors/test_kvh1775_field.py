@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rig.sensors.kvh1775.field import FieldReader
+from rig.sensors.kvh1775.field import MagneticFieldReader
 from rig.sensors.kvh1775.messages import MESSAGE_DTYPE, SEQUENCE_NUMBERS
 
 COUNT_T = 1e-9
@@ -23,7 +23,7 @@ def read(kept: np.ndarray, cuts: list[int]) -> np.ndarray:
     numbers = np.arange(COUNT)
     messages["sequence"] = (FIRST + numbers) % SEQUENCE_NUMBERS
     messages["fourth"] = axis_of(numbers) * COUNT_T / 1e-4
-    reader = FieldReader(COUNT_T, 1 << 30)
+    reader = MagneticFieldReader(COUNT_T, 1 << 30)
     pieces = [kept[(kept >= a) & (kept < b)] for a, b in pairwise([0, *cuts, COUNT])]
     return np.concatenate([reader.feed(messages[p], p, 4000 * p, 1.0) for p in pieces])
 
@@ -44,5 +44,5 @@ def test_a_number_that_is_none_is_a_reading_lost() -> None:
     messages = np.zeros(8, MESSAGE_DTYPE)
     messages["sequence"], messages["fourth"] = np.arange(8), 0.5
     messages["fourth"][2] = np.nan
-    found = FieldReader(COUNT_T, 1 << 30).feed(messages, np.arange(8), np.arange(8), 0.0)
+    found = MagneticFieldReader(COUNT_T, 1 << 30).feed(messages, np.arange(8), np.arange(8), 0.0)
     assert found["sequence"].tolist() == [0] and found["field_counts"].tolist() == [[50_000] * 3]

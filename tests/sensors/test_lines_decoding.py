@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rig.config.sensors.lines_section import LinesSection
-from rig.sensors.lines.decoding import Decoded, LineReader
+from rig.sensors.lines.decoding import LineBatch, LineReader
 from support.wires.printed_lines import lines_section, summed
 
 THREE: dict[str, Any] = {"columns": ("gx", "gy", "gz"), "time": None, "acceleration": None, "clock": "arrival"}
 
 
-def read(section: LinesSection, data: bytes, piece: int = 10**6) -> tuple[np.ndarray, list[Decoded]]:
+def read(section: LinesSection, data: bytes, piece: int = 10**6) -> tuple[np.ndarray, list[LineBatch]]:
     """All values of `data`, which comes in pieces after the end of a line that had begun before."""
     reader = LineReader(section)
     data = b"half a line\n" + data
@@ -99,7 +99,7 @@ def test_what_is_no_sample_is_counted_and_costs_no_other(section: dict[str, Any]
     good = summed(body) if told.checksum == "nmea" else body.encode() + b"\n"
     values, (found,) = read(told, good + line + b"\n# 1,2,3\n\n" + good)
     assert values.tolist() == [[7, 8, 9]] * 2
-    assert (found.before.tolist(), found.comments, found.why) == ([1], 1, line)
+    assert (found.samples_before.tolist(), found.comments, found.first_rejected) == ([1], 1, line)
 
 
 def test_the_first_line_is_left_out_for_it_may_be_half_of_one() -> None:
@@ -141,7 +141,7 @@ def test_damaged_lines_pass_a_sum_no_oftener_than_one_in_256(count: int) -> None
         # A number written another way (01 for 1) is no wrong reading.
         true = {row.round(2).tobytes() for row in readings}
         passed += sum(row[1:].tobytes() not in true for row in values)
-        counted += len(values) + len(found.before) + found.comments
+        counted += len(values) + len(found.samples_before) + found.comments
     print(f"{passed} of {count} damaged lines passed, {count // 256} may; {counted} counted")
     assert counted >= count, "all are counted; a byte that becomes an end makes two lines of one"
     assert passed <= count / 256

@@ -11,7 +11,7 @@ import yaml
 
 from rig.config.sensors.lines_section import LinesSection
 from rig.sensors.lines.guessing import Guess, guess
-from rig.sensors.lines.shape import Line, NoShape, Shape, shape_of
+from rig.sensors.lines.shape import NoShape, Shape, TimedLine, find_shape
 from rig.sensors.lines.written import section
 from support.wires.printed_lines import summed
 
@@ -22,12 +22,12 @@ Row = dict[str, float]
 
 @dataclass(frozen=True)
 class Format:
-    """How a device prints a row of SI values, and what of the section must come of it; `untold` may stand open."""
+    """How a device prints a row of SI values, and what of the section must come of it; `gaps` may stand open."""
 
     line: Callable[[Row], bytes]
     columns: str
     wanted: dict[str, Any]
-    untold: tuple[str, ...] = ()
+    gaps: tuple[str, ...] = ()
     rate_hz: float = 100.0
     before: tuple[str, ...] = field(default=())
 
@@ -63,13 +63,13 @@ def moved(rate_hz: float) -> list[Row]:
     ]
 
 
-def arrived(row_format: Format) -> list[Line]:
+def arrived(row_format: Format) -> list[TimedLine]:
     """The lines, in heaps of 8 ms, with half a line and what a boot prints before."""
     rows = moved(row_format.rate_hz)
-    lines = [Line(0.0, "3,0.1"), *(Line(0.0, text) for text in row_format.before)]
+    lines = [TimedLine(0.0, "3,0.1"), *(TimedLine(0.0, text) for text in row_format.before)]
     for row in rows:
         at_s = np.ceil((row["t"] - 3.5) / 0.008) * 0.008 + 0.002
-        lines.append(Line(float(at_s), row_format.line(row).decode().strip("\r\n")))
+        lines.append(TimedLine(float(at_s), row_format.line(row).decode().strip("\r\n")))
     return lines[1:]
 
 
@@ -183,7 +183,7 @@ FORMATS = {
 
 
 def looked_at(name: str) -> tuple[Shape, Guess]:
-    shape = shape_of(arrived(FORMATS[name]))
+    shape = find_shape(arrived(FORMATS[name]))
     return shape, guess(shape, STILL_S)
 
 
@@ -203,20 +203,20 @@ def test_the_section_is_right_or_says_what_it_cannot_tell(name: str) -> None:
                 assert seen == (told if isinstance(told, str) else pytest.approx(told, rel=1e-6)), (key, each)
         else:
             assert lines.get(key, "comma" if key == "separator" else None) == value, key
-    for gap in wanted.untold:
-        assert any(gap in each for each in found.untold), (gap, found.untold)
-    if not wanted.untold:
-        assert found.untold == []
+    for gap in wanted.gaps:
+        assert any(gap in each for each in found.gaps), (gap, found.gaps)
+    if not wanted.gaps:
+        assert found.gaps == []
     text_of_it = yaml.safe_dump(lines).replace("'?'", "us" if lines.get("time", {}).get("unit") == "?" else "deg/s")
     LinesSection.model_validate(yaml.safe_load(text_of_it))
 
 
 def test_what_is_no_sample_a_line_is_said_to_be_none() -> None:
-    lines = [Line(0.01 * n, ("gyro: 1 2 3", "acc: 4 5", "status ok")[n % 3]) for n in range(300)]
+    lines = [TimedLine(0.01 * n, ("gyro: 1 2 3", "acc: 4 5", "status ok")[n % 3]) for n in range(300)]
     with pytest.raises(NoShape, match="look alike"):
-        shape_of(lines)
+        find_shape(lines)
     with pytest.raises(NoShape, match="which is too few"):
-        shape_of(lines[:5])
+        find_shape(lines[:5])
 
 
 HARM: dict[str, tuple[Callable[[int], str], str]] = {
@@ -233,14 +233,14 @@ HARM: dict[str, tuple[Callable[[int], str], str]] = {
 def test_lines_that_no_device_prints_are_refused_at_once(harm: str) -> None:
     line, why = HARM[harm]
     with pytest.raises(NoShape, match=why) as refused:
-        guess(shape_of([Line(0.01 * n, line(n)) for n in range(1, 61)]), STILL_S)
+        guess(find_shape([TimedLine(0.01 * n, line(n)) for n in range(1, 61)]), STILL_S)
     assert len(str(refused.value)) < 200 and str(refused.value).isprintable()
 
 
 def test_one_impossible_number_costs_its_line_and_a_device_that_stood_mute_is_told() -> None:
-    lines = [Line(0.01 * n, f"{n},{n % 7},{n % 5},0.{n}") for n in range(1000)]
-    lines[500] = Line(5.0, "500,1e400,2,3")
-    shape = shape_of(lines)
+    lines = [TimedLine(0.01 * n, f"{n},{n % 7},{n % 5},0.{n}") for n in range(1000)]
+    lines[500] = TimedLine(5.0, "500,1e400,2,3")
+    shape = find_shape(lines)
     assert len(shape.values) == 999 and shape.others == 1
     assert guess(shape, STILL_S).columns[0] == "sequence"
     with pytest.raises(NoShape, match="only 0 of its lines came while it lay still"):

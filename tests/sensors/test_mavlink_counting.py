@@ -8,9 +8,9 @@ import pytest
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.counting import ImuCounter, LinkCounter
 from rig.sensors.mavlink.dialect import ARDUPILOT, PX4
-from rig.sensors.mavlink.orientations import RIGHT_ANGLES, signed_axes
-from rig.sensors.mavlink.parameters import Parameter, field_of
-from rig.world.autopilot.imu import TURNS, board_rotation
+from rig.sensors.mavlink.orientations import RIGHT_ANGLES, board_rotation
+from rig.sensors.mavlink.parameters import Parameter, encode_value
+from rig.world.autopilot.imu import TURNS, simulated_rotation
 
 
 def taken(sequence: list[int], counter: LinkCounter) -> list[int]:
@@ -60,14 +60,14 @@ def test_a_clock_that_jumps_is_a_restart(back: int) -> None:
 )
 def test_whole_numbers_are_cast_by_one_and_copied_by_the_other(firmware: int, field: bytes, value: float) -> None:
     assert Parameter("CAL_GYRO0_ID", 6, field, firmware).value == value
-    assert Parameter("X", 9, field_of(0.1), firmware).value == np.float32(0.1)
+    assert Parameter("X", 9, encode_value(0.1), firmware).value == np.float32(0.1)
 
 
 def test_orientations_are_rotations_and_those_of_the_simulated_autopilot() -> None:
     for number in RIGHT_ANGLES:
-        matrix = signed_axes(float(number))
+        matrix = board_rotation(float(number))
         assert matrix is not None and matrix @ matrix.T == pytest.approx(np.eye(3))
         assert np.linalg.det(matrix) == pytest.approx(1.0)
     for number in TURNS:
-        assert signed_axes(float(number)) == pytest.approx(board_rotation(number))
-    assert signed_axes(1.0) is None and signed_axes(100.0) is None and signed_axes(0.5) is None
+        assert board_rotation(float(number)) == pytest.approx(simulated_rotation(number))
+    assert board_rotation(1.0) is None and board_rotation(100.0) is None and board_rotation(0.5) is None

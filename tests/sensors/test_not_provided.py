@@ -9,7 +9,7 @@ from rig.sensors.kvh1775.source import NOT_PROVIDED as KVH
 from rig.sensors.lines.fields import NOT_PROVIDED as LINES
 from rig.sensors.mavlink.dialect import dialect
 from rig.sensors.mavlink.readings import NOT_PROVIDED as MAVLINK
-from rig.sensors.mavlink.readings import reading_of
+from rig.sensors.mavlink.readings import decode_reading
 from rig.sensors.thermometer import LONGEST_WITHOUT_S, Thermometer
 
 SIX = (1, 2, 3, 4, 5, 6)
@@ -53,7 +53,7 @@ def test_mavlink_1_has_no_temperature_of_an_imu(message: str) -> None:
         kind = mavlink.mavlink_map[getattr(mavlink, f"MAVLINK_MSG_ID_{message}")]
         sent = kind(1000, *SIX, 0, 0, 0, *more).pack(mavlink.MAVLink(None))
         (heard,) = second_version.MAVLink(None).parse_buffer(sent)
-        reading = reading_of(heard)
+        reading = decode_reading(heard)
         assert reading.temperature_c == pytest.approx(celsius, nan_ok=True)
         assert ("temperature" in reading.provided) is bool(more) and {"rate", "force"} <= reading.provided
 

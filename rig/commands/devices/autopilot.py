@@ -15,8 +15,8 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.config.sensors.sensor_sections import SensorSection
     from rig.data.result_file import ResultDocument
-    from rig.sensors.mavlink.journal import Change
-    from rig.sensors.mavlink.link import Link
+    from rig.sensors.mavlink.journal import ParameterChange
+    from rig.sensors.mavlink.link import AutopilotLink
 
 BEYOND = {
     "gyroscope": "scale factors and axes of gyroscopes: no parameter holds them",
@@ -49,16 +49,16 @@ def run(options: Namespace) -> int:
 
 def _store(options: Namespace) -> int:
     from rig.data.result_file import passed_result
-    from rig.sensors.mavlink.journal import Change
-    from rig.sensors.mavlink.parameters import Parameter, field_of
-    from rig.sensors.mavlink.writing import place_of, unfinished
+    from rig.sensors.mavlink.journal import ParameterChange
+    from rig.sensors.mavlink.parameters import Parameter, encode_value
+    from rig.sensors.mavlink.writing import autopilot_id, find_unfinished_change
     from rig.station.confirm import agreed_or_refused
 
     result = passed_result(options.result)
     with _connected(options) as (link, sections):
-        for problem in unfinished(link):
+        for problem in find_unfinished_change(link):
             raise problem
-        wanted = _values(link.known.firmware, result, options.result, sections)
+        wanted = _values(link.identity.firmware, result, options.result, sections)
         old = link.parameters(wanted)
         if missing := wanted.keys() - old.keys():
             raise Refused(
@@ -67,13 +67,13 @@ def _store(options: Namespace) -> int:
                 "See that it has that IMU, and that its firmware is no older than ArduPilot 4.0 or PX4 1.12",
             )
         new = {
-            name: Parameter(name, old[name].type, field_of(value), link.known.firmware)
+            name: Parameter(name, old[name].type, encode_value(value), link.identity.firmware)
             for name, value in wanted.items()
         }
-        planned = Change(place_of(link), link.known.firmware, old, new, _kept(options))
-        agreed_or_refused([f"In the {link.known.words}:", *_announced(planned, "new")], "store", options.yes)
+        planned = ParameterChange(autopilot_id(link), link.identity.firmware, old, new, _kept(options))
+        agreed_or_refused([f"In the {link.identity.words}:", *_announced(planned, "new")], "store", options.yes)
         planned.keep()
-        say(f"the old parameters are kept in {planned.kept}")
+        say(f"the old parameters are kept in {planned.backup}")
         _changed(link, planned, "new")
         for line in BEYOND.values():
             say(f"not stored: {line}")
@@ -81,25 +81,26 @@ def _store(options: Namespace) -> int:
 
 
 def _restore(options: Namespace) -> int:
-    from rig.sensors.mavlink.journal import change_in
-    from rig.sensors.mavlink.writing import place_of
+    from rig.sensors.mavlink.journal import read_change
+    from rig.sensors.mavlink.writing import autopilot_id
     from rig.station.confirm import agreed_or_refused
 
-    planned = change_in(options.file)
+    planned = read_change(options.file)
     with _connected(options) as (link, _):
-        if (planned.place, planned.firmware) != (place_of(link), link.known.firmware):
+        if (planned.autopilot_id, planned.firmware) != (autopilot_id(link), link.identity.firmware):
             raise Refused(
                 "autopilot_other_uid",
-                f"{options.file} is of the autopilot {planned.place}, the one at {link.port} is {place_of(link)}",
+                f"{options.file} is of the autopilot {planned.autopilot_id}, the one at {link.port} is "
+                f"{autopilot_id(link)}",
                 "Connect that autopilot, or give the file of this one",
             )
         which = "new" if options.new else "old"
-        agreed_or_refused([f"In the {link.known.words}:", *_announced(planned, which)], "restore", options.yes)
+        agreed_or_refused([f"In the {link.identity.words}:", *_announced(planned, which)], "restore", options.yes)
         _changed(link, planned, which)
     return 0
 
 
-def _changed(link: "Link", planned: "Change", which: str) -> None:
+def _changed(link: "AutopilotLink", planned: "ParameterChange", which: str) -> None:
     from rig.errors import Fault, raised_as
     from rig.sensors.mavlink.writing import change
 
@@ -109,7 +110,7 @@ def _changed(link: "Link", planned: "Change", which: str) -> None:
     say(f"written and read back, bit by bit: {len(to)} parameters, the {which} ones")
 
 
-def _announced(planned: "Change", which: str) -> Iterator[str]:
+def _announced(planned: "ParameterChange", which: str) -> Iterator[str]:
     to, others = (planned.new, planned.old) if which == "new" else (planned.old, planned.new)
     for name, each in to.items():
         yield f"  {name}: {each.value:.9g}, instead of {others[name].value:.9g}"
@@ -130,7 +131,7 @@ def _values(
     from rig.report.exports.autopilots import IMU, PX4
     from rig.report.exports.calibrations import calibrations
     from rig.sensors.mavlink.dialect import ARDUPILOT
-    from rig.sensors.mavlink.source import line_of
+    from rig.sensors.mavlink.source import mavlink_section
 
     called = ARDUPILOTS if firmware == ARDUPILOT else PX4
     values: dict[str, float] = {}
@@ -141,7 +142,7 @@ def _values(
         of = found.part, found.serial_number
         range_deg_s = degrees(found.full_scale or 0.0) if found.quantity == RATE else section.range_deg_s
         refuse_other_sensor(f"{path}: the calibration of {found.sensor}", *of, range_deg_s, section)
-        values |= dict(called[found.quantity](line_of(section).instance, found))
+        values |= dict(called[found.quantity](mavlink_section(section).instance, found))
         if found.quantity == RATE and firmware == ARDUPILOT:
             values["INS_GYR_CAL"] = 0.0  # or it finds offsets of its own at each boot
     if not values:
@@ -161,14 +162,14 @@ def _kept(options: Namespace) -> Path:
 
 
 @contextmanager
-def _connected(options: Namespace) -> Iterator[tuple["Link", Mapping[str, "SensorSection"]]]:
+def _connected(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
     """The only autopilot of a configuration, in its simulated laboratory if it has one, and the IMUs it is read by."""
     from rig.commands.laboratory.claims import claimed_sensor
     from rig.commands.laboratory.laboratory import simulated_laboratory
     from rig.commands.laboratory.own_address import loaded_here
     from rig.errors import raised_as
-    from rig.sensors.mavlink.link import Link
-    from rig.sensors.mavlink.source import line_of
+    from rig.sensors.mavlink.link import AutopilotLink
+    from rig.sensors.mavlink.source import mavlink_section
     from rig.sensors.registry import by_port
 
     with ExitStack() as stack:
@@ -191,6 +192,6 @@ def _connected(options: Namespace) -> Iterator[tuple["Link", Mapping[str, "Senso
         name, section = next(iter(sections.items()))
         stack.enter_context(claimed_sensor(name, port))
         stack.enter_context(raised_as(Refused))
-        link = stack.enter_context(closing(Link(name, port, line_of(section).baud)))
+        link = stack.enter_context(closing(AutopilotLink(name, port, mavlink_section(section).baud)))
         link.identify()
         yield link, sections

@@ -70,7 +70,7 @@ def _look(name: str, port: str, baud: int) -> "KvhInfo":
     from rig.report.terminal.kvh_info import KvhInfo
     from rig.sensors.errors import SensorError
     from rig.sensors.kvh1775.driver import Kvh1775
-    from rig.sensors.kvh1775.settings import Wanted
+    from rig.sensors.kvh1775.settings import Kvh1775Settings
 
     seen: list[NDArray[Any]] = []
     with (
@@ -83,7 +83,7 @@ def _look(name: str, port: str, baud: int) -> "KvhInfo":
             kvh.run()
             found = replace(found, built_in_test=kvh.test().values.hex(" "))
             rate_hz = float(kvh.settings["DR"])
-            kvh.start(Wanted(rate_hz, cast("Format", kvh.settings["OUTPUTFMT"]), "rate"))
+            kvh.start(Kvh1775Settings(rate_hz, cast("Format", kvh.settings["OUTPUTFMT"]), "rate"))
             kvh.listen(LOOK_S + LEAST_MESSAGES / rate_hz)
         except SensorError as error:
             found = replace(found, problem=str(error))

@@ -31,7 +31,7 @@ def run(options: Namespace) -> int:
     from rig.commands.laboratory.claims import claimed_sensor
     from rig.sensors.lines.guessing import guess
     from rig.sensors.lines.listening import listen
-    from rig.sensors.lines.shape import NoShape, shape_of
+    from rig.sensors.lines.shape import NoShape, find_shape
     from rig.sensors.lines.written import section
 
     if not all(0.5 <= each <= 600 for each in options.seconds):
@@ -39,16 +39,16 @@ def run(options: Namespace) -> int:
     with raised_as(Refused), claimed_sensor(options.name, options.port):
         baud, lines, still_s = listen(options.port, options.baud, _tell, tuple(options.seconds))
     try:
-        shape = shape_of(lines)
+        shape = find_shape(lines)
         found = guess(shape, still_s)
     except NoShape as why:
         raise Refused(
             "lines_no_pattern", f"{options.port}: {why}", "Let its program print one sample a line, numbers only"
         ) from why
-    for told in found.told:
-        _tell(told)
-    for untold in found.untold:
-        _tell(f"CANNOT TELL {untold}")
+    for reason in found.reasons:
+        _tell(reason)
+    for gap in found.gaps:
+        _tell(f"CANNOT TELL {gap}")
     _tell('write what is known in place of "?"; rig check refuses the section until then')
     sys.stdout.write(printable_lines(section(shape, found, options.port, baud, options.name)))
     return 0

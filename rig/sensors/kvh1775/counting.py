@@ -1,4 +1,4 @@
-"""Which message is which: the 7-bit sequence number and the 32-bit microseconds counted on across their wraps. Pure."""
+"""Numbering of messages: the 7-bit sequence number and the 32-bit microseconds, unwrapped. Pure."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.messages import SEQUENCE_NUMBERS
 
-HOST_JITTER_S = 0.04  # of a silence: a USB adapter collects for 16 ms, and a clock is looked at every 20 ms
+HOST_JITTER_S = 0.04  # error of a silence's duration: a USB adapter buffers for 16 ms, and a clock is read every 20 ms
 _US_WRAP = 1 << 32
 
 
 @dataclass(slots=True)
 class MessageCounter:
-    """Numbers the messages of one stream from 0, those that were lost included.
+    """The numbers of one stream's messages from 0, with lost ones included.
 
-    Formats A and C say only the sequence number, modulo 128: 127 messages lost in a row are counted, 128 look like
-    none, so that a silence of that length on the computer's clock is refused. Format B says the microseconds too, which
-    tell how many were lost beyond doubt.
+    Formats A and C have only the sequence number, modulo 128: 127 messages lost in a row are counted, 128 look like
+    none, so a silence of that length on the computer's clock is refused. Format B also has microseconds, which make the
+    count of lost messages unambiguous.
     """
 
     where: str  # the instrument as messages name it
@@ -29,13 +29,13 @@ class MessageCounter:
     lost: int = 0
     _number: int = -1
     _sequence: int = 0
-    _time_us: int = 0  # of the last message, since the instrument's count of microseconds last was 0 before the first
+    _time_us: int = 0  # of the last message, counted from a zero of its microseconds before the first message
 
     def count(self, messages: NDArray[Any], silent_s: float = 0.0) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """The numbers (n,) and times (n,) in µs of messages (n,), which came after so long a silence.
+        """Return the numbers (n,) and times (n,) in µs of messages (n,) that follow a silence of `silent_s`.
 
-        Raises SensorError: `kvh_gap_ambiguous` after 128 messages or more lost in a row, `kvh_time_contradicts` when
-        sequence and microseconds do not go together.
+        Raise SensorError: `kvh_gap_ambiguous` after 128 messages or more lost in a row, `kvh_time_contradicts` if
+        sequence numbers and microseconds disagree.
         """
         if not len(messages):
             return np.empty(0, np.int64), np.empty(0, np.int64)
@@ -66,11 +66,11 @@ class MessageCounter:
         if (by_time > SEQUENCE_NUMBERS).any():
             raise self._ambiguous(f"{int(by_time.max()) - 1} messages are missing in a row")
         if (by_time != steps).any():
-            place = int(np.argmax(by_time != steps))
+            index = int(np.argmax(by_time != steps))
             raise SensorError(
                 "kvh_time_contradicts",
-                f"{self.where}: by its microseconds {by_time[place]} data periods passed between two messages, by "
-                f"their sequence numbers {steps[place]}",
+                f"{self.where}: by its microseconds {by_time[index]} data periods passed between two messages, by "
+                f"their sequence numbers {steps[index]}",
                 "Look at its supply: it may have restarted. Then run again",
             )
 

@@ -1,4 +1,4 @@
-"""The KVH 1775's binary messages: bytes to arrays and back. Pure.
+"""The KVH 1775's binary messages: decoding to arrays, and encoding. Pure.
 
 Source: ICD 56-0298 Rev. B, tables 5-1 to 5-9 (formats A, B, C and their CRC) and section 5.3 (built-in test).
 """
@@ -32,7 +32,7 @@ _LAYOUTS: Mapping[Format, np.dtype[Any]] = MappingProxyType(
 _HEADERS: Mapping[Format, bytes] = MappingProxyType(
     {"A": b"\xfe\x81\xff\x55", "B": b"\xfe\x81\xff\x56", "C": b"\xfe\x81\xff\x57"}
 )
-# One message without its CRC: header, rotation, acceleration, and these.
+# One message without its CRC: header, rotation, acceleration, and these fields.
 _PACKERS: Mapping[Format, tuple[Struct, tuple[str, ...]]] = MappingProxyType(
     {
         "A": (Struct(">4s6fBBh"), ("status", "sequence", "temperature")),
@@ -49,10 +49,10 @@ _LENGTHS = {
 _ANY_HEADER = re.compile(b"|".join(re.escape(header) for header in _LENGTHS))
 _HEADER_BYTES = 4
 
-MESSAGE_BYTES: Mapping[Format, int] = MappingProxyType({name: each.itemsize for name, each in _LAYOUTS.items()})
+MESSAGE_BYTES: Mapping[Format, int] = MappingProxyType({name: layout.itemsize for name, layout in _LAYOUTS.items()})
 
 # A message of any format. `rotation` is an angle or a rate and `temperature` in whole degrees or hundredths, as the
-# instrument is set; `time_us` counts modulo 2³² and is 0 where the format has none. `fourth` is format C's: temperature
+# instrument is set; `time_us` counts modulo 2³² and is 0 in formats without it. `fourth` is format C's: temperature
 # and magnetic field x, y, z in turn, by the sequence number modulo 4.
 MESSAGE_DTYPE = np.dtype(
     [
@@ -72,70 +72,70 @@ _FIELDS = {
     for name, layout in _LAYOUTS.items()
 }
 
-# zlib's CRC is the same polynomial run over bits the other way round, so it is fed reversed bytes. Over a message with
-# its CRC the ICD's register ends at zero, which zlib, inverting, shows as ones.
+# zlib's CRC is the same polynomial with the opposite bit order, so its input bytes are reversed. Over a message with
+# its CRC the ICD's register ends at zero; zlib inverts it to ones.
 _BITS_REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 _CRC_RIGHT = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
 class BuiltInTest:
-    """What the instrument says of itself, six bytes or on request eight; each good one is `GOOD_TEST_BYTE`."""
+    """The instrument's test result of six bytes, or eight on request; each good one is `GOOD_TEST_BYTE`."""
 
     values: bytes
 
     @property
     def passed(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether all bytes are good."""
         return all(value == GOOD_TEST_BYTE for value in self.values)
 
 
 @dataclass(frozen=True, slots=True)
-class Decoded:
-    """What bytes held: `messages` (n,) MESSAGE_DTYPE in order, and built-in tests."""
+class MessageBatch:
+    """Decoded bytes: `messages` (n,) MESSAGE_DTYPE in order, and built-in tests."""
 
     messages: NDArray[Any]
     tests: tuple[BuiltInTest, ...]
 
 
 class MessageReader:
-    """Finds messages in bytes that come in pieces of any size. Only what its CRC or sum proves whole is handed on.
+    """The parser of a byte stream in blocks of any size. It returns only messages with the right CRC or sum.
 
-    After damage it looks for the next header from the byte after the last one, so a damaged message costs no other.
+    After damage it searches from the byte after the bad header, so a damaged message costs no other.
     """
 
     def __init__(self) -> None:
         self._rest = b""
 
-    def feed(self, data: bytes) -> Decoded:
-        """What is complete with these bytes."""
+    def feed(self, data: bytes) -> MessageBatch:
+        """Return the messages and tests completed by these bytes."""
         data = self._rest + data
         backwards = memoryview(data.translate(_BITS_REVERSED))
         starts: dict[bytes, list[int]] = {header: [] for header in _HEADERS.values()}
         tests: list[BuiltInTest] = []
-        place = 0
-        while (found := _ANY_HEADER.search(data, place)) is not None:
-            header, begun = found.group(), found.start()
+        position = 0
+        while (match := _ANY_HEADER.search(data, position)) is not None:
+            header, start = match.group(), match.start()
             length = _LENGTHS[header]
-            place = begun
-            if place + length > len(data):
+            position = start
+            if position + length > len(data):
                 break
             if header in starts:
-                for end in range(begun + length, len(data) + 1, length):  # as a rule the next is of the same format
-                    # Zeros behind a shorter message leave its CRC as it is: the header has to say that this is none.
-                    if crc32(backwards[place:end]) != _CRC_RIGHT or not data.startswith(header, place):
+                for end in range(start + length, len(data) + 1, length):  # as a rule the next is of the same format
+                    # Zeros after a shorter message leave its CRC unchanged, so the header must match too.
+                    if crc32(backwards[position:end]) != _CRC_RIGHT or not data.startswith(header, position):
                         break
-                    starts[header].append(place)
-                    place = end
-            elif sum(data[begun : begun + length - 1]) % 256 == data[begun + length - 1]:
-                tests.append(BuiltInTest(data[begun + _HEADER_BYTES : begun + length - 1]))
-                place += length
-            if place == begun:  # damaged
-                place += 1
+                    starts[header].append(position)
+                    position = end
+            elif sum(data[start : start + length - 1]) % 256 == data[start + length - 1]:
+                tests.append(BuiltInTest(data[start + _HEADER_BYTES : start + length - 1]))
+                position += length
+            if position == start:  # damaged
+                position += 1
         else:
-            place = max(place, len(data) - _HEADER_BYTES + 1)  # a header may have begun
-        self._rest = data[place:]
-        return Decoded(_decoded(data, starts), tuple(tests))
+            position = max(position, len(data) - _HEADER_BYTES + 1)  # keep the start of a possible header
+        self._rest = data[position:]
+        return MessageBatch(_gather_messages(data, starts), tuple(tests))
 
 
 def encode(
@@ -149,7 +149,7 @@ def encode(
     time_us: Any = 0,
     fourth: Any = 0.0,
 ) -> bytes:
-    """One message, or many of arrays (n, 3) and (n,), as the instrument sends them; the simulated one's half."""
+    """Return the bytes of one message, or of many from arrays (n, 3) and (n,), as the instrument sends them."""
     fields: dict[str, Any] = {
         "rotation": rotation,
         "acceleration_g": acceleration_g,
@@ -174,47 +174,47 @@ def encode(
 
 
 def encode_one(name: Format, rotation: Sequence[float], acceleration_g: Sequence[float], **tail: float) -> bytes:
-    """The bytes of one message, without arrays; `tail` holds every other field of the format, and may hold more."""
+    """Return the bytes of one message, without arrays; `tail` has all other fields of the format, and may have more."""
     packer, fields = _PACKERS[name]
     data = packer.pack(_HEADERS[name], *rotation, *acceleration_g, *[tail[field] for field in fields])
     return data + _crc(data.translate(_BITS_REVERSED))
 
 
 def encode_test(values: bytes) -> bytes:
-    """A built-in test of six or eight bytes."""
+    """Return the message of a built-in test of six or eight bytes."""
     data = _TEST_HEADERS[_TEST_BYTES.index(len(values))] + values
     return data + bytes([sum(data) % 256])
 
 
-def _at(data: bytes, places: NDArray[np.intp], layout: np.dtype[Any]) -> NDArray[Any]:
-    """What stands at these places (n,); as a rule one behind the other, which needs no copy."""
-    if places[-1] - places[0] == (len(places) - 1) * layout.itemsize:
-        return np.frombuffer(data, layout, len(places), int(places[0]))
+def _view_records(data: bytes, starts: NDArray[np.intp], layout: np.dtype[Any]) -> NDArray[Any]:
+    """Return the records (n,) that start at `starts` (n,), without a copy if they are contiguous."""
+    if starts[-1] - starts[0] == (len(starts) - 1) * layout.itemsize:
+        return np.frombuffer(data, layout, len(starts), int(starts[0]))
     octets = np.frombuffer(data, np.uint8)
-    found: NDArray[Any] = octets[places[:, None] + np.arange(layout.itemsize)].view(layout)[:, 0]
-    return found
+    records: NDArray[Any] = octets[starts[:, None] + np.arange(layout.itemsize)].view(layout)[:, 0]
+    return records
 
 
 def _crc(backwards: bytes | memoryview) -> bytes:
     return (crc32(backwards) ^ _CRC_RIGHT).to_bytes(4, "little").translate(_BITS_REVERSED)
 
 
-def _decoded(data: bytes, starts: Mapping[bytes, list[int]]) -> NDArray[Any]:
-    """The messages that begin at these places, of each header, in the order they came."""
-    parts, places = [], []
+def _gather_messages(data: bytes, starts: Mapping[bytes, list[int]]) -> NDArray[Any]:
+    """Return the messages at `starts`, the positions by header, in their order in the data."""
+    parts, part_positions = [], []
     for name, header in _HEADERS.items():
         if not starts[header]:
             continue
-        at = np.array(starts[header])
-        sent = _at(data, at, _LAYOUTS[name])
-        part = np.zeros(len(at), MESSAGE_DTYPE)
+        positions = np.array(starts[header])
+        sent = _view_records(data, positions, _LAYOUTS[name])
+        part = np.zeros(len(positions), MESSAGE_DTYPE)
         part["format"] = name
         for field in _FIELDS[name]:
             part[field] = sent[field]
         parts.append(part)
-        places.append(at)
+        part_positions.append(positions)
     if not parts:
         return np.zeros(0, MESSAGE_DTYPE)
     if len(parts) == 1:
         return parts[0]
-    return np.concatenate(parts)[np.argsort(np.concatenate(places), kind="stable")]
+    return np.concatenate(parts)[np.argsort(np.concatenate(part_positions), kind="stable")]

@@ -1,8 +1,8 @@
-"""Which of a KVH 1775's persistent settings the rig corrects, and which it refuses. Pure.
+"""A KVH 1775's persistent settings: those that the rig corrects, and those that it refuses. Pure.
 
-Whoever had the instrument before may have left anything in its memory, and most of it would spoil a calibration without
-a sign. So every setting is read. What says how it talks is set as the run needs it; what changes the readings
-themselves is somebody's purpose, and refused. Names and values: ICD 56-0298 Rev. B, section 8.
+A previous user may have left any setting in its memory, and most would spoil a calibration unnoticed. So every setting
+is read. Settings of its output are set as the run needs them; settings that change the readings serve a purpose, and
+are refused. Names and values: ICD 56-0298 Rev. B, section 8.
 """
 
 from collections.abc import Iterable, Mapping
@@ -14,8 +14,8 @@ import numpy as np
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.messages import Format
 
-# Every one there is, in the order in which they are set: the data rate computes the filters anew. FILTEN has the name
-# that the document of the 1750 gives it.
+# All settings, in the order of setting: the data rate recomputes the filters. FILTEN has its name
+# from the document of the 1750.
 NAMES = (
     "AXES",
     "BAUD",
@@ -30,13 +30,13 @@ NAMES = (
     "FILTEN,A",
     "FILTEN,G",
 )
-USUAL_FILTER = "CHEBY"  # as delivered; the other built-in ones are set back to it
+USUAL_FILTER = "CHEBY"  # as delivered; replaces the other built-in ones
 SAME_NUMBER = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What a run needs: samples a second, the format of the messages, what their rotation is."""
+class Kvh1775Settings:
+    """The settings that a run needs: samples a second, the messages' format, and the quantity of their rotation."""
 
     rate_hz: float
     message: Format
@@ -44,7 +44,7 @@ class Wanted:
 
     @property
     def settings(self) -> Mapping[str, str]:
-        """The settings that are corrected, by name."""
+        """The settings to correct, by name."""
         return {
             "MSYNC": "IMU",
             "DR": f"{self.rate_hz:g}",
@@ -59,17 +59,14 @@ class Wanted:
         }
 
 
-def corrections(stored: Mapping[str, str], wanted: Wanted) -> dict[str, str]:
-    """What has to be set, by name, in order; `stored` holds all `NAMES`."""
-    target = wanted.settings
+def corrections(stored: Mapping[str, str], required: Kvh1775Settings) -> dict[str, str]:
+    """Return the settings to change, in order; `stored` has all `NAMES`."""
+    target = required.settings
     return {name: target[name] for name in NAMES if name in target and not same(stored[name], target[name])}
 
 
 def refusals(sensor: str, stored: Mapping[str, str]) -> Iterable[SensorError]:
-    """What of the settings found only somebody who knows their purpose may change.
-
-    `kvh_axes_not_identity`, `kvh_custom_filter`.
-    """
+    """Yield `kvh_axes_not_identity`, `kvh_custom_filter` for stored settings that only their owner may change."""
     if not same(stored["AXES"], ",".join(str(value) for value in np.eye(3).ravel())):
         yield SensorError(
             "kvh_axes_not_identity",
@@ -86,12 +83,12 @@ def refusals(sensor: str, stored: Mapping[str, str]) -> Iterable[SensorError]:
 
 
 def same(one: str, other: str) -> bool:
-    """Whether two values of a setting mean the same, however their numbers are written."""
+    """Return whether two values of a setting are equal, however their numbers are written."""
     ours, theirs = one.split(","), other.split(",")
-    return len(ours) == len(theirs) and all(map(_same, ours, theirs))
+    return len(ours) == len(theirs) and all(map(_equal_entries, ours, theirs))
 
 
-def _same(one: str, other: str) -> bool:
+def _equal_entries(one: str, other: str) -> bool:
     try:
         return abs(float(one) - float(other)) <= SAME_NUMBER
     except ValueError:

@@ -1,9 +1,8 @@
-"""Lines of text to arrays of numbers, in blocks of bytes as they come. Pure.
+"""Lines of text decoded to arrays of numbers, in blocks of bytes as they arrive. Pure.
 
-A line is a sample when it holds as many numbers as there are columns, with the right things between them, and its
-checksum is right if there is one. A separator may stand behind the last, codes for colours around the line, any text in
-a column that is not read, and nothing, or a word that means it, in one that is: see `rig.sensors.lines.fields`.
-Everything else is counted as what it is.
+A line is a sample if it holds as many numbers as there are columns, with the right separators, and a right checksum if
+there is one. Allowed are a trailing separator, colour codes around the line, any text in an unused column, and an empty
+field or a word for "none" in others (`rig.sensors.lines.fields`). All other lines are counted by their kind.
 """
 
 import re
@@ -16,199 +15,199 @@ from numpy.typing import NDArray
 
 from rig.config.sensors.lines_section import SEPARATORS, LinesSection
 from rig.estimation.arrays import Array
-from rig.sensors.lines.fields import FieldReader
-from rig.sensors.lines.numbers import numbers_at
+from rig.sensors.lines.fields import TextFieldReader
+from rig.sensors.lines.numbers import parse_numbers
 
-LONGEST_LINE = 2000  # bytes; what has no end for so long is no line
-KEPT_TEXT = 120  # of a line that was no sample, for whoever has to see why
+LONGEST_LINE = 2000  # bytes; longer input without a line end is no line
+KEPT_TEXT = 120  # characters of a rejected line for the message about it
 
 # Classes of bytes.
 _OTHER, _NUMBER, _SEPARATOR, _SPACE, _END, _KEY = range(6)
-_KEYS = 0x80  # bytes from here on stand for the keys while a line is looked at; no key has one
-_NEWLINE, _STAR, _BLANK = (ord(each) for each in "\n* ")
+_KEYS = 0x80  # bytes from here on replace the keys during parsing; no key contains one
+_NEWLINE, _STAR, _BLANK = (ord(character) for character in "\n* ")
 _AROUND_KEYS = b",;{}[]()\"'|&"
-COLOURS = re.compile(rb"\x1b\[[0-9;]*[A-Za-z]")  # ECMA-48, control sequences, as terminals have them for colours
+COLOURS = re.compile(rb"\x1b\[[0-9;]*[A-Za-z]")  # ECMA-48 control sequences, which terminals use for colours
 _HEX = np.full(256, 255, np.uint8)
-for _place, _digit in enumerate("0123456789abcdef"):
-    _HEX[[ord(_digit), ord(_digit.upper())]] = _place
+for _value, _digit in enumerate("0123456789abcdef"):
+    _HEX[[ord(_digit), ord(_digit.upper())]] = _value
 
 
 @dataclass(frozen=True, slots=True)
-class Decoded:
-    """What bytes held: `values` (n, columns) of the samples, as printed, and how many lines were none.
+class LineBatch:
+    """Decoded lines: `values` (n, columns) of the samples, as printed, and the lines that were none.
 
-    A value that the device does not provide is NaN, and so is the text of a column that is not read.
-    `before` (m,) says of each line that was no sample, and no comment, how many samples of these stood before it;
-    `why` is how the first of them begins.
+    A value that the device does not provide is NaN, and so is text in an unused column. `samples_before` (m,): the
+    number of this block's samples before each rejected line (no sample, no comment). `first_rejected`: the start of the
+    first of them.
     """
 
     values: Array
-    before: NDArray[np.int64]
+    samples_before: NDArray[np.int64]
     comments: int
-    why: bytes
+    first_rejected: bytes
 
 
 class LineReader:
-    """Finds samples in bytes that come in pieces of any size. The first line is left out: it may be half of one."""
+    """The parser of a byte stream in blocks of any size. It skips the first line, which may be incomplete."""
 
     def __init__(self, section: LinesSection) -> None:
         self._columns = len(section.columns)
-        # Digits that change from line to line, for which a * stands, are made the same.
+        # Digits that change from line to line, marked by *, are replaced by a constant.
         self._changing = section.prefix_pattern
         self._prefix, self._comment = section.prefix.replace("*", "0").encode(), section.comment.encode()
         self._keys = _markers(section.keys)
-        self._summed = section.checksum == "nmea"
+        self._has_checksum = section.checksum == "nmea"
         self._separator = b"" if section.keys else SEPARATORS[section.separator].strip(b" ")
         self._classes = _classes(self._separator, keyed=bool(section.keys))
-        self._fields = FieldReader(section)
+        self._fields = TextFieldReader(section)
         self._rest = b""
-        self._begun = False
-        self._timed = "time" in section.columns
-        self.time_decimals = 0  # digits behind the point of the time, as far as they were seen
-        self.unprintable = 0  # bytes that no text has
-        self.bytes_seen = 0
+        self._is_aligned = False
+        self._has_time = "time" in section.columns
+        self.time_decimals = 0  # most decimals of the time so far
+        self.unprintable = 0  # bytes that are not text
+        self.byte_count = 0
 
-    def feed(self, data: bytes) -> Decoded:
-        """What is complete with these bytes."""
-        self.bytes_seen += len(data)
+    def feed(self, data: bytes) -> LineBatch:
+        """Return the lines completed by these bytes."""
+        self.byte_count += len(data)
         data = (self._rest + data).replace(b"\r", b"\n")
         end = data.rfind(b"\n") + 1
         self._rest = data[end:]
-        if len(self._rest) > LONGEST_LINE:  # what is left of it ends as a line that is none
+        if len(self._rest) > LONGEST_LINE:  # the rest of it becomes a rejected line
             data, end, self._rest = self._rest + b"\n", len(self._rest) + 1, b""
         data = COLOURS.sub(b"", data[:end])
         end = len(data)
         if self._changing is not None:
             data = self._changing.sub(self._prefix, data)
             end = len(data)
-        if not self._begun and end:
-            self._begun, data = True, data[data.find(b"\n") + 1 :]
+        if not self._is_aligned and end:
+            self._is_aligned, data = True, data[data.find(b"\n") + 1 :]
         if not data:
-            return self._nothing(0)
+            return self._make_empty(0)
         return self._decode(data)
 
-    def _nothing(self, comments: int) -> Decoded:
-        return Decoded(np.zeros((0, self._columns)), np.zeros(0, np.int64), comments, b"")
+    def _make_empty(self, comments: int) -> LineBatch:
+        return LineBatch(np.zeros((0, self._columns)), np.zeros(0, np.int64), comments, b"")
 
-    def _decode(self, data: bytes) -> Decoded:
+    def _decode(self, data: bytes) -> LineBatch:
         raw = np.frombuffer(data, np.uint8)
         self.unprintable += int(np.count_nonzero((raw >= 0x7F) | (raw < 9)))
         line_ends = np.flatnonzero(raw == _NEWLINE)
         line_starts = np.concatenate([[0], line_ends[:-1] + 1])
-        some = line_ends > line_starts
-        line_starts, line_ends = line_starts[some], line_ends[some]
-        commented = self._begin_with(raw, line_starts, self._comment) if self._comment else np.zeros(len(some), bool)
+        filled = line_ends > line_starts
+        line_starts, line_ends = line_starts[filled], line_ends[filled]
+        is_comment = self._match(raw, line_starts, self._comment) if self._comment else np.zeros(len(filled), bool)
         if self._comment:
-            line_starts, line_ends = line_starts[~commented], line_ends[~commented]
-        comments = int(np.count_nonzero(commented))
+            line_starts, line_ends = line_starts[~is_comment], line_ends[~is_comment]
+        comments = int(np.count_nonzero(is_comment))
         if not len(line_starts):
-            return self._nothing(comments)
+            return self._make_empty(comments)
         text = raw.copy()
         good = np.ones(len(line_starts), np.bool_)
         if self._prefix:
-            good &= self._begin_with(raw, line_starts, self._prefix)
-            places = line_starts[good][:, None] + np.arange(len(self._prefix))
-            text[places] = _BLANK
-        right = self._sums(raw, text, line_starts, line_ends) if self._summed else np.ones_like(good)
-        prefixed, bare = good & right, text
+            good &= self._match(raw, line_starts, self._prefix)
+            positions = line_starts[good][:, None] + np.arange(len(self._prefix))
+            text[positions] = _BLANK
+        sum_ok = self._match_checksums(raw, text, line_starts, line_ends) if self._has_checksum else np.ones_like(good)
+        prefixed, bare = good & sum_ok, text
         if self._keys:
-            text = self._keys_marked(text)
+            text = self._mark_keys(text)
         classes = self._classes[text]
-        good &= _hold_nothing_else(classes, line_starts, line_ends)
-        numbers = self._values(text, classes, (line_starts, line_ends), good, right)
-        taken = good & right
-        values = np.full((len(taken), self._columns), np.nan)
-        values[taken] = numbers
-        for line in np.flatnonzero(prefixed & ~taken).tolist():
-            read = self._fields.read(bare[line_starts[line] : line_ends[line]].tobytes())
-            if read is not None:
-                values[line], taken[line] = read, True
-        values = values[taken]
-        if self._timed and len(values):
-            line = int(np.argmax(taken))
+        good &= _have_valid_bytes(classes, line_starts, line_ends)
+        numbers = self._parse_values(text, classes, (line_starts, line_ends), good, sum_ok)
+        is_sample = good & sum_ok
+        values = np.full((len(is_sample), self._columns), np.nan)
+        values[is_sample] = numbers
+        for line in np.flatnonzero(prefixed & ~is_sample).tolist():
+            line_values = self._fields.read(bare[line_starts[line] : line_ends[line]].tobytes())
+            if line_values is not None:
+                values[line], is_sample[line] = line_values, True
+        values = values[is_sample]
+        if self._has_time and len(values):
+            line = int(np.argmax(is_sample))
             digits = self._fields.decimals(bare[line_starts[line] : line_ends[line]].tobytes(), "time")
             self.time_decimals = max(self.time_decimals, digits)
-        before = np.cumsum(taken, dtype=np.int64)[~taken]
-        why = b""
-        if len(before):
-            place = int(np.argmin(taken))
-            why = bytes(data[line_starts[place] : min(line_ends[place], line_starts[place] + KEPT_TEXT)])
-        return Decoded(values, before, comments, why)
+        samples_before = np.cumsum(is_sample, dtype=np.int64)[~is_sample]
+        first_rejected = b""
+        if len(samples_before):
+            index = int(np.argmin(is_sample))
+            first_rejected = bytes(data[line_starts[index] : min(line_ends[index], line_starts[index] + KEPT_TEXT)])
+        return LineBatch(values, samples_before, comments, first_rejected)
 
     @staticmethod
-    def _begin_with(raw: NDArray[np.uint8], starts: NDArray[np.intp], text: bytes) -> NDArray[np.bool_]:
-        """Which lines begin with `text`; a line's end is no part of it, so no shorter line does."""
-        wanted = np.frombuffer(text, np.uint8)
-        places = np.minimum(starts[:, None] + np.arange(len(wanted)), len(raw) - 1)
-        found: NDArray[np.bool_] = (raw[places] == wanted).all(axis=1)
-        return found
+    def _match(raw: NDArray[np.uint8], starts: NDArray[np.intp], text: bytes) -> NDArray[np.bool_]:
+        """Return which lines begin with `text`; it has no line end, so a shorter line never matches."""
+        expected = np.frombuffer(text, np.uint8)
+        positions = np.minimum(starts[:, None] + np.arange(len(expected)), len(raw) - 1)
+        matches: NDArray[np.bool_] = (raw[positions] == expected).all(axis=1)
+        return matches
 
     @staticmethod
-    def _sums(
+    def _match_checksums(
         raw: NDArray[np.uint8], text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """Which lines end with `*hh`, the XOR of what stands before; that end is blanked out in `text`."""
+        """Return which lines end with `*hh`, the XOR of the bytes before; blank that end in `text`."""
         star = np.maximum(ends - 3, 0)
         high, low = _HEX[raw[ends - 2]], _HEX[raw[ends - 1]]
-        begun = starts + np.isin(raw[starts], np.frombuffer(b"$!", np.uint8))
-        right: NDArray[np.bool_] = (ends - starts > 3) & (raw[star] == _STAR) & (high < 16) & (low < 16)
-        up_to = np.concatenate([[0], np.bitwise_xor.accumulate(raw)])  # of all bytes before each
-        right &= (up_to[star] ^ up_to[np.minimum(begun, star)]) == (high << 4 | low)
-        for back in (1, 2, 3):
-            text[ends[right] - back] = _BLANK
-        first = starts[right & (begun > starts)]
+        body_starts = starts + np.isin(raw[starts], np.frombuffer(b"$!", np.uint8))
+        sum_ok: NDArray[np.bool_] = (ends - starts > 3) & (raw[star] == _STAR) & (high < 16) & (low < 16)
+        xor_before = np.concatenate([[0], np.bitwise_xor.accumulate(raw)])  # XOR of all bytes before each position
+        sum_ok &= (xor_before[star] ^ xor_before[np.minimum(body_starts, star)]) == (high << 4 | low)
+        for offset in (1, 2, 3):
+            text[ends[sum_ok] - offset] = _BLANK
+        first = starts[sum_ok & (body_starts > starts)]
         text[first] = _BLANK
-        return right
+        return sum_ok
 
-    def _keys_marked(self, text: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """The text with one byte for each key; a byte that only looks like one is made something else first."""
+    def _mark_keys(self, text: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the text with one byte for each key, after replacing bytes that look like one."""
         data = np.where(text >= _KEYS, np.uint8(0x7F), text).tobytes()
         for key, marker in self._keys.items():
             data = data.replace(key, marker)
         return np.frombuffer(data, np.uint8)
 
-    def _values(
+    def _parse_values(
         self,
         text: NDArray[np.uint8],
         classes: NDArray[np.uint8],
         lines: tuple[NDArray[np.intp], NDArray[np.intp]],
         good: NDArray[np.bool_],
-        right: NDArray[np.bool_],
+        sum_ok: NDArray[np.bool_],
     ) -> Array:
-        """The numbers of lines that hold as many as there are columns, in order; `good` says afterwards which do."""
+        """Return the numbers (m, columns) of the lines with one per column, in order; `good` then marks these."""
         line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])
         edges = np.flatnonzero(number[1:] != number[:-1])
         starts, ends = edges[::2], edges[1::2]
         good &= _count(starts, line_starts, line_ends) == self._columns
-        between = np.flatnonzero(classes == (_KEY if self._keys else _SEPARATOR))
-        divided = bool(self._keys or self._separator)
-        wanted = self._columns if self._keys else self._columns - 1
-        if divided:
-            good &= _count(between, line_starts, line_ends) == wanted
-        mine = _of_lines(starts, line_starts, line_ends, good)
-        starts, ends = starts[mine].reshape(-1, self._columns), ends[mine].reshape(-1, self._columns)
-        if divided:
-            parts = between[_of_lines(between, line_starts, line_ends, good)].reshape(-1, wanted)
+        dividers = np.flatnonzero(classes == (_KEY if self._keys else _SEPARATOR))
+        has_dividers = bool(self._keys or self._separator)
+        divider_count = self._columns if self._keys else self._columns - 1
+        if has_dividers:
+            good &= _count(dividers, line_starts, line_ends) == divider_count
+        in_good_lines = _are_in_lines(starts, line_starts, line_ends, good)
+        starts, ends = starts[in_good_lines].reshape(-1, self._columns), ends[in_good_lines].reshape(-1, self._columns)
+        if has_dividers:
+            marks = dividers[_are_in_lines(dividers, line_starts, line_ends, good)].reshape(-1, divider_count)
             if self._keys:
-                named = (text[parts] == _KEYS + np.arange(self._columns)).all(axis=1)
-                ordered = (parts < starts).all(axis=1) & (ends[:, :-1] <= parts[:, 1:]).all(axis=1) & named
+                keys_match = (text[marks] == _KEYS + np.arange(self._columns)).all(axis=1)
+                ordered = (marks < starts).all(axis=1) & (ends[:, :-1] <= marks[:, 1:]).all(axis=1) & keys_match
             else:
-                ordered = ((ends[:, :-1] <= parts) & (parts < starts[:, 1:])).all(axis=1)
+                ordered = ((ends[:, :-1] <= marks) & (marks < starts[:, 1:])).all(axis=1)
             good[np.flatnonzero(good)[~ordered]] = False
             starts, ends = starts[ordered], ends[ordered]
-        summed = right[good]
-        starts, ends = starts[summed], ends[summed]
-        values = numbers_at(text, starts.ravel(), ends.ravel()).reshape(-1, self._columns)
+        has_right_sum = sum_ok[good]
+        starts, ends = starts[has_right_sum], ends[has_right_sum]
+        values = parse_numbers(text, starts.ravel(), ends.ravel()).reshape(-1, self._columns)
         numbers = np.isfinite(values).all(axis=1)
-        good[np.flatnonzero(good & right)[~numbers]] = False
+        good[np.flatnonzero(good & sum_ok)[~numbers]] = False
         return values[numbers]
 
 
-def _hold_nothing_else(
+def _have_valid_bytes(
     classes: NDArray[np.uint8], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Which lines hold nothing that no sample holds. What stands between lines belongs to none."""
+    """Return which lines hold only bytes that a sample may hold. Bytes between lines belong to none."""
     good = np.ones(len(line_starts), np.bool_)
     others = np.flatnonzero(classes == _OTHER)
     if len(others):
@@ -218,33 +217,33 @@ def _hold_nothing_else(
     return good
 
 
-def _count(places: NDArray[np.intp], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]) -> NDArray[np.intp]:
-    """How many of `places`, which increase, lie in each line."""
-    found: NDArray[np.intp] = np.searchsorted(places, line_ends) - np.searchsorted(places, line_starts)
-    return found
+def _count(positions: NDArray[np.intp], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the number of `positions`, which increase, in each line."""
+    counts: NDArray[np.intp] = np.searchsorted(positions, line_ends) - np.searchsorted(positions, line_starts)
+    return counts
 
 
-def _of_lines(
-    places: NDArray[np.intp],
+def _are_in_lines(
+    positions: NDArray[np.intp],
     line_starts: NDArray[np.intp],
     line_ends: NDArray[np.intp],
-    which: NDArray[np.bool_],
+    selection: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Which of `places` lie in those lines."""
-    first, after = np.searchsorted(places, line_starts[which]), np.searchsorted(places, line_ends[which])
-    if int((after - first).sum()) == len(places):  # as a rule
-        return np.ones(len(places), np.bool_)
-    steps = np.zeros(len(places) + 1, np.int64)
+    """Return which of `positions` lie in the selected lines."""
+    first, after = np.searchsorted(positions, line_starts[selection]), np.searchsorted(positions, line_ends[selection])
+    if int((after - first).sum()) == len(positions):  # the usual case
+        return np.ones(len(positions), np.bool_)
+    steps = np.zeros(len(positions) + 1, np.int64)
     np.add.at(steps, first, 1)
     np.add.at(steps, after, -1)
-    found: NDArray[np.bool_] = np.cumsum(steps[:-1]) > 0
-    return found
+    inside: NDArray[np.bool_] = np.cumsum(steps[:-1]) > 0
+    return inside
 
 
 def _markers(keys: tuple[str, ...]) -> Mapping[bytes, bytes]:
-    """What stands for each key while a line is looked at, of the same length; long keys first, that may hold others."""
-    by_length = sorted(enumerate(keys), key=lambda each: -len(each[1]))
-    return MappingProxyType({key.encode(): bytes([_KEYS + place]) + b" " * (len(key) - 1) for place, key in by_length})
+    """Return the marker of each key, of the same length; long keys first, which may contain others."""
+    by_length = sorted(enumerate(keys), key=lambda indexed_key: -len(indexed_key[1]))
+    return MappingProxyType({key.encode(): bytes([_KEYS + index]) + b" " * (len(key) - 1) for index, key in by_length})
 
 
 def _classes(separator: bytes, *, keyed: bool) -> NDArray[np.uint8]:

@@ -1,6 +1,6 @@
-"""The host end of a device that prints lines: a thread that reads, and names for all that can be wrong with it.
+"""The host end of a device that prints lines: a thread that reads, and a named error for each fault.
 
-Nothing is sent to the device. It says nothing of itself, so that it is what the configuration says shows in its lines.
+Nothing is sent to the device. It has no identification, so only its lines show that it is the configured one.
 """
 
 from collections.abc import Callable
@@ -15,28 +15,28 @@ from rig.config.units import UNITS
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
-from rig.sensors.lines.decoding import Decoded, LineReader
+from rig.sensors.lines.decoding import LineBatch, LineReader
 from rig.sensors.lines.stamping import Stamper, is_coarse
-from rig.sensors.lines.time_steps import step_of_time_s
-from rig.sensors.own_port import Faults, OwnPort, closed_on_failure, opened
+from rig.sensors.lines.time_steps import find_time_step_s
+from rig.sensors.own_port import OwnPort, PortFaults, closing_on_failure, open_device_port
 from rig.sensors.silence import USUAL, Patience
 
-LOOK_SAMPLES, LOOK_S = 50, 0.5  # of samples, of the device's time, until its rate is judged
-SHOWN = 60  # characters of a line that is quoted
-UNPRINTABLE = 0.05  # share of bytes from which on the speed of the line is wrong
-DAMAGED = 0.5  # share of lines that are no samples from which on a stream is no use
-DAMAGED_LINES = 200  # that are looked at for that
+LOOK_SAMPLES, LOOK_S = 50, 0.5  # samples, and device's time, before its rate is judged
+QUOTED = 60  # characters of a quoted line
+UNPRINTABLE = 0.05  # fraction of bytes above which the baud rate is wrong
+DAMAGED = 0.5  # fraction of rejected lines above which a stream is useless
+DAMAGED_LINES = 200  # least number of rejected lines for that
 RATE_TOLERANCE = 0.03
-ROUNDED = 2.0  # steps of its time, by which both ends of what was looked at may be off
+ROUNDED = 2.0  # steps of its time: the error of the interval from both its ends
 _CABLE = "Check its supply and cable, and whether another program has the port"
 
-# Values (n, columns) as printed, their numbers (n,) from 0, their times (n,) in µs, and when they were read.
+# Values (n, columns) as printed, their numbers (n,) from 0, their times (n,) in µs, and the time of the read.
 OnValues = Callable[[Array, NDArray[np.int64], NDArray[np.int64], float], None]
 
 
 @dataclass(slots=True)
 class Counts:
-    """What came: samples, comments, lines before the first sample, lines that were none after it, the first of them."""
+    """Counts of samples, comments, lines rejected before the first sample and after it, and the first rejected line."""
 
     samples: int = 0
     comments: int = 0
@@ -44,21 +44,21 @@ class Counts:
     damaged: int = 0
     first_other: bytes = b""
 
-    def add(self, decoded: Decoded) -> None:
-        """Count what one read brought."""
-        begun = self.samples > 0
-        boot = 0 if begun else int(np.count_nonzero(decoded.before == 0))
+    def add(self, decoded: LineBatch) -> None:
+        """Count the lines of one read."""
+        has_samples = self.samples > 0
+        boot = 0 if has_samples else int(np.count_nonzero(decoded.samples_before == 0))
         self.before += boot
-        self.damaged += len(decoded.before) - boot
+        self.damaged += len(decoded.samples_before) - boot
         self.samples += len(decoded.values)
         self.comments += decoded.comments
-        self.first_other = self.first_other or decoded.why
+        self.first_other = self.first_other or decoded.first_rejected
 
 
 class LinesDevice:
     """A device on a serial port or `socket://host:port`, until `close`. `on_values` runs on its thread.
 
-    What goes wrong is a SensorError whose name begins with `lines_`; all messages name `sensor`.
+    Its errors are SensorErrors with names that begin with `lines_`; their messages name `sensor`.
     """
 
     def __init__(
@@ -71,64 +71,64 @@ class LinesDevice:
         *,
         patience: Patience = USUAL,
     ) -> None:
-        """Opens the port, and reads until samples come at the rate that is stated.
+        """Open the port, and read until samples come at the stated rate.
 
-        Raises SensorError: no_port, lines_silent, lines_wrong_baud_rate, lines_other_format, lines_other_rate.
+        Raise SensorError: no_port, lines_silent, lines_wrong_baud_rate, lines_other_format, lines_other_rate.
         """
         self._sensor, self._line, self._section, self._rate_hz = sensor, line, section, rate_hz
         self._on_values = on_values
         self._lines = LineReader(section)
         self.counts = Counts()
         self._stamper: Stamper | None = None  # while it streams
-        self._skipped = 0  # lines that were no samples since the last that was
-        self._seen: list[Array] = []  # until it is known what comes
-        faults = Faults(
+        self._skipped = 0  # rejected lines since the last sample
+        self._first_blocks: list[Array] = []  # values before the stream starts
+        faults = PortFaults(
             closed=SensorError("lines_link_lost", f"{self.where}: the port closed", _CABLE),
             silent=SensorError("lines_link_lost", f"{self.where} has sent no sample", _CABLE),
             not_taken=SensorError("lines_not_taken", self.where, "See the run's log"),
         )
-        serial = opened(line.port, line.baud, where=f"sensors.{sensor}: ", named_by="serial.port")
+        serial = open_device_port(line.port, line.baud, owner=f"sensors.{sensor}: ", setting="serial.port")
         self.own_port = OwnPort(serial, line.port, faults, self._take, patience=patience)
         self.own_port.begin()
-        with closed_on_failure(self.close):
+        with closing_on_failure(self.close):
             self.rate_hz = self._look(patience.first_s)
 
     @property
     def where(self) -> str:
-        """The device as messages name it."""
+        """The device in messages."""
         return f"sensors.{self._sensor}: the device on {self._line.port}"
 
     @property
-    def seen(self) -> Array:
-        """The values (n, columns) that were read while the device was looked at."""
-        return np.concatenate(self._seen)
+    def first_values(self) -> Array:
+        """The values (n, columns) read before the stream starts."""
+        return np.concatenate(self._first_blocks)
 
     @property
     def time_step_s(self) -> float:
-        """The steps, s, in which the device prints its time; 0 of one that prints none."""
-        if self._section.time is None or not self._seen:
+        """The step, s, of the device's printed time; 0 if it prints none."""
+        if self._section.time is None or not self._first_blocks:
             return 0.0
-        printed = self.seen[:, self._section.columns.index("time")]
-        return step_of_time_s(printed, self._lines.time_decimals, self._section.time.unit)
+        printed = self.first_values[:, self._section.columns.index("time")]
+        return find_time_step_s(printed, self._lines.time_decimals, self._section.time.unit)
 
     def start(self) -> None:
-        """Start to hand everything to `on_values`, from the next line on."""
+        """Start to pass values to `on_values`, from the next line on."""
         with self.own_port.news:
             self._stamper = Stamper(self._section, self._rate_hz, self.where, self.time_step_s)
             self._skipped = 0
             self.own_port.stream(2 / self._rate_hz)
 
     def close(self) -> None:
-        """Ends the thread and closes the port. May be called twice."""
+        """End the thread and close the port. May be called twice."""
         self.own_port.close()
 
-    # -- what comes at all -----------------------------------------------------------------------------------------
+    # -- the first lines -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
-        """The rate of its samples by its own time, NaN where it has none. Raises as the constructor does."""
-        came = self.own_port.wait(self._has_seen_enough, timeout_s)
-        if not came and not self.counts.samples:
+        """Return the rate of its samples by its own time, NaN if it has none. Raise as the constructor does."""
+        has_enough = self.own_port.wait(self._has_enough, timeout_s)
+        if not has_enough and not self.counts.samples:
             raise self._why_no_sample(timeout_s)
-        rate_hz = self._measured_hz()
+        rate_hz = self._measure_rate_hz()
         if abs(rate_hz / self._rate_hz - 1) > max(RATE_TOLERANCE, self._rate_error):
             raise SensorError(
                 "lines_other_rate",
@@ -139,38 +139,38 @@ class LinesDevice:
             )
         return rate_hz
 
-    def _has_seen_enough(self) -> bool:
-        """Whether the rate can be judged: few samples are enough of a slow device, coarse times ask for more."""
+    def _has_enough(self) -> bool:
+        """Return whether the rate can be judged: few samples suffice for a slow device, coarse times need more."""
         if self._section.time is None:
             return self.counts.samples >= 3
-        long = self.counts.samples >= 5 and self._span_s() >= LOOK_S
-        return (long or self.counts.samples >= LOOK_SAMPLES) and self._rate_error <= RATE_TOLERANCE
+        is_long_enough = self.counts.samples >= 5 and self._span_s() >= LOOK_S
+        return (is_long_enough or self.counts.samples >= LOOK_SAMPLES) and self._rate_error <= RATE_TOLERANCE
 
     @property
     def _rate_error(self) -> float:
-        """Relative error that coarse times leave in the rate; 0 of fine ones."""
+        """The relative error of the rate due to coarse times; 0 for fine ones."""
         step_s, span_s = self.time_step_s, self._span_s()
         if not is_coarse(step_s, self._rate_hz):
             return 0.0
         return ROUNDED * step_s / span_s if span_s > 0 else float("inf")
 
     def _span_s(self) -> float:
-        if self._section.time is None or not self._seen:
+        if self._section.time is None or not self._first_blocks:
             return 0.0
-        printed = np.concatenate(self._seen)[:, self._section.columns.index("time")]
+        printed = np.concatenate(self._first_blocks)[:, self._section.columns.index("time")]
         passed = np.diff(printed)
         if self._section.time.wrap:
             passed %= self._section.time.wrap
         return float(passed.sum()) * UNITS[self._section.time.unit].size
 
-    def _measured_hz(self) -> float:
-        """Samples a second, by the median step of the device's time where that is fine, else by all of it."""
+    def _measure_rate_hz(self) -> float:
+        """Return samples a second, by the median step of the device's time if fine, else by the whole interval."""
         time_section = self._section.time
         if time_section is None or self.counts.samples < 5:
             return float("nan")
-        span_s, count, step_s = self._span_s(), len(self.seen) - 1, self.time_step_s
+        span_s, count, step_s = self._span_s(), len(self.first_values) - 1, self.time_step_s
         unit_s = UNITS[time_section.unit].size
-        printed = self.seen[:, self._section.columns.index("time")]
+        printed = self.first_values[:, self._section.columns.index("time")]
         typical_s = float(np.median(np.diff(printed))) * unit_s
         if span_s <= 0:
             raise SensorError(
@@ -183,16 +183,16 @@ class LinesDevice:
 
     def _why_no_sample(self, timeout_s: float) -> SensorError:
         reader, counts = self._lines, self.counts
-        if not reader.bytes_seen:
+        if not reader.byte_count:
             return SensorError("lines_silent", f"{self.where} has sent nothing within {timeout_s:g} s", _CABLE)
-        if reader.unprintable > UNPRINTABLE * reader.bytes_seen or not (counts.before or counts.comments):
+        if reader.unprintable > UNPRINTABLE * reader.byte_count or not (counts.before or counts.comments):
             return SensorError(
                 "lines_wrong_baud_rate",
-                f"{reader.bytes_seen} bytes came from {self.where} at {self._line.baud} Bd, and they are no lines of "
+                f"{reader.byte_count} bytes came from {self.where} at {self._line.baud} Bd, and they are no lines of "
                 "text",
                 "Set serial.baud to what the device's program sets; `rig lines` finds it",
             )
-        first = counts.first_other[:SHOWN].decode("ascii", "replace")
+        first = counts.first_other[:QUOTED].decode("ascii", "replace")
         return SensorError(
             "lines_other_format",
             f"{self.where} prints other lines than sensors.{self._sensor}.lines says, such as {quote(first)}",
@@ -209,18 +209,18 @@ class LinesDevice:
             self.counts.add(decoded)
             stamper = self._stamper
             if stamper is None and len(decoded.values):
-                self._seen.append(decoded.values)
+                self._first_blocks.append(decoded.values)
             self.own_port.news.notify_all()
         if stamper is None:
             return
         self._refuse_damage()
-        self._skipped += len(decoded.before)
+        self._skipped += len(decoded.samples_before)
         if not len(decoded.values):
             return
-        kept, numbers, times_us = stamper.stamp(decoded.values, self._skipped, host_time_s)
+        is_sample, numbers, times_us = stamper.stamp(decoded.values, self._skipped, host_time_s)
         self._skipped = 0
         if self._on_values is not None and len(numbers):
-            self._on_values(decoded.values[kept], numbers, times_us, host_time_s)
+            self._on_values(decoded.values[is_sample], numbers, times_us, host_time_s)
 
     def _refuse_damage(self) -> None:
         counts = self.counts
@@ -228,6 +228,6 @@ class LinesDevice:
             raise SensorError(
                 "lines_damaged",
                 f"{self.where}: {counts.damaged} of {counts.samples + counts.damaged} lines are no samples, such as "
-                f"{quote(counts.first_other[:SHOWN].decode('ascii', 'replace'))}",
+                f"{quote(counts.first_other[:QUOTED].decode('ascii', 'replace'))}",
                 "Check the cable and the speed of the line; see that nothing else prints there",
             )

@@ -1,4 +1,4 @@
-"""One line of text to its columns, if some hold no number: a text that is not read, or a value that is not provided."""
+"""One line of text parsed to its columns, if some hold no number: unused text, or a value that is not provided."""
 
 import re
 from collections.abc import Mapping
@@ -11,16 +11,16 @@ from rig.data.not_provided import POSSIBLE_C, Absent
 from rig.estimation.arrays import Array
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-# What programs print for a value that there is none of: C's and Python's own words, Arduino's "ovf", nothing at all.
+# Texts that programs print for a missing value: C's and Python's words, Arduino's "ovf", an empty field.
 WORDS = frozenset({"", "-", "--", "nan", "-nan", "null", "none", "na", "n/a", "inf", "-inf", "+inf", "ovf", "nil"})
-# -127 is DallasTemperature's DEVICE_DISCONNECTED_C; others print 999 or -273.15: none of them is possible.
+# -127 is DallasTemperature's DEVICE_DISCONNECTED_C; others print 999 or -273.15: all are impossible.
 NOT_PROVIDED: Mapping[str, Absent] = MappingProxyType({"temperature": Absent(within=POSSIBLE_C)})
-NEEDED = ("time", "sequence", *GYROSCOPE)  # without these a line is no sample
+NEEDED = ("time", "sequence", *GYROSCOPE)  # required in a sample
 _AROUND_KEYS = " \t,;{}[]()\"'|&"
 
 
-class FieldReader:
-    """Reads lines as a section says, one at a time: for what `LineReader` cannot read as numbers alone."""
+class TextFieldReader:
+    """The reader of single lines by a section, for those that `LineReader` cannot parse as numbers alone."""
 
     def __init__(self, section: LinesSection) -> None:
         self._columns = section.columns
@@ -29,29 +29,29 @@ class FieldReader:
         self._keyed = re.compile(f".*?{keys}(.*)") if section.keys else None
 
     def read(self, line: bytes) -> Array | None:
-        """Return the values (columns,) of a line without its prefix and checksum, NaN for none; None of no sample."""
+        """Return the values (columns,) of a line without prefix and checksum, NaN if missing; None for no sample."""
         fields = self._split(line.decode("ascii", "replace"))
         if len(fields) == len(self._columns) + 1 and not fields[-1]:
             fields.pop()
         if len(fields) != len(self._columns):
             return None
         values = np.full(len(fields), np.nan)
-        for place, (name, field) in enumerate(zip(self._columns, fields, strict=True)):
+        for index, (name, field) in enumerate(zip(self._columns, fields, strict=True)):
             number = float(field) if NUMBER.fullmatch(field) else np.nan
-            values[place] = number if np.isfinite(number) else np.nan
+            values[index] = number if np.isfinite(number) else np.nan
             absent = np.isnan(number) and field.lower() in WORDS
             if name != "-" and not np.isfinite(number) and (name in NEEDED or not absent):
                 return None
         return values
 
     def decimals(self, line: bytes, column: str) -> int:
-        """Return how many digits stand behind the point of a column's number; 0 without a point."""
+        """Return the number of decimals of a column's number; 0 without a point."""
         fields = self._split(line.decode("ascii", "replace"))
-        place = self._columns.index(column)
-        return len(fields[place].partition(".")[2]) if place < len(fields) else 0
+        index = self._columns.index(column)
+        return len(fields[index].partition(".")[2]) if index < len(fields) else 0
 
     def _split(self, text: str) -> list[str]:
         if self._keyed is not None:
-            found = self._keyed.fullmatch(text)
-            return [] if found is None else [each.strip(_AROUND_KEYS) for each in found.groups()]
-        return [each.strip() for each in text.split(self._separator)]
+            match = self._keyed.fullmatch(text)
+            return [] if match is None else [group.strip(_AROUND_KEYS) for group in match.groups()]
+        return [text_field.strip() for text_field in text.split(self._separator)]

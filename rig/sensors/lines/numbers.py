@@ -1,6 +1,6 @@
-"""Decimal numbers in text, many at a time: their digits summed up column by column, not one string after another. Pure.
+"""Decimal numbers in text, parsed many at a time: digits are summed column by column, not string by string. Pure.
 
-So seven numbers take a few tens of nanoseconds each, and a number is exactly what was printed.
+Seven numbers take a few tens of nanoseconds each, and each is exactly the printed number.
 """
 
 from contextlib import suppress
@@ -10,56 +10,56 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 
-MOST_DIGITS = 18  # that a whole number of 64 bits holds
-MOST_DECIMALS = 22  # powers of ten that a float holds exactly
+MOST_DIGITS = 18  # of a 64-bit integer
+MOST_DECIMALS = 22  # powers of ten that are exact as floats
 LONGEST = 40  # characters of a number
-_ZERO, _POINT, _PLUS, _MINUS = (ord(each) for each in "0.+-")
+_ZERO, _POINT, _PLUS, _MINUS = (ord(character) for character in "0.+-")
 _POWERS = 10.0 ** np.arange(MOST_DECIMALS + 1)
 
 
-def numbers_at(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
-    """The numbers (n,) that stand in `text` from `starts` to before `ends`, NaN for what is none."""
+def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
+    """Return the numbers (n,) in `text` from `starts` to before `ends`, NaN for text that is none."""
     if not len(starts):
         return np.empty(0)
-    whole, digits = _digits(text, starts, ends)
+    integer, digits = _sum_digits(text, starts, ends)
     signs = text[starts]
     signed = (signs == _MINUS) | (signs == _PLUS)
     first, last = int(starts[0]), int(ends[-1])
     points = first + np.flatnonzero(text[first:last] == _POINT)
-    belongs = np.searchsorted(starts, points, side="right") - 1
-    inside = points < ends[belongs]
-    points, belongs = points[inside], belongs[inside]
-    pointed = np.bincount(belongs, minlength=len(starts))
+    owner = np.searchsorted(starts, points, side="right") - 1
+    inside = points < ends[owner]
+    points, owner = points[inside], owner[inside]
+    dots = np.bincount(owner, minlength=len(starts))
     decimals = np.zeros(len(starts), np.int64)
-    decimals[belongs] = ends[belongs] - 1 - points
-    # Digits, at most one point, and a sign in front are all there is; else it is looked at for itself.
-    plain = (pointed <= 1) & (digits + pointed + signed == ends - starts) & (digits > 0) & (digits <= MOST_DIGITS)
-    found = whole / _POWERS[np.minimum(decimals, MOST_DECIMALS)]
-    found = np.where(signs == _MINUS, -found, found)
-    for odd in np.flatnonzero(~plain):
-        found[odd] = np.nan
-        if ends[odd] - starts[odd] <= LONGEST:
+    decimals[owner] = ends[owner] - 1 - points
+    # The fast path: digits, at most one point, a leading sign. Others are parsed one by one.
+    plain = (dots <= 1) & (digits + dots + signed == ends - starts) & (digits > 0) & (digits <= MOST_DIGITS)
+    numbers = integer / _POWERS[np.minimum(decimals, MOST_DECIMALS)]
+    numbers = np.where(signs == _MINUS, -numbers, numbers)
+    for index in np.flatnonzero(~plain):
+        numbers[index] = np.nan
+        if ends[index] - starts[index] <= LONGEST:
             with suppress(ValueError):
-                found[odd] = float(text[starts[odd] : ends[odd]].tobytes())
-    found[np.isinf(found)] = np.nan
-    return found
+                numbers[index] = float(text[starts[index] : ends[index]].tobytes())
+    numbers[np.isinf(numbers)] = np.nan
+    return numbers
 
 
-def _digits(
+def _sum_digits(
     text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """What all digits of each number are, read without its point, and how many there are."""
+    """Return the digits of each number as an integer, without its point, and their count."""
     lengths = ends - starts
     longest = min(int(lengths.max()), MOST_DIGITS + 2)
-    values = text - np.uint8(_ZERO)  # what is no digit wraps around to more than nine
-    whole, digits = np.zeros(len(starts), np.int64), np.zeros(len(starts), np.int64)
+    values = text - np.uint8(_ZERO)  # other characters wrap around to more than nine
+    integer, digits = np.zeros(len(starts), np.int64), np.zeros(len(starts), np.int64)
     shortest = int(lengths.min())
     last = len(text) - 1
-    for place in range(longest):
-        digit = values[np.minimum(starts + place, last)] if place >= shortest else values[starts + place]
+    for offset in range(longest):
+        digit = values[np.minimum(starts + offset, last)] if offset >= shortest else values[starts + offset]
         is_digit = digit < 10
-        if place >= shortest:
-            is_digit &= place < lengths
-        whole = np.where(is_digit, whole * 10 + digit, whole)
+        if offset >= shortest:
+            is_digit &= offset < lengths
+        integer = np.where(is_digit, integer * 10 + digit, integer)
         digits += is_digit
-    return whole, digits
+    return integer, digits

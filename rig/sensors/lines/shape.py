@@ -1,4 +1,4 @@
-"""What the lines of an unknown device have in common: what stands around their numbers, and the numbers. Pure."""
+"""The common pattern of an unknown device's lines: the text around their numbers, and the numbers. Pure."""
 
 import re
 from collections import Counter
@@ -15,23 +15,23 @@ from rig.estimation.arrays import Array
 from rig.sensors.lines.decoding import LONGEST_LINE
 from rig.sensors.lines.fields import NUMBER, WORDS
 
-MOST_NUMBERS = 40  # in a line, as a section has room for
-LARGEST = 1e30  # what is beyond was not measured, and its square overflows
-ENOUGH = 0.6  # share of the lines that have to be alike
+MOST_NUMBERS = 40  # in a line, the limit of a section
+LARGEST = 1e30  # a larger number is no measurement, and its square overflows
+ENOUGH = 0.6  # fraction of the lines that must be alike
 FEWEST = 30
 _NUMBER = re.compile(r"(?<![A-Za-z0-9_.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![A-Za-z0-9_])")
 _SUM = re.compile(r"\*([0-9A-Fa-f]{2})$")
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "": "space"}
-_Told = tuple["Line", str, bool]  # a line, its text without a sum at its end, and whether that is the sum
+_CheckedLine = tuple["TimedLine", str, bool]  # a line, its text without checksum, and whether that is right
 _AROUND = " \t,;{}[]()|&"
 _COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 _BEFORE_A_NUMBER = re.compile(r"(.*[^0-9.+\-])([-+]?[0-9.]+(?:[eE][-+]?\d+)?)")
-MOSTLY = 0.9  # share of a column's fields that are numbers, or none, in one that holds numbers
+MOSTLY = 0.9  # fraction of a numeric column's fields that are numbers or missing
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
-    """A line and when it arrived."""
+class TimedLine:
+    """A line and its time of arrival."""
 
     arrived_s: float
     text: str
@@ -39,10 +39,14 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What stands around the numbers of a sample: as the keys of a section `lines` say it; `names` as a header does.
+    """The pattern of a sample's line, and the samples.
 
-    `values` (n, columns) are the numbers, which arrived at `arrived_s` (n,), NaN where a column holds none or a text;
-    `decimals` (columns,) the digits behind the point that all of a column have, -1 where they differ.
+    - `separator`, `prefix`, `keys`, `checksum`: as in a section `lines`.
+    - `names`: the columns' names in a header.
+    - `values` (n, columns): the numbers, NaN if missing or text.
+    - `arrived_s` (n,): their times of arrival.
+    - `decimals` (columns,): the decimals of a column, -1 if they vary.
+    - `others`: the number of other lines.
     """
 
     separator: str
@@ -57,40 +61,40 @@ class Shape:
 
 
 class NoShape(Exception):
-    """Why lines have nothing in common, in a sentence."""
+    """The reason why lines have no common pattern, in a sentence."""
 
 
-def shape_of(lines: Sequence[Line]) -> Shape:
-    """The shape that most lines have. Raises NoShape."""
-    plain = [Line(line.arrived_s, _COLOURS.sub("", line.text).strip()) for line in lines]
-    told = _short_ones([(line, *_without_sum(line.text)) for line in plain if line.text])
+def find_shape(lines: Sequence[TimedLine]) -> Shape:
+    """Find the pattern of most lines. Raise NoShape."""
+    plain = [TimedLine(line.arrived_s, _COLOURS.sub("", line.text).strip()) for line in lines]
+    checked = _select_short([(line, *_split_sum(line.text)) for line in plain if line.text])
     try:
-        shape = _of_numbers(told)
+        shape = _find_number_shape(checked)
     except NoShape:
-        divided = _of_fields(told)
-        if divided is None:
+        field_shape = _find_field_shape(checked)
+        if field_shape is None:
             raise
-        shape = divided
+        shape = field_shape
     if not shape.arrived_s[-1] > shape.arrived_s[0]:
         raise NoShape("all its lines came at the same moment")
     return shape
 
 
-def _of_numbers(told: Sequence[_Told]) -> Shape:
-    """The shape of lines that hold numbers alone. Raises NoShape."""
-    pieces = [tuple(piece.strip(" ") for piece in _NUMBER.split(text)) for _, text, _ in told]
-    common = _common(pieces)
-    alike = [each for each, its in zip(told, pieces, strict=True) if its == common]
-    if any(not ok for _, _, ok in alike) and any(_SUM.search(line.text) for line, _, _ in alike):
+def _find_number_shape(checked: Sequence[_CheckedLine]) -> Shape:
+    """Return the shape of lines that hold numbers alone. Raise NoShape."""
+    texts = [tuple(part.strip(" ") for part in _NUMBER.split(text)) for _, text, _ in checked]
+    common = _find_common(texts)
+    alike = [line for line, line_texts in zip(checked, texts, strict=True) if line_texts == common]
+    if any(not sum_ok for _, _, sum_ok in alike) and any(_SUM.search(line.text) for line, _, _ in alike):
         raise NoShape("its lines end as if with a sum, which is another one than NMEA's")
-    separator, prefix, keys = _between(common)
+    separator, prefix, keys = _interpret_texts(common)
     numbers = [_NUMBER.findall(text) for _, text, _ in alike]
     values = np.array(numbers, dtype=np.float64)
     measured: NDArray[np.bool_] = np.all(np.abs(values) < LARGEST, axis=1)
-    if np.count_nonzero(measured) < ENOUGH * len(told):
-        raise NoShape(f"it prints numbers that nothing measures: {_one_beyond(numbers, values)}")
+    if np.count_nonzero(measured) < ENOUGH * len(checked):
+        raise NoShape(f"it prints numbers that nothing measures: {_find_impossible(numbers, values)}")
     arrived_s = np.array([line.arrived_s for line, _, _ in alike])[measured]
-    others = [text for (_, text, _), its in zip(told, pieces, strict=True) if its != common]
+    others = [text for (_, text, _), line_texts in zip(checked, texts, strict=True) if line_texts != common]
     checksum = _SUM.search(alike[0][0].text) is not None
     columns = zip(*(row for row, is_measured in zip(numbers, measured, strict=True) if is_measured), strict=True)
     return Shape(
@@ -98,31 +102,31 @@ def _of_numbers(told: Sequence[_Told]) -> Shape:
         prefix,
         keys,
         checksum,
-        tuple(key.strip(_AROUND + "\"':= ") for key in keys) or _header(others, separator, len(common) - 1),
+        tuple(key.strip(_AROUND + "\"':= ") for key in keys) or _find_header(others, separator, len(common) - 1),
         values[measured],
         arrived_s,
-        tuple(map(_decimals, columns)),
+        tuple(map(_common_decimals, columns)),
         len(others) + int(np.count_nonzero(~measured)),
     )
 
 
-def _short_ones(told: list[_Told]) -> list[_Told]:
-    """The lines that are not too long to be one sample each. Raises NoShape where they are too few."""
-    if len(told) < FEWEST:
-        raise NoShape(f"only {len(told)} lines came, which is too few to see what they have in common")
-    short = [each for each in told if len(each[1]) <= LONGEST_LINE]
-    if len(short) < ENOUGH * len(told):
+def _select_short(checked: list[_CheckedLine]) -> list[_CheckedLine]:
+    """Return the lines that are short enough for one sample each. Raise NoShape if too few remain."""
+    if len(checked) < FEWEST:
+        raise NoShape(f"only {len(checked)} lines came, which is too few to see what they have in common")
+    short = [line for line in checked if len(line[1]) <= LONGEST_LINE]
+    if len(short) < ENOUGH * len(checked):
         raise NoShape(f"its lines are longer than {LONGEST_LINE} characters")
     return short
 
 
-def _common(pieces: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
-    """What stands around the numbers of most lines. Raises NoShape."""
-    common, count = Counter(pieces).most_common(1)[0]
+def _find_common(texts: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """Return the texts around the numbers of most lines. Raise NoShape."""
+    common, count = Counter(texts).most_common(1)[0]
     numbers = len(common) - 1
-    if count < ENOUGH * len(pieces):
+    if count < ENOUGH * len(texts):
         raise NoShape(
-            f"only {count} of {len(pieces)} lines look alike: its lines are not one sample each, or of several kinds"
+            f"only {count} of {len(texts)} lines look alike: its lines are not one sample each, or of several kinds"
         )
     if numbers < 3:
         raise NoShape(f"a line holds {numbers} numbers, and three axes of a gyroscope are three")
@@ -131,88 +135,88 @@ def _common(pieces: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
     return common
 
 
-def _one_beyond(numbers: Sequence[Sequence[str]], values: Array) -> str:
+def _find_impossible(numbers: Sequence[Sequence[str]], values: Array) -> str:
     row, column = np.argwhere(~(np.abs(values) < LARGEST))[0]
     return shorten(numbers[row][column])
 
 
-def _of_fields(told: Sequence[_Told]) -> Shape | None:
-    """The shape of lines whose fields a separator divides: some hold a text, or nothing, such as behind the last."""
+def _find_field_shape(checked: Sequence[_CheckedLine]) -> Shape | None:
+    """Return the shape of lines with a separator between fields, of which some hold a text or nothing."""
     for sign, name in sorted(_SEPARATORS.items(), reverse=True):
-        rows = [[field.strip() for field in text.split(sign or None)] for _, text, _ in told]
-        count, often = Counter(map(len, rows)).most_common(1)[0]
-        alike = [place for place, row in enumerate(rows) if len(row) == count]
-        if not 3 <= count <= MOST_NUMBERS or often < ENOUGH * len(told):
+        rows = [[field.strip() for field in text.split(sign or None)] for _, text, _ in checked]
+        count, frequency = Counter(map(len, rows)).most_common(1)[0]
+        alike = [index for index, row in enumerate(rows) if len(row) == count]
+        if not 3 <= count <= MOST_NUMBERS or frequency < ENOUGH * len(checked):
             continue
-        fields = [rows[place] for place in alike]
+        fields = [rows[index] for index in alike]
         if not any(row[-1] for row in fields):
             fields, count = [row[:-1] for row in fields], count - 1
-        prefix, fields = _without_prefix(fields)
-        columns = [_column(column) for column in zip(*fields, strict=True)]
+        prefix, fields = _split_prefix(fields)
+        columns = [_parse_column(column) for column in zip(*fields, strict=True)]
         numbers = [column for column in columns if column is not None]
-        if len(numbers) < 3 or not all(told[place][2] for place in alike if _SUM.search(told[place][0].text)):
+        if len(numbers) < 3 or not all(checked[index][2] for index in alike if _SUM.search(checked[index][0].text)):
             continue
         return Shape(
             name,
             prefix,
             (),
-            all(_SUM.search(told[place][0].text) for place in alike),
-            _header([text for place, (_, text, _) in enumerate(told) if place not in set(alike)], name, count),
+            all(_SUM.search(checked[index][0].text) for index in alike),
+            _find_header([text for index, (_, text, _) in enumerate(checked) if index not in set(alike)], name, count),
             np.column_stack([np.full(len(fields), np.nan) if column is None else column for column in columns]),
-            np.array([told[place][0].arrived_s for place in alike]),
-            tuple(_decimals(column) for column in zip(*fields, strict=True)),
-            len(told) - len(alike),
+            np.array([checked[index][0].arrived_s for index in alike]),
+            tuple(_common_decimals(column) for column in zip(*fields, strict=True)),
+            len(checked) - len(alike),
         )
     return None
 
 
-def _without_prefix(fields: list[list[str]]) -> tuple[str, list[list[str]]]:
-    """What stands before the number in the first field of all rows, `*` for digits that change, and what is left."""
+def _split_prefix(fields: list[list[str]]) -> tuple[str, list[list[str]]]:
+    """Return the common text before the first field's number, `*` for digits that change, and the rows without it."""
     split = [_BEFORE_A_NUMBER.fullmatch(row[0]) for row in fields]
-    texts = {found.group(1) for found in split if found is not None}
-    same = {re.sub(r"\d+", "*", text) for text in texts}
-    if len(same) != 1 or any(found is None for found in split):
+    texts = {match.group(1) for match in split if match is not None}
+    patterns = {re.sub(r"\d+", "*", text) for text in texts}
+    if len(patterns) != 1 or any(match is None for match in split):
         return "", fields
-    (prefix,) = texts if len(texts) == 1 else same
-    return prefix, [[found.group(2), *row[1:]] for found, row in zip(split, fields, strict=True) if found is not None]
+    (prefix,) = texts if len(texts) == 1 else patterns
+    return prefix, [[match.group(2), *row[1:]] for match, row in zip(split, fields, strict=True) if match is not None]
 
 
-def _column(fields: Sequence[str]) -> Array | None:
-    """(n,) the numbers of a column, NaN for none; None if it holds a text."""
+def _parse_column(fields: Sequence[str]) -> Array | None:
+    """Return (n,) the numbers of a column, NaN if missing; None if it holds a text."""
     numbers = np.array([float(field) if NUMBER.fullmatch(field) else np.nan for field in fields])
     numbers[np.abs(numbers) >= LARGEST] = np.nan
-    none = sum(field.lower() in WORDS for field in fields)
-    if np.count_nonzero(np.isfinite(numbers)) + none < MOSTLY * len(fields) or none == len(fields):
+    missing = sum(field.lower() in WORDS for field in fields)
+    if np.count_nonzero(np.isfinite(numbers)) + missing < MOSTLY * len(fields) or missing == len(fields):
         return None
     return numbers
 
 
-def _without_sum(text: str) -> tuple[str, bool]:
-    """The line without a sum at its end, and whether what stands there is the sum."""
-    found = _SUM.search(text)
-    if found is None:
+def _split_sum(text: str) -> tuple[str, bool]:
+    """Return a line without the checksum at its end, and whether the checksum is right."""
+    match = _SUM.search(text)
+    if match is None:
         return text, False
-    body = text[: found.start()]
-    right = reduce(xor, body.lstrip("$!").encode(), 0) == int(found.group(1), 16)
-    return body, right
+    body = text[: match.start()]
+    sum_ok = reduce(xor, body.lstrip("$!").encode(), 0) == int(match.group(1), 16)
+    return body, sum_ok
 
 
-def _between(common: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]]:
-    """Separator, prefix and keys of what stands before, between and after the numbers. Raises NoShape."""
+def _interpret_texts(common: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]]:
+    """Return separator, prefix and keys from the texts before, between and after the numbers. Raise NoShape."""
     before, *inside, after = common
     if len({*inside}) == 1 and inside[0] in _SEPARATORS and not after.strip(_AROUND):
         if not after.strip() and before.strip(_AROUND):
             return _SEPARATORS[inside[0]], before, ()
         if not (before + after).strip():
             return _SEPARATORS[inside[0]], "", ()
-    keys = tuple(piece.strip(_AROUND) for piece in (before, *inside))
+    keys = tuple(part.strip(_AROUND) for part in (before, *inside))
     if all(keys) and len(set(keys)) == len(keys) and not after.strip(_AROUND):
         return "comma", "", keys
-    raise NoShape(f"between its numbers stands {' … '.join(quote(piece) for piece in (before, *inside[:3], after))}")
+    raise NoShape(f"between its numbers stands {' … '.join(quote(part) for part in (before, *inside[:3], after))}")
 
 
-def _header(others: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
-    """The names that a line of the others gives to so many columns."""
+def _find_header(others: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
+    """Return the `count` column names in one of the other lines, or none."""
     sign = {name: sign for sign, name in _SEPARATORS.items()}[separator]
     for text in others:
         names = [name.strip(" \"'") for name in text.lstrip("#%/ ").split(sign or None)]
@@ -221,8 +225,8 @@ def _header(others: Sequence[str], separator: str, count: int) -> tuple[str, ...
     return ()
 
 
-def _decimals(numbers: Sequence[str]) -> int:
-    if any("e" in each.lower() for each in numbers):
+def _common_decimals(numbers: Sequence[str]) -> int:
+    if any("e" in number.lower() for number in numbers):
         return -1
-    found = {len(each.partition(".")[2]) for each in numbers}
-    return found.pop() if len(found) == 1 else -1
+    counts = {len(number.partition(".")[2]) for number in numbers}
+    return counts.pop() if len(counts) == 1 else -1

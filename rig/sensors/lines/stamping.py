@@ -1,4 +1,4 @@
-"""Which sample is which, and when it was taken: by the device's time, by counting, or by when a line arrived. Pure."""
+"""Numbers and times of samples: by the device's time, by counting, or by the arrival of lines. Pure."""
 
 from copy import copy
 from dataclasses import dataclass, field
@@ -12,200 +12,203 @@ from rig.config.units import UNITS
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 
-ODD_ONES = 3  # samples in a row whose time cannot be: fewer are damaged, so many are a device that began anew
-COARSE = 0.2  # of the interval between samples: a time printed in coarser steps is made even
-SMOOTHED_S = 2.0  # over which arrival times, and coarse ones, are made even
-ARRIVAL_GAP_S = 0.1  # that a line may be late before one counts as lost
+ODD_SAMPLES = 3  # samples in a row with an impossible time: fewer are damaged, these are a restart
+COARSE = 0.2  # fraction of the sample interval: a time with coarser steps is smoothed
+SMOOTHED_S = 2.0  # time constant of smoothing arrival times and coarse ones
+ARRIVAL_GAP_S = 0.1  # delay of a line above which one counts as lost
 _RESTARTED = "Check its supply and cable, and that its program prints nothing else between; then run again"
 
 
 def is_coarse(step_s: float, rate_hz: float) -> bool:
-    """Whether steps of a printed time are no small part of the interval between samples."""
+    """Return whether the step of a printed time is a large part of the sample interval."""
     return step_s * rate_hz > COARSE
 
 
 @dataclass(slots=True)
 class Stamper:
-    """Numbers and times of one stream's samples, in µs of its clock; `lost` are those that never came.
+    """The numbers and times of one stream's samples, in µs of its clock.
 
-    What cannot be is left out and counted as `odd`: a time or a number that goes back, or more than 2 s ahead. The time
-    is printed in steps of `step_s`: coarse ones are made even.
+    - `section`, `rate_hz`: the configuration.
+    - `where`: the device in messages.
+    - `step_s`: the step of the printed time; a coarse one is smoothed.
+    - `lost`: the number of samples that never came.
+    - `odd`: the number of samples left out because their time or number goes back, or jumps by more than 2 s.
     """
 
     section: LinesSection
     rate_hz: float
-    where: str  # the device as messages name it
+    where: str
     step_s: float = 0.0
     lost: int = 0
     odd: int = 0
     _number: int = -1
-    _time_s: float = 0.0  # as it was told, from the first sample on
+    _time_s: float = 0.0  # device's time since the first sample
     _odd_in_a_row: int = 0
     _last_time: float | None = None  # as printed
     _last_sequence: float | None = None
-    _even: "Evened | None" = None
+    _smoothed: "SmoothedClock | None" = None
     _host_began_s: float | None = None
     _stamp_us: int = -1
 
     def stamp(
         self, values: Array, skipped: int, host_time_s: float
     ) -> tuple[NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64]]:
-        """Which of `values` (n, columns) are samples, and of those the numbers (m,) from 0, and times (m,) in µs.
+        """Return a mask (n,) of the samples in `values` (n, columns), their numbers (m,) from 0, and times (m,), µs.
 
-        `skipped` lines before them were no samples; they came at `host_time_s`. Raises SensorError `lines_time_jumped`.
+        `skipped` rejected lines preceded them; they came at `host_time_s`. Raise SensorError `lines_time_jumped`.
         """
         if not len(values):
             return np.zeros(0, np.bool_), np.zeros(0, np.int64), np.zeros(0, np.int64)
         passed_s, steps = self._steps(values, skipped)
-        kept = np.ones(len(values), np.bool_)
-        if not self._possible(passed_s, steps).all():
-            kept = self._possible_ones(values)
-            values = values[kept]
+        is_sample = np.ones(len(values), np.bool_)
+        if not self._is_possible(passed_s, steps).all():
+            is_sample = self._select_possible(values)
+            values = values[is_sample]
             if not len(values):
-                return kept, np.zeros(0, np.int64), np.zeros(0, np.int64)
+                return is_sample, np.zeros(0, np.int64), np.zeros(0, np.int64)
             passed_s, steps = self._steps(values, skipped)
         self._odd_in_a_row = 0
-        began = self._number < 0
+        is_first = self._number < 0
         if self.section.clock == "arrival":
-            steps = self._late(steps, host_time_s)
-        if began:
+            steps = self._add_late(steps, host_time_s)
+        if is_first:
             steps[0], passed_s[0] = 1, 0.0
-        told_s = self._time_s + np.cumsum(passed_s)
+        device_s = self._time_s + np.cumsum(passed_s)
         if self._is_coarse and "sequence" not in self.section.columns:
-            steps = self._steps_of_coarse(told_s)
+            steps = self._count_coarse_steps(device_s)
         self.lost += int(steps.sum()) - len(steps)
         numbers = self._number + np.cumsum(steps)
-        times_s = self._times_s(numbers, told_s, host_time_s)
+        times_s = self._compute_times_s(numbers, device_s, host_time_s)
         self._number, self._time_s = int(numbers[-1]), self._time_s + float(passed_s.sum())
         self._remember(values[-1])
         stamps = np.rint(times_s * 1e6).astype(np.int64)
-        # Coarse times that were made even may still meet.
+        # Smoothed coarse times may still coincide.
         ahead = self._stamp_us + 1 + np.arange(len(stamps))
         stamps = np.maximum.accumulate(np.maximum(stamps, ahead) - np.arange(len(stamps))) + np.arange(len(stamps))
         self._stamp_us = int(stamps[-1])
-        return kept, numbers, stamps
+        return is_sample, numbers, stamps
 
     # -- numbers -------------------------------------------------------------------------------------------------
     def _steps(self, values: Array, skipped: int) -> tuple[Array, NDArray[np.int64]]:
-        """Seconds (n,) by the device's time, and samples (n,), that passed before each; seconds are 0 without one."""
+        """Return seconds (n,) of the device's time, 0 without one, and samples (n,) that passed before each."""
         columns = self.section.columns
         passed_s = np.zeros(len(values))
         steps = np.ones(len(values), np.int64)
         if self.section.time is not None:
-            passed_s = self._passed_s(values[:, columns.index("time")], self.section.time)
+            passed_s = self._unwrap_time_s(values[:, columns.index("time")], self.section.time)
             steps = np.maximum(np.rint(passed_s * self.rate_hz), 1).astype(np.int64)
         elif "sequence" not in columns:
-            steps[0] += skipped  # a line that was no sample was one, most likely
+            steps[0] += skipped  # a rejected line was most likely a damaged sample
         if "sequence" in columns:
-            counted = values[:, columns.index("sequence")]
-            before = counted[0] - 1 if self._last_sequence is None else self._last_sequence
-            moved = np.diff(counted, prepend=before)
+            sequence = values[:, columns.index("sequence")]
+            last_sequence = sequence[0] - 1 if self._last_sequence is None else self._last_sequence
+            advance = np.diff(sequence, prepend=last_sequence)
             wrap = self.section.sequence_wrap
             if wrap:
-                moved %= wrap
+                advance %= wrap
                 if self.section.time is not None:
-                    moved += wrap * np.maximum(np.rint((steps - moved) / wrap), 0)
-            steps = np.where(np.abs(moved) < 2.0**53, moved, -1).astype(np.int64)
+                    advance += wrap * np.maximum(np.rint((steps - advance) / wrap), 0)
+            steps = np.where(np.abs(advance) < 2.0**53, advance, -1).astype(np.int64)
         return passed_s, steps
 
-    def _passed_s(self, printed: Array, column: LineTimeSection) -> Array:
+    def _unwrap_time_s(self, printed: Array, column: LineTimeSection) -> Array:
         unit_s, wrap = UNITS[column.unit].size, column.wrap
-        before = printed[0] if self._last_time is None else self._last_time
-        passed = np.diff(printed, prepend=before)
+        last_time = printed[0] if self._last_time is None else self._last_time
+        passed = np.diff(printed, prepend=last_time)
         if wrap:
             passed %= wrap
-        found: Array = passed * unit_s
+        passed_s: Array = passed * unit_s
         if self._last_time is None:
-            found[0] = 1.0 / self.rate_hz
-        return found
+            passed_s[0] = 1.0 / self.rate_hz
+        return passed_s
 
     def _remember(self, row: Array) -> None:
         columns = self.section.columns
         self._last_time = float(row[columns.index("time")]) if "time" in columns else None
         self._last_sequence = float(row[columns.index("sequence")]) if "sequence" in columns else None
 
-    def _possible_ones(self, values: Array) -> NDArray[np.bool_]:
-        """One by one, which of (n, columns) can follow those before. Raises SensorError `lines_time_jumped`."""
-        kept = np.zeros(len(values), np.bool_)
+    def _select_possible(self, values: Array) -> NDArray[np.bool_]:
+        """Return which rows of (n, columns) can follow those before. Raise SensorError `lines_time_jumped`."""
+        is_sample = np.zeros(len(values), np.bool_)
         last = (self._last_time, self._last_sequence)
         try:
-            for place, row in enumerate(values):
+            for index, row in enumerate(values):
                 passed_s, steps = self._steps(row[None], 0)
-                if self._possible(passed_s, steps).all():
-                    kept[place], self._odd_in_a_row = True, 0
+                if self._is_possible(passed_s, steps).all():
+                    is_sample[index], self._odd_in_a_row = True, 0
                     self._remember(row)
                     continue
                 self.odd += 1
                 self._odd_in_a_row += 1
-                if self._odd_in_a_row >= ODD_ONES:
+                if self._odd_in_a_row >= ODD_SAMPLES:
                     raise SensorError("lines_time_jumped", f"{self.where}: {self._jump(row)}", _RESTARTED)
         finally:
             self._last_time, self._last_sequence = last
-        return kept
+        return is_sample
 
-    def _possible(self, passed_s: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Which samples can follow the one before: later, unless times are coarse, and not too late."""
+    def _is_possible(self, passed_s: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which samples can follow the one before: later, or equal if times are coarse, and not too late."""
         later = passed_s > 0 if self.section.time is not None and not self._is_coarse else passed_s >= 0
         in_time = (passed_s <= LONGEST_GAP_S) & (steps >= 1) & (steps <= LONGEST_GAP_S * self.rate_hz + 1)
-        found: NDArray[np.bool_] = later & in_time
-        return found
+        possible: NDArray[np.bool_] = later & in_time
+        return possible
 
     @property
     def _is_coarse(self) -> bool:
-        """Whether the device's time is printed in steps that are no small part of the interval between samples."""
+        """Whether the step of the device's time is a large part of the sample interval."""
         return self.section.time is not None and is_coarse(self.step_s, self.rate_hz)
 
-    def _steps_of_coarse(self, told_s: Array) -> NDArray[np.int64]:
-        """Samples (n,) that passed before each, by coarse times (n,): one each, but where a time is too far ahead.
+    def _count_coarse_steps(self, device_s: Array) -> NDArray[np.int64]:
+        """Return the samples (n,) that passed before each, by coarse times (n,): one, or more if a time is far ahead.
 
-        What is lost within a step of the time cannot be seen.
+        A loss within a step of the time is invisible.
         """
-        even = Evened(self.rate_hz) if self._even is None else copy(self._even)
-        steps = np.ones(len(told_s), np.int64)
-        for place, time_s in enumerate(told_s):
-            if even.begun:
-                late = (time_s - even.ahead_s(1)) * self.rate_hz
-                steps[place] += round(late) if late > self.step_s * self.rate_hz + 0.5 else 0
-            number = even.number + int(steps[place])
-            even.evened(np.array([number]), float(time_s))
+        clock = SmoothedClock(self.rate_hz) if self._smoothed is None else copy(self._smoothed)
+        steps = np.ones(len(device_s), np.int64)
+        for index, time_s in enumerate(device_s):
+            if clock.is_set:
+                late = (time_s - clock.predict_s(1)) * self.rate_hz
+                steps[index] += round(late) if late > self.step_s * self.rate_hz + 0.5 else 0
+            number = clock.number + int(steps[index])
+            clock.advance_to(np.array([number]), float(time_s))
         return steps
 
     def _jump(self, row: Array) -> str:
         columns = self.section.columns
-        told = [
+        changes = [
             f"its {name} went from {before:.15g} to {row[columns.index(name)]:.15g}"
             for name, before in (("time", self._last_time), ("sequence", self._last_sequence))
             if name in columns and before is not None
         ]
-        return " and ".join(told) + ": the device was restarted, or more than 2 s of its lines are lost"
+        return " and ".join(changes) + ": the device was restarted, or more than 2 s of its lines are lost"
 
     # -- times ---------------------------------------------------------------------------------------------------
-    def _late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
-        """The steps, with those that only the wait before the lines shows to be lost."""
-        if "sequence" in self.section.columns or self._even is None:
+    def _add_late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
+        """Return the steps, plus the loss that only the delay of the lines shows."""
+        if "sequence" in self.section.columns or self._smoothed is None:
             return steps
-        late_s = host_time_s - (self._host_began_s or 0.0) - self._even.ahead_s(int(steps.sum()))
+        late_s = host_time_s - (self._host_began_s or 0.0) - self._smoothed.predict_s(int(steps.sum()))
         if late_s > max(ARRIVAL_GAP_S, 8 / self.rate_hz):
             steps = steps.copy()
             steps[0] += round(late_s * self.rate_hz)
         return steps
 
-    def _times_s(self, numbers: NDArray[np.int64], told_s: Array, host_time_s: float) -> Array:
+    def _compute_times_s(self, numbers: NDArray[np.int64], device_s: Array, host_time_s: float) -> Array:
         if self.section.clock == "counted":
             return numbers / self.rate_hz
         if self.section.clock == "device":
             if not self._is_coarse:
-                return told_s
-            self._even = self._even or Evened(self.rate_hz)
-            return self._even.evened_each(numbers, told_s)
-        if self._even is None or self._host_began_s is None:
-            self._even, self._host_began_s = Evened(self.rate_hz), host_time_s - numbers[-1] / self.rate_hz
-        return self._even.evened(numbers, host_time_s - self._host_began_s)
+                return device_s
+            self._smoothed = self._smoothed or SmoothedClock(self.rate_hz)
+            return self._smoothed.advance_through(numbers, device_s)
+        if self._smoothed is None or self._host_began_s is None:
+            self._smoothed, self._host_began_s = SmoothedClock(self.rate_hz), host_time_s - numbers[-1] / self.rate_hz
+        return self._smoothed.advance_to(numbers, host_time_s - self._host_began_s)
 
 
 @dataclass(slots=True)
-class Evened:
-    """A clock that follows told times slowly, by how many samples have passed: a loop of second order."""
+class SmoothedClock:
+    """A clock that follows input times slowly, by the number of samples: a phase-locked loop of second order."""
 
     rate_hz: float
     number: int = -1
@@ -216,28 +219,30 @@ class Evened:
         self._period_s = 1.0 / self.rate_hz
 
     @property
-    def begun(self) -> bool:
-        """Whether it knows the time of a sample."""
+    def is_set(self) -> bool:
+        """Whether a time was set."""
         return self.number >= 0
 
-    def ahead_s(self, steps: int) -> float:
-        """When the sample after so many steps would be."""
+    def predict_s(self, steps: int) -> float:
+        """Return the predicted time, s, of the sample `steps` after the last."""
         return self._time_s + steps * self._period_s
 
-    def evened(self, numbers: NDArray[np.int64], told_s: float) -> Array:
-        """Times (n,) of samples (n,), of which the last was told to be at `told_s`."""
-        last, before, count = int(numbers[-1]), self._time_s, int(numbers[-1]) - self.number
-        if not self.begun:
-            self.number, self._time_s = last, told_s
-            return np.asarray(told_s - (last - numbers) * self._period_s, np.float64)
-        wrong_s = told_s - self.ahead_s(count)
-        share = 1 - exp(-count * self._period_s / SMOOTHED_S)
-        self._time_s = max(self.ahead_s(count) + share * wrong_s, before + 1e-6 * count)
-        self._period_s = max(self._period_s + share**2 / 4 * wrong_s / count, 1e-6)
-        found: Array = before + (self._time_s - before) * (numbers - self.number) / count
+    def advance_to(self, numbers: NDArray[np.int64], input_s: float) -> Array:
+        """Advance the clock by samples (n,), the last with the input time `input_s`; return their times (n,), s."""
+        last, time_before_s, count = int(numbers[-1]), self._time_s, int(numbers[-1]) - self.number
+        if not self.is_set:
+            self.number, self._time_s = last, input_s
+            return np.asarray(input_s - (last - numbers) * self._period_s, np.float64)
+        error_s = input_s - self.predict_s(count)
+        gain = 1 - exp(-count * self._period_s / SMOOTHED_S)
+        self._time_s = max(self.predict_s(count) + gain * error_s, time_before_s + 1e-6 * count)
+        self._period_s = max(self._period_s + gain**2 / 4 * error_s / count, 1e-6)
+        times_s: Array = time_before_s + (self._time_s - time_before_s) * (numbers - self.number) / count
         self.number = last
-        return found
+        return times_s
 
-    def evened_each(self, numbers: NDArray[np.int64], told_s: Array) -> Array:
-        """Times (n,) of samples (n,) that each were told a time."""
-        return np.array([self.evened(numbers[k : k + 1], float(told_s[k]))[0] for k in range(len(numbers))])
+    def advance_through(self, numbers: NDArray[np.int64], input_s: Array) -> Array:
+        """Advance the clock by samples (n,) with an input time each (n,), s; return their times (n,), s."""
+        return np.array(
+            [self.advance_to(numbers[index : index + 1], float(input_s[index]))[0] for index in range(len(numbers))]
+        )

@@ -1,18 +1,18 @@
-"""Steps in which a device prints its time: by the digits that it prints, and by a number in single precision. Pure."""
+"""The step of a device's printed time: by its digits, or by the resolution of a single-precision number. Pure."""
 
 import numpy as np
 
 from rig.config.units import UNITS
 from rig.estimation.arrays import Array
 
-GROWS = 2.0  # the steps of a number in single precision, when it has become twice as large
+GROWS = 2.0  # growth of the step of a single-precision number that doubles
 
 
-def step_of_time_s(printed: Array, decimals: int, unit: str) -> float:
-    """Return the step, s, of printed times (n,) with so many decimals: of a device that may run on for as long again.
+def find_time_step_s(printed: Array, decimals: int, unit: str) -> float:
+    """Return the step, s, of printed times (n,) with `decimals` digits, for a device that runs on for as long again.
 
-    A time that the device holds in single precision, with 24 bits, goes in steps of its last bit, however many digits
-    it prints: every printed time lies on that grid.
+    A time in single precision, with 24 bits, has the step of its last bit, however many digits are printed: every
+    printed time lies on that grid.
     """
     last_digit = 10.0**-decimals
     single = np.float32(printed)

@@ -1,4 +1,4 @@
-"""The section of a sensor as `rig lines` writes it: what the lines told, and a gap for what they did not. Pure."""
+"""The section of a sensor as `rig lines` writes it: the guess, and a gap for each unknown. Pure."""
 
 from collections.abc import Mapping
 
@@ -6,37 +6,37 @@ from rig.config.sensors.lines_section import GAP
 from rig.sensors.lines.guessing import Guess
 from rig.sensors.lines.shape import Shape
 
-NICE = 0.02  # of a rate, within which it is a round one
+NICE = 0.02  # relative tolerance of a round rate
 ROUND = (1, 2, 2.5, 4, 5, 8, 10)
 
 
 def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu") -> str:
-    """The YAML of `sensors`; `?` stands where somebody has to look it up, and `rig check` refuses it by the key."""
-    lines: dict[str, object] = {"columns": _listed(guess.columns)}
+    """Return the YAML of `sensors`; `?` marks values to look up, which `rig check` refuses by their key."""
+    lines: dict[str, object] = {"columns": _format_list(guess.columns)}
     if shape.keys:
-        lines["keys"] = _listed([_quoted(key) for key in shape.keys])
+        lines["keys"] = _format_list([_quote(key) for key in shape.keys])
     else:
         lines["separator"] = shape.separator
     if shape.prefix:
-        lines["prefix"] = _quoted(shape.prefix)
+        lines["prefix"] = _quote(shape.prefix)
     if shape.checksum:
         lines["checksum"] = "nmea"
     if guess.clock != "device":
         lines["clock"] = guess.clock
     if guess.time is not None:
-        lines["time"] = _mapped(guess.time)
+        lines["time"] = _format_mapping(guess.time)
     if guess.sequence_wrap:
         lines["sequence_wrap"] = guess.sequence_wrap
     for kind, key in (("g", "rate"), ("a", "acceleration"), ("m", "field")):
         if kind in guess.units:
-            lines[key] = _mapped(guess.units[kind])
+            lines[key] = _format_mapping(guess.units[kind])
     gap = f'"{GAP}"'
     rows = [
         "sensors:",
         f"  {name}:",
         "    part: lines",
         f"    serial_number: {gap}  # of this specimen",
-        f"    rate_hz: {_nice(guess.rate_hz):g}",
+        f"    rate_hz: {_round_rate(guess.rate_hz):g}",
         f"    range_deg_s: {gap}  # full scale to which the device's program sets the gyroscope",
     ]
     if "a" in guess.units:
@@ -48,26 +48,26 @@ def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu")
     return "\n".join(rows) + "\n"
 
 
-def _listed(values: list[str]) -> str:
+def _format_list(values: list[str]) -> str:
     return "[" + ", ".join('"-"' if value == "-" else value for value in values) + "]"
 
 
-def _mapped(values: Mapping[str, object]) -> str:
-    return "{" + ", ".join(f"{key}: {_value(value)}" for key, value in values.items()) + "}"
+def _format_mapping(values: Mapping[str, object]) -> str:
+    return "{" + ", ".join(f"{key}: {_format_value(value)}" for key, value in values.items()) + "}"
 
 
-def _value(value: object) -> str:
+def _format_value(value: object) -> str:
     return f'"{GAP}"' if value == GAP else str(value)
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return "'" + text.replace("'", "''") + "'"
 
 
-def _nice(rate_hz: float) -> float:
-    """A round rate near by, as people set them; else three digits."""
+def _round_rate(rate_hz: float) -> float:
+    """Return the nearest round rate, or three digits if none is near."""
     size = 10.0 ** (len(str(int(rate_hz))) - 1)
-    for each in ROUND:
-        if abs(rate_hz / (each * size) - 1) < NICE:
-            return each * size
+    for digits in ROUND:
+        if abs(rate_hz / (digits * size) - 1) < NICE:
+            return digits * size
     return float(f"{rate_hz:.3g}")

@@ -1,11 +1,10 @@
-"""What an autopilot has done to readings before it sends them, by its parameters: undone, or refused by name. Pure.
+"""An autopilot's corrections of its readings, by its parameters: undone, or refused by name. Pure.
 
-ArduPilot, AP_InertialSensor_Backend.cpp (_rotate_and_correct_gyro, _rotate_and_correct_accel): readings in the axes of
-the sensor as the board's definition has them, less temperature's part, less an offset, accelerations then times a
-scale, all turned by AHRS_ORIENTATION; then notches and a low-pass of second order (apply_gyro_filters). PX4,
-src/lib/sensor_calibration (`Correct`): the same order, turned by SENS_BOARD_ROT; its messages hold the means over
-IMU_INTEG_RATE of what no filter has seen (VehicleIMU), in HIGHRES_IMU less the bias that its estimator believes in
-(HIGHRES_IMU.hpp).
+ArduPilot, AP_InertialSensor_Backend.cpp (_rotate_and_correct_gyro, _rotate_and_correct_accel): readings in the sensor's
+axes by the board's definition, minus the temperature's part, minus an offset, accelerations then times a scale, all
+rotated by AHRS_ORIENTATION; then notches and a low-pass of second order (apply_gyro_filters). PX4,
+src/lib/sensor_calibration (`Correct`): the same order, rotated by SENS_BOARD_ROT; its messages hold unfiltered means
+over IMU_INTEG_RATE (VehicleIMU), in HIGHRES_IMU minus its estimator's bias (HIGHRES_IMU.hpp).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,35 +17,43 @@ from rig.config.sensors.mavlink_section import MavlinkSection
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.dialect import ARDUPILOT
-from rig.sensors.mavlink.orientations import signed_axes
+from rig.sensors.mavlink.orientations import board_rotation
 
 AXES = "XYZ"
-LEAST_CUTOFF_HZ = 5.0  # of a low-pass: below that it has not settled where a sweep's steady part begins
+LEAST_CUTOFF_HZ = 5.0  # a slower low-pass has not settled when a sweep's steady part begins
 
 
 @dataclass(frozen=True, slots=True)
-class Names:
-    """How the parameters of one IMU are called: those of its correction, a name for each axis, and what else counts."""
+class ParameterNames:
+    """The names of one IMU's parameters.
+
+    - `gyro_offset`, `force_offset`, `force_scale`: its correction, a name for each axis.
+    - `orientation`: that of its board.
+    - `must_be_zero`: those of corrections that cannot be undone, if they exist.
+    - `filters`: its low-pass filters.
+    - `others`: those that are not 0 if the autopilot has a further IMU.
+    - `identity`: one that must not be 0, without which the correction is not applied.
+    """
 
     gyro_offset: tuple[str, ...]
     force_offset: tuple[str, ...]
     force_scale: tuple[str, ...]
     orientation: str
-    off: tuple[str, ...]  # must be 0 where they exist: each corrects in a way that cannot be undone
+    must_be_zero: tuple[str, ...]
     filters: tuple[str, ...] = ()
-    others: tuple[str, ...] = ()  # not 0 where there is a further IMU
-    identity: str | None = None  # must not be 0: without it the correction is not applied
+    others: tuple[str, ...] = ()
+    identity: str | None = None
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """The parameters without which nothing is known of its readings."""
-        named = (*self.gyro_offset, *self.force_offset, *self.force_scale, self.orientation, *self.filters)
-        return named if self.identity is None else (*named, self.identity)
+        """The parameters that are required to interpret its readings."""
+        required = (*self.gyro_offset, *self.force_offset, *self.force_scale, self.orientation, *self.filters)
+        return required if self.identity is None else (*required, self.identity)
 
 
 @dataclass(frozen=True, slots=True)
-class Correction:
-    """What is undone: rate = R (raw − offset), force = R scale (raw − offset), R (3, 3) the board's orientation."""
+class OnboardCorrection:
+    """A correction to undo: rate = R (raw − offset), force = R scale (raw − offset), R (3, 3) the orientation."""
 
     gyro_offset_rad_s: Array = field(default_factory=partial(np.zeros, 3))
     force_offset_m_s2: Array = field(default_factory=partial(np.zeros, 3))
@@ -54,48 +61,50 @@ class Correction:
     orientation: Array = field(default_factory=partial(np.eye, 3))
 
     def raw_rate(self, rate_rad_s: Array) -> Array:
-        """Rates (n, 3) as they were before, in the sensor's own axes."""
+        """Return rates (n, 3) before the correction, in the sensor's own axes."""
         raw: Array = rate_rad_s @ self.orientation + self.gyro_offset_rad_s
         return raw
 
     def raw_force(self, force_m_s2: Array) -> Array:
-        """Specific forces (n, 3) as they were before, in the sensor's own axes."""
+        """Return specific forces (n, 3) before the correction, in the sensor's own axes."""
         raw: Array = force_m_s2 @ self.orientation / self.force_scale + self.force_offset_m_s2
         return raw
 
 
-def names_of(firmware: int, section: MavlinkSection) -> Names:
-    """How that firmware calls the parameters of the configured IMU."""
-    place = section.instance
+def parameter_names(firmware: int, section: MavlinkSection) -> ParameterNames:
+    """Return the firmware's names of the configured IMU's parameters."""
+    instance = section.instance
     if firmware == ARDUPILOT:
-        nth = str(place + 1) if place else ""
-        gyro = f"INS_GYR{nth}OFFS" if place else "INS_GYROFFS"
-        return Names(
+        nth = str(instance + 1) if instance else ""
+        gyro = f"INS_GYR{nth}OFFS" if instance else "INS_GYROFFS"
+        return ParameterNames(
             gyro_offset=tuple(f"{gyro}_{axis}" for axis in AXES),
             force_offset=tuple(f"INS_ACC{nth}OFFS_{axis}" for axis in AXES),
             force_scale=tuple(f"INS_ACC{nth}SCAL_{axis}" for axis in AXES),
             orientation="AHRS_ORIENTATION",
-            off=(f"INS_TCAL{place + 1}_ENABLE", "INS_NOTCH_ENABLE", "INS_HNTCH_ENABLE", "INS_HNTC2_ENABLE"),
+            must_be_zero=(f"INS_TCAL{instance + 1}_ENABLE", "INS_NOTCH_ENABLE", "INS_HNTCH_ENABLE", "INS_HNTC2_ENABLE"),
             filters=("INS_GYRO_FILTER", "INS_ACCEL_FILTER"),
             others=("INS_GYR2_ID", "INS_GYR3_ID"),
         )
-    # Its estimator's bias goes into HIGHRES_IMU alone; it learns offsets by itself while it believes that it rests.
+    # Its estimator's bias affects HIGHRES_IMU alone; it learns offsets by itself at supposed rest.
     bias = ("EKF2_EN",) if section.imu == "HIGHRES_IMU" else ()
     board = tuple(f"SENS_BOARD_{axis}_OFF" for axis in AXES)
-    return Names(
-        gyro_offset=tuple(f"CAL_GYRO{place}_{axis}OFF" for axis in AXES),
-        force_offset=tuple(f"CAL_ACC{place}_{axis}OFF" for axis in AXES),
-        force_scale=tuple(f"CAL_ACC{place}_{axis}SCALE" for axis in AXES),
+    return ParameterNames(
+        gyro_offset=tuple(f"CAL_GYRO{instance}_{axis}OFF" for axis in AXES),
+        force_offset=tuple(f"CAL_ACC{instance}_{axis}OFF" for axis in AXES),
+        force_scale=tuple(f"CAL_ACC{instance}_{axis}SCALE" for axis in AXES),
         orientation="SENS_BOARD_ROT",
-        off=("TC_G_ENABLE", "TC_A_ENABLE", "IMU_GYRO_CAL_EN", "SENS_IMU_AUTOCAL", *board, *bias),
+        must_be_zero=("TC_G_ENABLE", "TC_A_ENABLE", "IMU_GYRO_CAL_EN", "SENS_IMU_AUTOCAL", *board, *bias),
         others=("CAL_GYRO1_ID", "CAL_GYRO2_ID"),
-        identity=f"CAL_GYRO{place}_ID",
+        identity=f"CAL_GYRO{instance}_ID",
     )
 
 
-def refusals(sensor: str, names: Names, parameters: Mapping[str, float]) -> Iterator[SensorError]:
-    """What cannot be undone: `autopilot_corrects`, `autopilot_orientation`, `autopilot_filter_slow`,
-    `autopilot_not_calibrated`, `autopilot_parameter_missing`.
+def refusals(sensor: str, names: ParameterNames, parameters: Mapping[str, float]) -> Iterator[SensorError]:
+    """Yield errors for corrections that cannot be undone.
+
+    `autopilot_corrects`, `autopilot_orientation`, `autopilot_filter_slow`, `autopilot_not_calibrated`,
+    `autopilot_parameter_missing`.
     """
     missing = [name for name in names.needed if name not in parameters]
     if missing:
@@ -105,7 +114,7 @@ def refusals(sensor: str, names: Names, parameters: Mapping[str, float]) -> Iter
             "See that it has that IMU, and that its firmware is no older than ArduPilot 4.0 or PX4 1.12",
         )
         return
-    for name in names.off:
+    for name in names.must_be_zero:
         if parameters.get(name, 0.0) != 0.0:
             yield SensorError(
                 "autopilot_corrects",
@@ -113,7 +122,7 @@ def refusals(sensor: str, names: Names, parameters: Mapping[str, float]) -> Iter
                 "be undone",
                 f"Set {name} to 0 for the calibration, restart the autopilot, and set it back afterwards",
             )
-    if signed_axes(parameters[names.orientation]) is None:
+    if board_rotation(parameters[names.orientation]) is None:
         yield SensorError(
             "autopilot_orientation",
             f"{sensor}: {names.orientation} is {parameters[names.orientation]:g}, which is not made of right angles",
@@ -134,13 +143,13 @@ def refusals(sensor: str, names: Names, parameters: Mapping[str, float]) -> Iter
         )
 
 
-def correction_of(names: Names, parameters: Mapping[str, float]) -> Correction:
-    """What is undone, by parameters that `refusals` has nothing against."""
-    orientation = signed_axes(parameters[names.orientation])
+def read_correction(names: ParameterNames, parameters: Mapping[str, float]) -> OnboardCorrection:
+    """Return the correction to undo, by parameters without `refusals`. Raise ValueError for an orientation."""
+    orientation = board_rotation(parameters[names.orientation])
     if orientation is None:
         raise ValueError(f"{names.orientation} is refused before")
     scale = _vector(names.force_scale, parameters)
-    return Correction(
+    return OnboardCorrection(
         _vector(names.gyro_offset, parameters),
         _vector(names.force_offset, parameters),
         np.where(scale == 0.0, 1.0, scale),
@@ -148,8 +157,8 @@ def correction_of(names: Names, parameters: Mapping[str, float]) -> Correction:
     )
 
 
-def delay_s(names: Names, parameters: Mapping[str, float]) -> float:
-    """The delay of rates by a low-pass of second order (Butterworth): √2 / (2π f); 0 without one."""
+def delay_s(names: ParameterNames, parameters: Mapping[str, float]) -> float:
+    """Return the delay of rates, s, by a low-pass of second order (Butterworth): √2 / (2π f); 0 without one."""
     cutoff_hz = parameters.get(names.filters[0], 0.0) if names.filters else 0.0
     return float(np.sqrt(2.0) / (2.0 * np.pi * cutoff_hz)) if cutoff_hz > 0 else 0.0
 

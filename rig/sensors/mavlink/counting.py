@@ -1,4 +1,4 @@
-"""Which message is which: lost and doubled ones by sequence numbers, samples by the autopilot's time. Pure."""
+"""Counting of messages: lost and doubled ones by sequence numbers, samples by the autopilot's time. Pure."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -6,18 +6,18 @@ from dataclasses import dataclass, field
 from rig.sensors.errors import SensorError
 
 SEQUENCE_NUMBERS = 256
-LATE = 64  # a number so little before the newest belongs to a message that was overtaken
-REMEMBERED = 64  # messages, of which another copy may come
+LATE = 64  # a number at most this far before the newest belongs to an overtaken message
+REMEMBERED = 64  # recent messages to detect copies of
 TIME_WRAP = 1 << 32
-LONGEST_GAP_US = 60e6  # a step of the clock beyond that is a clock that began anew
-MISSING = 1.5  # intervals from one sample to the next, of which one more must be missing: a scheduler may be late
+LONGEST_GAP_US = 60e6  # a longer step is a restarted clock
+MISSING = 1.5  # intervals between samples above which one is missing: a scheduler may be late
 
 
 @dataclass(slots=True)
 class LinkCounter:
-    """Counts what one autopilot sends over one link: all its messages have one sequence number, modulo 256.
+    """The count of one autopilot's messages over one link: they share one sequence number, modulo 256.
 
-    A message that comes after a later one is of no use any more: it stays counted as lost.
+    A message that comes after a later one is useless: it remains counted as lost.
     """
 
     lost: int = 0
@@ -26,7 +26,7 @@ class LinkCounter:
     _recent: deque[bytes] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
 
     def is_new(self, sequence: int, frame: bytes) -> bool:
-        """Whether the message, the bytes of a whole frame, is neither a copy of another nor a late one."""
+        """Return whether a message, given as the bytes of its frame, is neither a copy nor late."""
         if frame in self._recent:
             self.doubled += 1
             return False
@@ -41,9 +41,13 @@ class LinkCounter:
 
 @dataclass(slots=True)
 class ImuCounter:
-    """Numbers the samples of one IMU from 0, those that are missing included, by the autopilot's own time.
+    """The numbers of one IMU's samples from 0, missing ones included, by the autopilot's own time.
 
-    `time_us` counts on where its 32 bits begin anew: those of milliseconds do after 49.7 days.
+    - `name`, `interval_us`: the sensor, and the nominal interval of its samples.
+    - `unit_us`: the unit of the autopilot's time.
+    - `repeated`: the count of messages without a new time.
+    - `number`, `time_us`: those of the last sample; the time is unwrapped beyond 32 bits (milliseconds wrap after 49.7
+      days).
     """
 
     name: str
@@ -55,13 +59,13 @@ class ImuCounter:
     _last: int = 0
 
     def count(self, time: int) -> bool:
-        """Whether a sample of that time is another than the one before. Raises SensorError `autopilot_restarted`."""
+        """Return whether a time belongs to a new sample. Raise SensorError `autopilot_restarted`."""
         if self.number < 0:
             self.number, self.time_us, self._last = 0, time * self.unit_us, time
             return True
         passed = time - self._last
         passed_us = (passed if passed >= 0 else passed % TIME_WRAP) * self.unit_us
-        if passed_us == 0:  # PX4 sends a reading again when only its compass has a new one
+        if passed_us == 0:  # PX4 repeats a reading if only its compass has a new one
             self.repeated += 1
             return False
         if passed_us > LONGEST_GAP_US:

@@ -1,4 +1,4 @@
-"""The library that knows MAVLink's messages, which an extra brings."""
+"""The library of MAVLink's messages, an optional dependency."""
 
 from typing import Any
 
@@ -6,11 +6,11 @@ from rig.errors.extras import missing_extra
 
 ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT of a heartbeat
 FIRMWARES = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
-ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED of its base_mode
+ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED in its base_mode
 
 
 def dialect() -> Any:
-    """The messages and the parser of MAVLink 2, ArduPilot's among them. Raises Refused `missing_extra`."""
+    """Return the module with messages and parser of MAVLink 2, ArduPilot's included. Raise Refused `missing_extra`."""
     try:
         from pymavlink.dialects.v20 import ardupilotmega
     except ImportError as error:

@@ -1,7 +1,7 @@
-"""Two sets of an autopilot's parameters, the old and the new: a file that restores them, and one while they change.
+"""Two sets of an autopilot's parameters, old and new: a file that restores them, and a journal during the change.
 
-The journal lies in a folder of the user's own, by the autopilot's number, from before the first parameter is written
-until all are read back. So whoever connects next, however the writing ended, hears of a set that is neither.
+The journal lies in the user's own folder, by the autopilot's number, from before the first write until all are read
+back. So the next connection, after any interruption, learns of a mixed set.
 """
 
 import json
@@ -21,51 +21,53 @@ SCHEMA = "rig.autopilot/1"
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
-    """Parameters of one autopilot as they were, `old`, and as they are to be, `new`; both hold the same names.
+class ParameterChange:
+    """The parameters of one autopilot before a change, `old`, and after it, `new`; both have the same names.
 
-    `place` is its number, or its port where it tells none. `kept` is the file that restores them.
+    `autopilot_id` is its number, or its port if it has none. `backup` is the file that restores them.
     """
 
-    place: str
+    autopilot_id: str
     firmware: int
     old: Mapping[str, Parameter]
     new: Mapping[str, Parameter]
-    kept: Path
+    backup: Path
 
     def state(self, parameters: Mapping[str, Parameter]) -> str:
-        """Which of them `parameters` are, bit by bit: "old", "new" or, where it is neither, "mixture"."""
-        fields = {name: each.field for name, each in parameters.items()}
-        for name, meant in (("new", self.new), ("old", self.old)):
-            if fields == {each: parameter.field for each, parameter in meant.items()}:
+        """Return which set `parameters` are, bit by bit: "old", "new" or, if neither, "mixture"."""
+        fields = {name: parameter.field for name, parameter in parameters.items()}
+        for name, expected in (("new", self.new), ("old", self.old)):
+            if fields == {key: parameter.field for key, parameter in expected.items()}:
                 return name
         return "mixture"
 
-    def written(self) -> str:
-        """The text of the file: four bytes of each value in hexadecimal, and what they mean for who reads it."""
+    def to_text(self) -> str:
+        """Return the text of the file: four bytes of each value in hexadecimal, and their values for readers."""
         sets = {
-            name: {each.name: {"type": each.type, "bytes": each.field.hex(), "value": each.value} for each in one}
-            for name, one in (("old", self.old.values()), ("new", self.new.values()))
+            name: {
+                entry.name: {"type": entry.type, "bytes": entry.field.hex(), "value": entry.value} for entry in group
+            }
+            for name, group in (("old", self.old.values()), ("new", self.new.values()))
         }
-        document = {"schema": SCHEMA, "autopilot": self.place, "firmware": self.firmware, "kept": str(self.kept)}
-        return json.dumps({**document, **sets}, indent=2) + "\n"
+        head = {"schema": SCHEMA, "autopilot": self.autopilot_id, "firmware": self.firmware, "kept": str(self.backup)}
+        return json.dumps({**head, **sets}, indent=2) + "\n"
 
     def keep(self) -> None:
-        """Write the file that restores them. Raises Refused `autopilot_not_kept`; one that is there is not replaced."""
+        """Write the file that restores them. Raise Refused `autopilot_not_kept`; an existing file is not replaced."""
         try:
-            _write(self.kept, self.written(), exclusive=True)
+            _write(self.backup, self.to_text(), exclusive=True)
         except OSError as error:
             raise Refused(
                 "autopilot_not_kept",
-                f"the old parameters cannot be kept in {self.kept}: {error.strerror or error}",
+                f"the old parameters cannot be kept in {self.backup}: {error.strerror or error}",
                 "Choose another file with --old; nothing was changed",
             ) from error
 
     def begin(self) -> None:
-        """Enter it in the journal. Raises Refused `autopilot_not_kept`."""
+        """Enter the change in the journal. Raise Refused `autopilot_not_kept`."""
         try:
             folder().mkdir(mode=0o700, parents=True, exist_ok=True)
-            _write(_journal(self.place), self.written(), exclusive=False)
+            _write(_journal_path(self.autopilot_id), self.to_text(), exclusive=False)
         except OSError as error:
             raise Refused(
                 "autopilot_not_kept",
@@ -74,27 +76,27 @@ class Change:
             ) from error
 
     def end(self) -> None:
-        """Take it out of the journal."""
+        """Remove the change from the journal."""
         with suppress(FileNotFoundError):
-            _journal(self.place).unlink()
+            _journal_path(self.autopilot_id).unlink()
 
 
-def begun(place: str) -> Change | None:
-    """The change of that autopilot that the journal holds. Raises Refused `not_an_autopilot_file`."""
-    path = _journal(place)
-    return change_in(path) if path.exists() else None
+def find_change(autopilot_id: str) -> ParameterChange | None:
+    """Return the autopilot's change in the journal, or None. Raise Refused `not_an_autopilot_file`."""
+    path = _journal_path(autopilot_id)
+    return read_change(path) if path.exists() else None
 
 
-def change_in(path: Path) -> Change:
-    """The change in a file. Raises Refused `not_an_autopilot_file`."""
+def read_change(path: Path) -> ParameterChange:
+    """Read the change in a file. Raise Refused `not_an_autopilot_file`."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         if document["schema"] != SCHEMA:
             raise ValueError(f"its schema is {document['schema']!r}")
-        old, new = (_parameters(document[name], int(document["firmware"])) for name in ("old", "new"))
+        old, new = (_read_parameters(document[name], int(document["firmware"])) for name in ("old", "new"))
         if old.keys() != new.keys() or not old:
             raise ValueError("its two sets have not the same names")
-        return Change(str(document["autopilot"]), int(document["firmware"]), old, new, Path(document["kept"]))
+        return ParameterChange(str(document["autopilot"]), int(document["firmware"]), old, new, Path(document["kept"]))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Refused(
             "not_an_autopilot_file",
@@ -104,25 +106,25 @@ def change_in(path: Path) -> Change:
 
 
 def folder() -> Path:
-    """Where the journals lie. Raises as `own_folder`."""
+    """Return the folder of the journals. Raise as `own_folder`."""
     return own_folder() / "autopilots"
 
 
-def _journal(place: str) -> Path:
-    return folder() / f"{sha256(place.encode()).hexdigest()[:32]}.json"
+def _journal_path(autopilot_id: str) -> Path:
+    return folder() / f"{sha256(autopilot_id.encode()).hexdigest()[:32]}.json"
 
 
-def _parameters(document: Mapping[str, Any], firmware: int) -> dict[str, Parameter]:
-    found = {name: Parameter(str(name), int(each["type"]), bytes.fromhex(each["bytes"]), firmware)
-             for name, each in document.items()}  # fmt: skip
-    for each in found.values():
-        if len(each.field) != 4 or not (each.type in WHOLE or each.type == REAL32):
-            raise ValueError(f"{each.name} is no parameter")
-    return found
+def _read_parameters(document: Mapping[str, Any], firmware: int) -> dict[str, Parameter]:
+    parameters = {name: Parameter(str(name), int(entry["type"]), bytes.fromhex(entry["bytes"]), firmware)
+             for name, entry in document.items()}  # fmt: skip
+    for parameter in parameters.values():
+        if len(parameter.field) != 4 or not (parameter.type in WHOLE or parameter.type == REAL32):
+            raise ValueError(f"{parameter.name} is no parameter")
+    return parameters
 
 
 def _write(path: Path, text: str, *, exclusive: bool) -> None:
-    """Whole or not at all, and on the disk when it returns."""
+    """Write a file atomically, and return when it is on the disk."""
     if exclusive and path.exists():
         raise FileExistsError(17, "there is such a file already")
     new = path.with_name(f".{path.name}.{os.getpid()}")
@@ -132,8 +134,8 @@ def _write(path: Path, text: str, *, exclusive: bool) -> None:
         os.fsync(file.fileno())
     new.replace(path)
     if os.name == "posix":
-        inside = os.open(path.parent, os.O_RDONLY)
+        directory = os.open(path.parent, os.O_RDONLY)
         try:
-            os.fsync(inside)
+            os.fsync(directory)
         finally:
-            os.close(inside)
+            os.close(directory)

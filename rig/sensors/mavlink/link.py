@@ -1,6 +1,6 @@
 """The host end of an autopilot's link: a thread that reads, a dialogue about parameters, a stream of IMU messages.
 
-The same link talks to an autopilot over a cable and to the simulated one: bytes on a port.
+The same link talks to an autopilot over a cable and to the simulated one, as bytes on a port.
 """
 
 import threading
@@ -12,9 +12,9 @@ from typing import Any
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.counting import LinkCounter
 from rig.sensors.mavlink.dialect import ARMED, FIRMWARES, dialect
-from rig.sensors.mavlink.parameters import Parameter, field_as_number, payload_field
+from rig.sensors.mavlink.parameters import Parameter, decode_float, extract_value
 from rig.sensors.mavlink.port import open_port
-from rig.sensors.own_port import Faults, OwnPort, closed_on_failure, opened
+from rig.sensors.own_port import OwnPort, PortFaults, closing_on_failure, open_device_port
 from rig.sensors.silence import USUAL, Patience
 
 HEARTBEAT_S = 1.0
@@ -25,13 +25,13 @@ AUTOPILOT_VERSION = 148
 ACCEPTED = 0  # MAV_RESULT
 _CABLE = "Check its supply and cable, and whether another program, such as a ground station, has the port"
 
-# Messages of pymavlink's in their order, whether none was lost since the one before, and when they were read.
+# Messages of pymavlink in their order, each with whether none was lost before it, and the time of the read.
 OnMessages = Callable[[list[tuple[Any, bool]], float], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Autopilot:
-    """Who answers: its number in MAVLink's network, its firmware (MAV_AUTOPILOT), its version, its own number."""
+    """An autopilot: its number in MAVLink's network, its firmware (MAV_AUTOPILOT), version, unique number."""
 
     system: int
     component: int
@@ -41,28 +41,22 @@ class Autopilot:
 
     @property
     def words(self) -> str:
-        """Firmware, version and number."""
+        """Firmware, version and number in a line of text."""
         return f"{FIRMWARES[self.firmware]} {self.version}, number {self.uid or 'unknown'}"
 
 
-class Link:
-    """An autopilot at a port, until `close`. `on_messages` gets what is in `wanted`, on the reader's thread.
+class AutopilotLink:
+    """An autopilot at a port, until `close`. `on_messages` gets the messages in `wanted`, on the reader's thread.
 
-    What goes wrong is a SensorError; all messages name `sensor`, as the configuration does.
+    Its errors are SensorErrors; their messages name `sensor`, as the configuration does.
     """
 
     def __init__(
-        self,
-        sensor: str,
-        port: str,
-        baud: int,
-        on_messages: OnMessages | None = None,
-        *,
-        patience: Patience = USUAL,
+        self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, *, patience: Patience = USUAL
     ) -> None:
-        """Opens the port, and waits for the heartbeat of an autopilot that is not armed.
+        """Open the port, and wait for the heartbeat of an autopilot that is not armed.
 
-        Raises SensorError: no_port, no_autopilot, mavlink_no_message, mavlink_other_device, autopilot_armed; Refused
+        Raise SensorError: no_port, no_autopilot, mavlink_no_message, mavlink_other_device, autopilot_armed; Refused
         `missing_extra`.
         """
         self._mavlink = dialect()
@@ -74,34 +68,34 @@ class Link:
         self.counter = LinkCounter()
         self.autopilot: Autopilot | None = None
         self.armed = False
-        self._bytes_seen = self._others_seen = 0
+        self._byte_count = self._other_count = 0
         self._parameters: dict[str, Parameter] = {}
         self._answers: dict[int, int] = {}
         self._version: Any = None
         self._sending = threading.Lock()
         self._beaten_s = 0.0
-        faults = Faults(
+        faults = PortFaults(
             closed=SensorError("mavlink_link_lost", f"{self._where}: the port closed", _CABLE),
             silent=SensorError("mavlink_link_lost", f"{self._where} has sent no reading", _CABLE),
             not_taken=SensorError("mavlink_not_taken", f"sensors.{sensor}", "See the run's log"),
         )
-        line = opened(port, baud, open_port, where=f"sensors.{sensor}: ", named_by="mavlink.port")
-        self.own_port = OwnPort(line, port, faults, self._take, patience=patience, farewell=self._as_before)
+        line = open_device_port(port, baud, open_port, owner=f"sensors.{sensor}: ", setting="mavlink.port")
+        self.own_port = OwnPort(line, port, faults, self._take, patience=patience, farewell=self._restore_intervals)
         self.own_port.begin()
-        with closed_on_failure(self.close):
+        with closing_on_failure(self.close):
             self._find()
 
     @property
-    def known(self) -> Autopilot:
+    def identity(self) -> Autopilot:
         """The autopilot that answers."""
         assert self.autopilot is not None, "there is none without a heartbeat"
         return self.autopilot
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
     def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, Parameter]:
-        """The parameters of those names that it has, asked anew; of `others` it may have none.
+        """Read the parameters of these names; `others` may be missing.
 
-        Raises SensorError `autopilot_silent` when it answers nothing at all.
+        Raise SensorError `autopilot_silent` if none is answered.
         """
         needed = set(needed)
         names = needed | set(others)
@@ -114,20 +108,20 @@ class Link:
             self.own_port.wait(lambda: names <= self._parameters.keys(), wait_s)
             if needed <= self._parameters.keys() and wait_s > 2 * self._patience.attempts()[0]:
                 break
-        found = {name: self._parameters[name] for name in names & self._parameters.keys()}
-        if not found:
+        parameters = {name: self._parameters[name] for name in names & self._parameters.keys()}
+        if not parameters:
             raise SensorError(
                 "autopilot_silent",
                 f"{self._where} sends, but answers no question for a parameter",
                 "Check the line to its receiver (RX), and that the port is not one that only sends",
             )
-        return found
+        return parameters
 
     def set_parameter(self, parameter: Parameter) -> Parameter:
-        """Set it to those four bytes, and what the autopilot answers. Raises SensorError `autopilot_not_set`."""
+        """Set a parameter to its four bytes and return the answer. Raise SensorError `autopilot_not_set`."""
         with self.own_port.news:
             self._parameters.pop(parameter.name, None)
-        value = field_as_number(parameter.field)
+        value = decode_float(parameter.field)
         for wait_s in self._patience.attempts():
             name = parameter.name.encode()
             self._send(self._mavlink.MAVLink_param_set_message(*self._address, name, value, parameter.type))
@@ -140,24 +134,24 @@ class Link:
         )
 
     def ask_for(self, message: str, interval_us: float) -> None:
-        """Have a message sent that often. Raises SensorError `autopilot_message_refused`."""
+        """Request a message at an interval in µs. Raise SensorError `autopilot_message_refused`."""
         number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
         answer = self._command(SET_INTERVAL, number, interval_us)
         if answer != ACCEPTED:
-            said = "nothing" if answer is None else f"result {answer}"
+            reply = "nothing" if answer is None else f"result {answer}"
             raise SensorError(
                 "autopilot_message_refused",
-                f"{self._where} answers {said} to the request for {message}",
+                f"{self._where} answers {reply} to the request for {message}",
                 "Choose another message with mavlink.imu: not every firmware has all of them",
             )
 
     def request(self, message: str) -> None:
-        """Have a message sent once, if the autopilot can do that."""
+        """Request a message once, if the autopilot supports that."""
         number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
         self._send(self._command_message(REQUEST_MESSAGE, number, 0.0))
 
     def identify(self) -> None:
-        """Ask for its version and its own number, which some do not tell."""
+        """Request its version and its unique number, which some do not report."""
         for wait_s in self._patience.attempts()[:2]:
             self._send(self._command_message(REQUEST_MESSAGE, AUTOPILOT_VERSION, 0.0))
             if self.own_port.wait(lambda: self._version is not None, wait_s):
@@ -165,12 +159,12 @@ class Link:
         if self._version is not None:
             version = self._version.flight_sw_version
             uid = bytes(self._version.uid2).strip(b"\0").hex() or f"{self._version.uid:016x}".strip("0")
-            said = f"{version >> 24}.{version >> 16 & 255}.{version >> 8 & 255}"
-            known = self.known
-            self.autopilot = Autopilot(known.system, known.component, known.firmware, said, uid)
+            version_text = f"{version >> 24}.{version >> 16 & 255}.{version >> 8 & 255}"
+            identity = self.identity
+            self.autopilot = Autopilot(identity.system, identity.component, identity.firmware, version_text, uid)
 
     def close(self) -> None:
-        """Lets messages come as often as they did before, and closes the port. May be called twice."""
+        """Restore the former message intervals, and close the port. May be called twice."""
         self.own_port.close()
 
     # -- inside ----------------------------------------------------------------------------------------------------
@@ -180,20 +174,20 @@ class Link:
 
     @property
     def _address(self) -> tuple[int, int]:
-        return self.known.system, self.known.component
+        return self.identity.system, self.identity.component
 
     def _find(self) -> None:
         if not self.own_port.wait(lambda: self.autopilot is not None, self._patience.first_s):
-            if self._others_seen:
+            if self._other_count:
                 raise SensorError(
                     "mavlink_other_device",
                     f"{self._where}: who speaks MAVLink there is neither ArduPilot nor PX4",
                     "Connect the autopilot itself, not a radio or a camera",
                 )
-            if self._bytes_seen:
+            if self._byte_count:
                 raise SensorError(
                     "mavlink_no_message",
-                    f"{self._bytes_seen} bytes came from {self._where} at {self._baud} Bd, and no message in them",
+                    f"{self._byte_count} bytes came from {self._where} at {self._baud} Bd, and no message in them",
                     "Set mavlink.baud to the speed of that port of the autopilot (SERIALn_BAUD, SER_TELn_BAUD), and "
                     "see that the port speaks MAVLink 2",
                 )
@@ -201,9 +195,9 @@ class Link:
                 "no_autopilot", f"{self._where}: nothing came within {self._patience.first_s:g} s", _CABLE
             )
         if self.armed:
-            raise self._armed()
+            raise self._describe_armed()
 
-    def _armed(self) -> SensorError:
+    def _describe_armed(self) -> SensorError:
         return SensorError(
             "autopilot_armed",
             f"{self._where} is armed: its motors may turn",
@@ -227,52 +221,52 @@ class Link:
             self.own_port.write(message.pack(self._parser))
             self._parser.seq = (self._parser.seq + 1) % 256
 
-    def _as_before(self) -> None:
+    def _restore_intervals(self) -> None:
         for message in self.wanted if self.autopilot is not None else ():
             number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
             self._send(self._command_message(SET_INTERVAL, number, 0.0))
 
     # -- the reader's thread ---------------------------------------------------------------------------------------
     def _beat(self) -> None:
-        """Tell the autopilot every second that somebody listens."""
+        """Send the heartbeat of a ground station every second."""
         if time.monotonic() - self._beaten_s > HEARTBEAT_S:
             self._beaten_s = time.monotonic()
             self._send(self._mavlink.MAVLink_heartbeat_message(GROUND_STATION, NO_AUTOPILOT, 0, 0, 4, 3))
 
     def _take(self, data: bytes, host_time_s: float) -> None:
         self._beat()
-        found: list[tuple[Any, bool]] = []
+        wanted_messages: list[tuple[Any, bool]] = []
         with self.own_port.news:
-            self._bytes_seen += len(data)
-            heard = False
+            self._byte_count += len(data)
+            has_message = False
             for message in (self._parser.parse_buffer(data) or []) if data else []:
-                if message.get_type() == "BAD_DATA" or not self._is_its(message):
+                if message.get_type() == "BAD_DATA" or not self._is_from_autopilot(message):
                     continue
-                heard, lost = True, self.counter.lost
+                has_message, lost = True, self.counter.lost
                 if not self.counter.is_new(message.get_seq(), bytes(message.get_msgbuf())):
                     continue
                 self._note(message)
                 if message.get_type() in self.wanted:
-                    found.append((message, self.counter.lost == lost))
-            # An autopilot that has restarted sends heartbeats, and nothing that it was asked for before.
-            self.own_port.silence.note(len(found) if self.own_port.streams else heard)
+                    wanted_messages.append((message, self.counter.lost == lost))
+            # A restarted autopilot sends heartbeats, but no longer the requested messages.
+            self.own_port.silence.note(len(wanted_messages) if self.own_port.streams else has_message)
             if self.armed and self.own_port.streams:
-                raise self._armed()
+                raise self._describe_armed()
             if data:
                 self.own_port.news.notify_all()
-        if found and self._on_messages is not None:
-            self._on_messages(found, host_time_s)
+        if wanted_messages and self._on_messages is not None:
+            self._on_messages(wanted_messages, host_time_s)
             with self.own_port.news:
                 self.own_port.news.notify_all()
 
-    def _is_its(self, message: Any) -> bool:
-        """Whether the autopilot sent it; the first heartbeat of one says which it is."""
+    def _is_from_autopilot(self, message: Any) -> bool:
+        """Return whether the autopilot sent a message; the first heartbeat of an autopilot selects it."""
         source = (message.get_srcSystem(), message.get_srcComponent())
         if self.autopilot is None and message.get_type() == "HEARTBEAT":
             if message.autopilot in FIRMWARES:
                 self.autopilot = Autopilot(*source, message.autopilot)
             else:
-                self._others_seen += 1
+                self._other_count += 1
         return self.autopilot is not None and source == self._address
 
     def _note(self, message: Any) -> None:
@@ -281,8 +275,8 @@ class Link:
                 self.armed = bool(message.base_mode & ARMED)
             case "PARAM_VALUE":
                 name = message.param_id
-                field = payload_field(bytes(message.get_msgbuf()))
-                self._parameters[name] = Parameter(name, message.param_type, field, self.known.firmware)
+                field = extract_value(bytes(message.get_msgbuf()))
+                self._parameters[name] = Parameter(name, message.param_type, field, self.identity.firmware)
             case "COMMAND_ACK":
                 self._answers[message.command] = message.result
             case "AUTOPILOT_VERSION":

@@ -1,4 +1,4 @@
-"""How a board sits in its vehicle, by the number that both firmwares give it (MAV_SENSOR_ORIENTATION). Pure."""
+"""A board's orientation in its vehicle, by the number in both firmwares (MAV_SENSOR_ORIENTATION). Pure."""
 
 from functools import cache
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-# Roll, pitch, yaw in degrees of those that are made of right angles, by the numbers of MAV_SENSOR_ORIENTATION, which
+# Roll, pitch, yaw in degrees of the orientations with right angles, by the numbers of MAV_SENSOR_ORIENTATION, which
 # ArduPilot (AP_Math/rotations.h) and PX4 (lib/conversion/rotation.h) share.
 RIGHT_ANGLES = {
     0: (0, 0, 0), 2: (0, 0, 90), 4: (0, 0, 180), 6: (0, 0, 270), 8: (180, 0, 0), 10: (180, 0, 90), 12: (0, 180, 0),
@@ -18,13 +18,13 @@ RIGHT_ANGLES = {
 
 
 @cache
-def signed_axes(number: float) -> Array | None:
-    """(3, 3) rotation from the board's axes to the vehicle's, a row with one 1 or -1 each; None for any other."""
+def board_rotation(number: float) -> Array | None:
+    """Return the (3, 3) rotation from the board's axes to the vehicle's, of entries 0 and ±1; None for other angles."""
     angles = RIGHT_ANGLES.get(int(number)) if number == int(number) else None
     if angles is None:
         return None
     roll, pitch, yaw = np.radians(angles)
-    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(each), np.sin(each)) for each in (roll, pitch, yaw))
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle_rad), np.sin(angle_rad)) for angle_rad in (roll, pitch, yaw))
     about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
     about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
     about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])

@@ -1,7 +1,7 @@
-"""A parameter's value as it comes and goes: four bytes, whose meaning the two firmwares see differently. Pure.
+"""A parameter's value in transfer: four bytes, which the two firmwares interpret differently. Pure.
 
-The field is a float. ArduPilot casts whole numbers to one (GCS_Param.cpp, `cast_to_float`); PX4 copies their four bytes
-into it (mavlink_parameters.cpp, "MAVLink encodes float and int params in the same space").
+The field is a float. ArduPilot casts integers to one (GCS_Param.cpp, `cast_to_float`); PX4 copies their four bytes into
+it (mavlink_parameters.cpp, "MAVLink encodes float and int params in the same space").
 """
 
 import struct
@@ -16,7 +16,7 @@ SINGLE = struct.Struct("<f")
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A parameter of an autopilot: its type and the four bytes of its value as they were sent."""
+    """A parameter of an autopilot: its type and the four bytes of its value as sent."""
 
     name: str
     type: int
@@ -25,7 +25,7 @@ class Parameter:
 
     @property
     def value(self) -> float:
-        """What the four bytes mean. Raises ValueError of a type that nobody sends in four."""
+        """The value of the four bytes. Raises ValueError for a type that does not fit four bytes."""
         if self.type in WHOLE and self.firmware == PX4:
             code = WHOLE[self.type]
             return float(struct.unpack_from(f"<{code}", self.field)[0])
@@ -34,17 +34,17 @@ class Parameter:
         raise ValueError(f"{self.name} is of type {self.type}, which four bytes cannot hold")
 
 
-def field_of(value: float) -> bytes:
-    """The four bytes of a value in single precision, as a parameter of type REAL32 has them."""
+def encode_value(value: float) -> bytes:
+    """Return the four bytes of a value in single precision, as in a parameter of type REAL32."""
     return SINGLE.pack(value)
 
 
-def field_as_number(field: bytes) -> float:
-    """The float that pymavlink makes those four bytes of."""
+def decode_float(field: bytes) -> float:
+    """Return the float that pymavlink decodes from those four bytes."""
     return float(SINGLE.unpack(field)[0])
 
 
-def payload_field(frame: bytes) -> bytes:
-    """The four bytes of the value in the frame of a PARAM_VALUE, which begins with them after the header."""
+def extract_value(frame: bytes) -> bytes:
+    """Return the four bytes of the value in the frame of a PARAM_VALUE, which follow its header."""
     begin = 10 if frame[0] == 0xFD else 6
     return frame[begin : begin + 4]

@@ -1,17 +1,17 @@
-"""Bytes to and from an autopilot: over a serial port, a TCP connection, or datagrams that it sends to this computer."""
+"""The port to an autopilot: a serial port, a TCP connection, or datagrams that it sends to this computer."""
 
 import socket
 import time
 from contextlib import suppress
 
 from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort
-from rig.sensors.own_port import Port
+from rig.sensors.own_port import DevicePort
 
 DATAGRAM_BYTES = 65536
 
 
-def open_port(port: str, baud: int) -> Port:
-    """The port at `tcp:host:port`, `udp:host:port`, or a serial port's name. Raises OSError."""
+def open_port(port: str, baud: int) -> DevicePort:
+    """Open the port at `tcp:host:port`, `udp:host:port`, or a serial port's name. Raise OSError."""
     kind, _, address = port.partition(":")
     if kind == "udp":
         host, _, number = address.rpartition(":")
@@ -20,7 +20,7 @@ def open_port(port: str, baud: int) -> Port:
 
 
 class UdpPort:
-    """Datagrams that come to an address of this computer; answers go to who sent the first one."""
+    """Datagrams to an address of this computer; answers go to the sender of the first one."""
 
     def __init__(self, host: str, port: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -33,21 +33,21 @@ class UdpPort:
             raise
 
     def read(self) -> bytes:
-        """What came within `READ_TIMEOUT_S`, from one sender."""
+        """Return the data received within `READ_TIMEOUT_S`, from one sender."""
         time.sleep(READ_TIMEOUT_S)
-        found = bytearray()
+        received = bytearray()
         with suppress(BlockingIOError, ConnectionRefusedError):
             while True:
                 data, sender = self._socket.recvfrom(DATAGRAM_BYTES)
                 self._peer = self._peer or sender
                 if sender == self._peer:
-                    found += data
-        return bytes(found)
+                    received += data
+        return bytes(received)
 
     def write(self, data: bytes) -> None:
-        """Send, once somebody has sent something."""
+        """Send, once a sender is known."""
         if self._peer is not None:
-            with suppress(BlockingIOError, ConnectionRefusedError):  # nobody listens just now: silence says so
+            with suppress(BlockingIOError, ConnectionRefusedError):  # no receiver at the moment: the silence shows it
                 self._socket.sendto(data, self._peer)
 
     def close(self) -> None:

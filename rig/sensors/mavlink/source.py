@@ -1,4 +1,4 @@
-"""The configured IMUs of one autopilot as a source of samples: rates asked for, corrections undone."""
+"""The configured IMUs of one autopilot as a source of samples: rates requested, corrections undone."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import closing
@@ -16,34 +16,43 @@ from rig.data.recording.channel import Channel, of_thermometer, stamped
 from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
-from rig.sensors.mavlink.corrections import Correction, correction_of, delay_s, names_of, refusals
+from rig.sensors.mavlink.corrections import OnboardCorrection, delay_s, parameter_names, read_correction, refusals
 from rig.sensors.mavlink.counting import ImuCounter
-from rig.sensors.mavlink.link import Link
-from rig.sensors.mavlink.readings import CUT_STEPS, INT16_MAX, MILLI, UNIT_US, Field, Reading, is_cut, reading_of
-from rig.sensors.mavlink.writing import unfinished
-from rig.sensors.own_port import closed_on_failure
+from rig.sensors.mavlink.link import AutopilotLink
+from rig.sensors.mavlink.readings import (
+    CUT_STEPS,
+    INT16_MAX,
+    MILLI,
+    UNIT_US,
+    Field,
+    Reading,
+    decode_reading,
+    is_integer,
+)
+from rig.sensors.mavlink.writing import find_unfinished_change
+from rig.sensors.own_port import closing_on_failure
 from rig.sensors.scales import DEGREES_PER_COUNT, fine_axes, thermometer_channels
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 from rig.sensors.thermometer import Thermometer
 
-RATE_LOOK = 40  # messages by which the rate is judged
+RATE_LOOK = 40  # messages for judging the rate
 RATE_WAIT_S = 20.0
 RATE_TOLERANCE = 0.05
-ASKED_FOR, ASKED_S = 10, 2.0  # messages that a look asks for one by one, and how long it waits for them
-WIDEST = 0.98  # of what 16 bits hold, where undoing a correction may have shifted the end of the scale
+ASKED_FOR, ASKED_S = 10, 2.0  # messages that a look requests one by one, and its wait for them
+WIDEST = 0.98  # fraction of the 16-bit range, because undoing a correction may shift the end of the scale
 
 
-class _Imu:
+class _ImuStream:
     """One configured IMU of the stream: its correction, its numbers, the intervals of its first messages.
 
-    `without_reading` counts the messages that hold no new rate, or no new force where that is recorded.
+    `without_reading` counts the messages without a new rate, or without a new force if that is recorded.
     """
 
     def __init__(self, name: str, section: SensorSection) -> None:
-        self.name, self.section, self.line = name, section, line_of(section)
-        self.described = describe(name, section)
-        self.correction = Correction()
+        self.name, self.section, self.line = name, section, mavlink_section(section)
+        self.description = describe(name, section)
+        self.correction = OnboardCorrection()
         self.counter = ImuCounter(name, 1e6 / section.rate_hz, UNIT_US[self.line.imu])
         self.thermometer = Thermometer(f"sensors.{name}: the autopilot at {self.line.port}", section.rate_hz)
         self.intervals_us: list[int] = []
@@ -55,17 +64,17 @@ class _Imu:
         return self.section.acceleration is not None
 
     @property
-    def looked_at(self) -> bool:
+    def has_enough_messages(self) -> bool:
         """Whether enough messages came to judge them."""
         return max(len(self.intervals_us), self.without_reading) >= RATE_LOOK
 
     def settle(self) -> None:
-        """Describe the samples by what the first messages have provided."""
-        self.described = describe(self.name, self.section, provides_temperature=self.thermometer.provides)
+        """Describe the samples by the fields that the first messages provided."""
+        self.description = describe(self.name, self.section, provides_temperature=self.thermometer.provides)
 
-    def take(self, message: Any, *, whole: bool) -> tuple[int, int, Reading] | None:
-        """Number, time and reading; None of a copy. `whole`: none was lost since the message before."""
-        reading = reading_of(message)
+    def take(self, message: Any, *, is_consecutive: bool) -> tuple[int, int, Reading] | None:
+        """Return number, time and reading of a message; None for a copy. `is_consecutive`: none was lost before it."""
+        reading = decode_reading(message)
         if not self.thermometer.provides:
             self.thermometer.last_c = reading.temperature_c
         if not self._needed <= reading.provided:
@@ -74,83 +83,85 @@ class _Imu:
         before_us, first = self.counter.time_us, self.counter.number < 0
         if not self.counter.count(reading.time):
             return None
-        if whole and not first and len(self.intervals_us) < RATE_LOOK:
+        if is_consecutive and not first and len(self.intervals_us) < RATE_LOOK:
             self.intervals_us.append(self.counter.time_us - before_us)
         return self.counter.number, self.counter.time_us, reading
 
-    def samples(self, taken: list[tuple[int, int, Reading]], first: int, host_time_s: float) -> NDArray[Any]:
-        """Samples of the readings, numbered from the number `first`."""
-        numbers, times_us, readings = zip(*taken, strict=True)
-        samples = stamped(self.described.sample_dtype, np.array(numbers) - first, np.array(times_us), host_time_s)
-        if self.thermometer.provides and self.described.measures(TEMPERATURE):
-            temperatures_c = self.thermometer.read(np.array([each.temperature_c for each in readings]))
-            self.described.channel(TEMPERATURE).fill(samples, temperatures_c)
-        rates = self.correction.raw_rate(np.array([each.rate_rad_s for each in readings]))
-        self.described.channel(RATE).fill(samples, rates)
-        if self.described.measures(ACCELERATION):
-            forces = self.correction.raw_force(np.array([each.force_m_s2 for each in readings]))
-            self.described.channel(ACCELERATION).fill(samples, forces)
+    def samples(self, numbered: list[tuple[int, int, Reading]], first: int, host_time_s: float) -> NDArray[Any]:
+        """Return the samples of the readings, numbered from `first`."""
+        numbers, times_us, readings = zip(*numbered, strict=True)
+        samples = stamped(self.description.sample_dtype, np.array(numbers) - first, np.array(times_us), host_time_s)
+        if self.thermometer.provides and self.description.measures(TEMPERATURE):
+            temperatures_c = self.thermometer.read(np.array([reading.temperature_c for reading in readings]))
+            self.description.channel(TEMPERATURE).fill(samples, temperatures_c)
+        rates = self.correction.raw_rate(np.array([reading.rate_rad_s for reading in readings]))
+        self.description.channel(RATE).fill(samples, rates)
+        if self.description.measures(ACCELERATION):
+            forces = self.correction.raw_force(np.array([reading.force_m_s2 for reading in readings]))
+            self.description.channel(ACCELERATION).fill(samples, forces)
         return samples
 
 
 class MavlinkSource:
-    """The autopilot's configured IMUs, set up: parameters read, rates asked for and seen to come."""
+    """The autopilot's configured IMUs, set up: parameters read, rates requested and confirmed."""
 
     def __init__(
         self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
     ) -> None:
-        """Raises SensorError as `Link` and `refusals`; autopilot_other_uid, autopilot_several_imus, autopilot_rate."""
+        """Connect and set up. Raise SensorError as link and `refusals`, autopilot_rate, _other_uid, _several_imus."""
         self._on_samples = on_samples
-        self._imus: dict[str, _Imu] = {line_of(section).imu: _Imu(name, section) for name, section in sections.items()}
+        self._imus: dict[str, _ImuStream] = {
+            mavlink_section(section).imu: _ImuStream(name, section) for name, section in sections.items()
+        }
         self._first: dict[str, int] = {}
         (name, section), *_ = sections.items()
-        line = line_of(section)
-        self.link = Link(name, line.port, line.baud, self._take, patience=patience)
-        with closed_on_failure(self.close):
+        line = mavlink_section(section)
+        self.link = AutopilotLink(name, line.port, line.baud, self._take, patience=patience)
+        with closing_on_failure(self.close):
             self.link.identify()
-            for refusal in (*unfinished(self.link), *self._judge()):
+            for refusal in (*find_unfinished_change(self.link), *self._judge()):
                 raise refusal
             self.link.wanted = frozenset(self._imus)
             for message, imu in self._imus.items():
                 self.link.ask_for(message, imu.counter.interval_us)
-            self._see_rates()
+            self._confirm_rates()
             for imu in self._imus.values():
                 imu.settle()
 
     @property
     def corrected(self) -> Mapping[str, str]:
-        """Settings that were changed: none, to read an autopilot."""
+        """The settings that were changed: none, to read an autopilot."""
         return {}
 
     @property
     def sensors(self) -> Mapping[str, RecordedSensor]:
         """The configured IMUs by name."""
-        return {imu.name: imu.described for imu in self._imus.values()}
+        return {imu.name: imu.description for imu in self._imus.values()}
 
     def start(self) -> None:
-        """Start to hand samples on, as of `SampleSource`."""
+        """Start to pass samples to the consumer."""
         self.link.own_port.stream()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the autopilot, as of `SampleSource`. Raises SensorError as `OwnPort.check`, and `autopilot_armed`."""
+        """Raise errors of the meantime: SensorError as `OwnPort.check`, and `autopilot_armed`."""
         self.link.own_port.check(clock_s)
 
     def close(self) -> None:
-        """Ends the thread and closes the port."""
+        """End the thread and close the port."""
         self.link.close()
 
     def _judge(self) -> Iterator[SensorError]:
         for imu in self._imus.values():
-            found, problems = judged(self.link, imu.name, imu.section)
+            values, problems = check_parameters(self.link, imu.name, imu.section)
             yield from problems
             if not problems:
-                imu.correction = correction_of(names_of(self.link.known.firmware, imu.line), found)
+                imu.correction = read_correction(parameter_names(self.link.identity.firmware, imu.line), values)
 
-    def _see_rates(self) -> None:
+    def _confirm_rates(self) -> None:
         imus = self._imus.values()
-        self.link.own_port.wait(lambda: all(imu.looked_at for imu in imus), RATE_WAIT_S)
+        self.link.own_port.wait(lambda: all(imu.has_enough_messages for imu in imus), RATE_WAIT_S)
         for imu in imus:
-            asked_hz, intervals_us = imu.section.rate_hz, imu.intervals_us[1:]
+            requested_hz, intervals_us = imu.section.rate_hz, imu.intervals_us[1:]
             if imu.without_reading > imu.counter.number:
                 raise SensorError(
                     "autopilot_no_reading",
@@ -158,48 +169,50 @@ class MavlinkSource:
                     f"{imu.without_reading} of {imu.without_reading + max(imu.counter.number, 0)} messages",
                     "Lower rate_hz, or choose another message with mavlink.imu",
                 )
-            came_hz = 1e6 * len(intervals_us) / sum(intervals_us) if intervals_us else 0.0
-            if abs(came_hz / asked_hz - 1.0) > RATE_TOLERANCE:
+            measured_hz = 1e6 * len(intervals_us) / sum(intervals_us) if intervals_us else 0.0
+            if abs(measured_hz / requested_hz - 1.0) > RATE_TOLERANCE:
                 raise SensorError(
                     "autopilot_rate",
-                    f"sensors.{imu.name}: {imu.line.imu} was asked for {asked_hz:g} times a second and comes "
-                    f"{came_hz:.1f} times",
+                    f"sensors.{imu.name}: {imu.line.imu} was asked for {requested_hz:g} times a second and comes "
+                    f"{measured_hz:.1f} times",
                     "Lower rate_hz: the autopilot sends no faster than its main loop and its line allow",
                 )
 
     def _take(self, messages: list[tuple[Any, bool]], host_time_s: float) -> None:
-        """Hand over samples of each IMU, on the reader's thread; before the start only the rates are seen."""
-        taken: dict[str, list[tuple[int, int, Reading]]] = {}
-        for message, whole in messages:
+        """Pass on the samples of each IMU, on the reader's thread; before the start only judge the rates."""
+        readings: dict[str, list[tuple[int, int, Reading]]] = {}
+        for message, is_consecutive in messages:
             kind = message.get_type()
-            found = self._imus[kind].take(message, whole=whole)
-            if found is not None and self.link.own_port.streams:
-                self._first.setdefault(kind, found[0])
-                taken.setdefault(kind, []).append(found)
-        for kind, each in taken.items():
+            numbered_reading = self._imus[kind].take(message, is_consecutive=is_consecutive)
+            if numbered_reading is not None and self.link.own_port.streams:
+                self._first.setdefault(kind, numbered_reading[0])
+                readings.setdefault(kind, []).append(numbered_reading)
+        for kind, imu_readings in readings.items():
             imu = self._imus[kind]
-            self._on_samples(imu.name, imu.samples(each, self._first[kind], host_time_s))
+            self._on_samples(imu.name, imu.samples(imu_readings, self._first[kind], host_time_s))
 
 
-def judged(link: Link, name: str, section: SensorSection) -> tuple[Mapping[str, float], list[SensorError]]:
-    """The parameters' values of the configured IMU, and what speaks against reading it."""
-    line = line_of(section)
-    known = link.known
-    names = names_of(known.firmware, line)
-    several = names.others if line.imu == "HIGHRES_IMU" else ()
-    asked = link.parameters(names.needed, [*names.off, *several])
-    found = {each: parameter.value for each, parameter in asked.items()}
-    problems = list(refusals(f"sensors.{name}", names, found))
-    if line.uid is not None and known.uid != line.uid:
+def check_parameters(
+    link: AutopilotLink, name: str, section: SensorSection
+) -> tuple[Mapping[str, float], list[SensorError]]:
+    """Return the parameter values of the configured IMU, and the problems of reading it."""
+    line = mavlink_section(section)
+    identity = link.identity
+    names = parameter_names(identity.firmware, line)
+    further_imus = names.others if line.imu == "HIGHRES_IMU" else ()
+    parameters = link.parameters(names.needed, [*names.must_be_zero, *further_imus])
+    values = {parameter_name: parameter.value for parameter_name, parameter in parameters.items()}
+    problems = list(refusals(f"sensors.{name}", names, values))
+    if line.uid is not None and identity.uid != line.uid:
         problems.append(
             SensorError(
                 "autopilot_other_uid",
-                f"sensors.{name}: the autopilot at {line.port} has the number {known.uid or 'unknown'}, the "
+                f"sensors.{name}: the autopilot at {line.port} has the number {identity.uid or 'unknown'}, the "
                 f"configuration says {line.uid}",
                 "Correct mavlink.uid in the configuration, or connect that autopilot",
             )
         )
-    if any(found.get(each, 0.0) for each in several):
+    if any(values.get(parameter_name, 0.0) for parameter_name in further_imus):
         problems.append(
             SensorError(
                 "autopilot_several_imus",
@@ -207,19 +220,19 @@ def judged(link: Link, name: str, section: SensorSection) -> tuple[Mapping[str, 
                 "Read them by SCALED_IMU, SCALED_IMU2 and SCALED_IMU3",
             )
         )
-    return found, problems
+    return values, problems
 
 
 def describe(name: str, section: SensorSection, *, provides_temperature: bool = True) -> RecordedSensor:
-    """What a reader of its samples must know; without a connection a temperature counts as provided."""
-    cut = is_cut(line_of(section).imu)
-    stated = line_of(section).temperature
+    """Return the description of its samples for a recording; without a connection a temperature counts as provided."""
+    integer = is_integer(mavlink_section(section).imu)
+    stated = mavlink_section(section).temperature
     channels = [
-        _channel(RATE, radians(section.range_deg_s), MILLI if cut else None),
+        _channel(RATE, radians(section.range_deg_s), MILLI if integer else None),
         *thermometer_channels(of_thermometer(DEGREES_PER_COUNT, 0.0) if provides_temperature else None, stated),
     ]
     if section.acceleration is not None:
-        step = MILLI * STANDARD_GRAVITY_M_S2 if cut else None
+        step = MILLI * STANDARD_GRAVITY_M_S2 if integer else None
         channels.append(_channel(ACCELERATION, range_m_s2(section.acceleration), step))
     return recorded_as(section, *channels, clock=name)
 
@@ -227,44 +240,44 @@ def describe(name: str, section: SensorSection, *, provides_temperature: bool = 
 def mavlink(
     sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
 ) -> closing[MavlinkSource]:
-    """The IMUs at one port for the length of the `with` block. Raises SensorError as `MavlinkSource`."""
+    """Return the source of the IMUs at one port as a context manager. Raise SensorError as `MavlinkSource`."""
     return closing(MavlinkSource(sections, on_samples, patience=patience))
 
 
 def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
-    """What there is and what is wrong with it; nothing is changed. Raises SensorError as `Link`."""
+    """Yield the autopilot's state and its problems; nothing is changed. Raise SensorError as `AutopilotLink`."""
     (first, section), *_ = sections.items()
-    line = line_of(section)
-    heard: list[Any] = []
+    line = mavlink_section(section)
+    messages: list[Any] = []
 
-    def hear(messages: list[tuple[Any, bool]], _: float) -> None:
-        heard.extend(message for message, _ in messages)
+    def collect(new_messages: list[tuple[Any, bool]], _: float) -> None:
+        messages.extend(message for message, _ in new_messages)
 
-    with closing(Link(first, line.port, line.baud, hear)) as link:
+    with closing(AutopilotLink(first, line.port, line.baud, collect)) as link:
         link.identify()
-        yield f"{link.known.words}, at {line.port}"
-        yield from unfinished(link)
-        for name, each in sections.items():
-            names = names_of(link.known.firmware, line_of(each))
-            found, problems = judged(link, name, each)
+        yield f"{link.identity.words}, at {line.port}"
+        yield from find_unfinished_change(link)
+        for name, imu_section in sections.items():
+            names = parameter_names(link.identity.firmware, mavlink_section(imu_section))
+            values, problems = check_parameters(link, name, imu_section)
             yield from problems
             if not problems:
-                yield from _of_the_temperature(name, each, link, heard)
-                undone = [f"{each}: {found[each]:g}" for each in names.needed if each in found]
-                yield f"{name}: {line_of(each).imu}; undone: {', '.join(undone)}"
-                yield f"{name}: the low-pass delays rates by {1e3 * delay_s(names, found):.1f} ms"
+                yield from _describe_temperature(name, imu_section, link, messages)
+                undone = [f"{parameter}: {values[parameter]:g}" for parameter in names.needed if parameter in values]
+                yield f"{name}: {mavlink_section(imu_section).imu}; undone: {', '.join(undone)}"
+                yield f"{name}: the low-pass delays rates by {1e3 * delay_s(names, values):.1f} ms"
 
 
-def _of_the_temperature(name: str, section: SensorSection, link: Link, heard: list[Any]) -> Iterator[str]:
-    """How the temperature is known, unless the first messages that it is asked for provide one."""
-    line = line_of(section)
+def _describe_temperature(name: str, section: SensorSection, link: AutopilotLink, messages: list[Any]) -> Iterator[str]:
+    """Yield a sentence on the source of the temperature, unless the first messages provide one."""
+    line = mavlink_section(section)
     link.wanted = (line.imu,)
     for _ in range(ASKED_FOR):
         link.request(line.imu)
-    came = link.own_port.wait(lambda: sum(each.get_type() == line.imu for each in heard) >= ASKED_FOR, ASKED_S)
-    link.wanted = ()  # nothing was changed that is to be as before
-    readings = [reading_of(each) for each in heard if each.get_type() == line.imu]
-    if not came or any("temperature" in reading.provided for reading in readings):
+    done = link.own_port.wait(lambda: sum(message.get_type() == line.imu for message in messages) >= ASKED_FOR, ASKED_S)
+    link.wanted = ()  # no interval was changed, so none has to be restored
+    readings = [decode_reading(message) for message in messages if message.get_type() == line.imu]
+    if not done or any("temperature" in reading.provided for reading in readings):
         return
     stated = line.temperature
     yield f"{name}: {line.imu} provides no temperature" + (
@@ -274,15 +287,15 @@ def _of_the_temperature(name: str, section: SensorSection, link: Link, heard: li
     )
 
 
-def line_of(section: SensorSection) -> MavlinkSection:
-    """The section that says which IMU it is."""
+def mavlink_section(section: SensorSection) -> MavlinkSection:
+    """Return the section that selects the IMU. Raise ValueError if there is none."""
     if section.mavlink is None:
         raise ValueError("the configuration lets no IMU of an autopilot pass without its section")
     return section.mavlink
 
 
 def _channel(quantity: Quantity, end_of_scale: float, sent: float | None) -> Channel:
-    """The channel of three axes; `sent` is the unit of the whole numbers that are sent, None where none are."""
+    """Return the channel of three axes; `sent` is the unit of the integers that are sent, None for floats."""
     channel = fine_axes(quantity, end_of_scale)
     if sent is None:
         return channel

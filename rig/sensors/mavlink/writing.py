@@ -1,54 +1,55 @@
-"""Changes parameters of an autopilot: entered in the journal first, then written one by one, then read back."""
+"""Changes of an autopilot's parameters: entered in the journal, written one by one, read back."""
 
 from collections.abc import Iterator, Mapping
 
 from rig.sensors.errors import SensorError
-from rig.sensors.mavlink.journal import Change, begun
-from rig.sensors.mavlink.link import Link
+from rig.sensors.mavlink.journal import ParameterChange, find_change
+from rig.sensors.mavlink.link import AutopilotLink
 from rig.sensors.mavlink.parameters import Parameter
 
 
-def place_of(link: Link) -> str:
-    """The mark by which an autopilot is known again: its own number, its port where it tells none."""
-    return link.known.uid or link.port
+def autopilot_id(link: AutopilotLink) -> str:
+    """Return the mark that identifies an autopilot: its unique number, or its port if it has none."""
+    return link.identity.uid or link.port
 
 
-def change(link: Link, planned: Change, to: Mapping[str, Parameter]) -> None:
-    """Bring an autopilot to one of the two sets of a change.
+def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, Parameter]) -> None:
+    """Bring an autopilot to one of the two sets of a change, `target`.
 
-    Raises SensorError as `Link.set_parameter`, and `autopilot_not_stored` where it reads back something else; then and
-    after any other end the journal still tells of it. Raises Refused as `Change.begin`.
+    Raise SensorError as `AutopilotLink.set_parameter`, and `autopilot_not_stored` if it reads back another value; after
+    any such end the journal still holds the change. Raise Refused as `ParameterChange.begin`.
     """
     planned.begin()
-    for parameter in to.values():
+    for parameter in target.values():
         link.set_parameter(parameter)
-    found = link.parameters(to)
-    wrong = [name for name, each in to.items() if name not in found or found[name].field != each.field]
+    actual = link.parameters(target)
+    wrong = [name for name, parameter in target.items() if name not in actual or actual[name].field != parameter.field]
     if wrong:
         raise SensorError(
             "autopilot_not_stored",
             f"the autopilot at {link.port} reads back other values than were written of {', '.join(wrong)}",
-            f"Restore the old ones: rig autopilot restore CONFIG {planned.kept}",
+            f"Restore the old ones: rig autopilot restore CONFIG {planned.backup}",
         )
     planned.end()
 
 
-def unfinished(link: Link) -> Iterator[SensorError]:
-    """A change of this autopilot that was begun and left between the sets, `autopilot_mixture`.
+def find_unfinished_change(link: AutopilotLink) -> Iterator[SensorError]:
+    """Yield the error `autopilot_mixture` if a change of this autopilot stopped between the sets.
 
-    One that ended before the first parameter or after the last is taken out of the journal. Raises Refused as `begun`.
+    Remove one from the journal that stopped before the first parameter or after the last. Raise as `find_change`.
     """
-    left = begun(place_of(link))
-    if left is None:
+    begun = find_change(autopilot_id(link))
+    if begun is None:
         return
-    found = link.parameters(left.old)
-    if left.state(found) != "mixture":
-        left.end()
+    values = link.parameters(begun.old)
+    if begun.state(values) != "mixture":
+        begun.end()
         return
-    new = [name for name, each in left.new.items() if name in found and found[name].field == each.field]
+    new = [name for name, parameter in begun.new.items() if name in values and values[name].field == parameter.field]
     yield SensorError(
         "autopilot_mixture",
         f"the autopilot at {link.port} holds a mixture: writing its parameters was broken off after {len(new)} of "
-        f"{len(left.new)}",
-        f"Bring it to the old ones: rig autopilot restore CONFIG {left.kept}, or to the new ones: the same with --new",
+        f"{len(begun.new)}",
+        f"Bring it to the old ones: rig autopilot restore CONFIG {begun.backup}, or to the new ones: the "
+        "same with --new",
     )

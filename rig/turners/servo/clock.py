@@ -23,8 +23,7 @@ class Clock(Protocol):
 
 
 class HostClock:
-    """The host's clock. Its stamps come from the raw monotonic clock, which is never slewed or set, if the system has
-    one.
+    """The host's clock, with stamps of the raw monotonic clock, which is never slewed or set, if the system has one.
 
     The servo's clock (Realtime Tick) does not serve: it counts milliseconds of an oscillator with 1 % tolerance.
     """

@@ -42,8 +42,7 @@ def _nothing() -> None:
 
 
 class Servo:
-    """The servo `servo_id` at `port`, a context manager that receives states from its entry and leaves the shaft at
-    rest.
+    """The servo `servo_id` at `port`, a context manager that receives from its entry and leaves the shaft at rest.
 
     `model` is the configured one (`rig.turners.servo.models`). `on_state` gets every state in order, from a thread of
     this class, and must not wait: a servo without traffic for `watchdog_s` stops. After a failure of the servo or its
@@ -220,9 +219,7 @@ class Servo:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        is_reported = self._problem is not None and isinstance(
-            error, RigError
-        )  # the servo's own problems include the stop's outcome
+        is_reported = self._problem is not None and isinstance(error, RigError)  # with the outcome of the stop
         if error is not None and not is_reported:
             tell_of_stop(error, self.stop)
         self.close()

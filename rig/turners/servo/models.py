@@ -22,9 +22,7 @@ LOAD_FRACTION = 0.2
 
 @dataclass(frozen=True, slots=True)
 class ServoModel:
-    """One model: configuration name, model number, stall torque at 12 V, no-load speed, and quantity of its load
-    register.
-    """
+    """One model: names, model number, stall torque at 12 V, no-load speed, and the quantity of its load register."""
 
     name: str
     number: int

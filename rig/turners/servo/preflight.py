@@ -23,12 +23,7 @@ HEADROOM_C = 10.0  # margin below its limit: a servo that holds and turns for mi
 
 def servo_problems(report: ServoReport, wanted_model: str, carried: Carried, period_s: float) -> list[Problem]:
     """Return every reason why this servo cannot be driven as it is; `period_s` is the period of its states."""
-    problems = [
-        *_identity(report, wanted_model),
-        *_settings(report),
-        *_condition(report),
-        *_load(report, carried),
-    ]
+    problems = [*_identity(report, wanted_model), *_settings(report), *_condition(report), *_load(report, carried)]
     if report.round_trip_s > period_s:
         problems.append(
             Problem(

@@ -83,9 +83,7 @@ def decode(
 
 
 def stands(states: Sequence[ServoState]) -> bool:
-    """Return whether the shaft stands still in the newest of `states`, in order; at a low rate, in `STILL_STATES` of
-    them.
-    """
+    """Return whether the shaft stands still in the newest of `states` (in order), in `STILL_STATES` at least."""
     if len(states) < STILL_STATES:
         return False
     newest = states[-1]
@@ -98,8 +96,7 @@ def stands(states: Sequence[ServoState]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ServoReport:
-    """The servo's settings and state for pre-flight, a `Report`; `startup` is None if its firmware has no such
-    register.
+    """The servo's settings and state for pre-flight, a `Report`; `startup` is None without such a register.
 
     `round_trip_s` is the duration of reading a state.
     """

@@ -54,9 +54,7 @@ def no_states(host: str, error: OSError) -> Problem:
 
 
 def reports_local_control(host: str, version: tuple[int, ...]) -> bool:
-    """Return whether a controller with a dashboard reports local control; for others the trial of the stop finds
-    out.
-    """
+    """Return whether a dashboard reports local control; for other controllers the trial of the stop finds out."""
     if is_polyscope_x(version) or host in MAKERS_SIMULATOR:
         return False
     try:

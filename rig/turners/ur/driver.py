@@ -187,7 +187,7 @@ class Arm:
             deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
 
             def is_late() -> bool:
-                """Return whether it is late by the controller's clock; this machine's clock limits the report of its
+                """Return whether it is late by the controller's clock; this machine's clock limits the report of
                 arrival.
                 """
                 has_arrived = self._stands_at(motion) and time.monotonic() < reported_s
@@ -258,9 +258,7 @@ class Arm:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        is_reported = self._problem is not None and isinstance(
-            error, RigError
-        )  # the arm's own problems include the stop's outcome
+        is_reported = self._problem is not None and isinstance(error, RigError)  # with the outcome of the stop
         if error is not None and not is_reported:
             tell_of_stop(error, self.stop)
         warning = self._close()
@@ -419,9 +417,7 @@ class Arm:
 
 def _not_started(motion: Motion) -> Problem:
     return Problem(
-        "move_refused",
-        f"{motion.name} was not begun within {START_S:g} s",
-        "Read the pendant's log, then start again",
+        "move_refused", f"{motion.name} was not begun within {START_S:g} s", "Read the pendant's log, then start again"
     )
 
 

@@ -85,12 +85,12 @@ def identity_problems(arm: "ArmSection", report: ArmReport) -> list[Problem]:
         if not (model.series == "CB3" and series.name == "cb3_not_supported"):
             return [series]
     elif model.series == "CB3":
-        return [_other_arm(arm, report, f"by its software, {version_text(report.version)}")]
+        return [_mismatch(arm, report, f"by its software, {version_text(report.version)}")]
     setup, kinematics = report.setup, report.kinematics
-    geometries = [] if setup is None else [setup.drawing]
+    chains = [] if setup is None else [setup.drawing]
     if kinematics is not None and (setup is None or arm.kinematics == "controller"):
-        geometries.append(kinematics)
-    if not geometries and robot_type is None:
+        chains.append(kinematics)
+    if not chains and robot_type is None:
         return [
             Problem(
                 "arm_not_identified",
@@ -100,12 +100,10 @@ def identity_problems(arm: "ArmSection", report: ArmReport) -> list[Problem]:
             )
         ]
     if setup is not None and robot_type != model.robot_type:
-        return [_other_arm(arm, report, f"by its type, {robot_type}")]
-    if not geometries and robot_type != model.robot_type:
-        return [_other_arm(arm, report, f"its dashboard: {report.called!r}")]
-    return [
-        _other_arm(arm, report, why) for geometry in geometries if (why := _other_length(geometry, model)) is not None
-    ][:1]
+        return [_mismatch(arm, report, f"by its type, {robot_type}")]
+    if not chains and robot_type != model.robot_type:
+        return [_mismatch(arm, report, f"its dashboard: {report.called!r}")]
+    return [_mismatch(arm, report, why) for chain in chains if (why := _other_length(chain, model)) is not None][:1]
 
 
 def _models(report: ArmReport) -> Mapping[int, str]:
@@ -122,10 +120,8 @@ def _robot_type(report: ArmReport) -> int | None:
         models = (model for model in map(turner_model, get_args(ModelName)) if model.series == series)
         return next((model.robot_type for model in models if _other_length(report.kinematics, model) is None), None)
     called = (report.called or "").strip().upper()
-    names = (
-        (robot_type, name.upper()) for robot_type, words in _models(report).items() for name in words.split(" or ")
-    )
-    return next((robot_type for robot_type, name in names if called in (name, name.removesuffix("E"))), None)
+    names = ((number, name.upper()) for number, words in _models(report).items() for name in words.split(" or "))
+    return next((number for number, name in names if called in (name, name.removesuffix("E"))), None)
 
 
 def _other_length(arm: DenavitHartenberg, model: TurnerModel) -> str | None:
@@ -137,7 +133,7 @@ def _other_length(arm: DenavitHartenberg, model: TurnerModel) -> str | None:
     return f"its {LENGTHS[worst]} is {lengths[worst]:.3f} m, a {model.name}'s {nominal[worst]:.3f} m"
 
 
-def _other_arm(arm: "ArmSection", report: ArmReport, why: str) -> Problem:
+def _mismatch(arm: "ArmSection", report: ArmReport, why: str) -> Problem:
     model = identify_model(report) or "arm that is not known"
     with_article = f"an {model}" if model.startswith("arm") else f"a {model}"
     what = f"the controller at {report.host} is {with_article}; configured is {arm.model} ({why})"

@@ -15,23 +15,21 @@ WIDER = ", or widen that limit in the arm's safety settings"
 ROUNDING = 1e-6  # relative to a limit
 
 
-def motion_problems(motion: Motion, ours: JointLimits, controller: JointLimits | None) -> list[Problem]:
+def motion_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | None) -> list[Problem]:
     """Return the problems of a motion beyond the model's limits or its controller's, whichever is narrower."""
     return [
-        *_position_problems(motion, ours, controller),
-        *_speed_problems(motion, ours.speed_rad_s, None if controller is None else controller.speed_rad_s),
-        *_acceleration_problems(
-            motion, ours.acceleration_rad_s2, None if controller is None else controller.acceleration_rad_s2
-        ),
+        *_position_problems(motion, ours, theirs),
+        *_speed_problems(motion, ours.speed_rad_s, None if theirs is None else theirs.speed_rad_s),
+        *_ramp_problems(motion, ours.acceleration_rad_s2, None if theirs is None else theirs.acceleration_rad_s2),
     ]
 
 
-def _position_problems(motion: Motion, ours: JointLimits, controller: JointLimits | None) -> list[Problem]:
+def _position_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | None) -> list[Problem]:
     problems = []
     for joint, name in enumerate(JOINT_NAMES):
         most = ours.greatest_rad[joint]
-        least, _ = _narrower(-ours.least_rad[joint], None if controller is None else -controller.least_rad[joint])
-        greatest, _ = _narrower(most, None if controller is None else controller.greatest_rad[joint])
+        least, _ = _narrower(-ours.least_rad[joint], None if theirs is None else -theirs.least_rad[joint])
+        greatest, _ = _narrower(most, None if theirs is None else theirs.greatest_rad[joint])
         low, high = sorted((motion.start_q_rad[joint], motion.target_q_rad[joint]))
         if low < -least or high > greatest:
             narrow = min(least, greatest) < most
@@ -65,20 +63,18 @@ def _nearer(motion: Motion, joint: int, within_rad: tuple[float, float]) -> str:
     )
 
 
-def _speed_problems(motion: Motion, ours_rad_s: Joints, controller_rad_s: Joints | None) -> list[Problem]:
+def _speed_problems(motion: Motion, ours_rad_s: Joints, theirs_rad_s: Joints | None) -> list[Problem]:
     return [
         Problem(
             "joint_speed",
             f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s, {whose} is {math.degrees(limit):.1f}°/s",
             f"Lower procedure.speed_deg_s or arm.transfer_speed_deg_s{WIDER if whose == THEIRS else ''}",
         )
-        for name, speed, limit, whose in _find_excess(
-            motion.speed_rad_s * _joint_fractions(motion), ours_rad_s, controller_rad_s
-        )
+        for name, speed, limit, whose in _find_excess(motion.speed_rad_s * _fractions(motion), ours_rad_s, theirs_rad_s)
     ]
 
 
-def _acceleration_problems(motion: Motion, ours_rad_s2: Joints, controller_rad_s2: Joints | None) -> list[Problem]:
+def _ramp_problems(motion: Motion, ours_rad_s2: Joints, theirs_rad_s2: Joints | None) -> list[Problem]:
     return [
         Problem(
             "joint_acceleration",
@@ -87,29 +83,29 @@ def _acceleration_problems(motion: Motion, ours_rad_s2: Joints, controller_rad_s
             "Lower procedure.acceleration_deg_s2",
         )
         for name, acceleration, limit, whose in _find_excess(
-            motion.acceleration_rad_s2 * _joint_fractions(motion), ours_rad_s2, controller_rad_s2
+            motion.acceleration_rad_s2 * _fractions(motion), ours_rad_s2, theirs_rad_s2
         )
     ]
 
 
-def _find_excess(values: Array, ours: Joints, controller: Joints | None) -> Iterator[tuple[str, float, float, str]]:
+def _find_excess(values: Array, ours: Joints, theirs: Joints | None) -> Iterator[tuple[str, float, float, str]]:
     """Yield the joints whose `values` (6,) exceed the narrower limit: name, value, that limit, and its owner."""
     for joint, name in enumerate(JOINT_NAMES):
-        limit, whose = _narrower(ours[joint], None if controller is None else controller[joint])
+        limit, whose = _narrower(ours[joint], None if theirs is None else theirs[joint])
         if values[joint] > limit:
             yield name, values[joint], limit, whose
 
 
-def _joint_fractions(motion: Motion) -> Array:
+def _fractions(motion: Motion) -> Array:
     """Return (6,) the travel of each joint relative to the longest: its speed scales with it."""
     travel_rad = np.abs(travel(motion.start_q_rad, motion.target_q_rad))
     fractions: Array = travel_rad / travel_rad.max()
     return fractions
 
 
-def _narrower(ours: float, controller: float | None) -> tuple[float, str]:
+def _narrower(ours: float, theirs: float | None) -> tuple[float, str]:
     """Return the narrower of the model's and the controller's limit, and its owner.
 
     Limits that differ by rounding count as equal.
     """
-    return (ours, OURS) if controller is None or controller >= ours * (1 - ROUNDING) else (controller, THEIRS)
+    return (ours, OURS) if theirs is None or theirs >= ours * (1 - ROUNDING) else (theirs, THEIRS)

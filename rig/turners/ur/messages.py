@@ -11,9 +11,7 @@ from rig.motion.state import ArmState, Joints
 
 @dataclass(frozen=True, slots=True)
 class TakeControl:
-    """The request to upload the control script and set the payload. Answers: `ScriptStarted` and `ControlTaken`, or
-    `RequestFailed`.
-    """
+    """The request to upload the script and set the payload, answered by `ScriptStarted` and `ControlTaken`."""
 
     carried: Carried
 

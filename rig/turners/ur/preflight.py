@@ -121,12 +121,8 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
             )
         ]
     home, model = home_of(arm), model_of(arm)
-    controller, nominal = (
-        flange_axes(home, arm_geometry)[:, WRISTS] for arm_geometry in (report.kinematics, model.drawing)
-    )
-    angles = np.arctan2(
-        np.linalg.norm(np.cross(controller, nominal, axis=0), axis=0), np.sum(controller * nominal, axis=0)
-    )
+    actual, nominal = (flange_axes(home, chain)[:, WRISTS] for chain in (report.kinematics, model.drawing))
+    angles = np.arctan2(np.linalg.norm(np.cross(actual, nominal, axis=0), axis=0), np.sum(actual * nominal, axis=0))
     return [
         Problem(
             "kinematics_disagree",

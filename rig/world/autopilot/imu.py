@@ -90,7 +90,7 @@ class SimulatedImu:
             np.array([self._parameters[name] for name in names]) for names in self._names
         )
         self.temperature_c = self._gyroscope.temperature_c(at_s)
-        turned = board_rotation(self._parameters["SENS_BOARD_ROT" if self._px4 else "AHRS_ORIENTATION"])
+        turned = simulated_rotation(self._parameters["SENS_BOARD_ROT" if self._px4 else "AHRS_ORIENTATION"])
         rate = turned @ (np.array(self._gyroscope.read(at_s)) - offset)
         force = turned @ ((np.array(self._accelerometer.read(at_s)) - force_offset) * force_scale)
         if self._px4:
@@ -105,7 +105,7 @@ class SimulatedImu:
         self.time_us = time_us
 
 
-def board_rotation(number: float) -> Vector:
+def simulated_rotation(number: float) -> Vector:
     """(3, 3) what an orientation of a few that are known turns readings by. Raises ValueError of another."""
     if int(number) not in TURNS:
         raise ValueError(f"the simulated autopilot has no orientation {number:g}")

@@ -15,9 +15,9 @@ import yaml
 
 from rig.config.load import load
 from rig.sensors.errors import SensorError
-from rig.sensors.mavlink.link import Link
+from rig.sensors.mavlink.link import AutopilotLink
 from rig.sensors.mavlink.source import look
-from rig.sensors.mavlink.writing import unfinished
+from rig.sensors.mavlink.writing import find_unfinished_change
 from support.laboratories.commands import rig_here
 from support.paths import CONFIGS, ROOT
 from support.processes.waiting import PATIENCE_S
@@ -152,6 +152,6 @@ def killed_after(wire: AutopilotOnAWire, arguments: list[Any], place: int, *, ap
 
 def seen(wire: AutopilotOnAWire) -> list[SensorError]:
     """What the next start says."""
-    with closing(Link("imu", wire.port, 921600)) as link:
+    with closing(AutopilotLink("imu", wire.port, 921600)) as link:
         link.identify()
-        return list(unfinished(link))
+        return list(find_unfinished_change(link))

@@ -17,7 +17,7 @@ from rig.errors import Problem, Refused
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm, lengths_m
 from rig.motion.state import JointLimits
 from rig.turners.ur.driver import look
-from rig.turners.ur.identity import identity_problems, identify_model
+from rig.turners.ur.identity import identify_model, identity_problems
 from rig.turners.ur.preflight import preflight_problems
 from rig.turners.ur.report import ArmReport, ArmSetup
 from rig.world.ur10e.motion.models import MODELS

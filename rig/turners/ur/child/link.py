@@ -91,9 +91,7 @@ class ChildLink:
 
     @contextmanager
     def patience(self) -> Iterator[None]:
-        """Tolerate a long silence inside the block: the child starts, or a constructor of the client holds its
-        interpreter.
-        """
+        """Tolerate a long silence inside the block: a constructor of the client holds the child's interpreter."""
         self._patient = True
         try:
             yield

@@ -42,9 +42,5 @@ def _holders(file: str) -> Iterator[int]:
     for process in PROC.iterdir():
         if process.name.isdecimal():
             with suppress(OSError):  # it has ended, or belongs to another user
-                if any(
-                    str(descriptor.readlink()) == file
-                    for descriptor in (process / "fd").iterdir()
-                    if descriptor.is_symlink()
-                ):
+                if any(str(link.readlink()) == file for link in (process / "fd").iterdir() if link.is_symlink()):
                     yield int(process.name)

@@ -121,9 +121,7 @@ def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
-    """Remove the complete packages from the start of `buffer` and yield them. Raise `ConnectionError` for other
-    bytes.
-    """
+    """Remove complete packages from the start of `buffer` and yield them. Raise `ConnectionError` for other bytes."""
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if not HEADER.size <= size <= SIZE_MAX:

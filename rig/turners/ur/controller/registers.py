@@ -25,8 +25,7 @@ OWNERS = (
 
 
 def find_free_half(host: str, version: tuple[int, ...], timeout_s: float) -> int | None:
-    """Return the free half, `LOWER` or `UPPER`, at the controller `host` with software `version`; None if neither is
-    free.
+    """Return the free half, `LOWER` or `UPPER`, at the controller `host` with software `version`, or None.
 
     The query reserves nothing. Raise `OSError` if the controller does not answer within `timeout_s`.
     """

@@ -49,9 +49,7 @@ class StopOrder:
             self._changed.wait_for(lambda: not self._unanswered, timeout_s)
 
     def await_program_end(self) -> bool:
-        """Wait, within the order's time, for a report on any path that the program has ended; return whether one
-        came.
-        """
+        """Wait, within the order's time, for a report that the program has ended; return whether one came."""
         with self._changed:
             self._changed.wait_for(lambda: self._ended or not self._active, max(0.0, self._remaining_s))
         self.await_delivery()
