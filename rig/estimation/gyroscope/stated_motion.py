@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.estimation.arrays import Array, across
+from rig.estimation.arrays import Array, perpendicular_unit_vectors
 from rig.estimation.statistics.coverage import PROBABILITY
 
 SMALLEST_OF_NOISE = 0.1  # of a sweep's noise: a smaller size adds half a percent to it
@@ -44,7 +44,7 @@ class StatedMotion:
         speeds = np.linalg.norm(rates_rad_s, axis=1)
         leaning = np.zeros((2, *rates_rad_s.shape))
         for row in np.flatnonzero(speeds):
-            leaning[:, row] = speeds[row] * across(rates_rad_s[row] / speeds[row])
+            leaning[:, row] = speeds[row] * perpendicular_unit_vectors(rates_rad_s[row] / speeds[row])
         return StatedMotion(residuals_rad_s, rates_rad_s, variances_rad2_s2, rates_rad_s @ matrix.T, leaning @ matrix.T)
 
     @property
