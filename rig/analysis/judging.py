@@ -8,8 +8,8 @@ import numpy as np
 
 from rig.analysis.check import Check, unsolved_checks
 from rig.analysis.clock import ClockCheck
-from rig.analysis.consistency.contradictions import contradictions, in_reference
-from rig.analysis.consistency.detection_limits import ToldFrom
+from rig.analysis.consistency.contradictions import check_references, contradictions
+from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.analysis.estimators import Estimator, known_estimator
 from rig.analysis.gyroscope.board_averages import board_averages
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
@@ -75,7 +75,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
     )
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     of_kinds = kinds_on_arm(recordings, settings)
-    among_dwells = in_reference(recordings, accelerometers, magnetometers.results, settings, drifting=drifting)
+    among_dwells = check_references(recordings, accelerometers, magnetometers.results, settings, drifting=drifting)
     return Outcome(
         recordings=recordings,
         settings=settings,
@@ -96,7 +96,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         accelerometers=accelerometers,
         magnetometers=magnetometers,
         told_from=swept.told_from,
-        told_from_in_reference=among_dwells.told_from,
+        told_from_in_reference=among_dwells.detection_limits,
         polynomials=found,
     )
 
@@ -116,7 +116,7 @@ class _Swept:
     onboard: Mapping[str, Agreement] = field(default_factory=dict)
     checks: tuple[Check, ...] = ()
     clock: ClockCheck | None = None
-    told_from: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
+    told_from: Mapping[str, tuple[DetectionLimit, ...]] = field(default_factory=dict)
 
 
 def _swept(
@@ -148,7 +148,7 @@ def _swept(
             *clock_checks(surroundings.clocks),
         ),
         clock=surroundings.clock,
-        told_from=among_rates.told_from,
+        told_from=among_rates.detection_limits,
     )
 
 

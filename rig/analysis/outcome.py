@@ -11,7 +11,7 @@ from rig.errors.attempts import Attempts
 if TYPE_CHECKING:
     from rig.analysis.check import Check
     from rig.analysis.clock import ClockCheck
-    from rig.analysis.consistency.detection_limits import ToldFrom
+    from rig.analysis.consistency.detection_limits import DetectionLimit
     from rig.analysis.external.elsewhere import OfSensor
     from rig.analysis.gyroscope.calibration import SensorResult
     from rig.analysis.gyroscope.mounts import FoundMount
@@ -83,8 +83,8 @@ class Outcome:
     accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
     magnetometers: "Attempts[str, MagnetometerResult]" = field(default_factory=Attempts)
     drifts: "Drifts" = field(default_factory=dict)
-    told_from: "Mapping[str, tuple[ToldFrom, ...]]" = field(default_factory=dict)
-    told_from_in_reference: "Mapping[str, tuple[ToldFrom, ...]]" = field(default_factory=dict)
+    told_from: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
+    told_from_in_reference: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
     elsewhere: "Mapping[str, OfSensor]" = field(default_factory=dict)
     of_kinds: "tuple[KindFound, ...]" = ()
     mounts: "tuple[FoundMount, ...]" = ()

@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from firmware_host.answers import BoardSolution
 from rig.analysis.check import Check
 from rig.analysis.clock import ClockCheck, ClockComparison
-from rig.analysis.consistency.detection_limits import ToldFrom
+from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.analysis.external.attitudes import InAttitudes
 from rig.analysis.external.increments import InIncrements
 from rig.analysis.gyroscope.alignment import RelativeRotation
@@ -205,7 +205,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     ),
     shared.ConditionsEntry: (_row(When, same="temperature_c temperature_range_c"),),
     shared.DetectionLimitEntry: (
-        _row(ToldFrom, same="check unit", fault="what", error_over_expanded="off_by_expanded"),
+        _row(DetectionLimit, same="check unit", fault="what", error_over_expanded="off_by_expanded"),
     ),
     shared.OmittedEntry: (_row(Omitted, same="what count total reason first"),),
     temperature.OverTemperatureEntry: (

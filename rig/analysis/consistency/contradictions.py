@@ -1,4 +1,4 @@
-"""What contradicts itself does not pass: the checks of the verdict that hold a recording against itself."""
+"""The checks of the verdict that compare a recording with itself: a recording that contradicts itself does not pass."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -8,17 +8,17 @@ import numpy as np
 
 from rig.analysis.check import Check, fitness
 from rig.analysis.consistency import gyroscope_checks, readings
-from rig.analysis.consistency.detection_limits import ToldFrom, of_gyroscope, of_reference
-from rig.analysis.consistency.frozen_axis import longest_frozen
+from rig.analysis.consistency.detection_limits import DetectionLimit, find_gyroscope_limits, find_reference_limits
+from rig.analysis.consistency.frozen_axis import find_longest_frozen
 from rig.analysis.consistency.reference_contradictions import (
     DISTURBED_SWEEP,
-    ReadInReference,
-    of_accelerometer,
-    of_magnetometer,
-    reference_statistics,
+    ReferenceReadings,
+    compute_reference_statistics,
+    read_accelerometer,
+    read_magnetometer,
 )
 from rig.analysis.consistency.residual_tests import Statistic
-from rig.analysis.consistency.systematic_errors import allow, allowed
+from rig.analysis.consistency.systematic_errors import build_error_patterns, collect_known_errors
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.analysis.gyroscope.mounts import observe_as_mounted
 from rig.analysis.gyroscope.segments import stack_segments, with_transfers
@@ -44,19 +44,19 @@ CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *readings.CHECKS, NON_ORTHO
 
 
 @dataclass(frozen=True, slots=True)
-class Contradictions:
-    """The checks, in order, and what of each sensor is told."""
+class ConsistencyChecks:
+    """The checks, in order, and the detection limits of each sensor."""
 
     checks: tuple[Check, ...]
-    told_from: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
+    detection_limits: Mapping[str, tuple[DetectionLimit, ...]] = field(default_factory=dict)
 
     @property
     def disturbed(self) -> frozenset[int]:
-        """The sweeps of the plan, by index, that the checks name."""
+        """The indices of the plan's sweeps that the checks name."""
         return frozenset(check.means.sweep for check in self.checks if check.means.sweep is not None)
 
 
-NOTHING = Contradictions(())
+NOTHING = ConsistencyChecks(())
 
 
 def contradictions(
@@ -67,125 +67,135 @@ def contradictions(
     settings: RunSettings,
     *,
     false_alarms: float = FALSE_ALARMS,
-) -> Contradictions:
-    """Return what contradicts itself in these sensors' results.
+) -> ConsistencyChecks:
+    """Return the checks of these sensors' results against contradictions.
 
-    `surroundings` are those of the recordings, `false_alarms` is the share of undamaged runs that may fail. A sweep
-    that is named is part of the name, `gyro.disturbed_sweep.3`, and of what the check means.
+    `surroundings` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. A
+    disturbed sweep is part of the check's name, `gyro.disturbed_sweep.3`, and of its meaning.
     """
     checks: list[Check] = []
-    told_from: dict[str, tuple[ToldFrom, ...]] = {}
-    rate = _rate(recordings[0].run, sensors, settings, false_alarms)
+    detection_limits: dict[str, tuple[DetectionLimit, ...]] = {}
+    false_alarm_probability = _false_alarm_probability(recordings[0].run, sensors, settings, false_alarms)
     for name in sensors:
         explained = results[name].explained
         if explained is None:
             continue
         windows = segment_recordings(name, recordings)
         segments = stack_segments(windows, explained, settings.site)
-        known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
+        known_errors = collect_known_errors(
+            surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s
+        )
         matrix, extension_m = explained.solution.matrix, np.array(settings.extension_m)
         transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
-        ways = with_transfers(segments, transfers, windows, explained)
-        allowance = allow(known, segments, ways, matrix)
-        found = gyroscope_checks.consistency(segments, matrix, rate, allowance)
+        with_transfers_averaged = with_transfers(segments, transfers, windows, explained)
+        allowance = build_error_patterns(known_errors, segments, with_transfers_averaged, matrix)
+        tested = gyroscope_checks.check_gyroscope(segments, matrix, false_alarm_probability, allowance)
         sensor = recordings[0].run.sensors[name]
         gyroscope = sensor.channel(RATE)
         counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
-        named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
-        sweeps = [fitness(name, "rate", DISTURBED_SWEEP, *named[sweep], sweep=sweep) for sweep in sorted(named)]
-        checks += sweeps or [fitness(name, "rate", DISTURBED_SWEEP, *found.piece)]
+        disturbed = {
+            results[name].observations[index].sweep: statistic for index, statistic in tested.disturbed.items()
+        }
+        sweeps = [fitness(name, "rate", DISTURBED_SWEEP, *disturbed[sweep], sweep=sweep) for sweep in sorted(disturbed)]
+        checks += sweeps or [fitness(name, "rate", DISTURBED_SWEEP, *tested.worst)]
         of_readings = readings.judge_readings(
             counts,
             segments.readings,
-            rate,
-            digits=readings.digits_of(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
-            frozen=max(longest_frozen(recording, name) for recording in recordings),
+            false_alarm_probability,
+            digits=readings.find_digits(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
+            frozen=max(find_longest_frozen(recording, name) for recording in recordings),
         )
-        checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]
+        checks += [
+            fitness(name, "rate", what, *statistic) for what, statistic in {**tested.statistics, **of_readings}.items()
+        ]
         stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name)
-        leaning = _leaning_deg(explained.solution, stated_deg, rate)
-        checks.append(fitness(name, "rate", NON_ORTHOGONALITY, *leaning, unit="°"))
-        told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
-    return Contradictions(tuple(checks), told_from)
+        non_orthogonality = _non_orthogonality_deg(explained.solution, stated_deg, false_alarm_probability)
+        checks.append(fitness(name, "rate", NON_ORTHOGONALITY, *non_orthogonality, unit="°"))
+        detection_limits[name] = tuple(
+            find_gyroscope_limits(tested.detection_limits, name, results[name], surroundings)
+        )
+    return ConsistencyChecks(tuple(checks), detection_limits)
 
 
-def _leaning_deg(solution: VectorSolution, stated_deg: float, rate: float) -> Statistic:
-    """The angle between two axes that is farthest off 90° for what is stated, and its limit, in degrees.
+def _non_orthogonality_deg(solution: VectorSolution, stated_deg: float, false_alarm_probability: float) -> Statistic:
+    """Return the largest non-orthogonality relative to the stated one, and its limit, in degrees.
 
-    `stated_deg` is a half-width; beside it stands what of the angle is not known, so that chance is beyond the limit in
-    a share `rate` of recordings at most. Sweeps about three axes do not tell a wrist whose zero is off from a sensor's
-    axis that leans: no residual shows it, and the scale factors of a sensor that is mounted askew are off by it.
+    `stated_deg` is a half-width. The limit adds the uncertainty of the angle, at this false-alarm probability. Sweeps
+    about three axes do not separate a wrist's zero error from a tilted sensor axis: no residual shows it, and it makes
+    errors of the scale factors of a sensor that is mounted askew.
     """
     from scipy.special import ndtri
 
-    off_deg = np.degrees(np.abs(solution.non_orthogonality_rad))
+    angles_deg = np.degrees(np.abs(solution.non_orthogonality_rad))
     std_deg = np.degrees(np.sqrt(np.diag(solution.angles_covariance_rad2)[:3]))
-    limits_deg = stated_deg + std_deg * float(ndtri(1 - rate / 6))
-    worst = int(np.argmax(off_deg - limits_deg))
-    return float(off_deg[worst]), float(limits_deg[worst])
+    limits_deg = stated_deg + std_deg * float(ndtri(1 - false_alarm_probability / 6))
+    worst = int(np.argmax(angles_deg - limits_deg))
+    return float(angles_deg[worst]), float(limits_deg[worst])
 
 
-def in_reference(
+def check_references(
     recordings: Sequence[ObservedRun],
     accelerometers: Mapping[str, AccelerometerResult],
     magnetometers: Mapping[str, MagnetometerResult],
     settings: RunSettings,
     *,
     drifting: bool = False,
-) -> Contradictions:
-    """Return what contradicts itself in readings of gravity and field.
+) -> ConsistencyChecks:
+    """Return the checks of readings of gravity and field against contradictions.
 
-    Dwell and sweep are named as a gyroscope's sweep is: `gyro.acceleration_disturbed_dwell.13`. The bias may change
-    steadily where it is `drifting`.
+    Dwells and sweeps are named as a gyroscope's sweeps are: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the
+    bias may change steadily.
     """
-    known = settings.stated_uncertainty
-    asked: dict[tuple[str, Quantity], ReadInReference] = {
-        **{(name, ACCELERATION): of_accelerometer(name, recordings, each, known)
-           for name, each in accelerometers.items()},
-        **{(name, FIELD): of_magnetometer(name, recordings, each, known)
-           for name, each in magnetometers.items()}}  # fmt: skip
-    rate = _rate(recordings[0].run, settings.to_calibrate, settings, FALSE_ALARMS)
+    known_errors = settings.stated_uncertainty
+    readings_of: dict[tuple[str, Quantity], ReferenceReadings] = {
+        **{(name, ACCELERATION): read_accelerometer(name, recordings, result, known_errors)
+           for name, result in accelerometers.items()},
+        **{(name, FIELD): read_magnetometer(name, recordings, result, known_errors)
+           for name, result in magnetometers.items()}}  # fmt: skip
+    false_alarm_probability = _false_alarm_probability(recordings[0].run, settings.to_calibrate, settings, FALSE_ALARMS)
     checks: list[Check] = []
-    told_from: dict[str, tuple[ToldFrom, ...]] = {}
-    for (name, quantity), held in asked.items():
-        found = reference_statistics(held, rate, drifting=drifting)
-        for at, statistic in found.pieces:
-            checks.append(fitness(name, quantity.name, at.what, *statistic, sweep=at.sweep, dwell=at.dwell))
-        checks += [fitness(name, quantity.name, what, *each) for what, each in found.statistics.items()]
-        told_from[name] = of_reference(found.told_from, quantity)
-    return Contradictions(tuple(checks), told_from)
+    detection_limits: dict[str, tuple[DetectionLimit, ...]] = {}
+    for (name, quantity), sensor_readings in readings_of.items():
+        tested = compute_reference_statistics(sensor_readings, false_alarm_probability, drifting=drifting)
+        for segment, statistic in tested.segments:
+            checks.append(
+                fitness(name, quantity.name, segment.what, *statistic, sweep=segment.sweep, dwell=segment.dwell)
+            )
+        checks += [fitness(name, quantity.name, what, *statistic) for what, statistic in tested.statistics.items()]
+        detection_limits[name] = find_reference_limits(tested.detection_limits, quantity)
+    return ConsistencyChecks(tuple(checks), detection_limits)
 
 
-def _rate(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
-    """Rate of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
+def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
+    """Return the false-alarm probability of each statistic of a run, which all kinds of its readings share."""
     accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
-    return rate_of_each(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
+    return false_alarm_per_check(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 
 
-def rate_of_each(kinds: int, *, of_all: float = FALSE_ALARMS) -> float:
-    """Rate of false alarms for each statistic, where so many kinds of readings are held against themselves."""
+def false_alarm_per_check(kinds: int, *, of_all: float = FALSE_ALARMS) -> float:
+    """Return the false-alarm probability of each statistic of so many kinds of readings."""
     return coverage.false_alarm_of_each(of_all, len(CHECKS) * kinds)
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
-    """The sweeps in the recordings of a run so far that contradict the others by what any sensor felt in them.
+    """Return the sweeps of a run so far that contradict the others, by any sensor, as the verdict would name them.
 
-    Those that the verdict names; none of gyroscopes or of accelerometers where these cannot be solved yet.
+    Gyroscopes or accelerometers that cannot be solved yet contribute none.
     """
     settings = runs[0].settings if runs else None
     if settings is None or not settings.planned_sweeps:
         return frozenset()
-    named = frozenset[int]()
+    disturbed = frozenset[int]()
     with suppress(RigError), solvable():
         recordings, _ = observe_as_mounted(runs, settings)
         if not recordings:
-            return named
+            return disturbed
         if settings.reference_c is not None:
             recordings = taken_to_reference(recordings, settings, settings.reference_c).recordings
         chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
         surroundings = surroundings_of(recordings, settings)
         results = solve_observed(chosen, recordings, surroundings)
-        named = contradictions(recordings, results, settings.to_calibrate, surroundings, settings).disturbed
+        disturbed = contradictions(recordings, results, settings.to_calibrate, surroundings, settings).disturbed
         accelerometers = calibrate_accelerometers(recordings, settings, results)
-        named |= in_reference(recordings, accelerometers, {}, settings).disturbed
-    return named
+        disturbed |= check_references(recordings, accelerometers, {}, settings).disturbed
+    return disturbed

@@ -1,12 +1,12 @@
-"""What may happen while a sensor is recorded, from what size on that is told, and what it does to a result."""
+"""Fault modes of a recording with their minimal detectable size, and the error of a result that escapes detection."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency.alternatives import DAMAGES, Means
-from rig.analysis.consistency.reference_alternatives import DAMAGES as REFERENCE_DAMAGES
+from rig.analysis.consistency.alternatives import FAULT_MODES, Means
+from rig.analysis.consistency.reference_alternatives import FAULT_MODES as REFERENCE_FAULT_MODES
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.vector_inputs import unknown_of
 from rig.analysis.surroundings import Surroundings
@@ -19,11 +19,11 @@ from rig.observation.consistency.raw_readings import REST
 
 
 @dataclass(frozen=True, slots=True)
-class ToldFrom:
-    """The size, in `unit`, from which on a check tells that `what` happened, in 95 of 100 recordings.
+class DetectionLimit:
+    """The `size` of a fault, in `unit`, that its check detects in 95 of 100 recordings, or infinity.
 
-    Infinite where no size is told. Just below it the scale factor or bias farthest off is off by so many times the U
-    that is stated then, where that is known.
+    `off_by_expanded`: the largest error of a scale factor or bias by a fault just below it, in U as then stated, if
+    known.
     """
 
     what: str
@@ -33,54 +33,54 @@ class ToldFrom:
     off_by_expanded: float | None = None
 
 
-def of_gyroscope(
+def find_gyroscope_limits(
     sizes: Mapping[str, float], name: str, result: SensorResult, surroundings: Surroundings
-) -> Iterator[ToldFrom]:
-    """What may happen to the gyroscope `name`, which its checks tell from these `sizes` on."""
+) -> Iterator[DetectionLimit]:
+    """Yield the detection limits of the gyroscope `name`, with these `sizes` by fault mode."""
     explained = result.explained
     if explained is None:
         return
-    means, mounting = _means(explained), np.array(result.sensor.mounting)
-    unknown = unknown_of(surroundings, name, result.earth)
-    for each in DAMAGES:
-        if (size := sizes.get(each.what)) is None:
+    means, mounting = _means_of_solve(explained), np.array(result.sensor.mounting)
+    inputs = unknown_of(surroundings, name, result.earth)
+    for mode in FAULT_MODES:
+        if (size := sizes.get(mode.what)) is None:
             continue
-        off_by = None
+        ratio = None
         if np.isfinite(size) and result.uncertainty is not None:
-            off_by = _off_by(size * each.patterns(means), explained, mounting, unknown)
-        yield ToldFrom(each.what, each.check, size, each.unit or RATE.unit, off_by)
+            ratio = _error_over_expanded(size * mode.patterns(means), explained, mounting, inputs)
+        yield DetectionLimit(mode.what, mode.check, size, mode.unit or RATE.unit, ratio)
 
 
-def of_reference(sizes: Mapping[str, float], quantity: Quantity) -> tuple[ToldFrom, ...]:
-    """The damages that are told of what gravity or the field calibrates, whose checks are named by its quantity."""
+def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tuple[DetectionLimit, ...]:
+    """Return the detection limits of a calibration by gravity or field; its checks bear the quantity's name."""
     return tuple(
-        ToldFrom(each.what, f"{quantity}_{each.check}", sizes[each.what], each.unit or quantity.unit)
-        for each in REFERENCE_DAMAGES
-        if each.what in sizes
+        DetectionLimit(mode.what, f"{quantity}_{mode.check}", sizes[mode.what], mode.unit or quantity.unit)
+        for mode in REFERENCE_FAULT_MODES
+        if mode.what in sizes
     )
 
 
-def _means(explained: Explained) -> Means:
-    """The averages that the solution was found from."""
-    seen = explained.seen
-    turns = np.flatnonzero(seen.turns_rad_s.any(axis=1))
-    sweep = np.full(len(seen.turns_rad_s), REST)
+def _means_of_solve(explained: Explained) -> Means:
+    """Return the means from which the solution was computed."""
+    inputs_of_solve = explained.seen
+    turns = np.flatnonzero(inputs_of_solve.turns_rad_s.any(axis=1))
+    sweep = np.full(len(inputs_of_solve.turns_rad_s), REST)
     sweep[turns] = np.arange(len(turns))
-    return Means(seen.rates_rad_s @ explained.solution.matrix.T, seen.windows_s, sweep)
+    return Means(inputs_of_solve.rates_rad_s @ explained.solution.matrix.T, inputs_of_solve.windows_s, sweep)
 
 
-def _off_by(patterns: Array, explained: Explained, mounting: Array, unknown: Unknown) -> float | None:
-    """How wrong a result is, in U, by that of the patterns (k, N, 3) to which the solution responds most.
+def _error_over_expanded(patterns: Array, explained: Explained, mounting: Array, inputs: Unknown) -> float | None:
+    """Return the error of a result, in U, by the most influential of the patterns (k, N, 3); None without a solution.
 
-    Solved anew: a bias that seems to wander because of it has a larger U too. None where it has no solution.
+    The means are solved again, as a bias that seems to drift because of the fault has a larger U, too.
     """
-    solution, seen = explained.solution, explained.seen
+    solution, inputs_of_solve = explained.solution, explained.seen
     response = np.einsum("qni,kni->kq", solution.response, patterns) / np.sqrt(np.diag(solution.covariance))
     worst = patterns[int(np.argmax(np.abs(response).max(axis=1)))]
     try:
-        damaged = explain(replace(seen, means_rad_s=seen.means_rad_s + worst), mounting)
+        damaged = explain(replace(inputs_of_solve, means_rad_s=inputs_of_solve.means_rad_s + worst), mounting)
     except Fault:
         return None
-    found, undamaged = damaged.solution, solution
-    off = np.concatenate([found.scale - undamaged.scale, found.bias_rad_s - undamaged.bias_rad_s])
-    return float(np.max(np.abs(off) / budget(damaged, unknown).expanded))
+    with_fault, undamaged = damaged.solution, solution
+    errors = np.concatenate([with_fault.scale - undamaged.scale, with_fault.bias_rad_s - undamaged.bias_rad_s])
+    return float(np.max(np.abs(errors) / budget(damaged, inputs).expanded))

@@ -1,4 +1,4 @@
-"""Whether an axis repeats one reading while the arm turns it: no healthy one does, however coarse its steps are."""
+"""The check for an axis that repeats one reading while the arm rotates it: no healthy axis does, however coarse."""
 
 import numpy as np
 
@@ -12,11 +12,11 @@ SMOOTHED_S = 0.1
 MOVED_STEPS, MOVED_RAD_S = 10.0, 0.02  # by which the rate along the axis must have changed, in the nominal mounting
 
 
-def longest_frozen(recording: ObservedRun, name: str) -> int:
-    """Return how many equal readings of one axis of a gyroscope followed each other, at most, while its rate changed.
+def find_longest_frozen(recording: ObservedRun, name: str) -> int:
+    """Return the longest run of equal readings of one axis of a gyroscope during which its rate changed.
 
-    The nominal mounting is good for this: an axis that leans, or a scale factor that is off, changes a change of rate
-    by a part of it.
+    The nominal mounting is accurate enough: a tilted axis, or a wrong scale factor, changes a change of rate by a
+    fraction.
     """
     stream = recording.stream(name)
     counts = stream.sensor.channel(RATE).counts(stream.raw)
@@ -30,19 +30,19 @@ def longest_frozen(recording: ObservedRun, name: str) -> int:
             if end - start + 1 > max(longest, FEWEST):
                 time_s = stream.time_s[start : end + 1]
                 inside = (time_s > time_s[0] + LAG_S) & (time_s < time_s[-1] - LAG_S)
-                if _changes(recording, time_s[inside], axes[axis]) > least_rad_s[axis]:
+                if _rate_change(recording, time_s[inside], axes[axis]) > least_rad_s[axis]:
                     longest = int(end - start + 1)
     return longest
 
 
-def _changes(recording: ObservedRun, time_s: Array, axis: Array) -> float:
-    """Return how much the rate along an axis (3,) of the flange changes at such times (n,), rad/s.
+def _rate_change(recording: ObservedRun, time_s: Array, axis: Array) -> float:
+    """Return the change of the rate along an axis (3,) of the flange over times (n,), rad/s.
 
-    Of means over `SMOOTHED_S`: the rate between two states is as noisy as their times are.
+    Of means over `SMOOTHED_S`, as the rate between two states is as noisy as their times.
     """
-    known = time_s[recording.motion.covered(time_s)] if len(time_s) else time_s
-    if len(known) < FEWEST:
+    covered_s = time_s[recording.motion.covered(time_s)] if len(time_s) else time_s
+    if len(covered_s) < FEWEST:
         return 0.0
-    blocks = max(int((known[-1] - known[0]) / SMOOTHED_S), 1)
-    rates = recording.motion.rate(known) @ axis
+    blocks = max(int((covered_s[-1] - covered_s[0]) / SMOOTHED_S), 1)
+    rates = recording.motion.rate(covered_s) @ axis
     return float(np.ptp([block.mean() for block in np.array_split(rates, blocks)]))

@@ -1,14 +1,13 @@
-"""Whether what a recording tells of a sensor agrees with itself: segments of sweeps and rests against one model.
+"""The checks of a gyroscope's recording against itself: segments of sweeps and rests against one model.
 
-All segments must be explained by one calibration: m = F ω + c + G a + d t, the vector model with gravity and a bias
-that drifts steadily, to within the noise, a bias that wanders, and what arm and sensor may legitimately be off by. Each
-check adds columns for one thing that might be wrong and asks how much they explain: without it, χ² with as many degrees
-of freedom as columns. The process of the bias comes from what is left within the sweeps and between the rests, so that
-a wrong sweep does not excuse itself.
+One calibration must explain all segments: m = F ω + c + G a + d t, the vector model with gravity and a steady bias
+drift, within noise, bias random walk and the known errors of arm and sensor. Each check tests the columns of one fault:
+without it, their χ² has as many degrees of freedom as columns. The bias process is estimated from residuals within
+sweeps and between rests, so that a disturbed sweep does not mask itself.
 
-A ripple that is faster than readings and states come is in the ways' means, and in neither's rates. It looks like noise
-unless it stands still in the samples: so what scatters on them counts as much more as they contradict each other beside
-all that may have changed from quarter to quarter (Birge's ratio). Where nothing scatters, nothing is excused.
+A ripple faster than readings and states is in the transfers' mean readings but in no rates. It looks like noise unless
+it is synchronous with the samples. So the unexplained variance of transfers is inflated as far as they contradict each
+other, beside all that may have changed from quarter to quarter (Birge ratio).
 """
 
 from collections.abc import Iterator
@@ -17,39 +16,39 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.consistency.alternatives import (
-    DAMAGES,
+    FAULT_MODES,
     Means,
     changes,
     differences,
-    each_axis,
-    in_quarters,
-    in_time,
-    jumps,
-    of_one_axis,
-    of_sweep,
+    normalised_time,
+    quarter_columns,
+    repeat_per_axis,
+    single_axis_columns,
+    step_columns,
+    sweep_columns,
 )
 from rig.analysis.consistency.residual_tests import (
-    Consistency,
+    Alternative,
     Statistic,
-    Suspected,
-    basis,
-    explained,
-    told_by,
-    unlike_the_others,
+    TestResults,
+    chi_square_of,
+    find_outliers,
+    orthonormal_basis,
+    test_alternatives,
 )
 from rig.analysis.consistency.whitened_segments import (
     Scatter,
     WhitenedSegments,
-    beyond_chance,
-    whiten,
+    apply_whitener,
+    build_whitener,
+    critical_value,
     whiten_segments,
-    whitening,
 )
 from rig.analysis.gyroscope.segments import Segments
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process, likeliest
 
-# Of one gyroscope, at most; the latter with an allowance alone. Which sweep is disturbed is a check beside them.
+# At most these of one gyroscope, besides the check of its worst sweep.
 CHECKS = (
     "axis_changed",
     "bias_jumped",
@@ -60,165 +59,224 @@ CHECKS = (
     "sweeps_against_rests",
 )
 
-MOST, TRIED = 16.0, 7  # times its variance by low frequencies is what stands still in the samples; sizes that are tried
+MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; factors that are tried
 
 
 @dataclass(frozen=True, slots=True)
-class Allowance:
-    """What segments may be off by, a pattern for each thing of one standard deviation: `off_rad_s` (P, N, 3).
+class ErrorPatterns:
+    """The known errors of segments, one pattern of one standard deviation each: `patterns_rad_s` (P, N, 3).
 
-    `ways` are the same segments and the ways between them, `off_on_ways_rad_s` (Q, M, 3) what these may be off by;
-    `instability_rad_s` is the sensor's known bias instability.
+    `transfers` are the same segments with the transfers between them, `transfer_patterns_rad_s` (Q, M, 3) their
+    patterns; `instability_rad_s` is the sensor's bias instability.
     """
 
-    off_rad_s: Array
-    ways: Segments
-    off_on_ways_rad_s: Array
+    patterns_rad_s: Array
+    transfers: Segments
+    transfer_patterns_rad_s: Array
     instability_rad_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class _Look:
-    """Segments, what each axis of the sensor feels in them (N, 3), and both held against their model."""
+class _Tested:
+    """Segments, the rates along the sensor's axes in them (N, 3), and their whitened model."""
 
     segments: Segments
-    felt: Array
-    held: WhitenedSegments
+    axis_rates: Array
+    model: WhitenedSegments
 
     @property
     def means(self) -> Means:
-        """What the axes feel in the segments, as means that a damage may change."""
-        return Means(self.felt, self.segments.times_s, self.segments.sweep)
+        """The rates in the segments, as means that a fault may change."""
+        return Means(self.axis_rates, self.segments.times_s, self.segments.sweep)
 
 
-def consistency(segments: Segments, matrix: Array, rate: float, allowance: Allowance) -> Consistency:
-    """Return every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
-    felt = segments.rates_rad_s @ matrix.T
-    scatter = _allowed(segments, allowance.off_rad_s, allowance)
-    bias = _wandering(segments, felt, _steady(segments), scatter)
-    here = _Look(segments, felt, whiten_segments(segments, scatter, bias))
-    later = _on_contradicting_ways(here, matrix, allowance, bias)
-    found = told_by(later.held, changes(later.segments, later.felt), rate)
-    found |= told_by(here.held, differences(segments, felt, each_axis(here.means.sweeps)), rate)
-    if told := later.held.most_by_one(of_one_axis(later.segments, later.felt), rate):
-        found["axis_changed"] = told
-    jumped = _jumped(segments, felt, scatter, rate)
-    if jumped is not None:
-        found["bias_jumped"] = jumped
+def check_gyroscope(
+    segments: Segments, matrix: Array, false_alarm_probability: float, allowance: ErrorPatterns
+) -> TestResults:
+    """Return every statistic with its critical value, each with that false-alarm probability; `matrix` (3, 3) is F."""
+    axis_rates = segments.rates_rad_s @ matrix.T
+    scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
+    bias = _estimate_bias_process(segments, axis_rates, _steady_columns(segments), scatter)
+    segments_only = _Tested(segments, axis_rates, whiten_segments(segments, scatter, bias))
+    with_transfers = _inflate_transfers(segments_only, matrix, allowance, bias)
+    statistics = test_alternatives(
+        with_transfers.model, changes(with_transfers.segments, with_transfers.axis_rates), false_alarm_probability
+    )
+    statistics |= test_alternatives(
+        segments_only.model,
+        differences(segments, axis_rates, repeat_per_axis(segments_only.means.sweeps)),
+        false_alarm_probability,
+    )
+    if explain_step := with_transfers.model.test_single_columns(
+        single_axis_columns(with_transfers.segments, with_transfers.axis_rates), false_alarm_probability
+    ):
+        statistics["axis_changed"] = explain_step
+    bias_jump = _test_bias_jump(segments, axis_rates, scatter, false_alarm_probability)
+    if bias_jump is not None:
+        statistics["bias_jumped"] = bias_jump
     sweeps = np.unique(segments.sweep[segments.sweep >= 0]).tolist()
-    ranked = unlike_the_others(here.held, sweeps, lambda sweep: of_sweep(segments, sweep), rate)
-    disturbed = {sweep: each for sweep, each in ranked if each[0] > each[1]}
-    return Consistency(found, ranked[0][1], disturbed, dict(_told_from(here, later, rate)))
-
-
-def would_tell(segments: Segments, matrix: Array, rate: float, allowance: Allowance) -> dict[str, float]:
-    """`told_from` of segments with which nothing is wrong, and whose bias wanders as is known of it alone."""
-    bias = BiasProcess(0.0, 0.0, 0, allowance.instability_rad_s)
-    scatter = _allowed(segments, allowance.off_rad_s, allowance)
-    here = _Look(segments, segments.rates_rad_s @ matrix.T, whiten_segments(segments, scatter, bias))
-    return dict(_told_from(here, _on_ways(matrix, allowance, bias), rate))
-
-
-def _on_contradicting_ways(here: _Look, matrix: Array, allowance: Allowance, bias: BiasProcess) -> _Look:
-    """Return `_on_ways` with what is unexplained of these as large as they contradict each other, up to `MOST` times.
-
-    χ² of all segments less that of those without the ways is theirs: it is to be as they are many.
-    """
-    ways, (own, freedom) = allowance.ways, _unexplained(here)
-    for ratio in np.geomspace(1.0, MOST, TRIED):
-        variances = ways.variances_rad2_s2 + (ratio - 1) * ways.unexplained_rad2_s2
-        later = _on_ways(matrix, replace(allowance, ways=replace(ways, variances_rad2_s2=variances)), bias)
-        whole, whole_freedom = _unexplained(later)
-        if whole - own <= whole_freedom - freedom:
-            break
-    return later
-
-
-def _unexplained(look: _Look) -> tuple[float, int]:
-    """χ² of segments beside all that may have changed, and with how many degrees of freedom."""
-    changed = [*changes(look.segments, look.felt).values(), in_quarters(look.means)]
-    beside = [whiten(look.held.white, each) for each in changed if each is not None]
-    return explained(look.held.seen, np.concatenate([look.held.base, *beside], axis=1), None)
-
-
-def _on_ways(matrix: Array, allowance: Allowance, bias: BiasProcess) -> _Look:
-    ways = allowance.ways
-    scatter = _allowed(ways, allowance.off_on_ways_rad_s, allowance)
-    return _Look(ways, ways.rates_rad_s @ matrix.T, whiten_segments(ways, scatter, bias))
-
-
-def _told_from(here: _Look, later: _Look, rate: float) -> Iterator[tuple[str, float]]:
-    """What may happen, and the size from which on the check that is to tell it does."""
-    segments, chance = here.segments, beyond_chance(rate)
-    steps, sweeps = jumps(segments), np.unique(segments.sweep[segments.sweep >= 0]).tolist()
-    among_ways, among_segments = changes(later.segments, later.felt), differences(segments, here.felt, None)
-    asked: dict[str, tuple[_Look, list[Suspected]]] = {
-        name: (look, [(columns, chance)])
-        for look, suspicions in ((later, among_ways), (here, among_segments))
-        for name, columns in suspicions.items()
-        if columns is not None
-    }
-    asked["axis_changed"] = later, list(later.held.each_alone(of_one_axis(later.segments, later.felt), rate))
-    of_one = beyond_chance(rate / len(sweeps))
-    asked["disturbed_sweep"] = here, [(of_sweep(segments, sweep), of_one) for sweep in sweeps]
-    if len(steps) > 1:
-        steady = replace(here.held, base=whiten(here.held.white, each_axis(_steady(segments))))
-        limit = _beyond_jumps(len(steps), rate)
-        asked["bias_jumped"] = replace(here, held=steady), [(each_axis(step), lambda _: limit) for step in steps]
-    for damage in DAMAGES:
-        if damage.check in asked:
-            look, suspected = asked[damage.check]
-            yield damage.what, look.held.told_from(damage.patterns(look.means), suspected)
-
-
-def _jumped(segments: Segments, felt: Array, scatter: Scatter, rate: float) -> Statistic | None:
-    """How much a jump of the bias between two rests explains beside its wandering; None without three rests.
-
-    The process is estimated anew beside the jump that explains most, for that jump would be taken for wandering. Few
-    rests tell that process, and least of all beside the jump that suits them best: simulated random walks exceed
-    the critical value about as often as F does with one degree of freedom for each place a jump might have.
-    """
-    steady, steps = _steady(segments), jumps(segments)
-    if len(steps) < 2:
-        return None
-
-    def told(step: Array, beside: Array) -> float:
-        bias = _wandering(segments, felt, beside, scatter)
-        white = whitening(segments, scatter, bias)
-        seen = whiten(white, (segments.means_rad_s - felt).T[:, :, None])[:, 0]
-        return explained(seen, whiten(white, each_axis(steady)), whiten(white, each_axis(step)))[0]
-
-    left = segments.means_rad_s - felt
-    left = left - steady @ (steady.T @ left)
-    aside = [step - steady @ (steady.T @ step) for step in steps]
-    best = max(range(len(steps)), key=lambda k: float(np.sum((aside[k].T @ left) ** 2 / np.sum(aside[k] ** 2))))
-    beside = basis(np.column_stack([steady, steps[best]]))
-    return told(steps[best], beside), _beyond_jumps(len(steps), rate)
-
-
-def _beyond_jumps(places: int, rate: float) -> float:
-    """The critical value of a jump that may be in so many places."""
-    from scipy.special import fdtri
-
-    return 3 * float(fdtri(3, places, 1 - rate / places))
-
-
-def _wandering(segments: Segments, felt: Array, steady: Array, scatter: Scatter) -> BiasProcess:
-    """How the bias wanders, by what `steady` (N, k), orthonormal columns, leaves of the readings."""
-    common = scatter.common_rad2_s2
-    left = segments.means_rad_s - felt
-    known = scatter.instability_rad_s
-    return bias_process(
-        steady, left, scatter.variances_rad2_s2, segments.times_s, common, instability_rad_s=known, chosen=likeliest
+    ranked = find_outliers(
+        segments_only.model, sweeps, lambda sweep: sweep_columns(segments, sweep), false_alarm_probability
+    )
+    disturbed = {sweep: statistic for sweep, statistic in ranked if statistic[0] > statistic[1]}
+    return TestResults(
+        statistics,
+        ranked[0][1],
+        disturbed,
+        dict(_detection_limits(segments_only, with_transfers, false_alarm_probability)),
     )
 
 
-def _allowed(segments: Segments, off_rad_s: Array, allowance: Allowance) -> Scatter:
-    """What is known of arm and sensor."""
-    return Scatter(segments.variances_rad2_s2, off_rad_s, allowance.instability_rad_s)
+def predict_detection_limits(
+    segments: Segments, matrix: Array, false_alarm_probability: float, allowance: ErrorPatterns
+) -> dict[str, float]:
+    """Return the detection limits of segments without a fault, whose bias drifts as its flicker alone makes it."""
+    bias = BiasProcess(0.0, 0.0, 0, allowance.instability_rad_s)
+    scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
+    segments_only = _Tested(segments, segments.rates_rad_s @ matrix.T, whiten_segments(segments, scatter, bias))
+    return dict(_detection_limits(segments_only, _test_transfers(matrix, allowance, bias), false_alarm_probability))
 
 
-def _steady(segments: Segments) -> Array:
-    """(N, k) orthonormal columns: whatever each sweep reads as a whole, the rests alike, gravity, a steady drift."""
-    places = [segments.sweep == sweep for sweep in np.unique(segments.sweep)]
-    return basis(np.column_stack([*places, segments.gravity_m_s2, in_time(segments)]))
+def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:
+    """Return `_test_transfers` with the unexplained variance inflated as the transfers contradict each other.
+
+    The χ² of all segments less that of those without transfers is the transfers': it is to equal their number. The
+    factor is at most `MOST`.
+    """
+    transfers, (segments_chi_square, segments_freedom) = allowance.transfers, _residual_chi_square(segments_only)
+    for ratio in np.geomspace(1.0, MOST, TRIED):
+        variances = transfers.variances_rad2_s2 + (ratio - 1) * transfers.unexplained_rad2_s2
+        with_transfers = _test_transfers(
+            matrix, replace(allowance, transfers=replace(transfers, variances_rad2_s2=variances)), bias
+        )
+        chi_square, freedom = _residual_chi_square(with_transfers)
+        if chi_square - segments_chi_square <= freedom - segments_freedom:
+            break
+    return with_transfers
+
+
+def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
+    """Return the χ² of segments beside all possible changes, and its degrees of freedom."""
+    changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
+    nuisance = [apply_whitener(tested.model.whitener, columns) for columns in changed if columns is not None]
+    return chi_square_of(tested.model.readings, np.concatenate([tested.model.model, *nuisance], axis=1), None)
+
+
+def _test_transfers(matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:
+    """Return segments and transfers with their whitened model."""
+    transfers = allowance.transfers
+    scatter = _build_scatter(transfers, allowance.transfer_patterns_rad_s, allowance)
+    return _Tested(transfers, transfers.rates_rad_s @ matrix.T, whiten_segments(transfers, scatter, bias))
+
+
+def _detection_limits(
+    segments_only: _Tested, with_transfers: _Tested, false_alarm_probability: float
+) -> Iterator[tuple[str, float]]:
+    """Yield every fault mode with the minimal detectable size of its check."""
+    segments, chance = segments_only.segments, critical_value(false_alarm_probability)
+    steps, sweeps = step_columns(segments), np.unique(segments.sweep[segments.sweep >= 0]).tolist()
+    of_transfers, of_segments = (
+        changes(with_transfers.segments, with_transfers.axis_rates),
+        differences(segments, segments_only.axis_rates, None),
+    )
+    tests: dict[str, tuple[_Tested, list[Alternative]]] = {
+        name: (tested, [(columns, chance)])
+        for tested, columns_by_name in ((with_transfers, of_transfers), (segments_only, of_segments))
+        for name, columns in columns_by_name.items()
+        if columns is not None
+    }
+    tests["axis_changed"] = (
+        with_transfers,
+        list(
+            with_transfers.model.single_column_alternatives(
+                single_axis_columns(with_transfers.segments, with_transfers.axis_rates), false_alarm_probability
+            )
+        ),
+    )
+    per_sweep = critical_value(false_alarm_probability / len(sweeps))
+    tests["disturbed_sweep"] = segments_only, [(sweep_columns(segments, sweep), per_sweep) for sweep in sweeps]
+    if len(steps) > 1:
+        steady_columns = replace(
+            segments_only.model,
+            model=apply_whitener(segments_only.model.whitener, repeat_per_axis(_steady_columns(segments))),
+        )
+        limit = _jump_critical_value(len(steps), false_alarm_probability)
+        tests["bias_jumped"] = (
+            replace(segments_only, model=steady_columns),
+            [(repeat_per_axis(step), lambda _: limit) for step in steps],
+        )
+    for fault_mode in FAULT_MODES:
+        if fault_mode.check in tests:
+            tested, alternatives = tests[fault_mode.check]
+            yield fault_mode.what, tested.model.minimal_detectable_size(fault_mode.patterns(tested.means), alternatives)
+
+
+def _test_bias_jump(
+    segments: Segments, axis_rates: Array, scatter: Scatter, false_alarm_probability: float
+) -> Statistic | None:
+    """Return the χ² of the largest jump of the bias between two rests, beside its drift; None with fewer than three
+    rests.
+
+    The process is re-estimated with the best jump in the model, which would otherwise count as drift. Few rests
+    determine the process poorly, most of all beside the jump that fits best: simulated random walks exceed the critical
+    value about as often as F with one degree of freedom for each possible jump.
+    """
+    steady_columns, steps = _steady_columns(segments), step_columns(segments)
+    if len(steps) < 2:
+        return None
+
+    def explain_step(step: Array, nuisance: Array) -> float:
+        bias = _estimate_bias_process(segments, axis_rates, nuisance, scatter)
+        whitener = build_whitener(segments, scatter, bias)
+        readings = apply_whitener(whitener, (segments.means_rad_s - axis_rates).T[:, :, None])[:, 0]
+        return chi_square_of(
+            readings,
+            apply_whitener(whitener, repeat_per_axis(steady_columns)),
+            apply_whitener(whitener, repeat_per_axis(step)),
+        )[0]
+
+    residuals = segments.means_rad_s - axis_rates
+    residuals = residuals - steady_columns @ (steady_columns.T @ residuals)
+    step_residuals = [step - steady_columns @ (steady_columns.T @ step) for step in steps]
+    best = max(
+        range(len(steps)),
+        key=lambda k: float(np.sum((step_residuals[k].T @ residuals) ** 2 / np.sum(step_residuals[k] ** 2))),
+    )
+    nuisance = orthonormal_basis(np.column_stack([steady_columns, steps[best]]))
+    return explain_step(steps[best], nuisance), _jump_critical_value(len(steps), false_alarm_probability)
+
+
+def _jump_critical_value(segment_sets: int, false_alarm_probability: float) -> float:
+    """Return the critical value of a jump that may be at any of this many ends of sweeps."""
+    from scipy.special import fdtri
+
+    return 3 * float(fdtri(3, segment_sets, 1 - false_alarm_probability / segment_sets))
+
+
+def _estimate_bias_process(
+    segments: Segments, axis_rates: Array, steady_columns: Array, scatter: Scatter
+) -> BiasProcess:
+    """Estimate the bias process from the residuals of orthonormal `steady_columns` (N, k)."""
+    common = scatter.common_rad2_s2
+    residuals = segments.means_rad_s - axis_rates
+    instability_rad_s = scatter.instability_rad_s
+    return bias_process(
+        steady_columns,
+        residuals,
+        scatter.variances_rad2_s2,
+        segments.times_s,
+        common,
+        instability_rad_s=instability_rad_s,
+        chosen=likeliest,
+    )
+
+
+def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPatterns) -> Scatter:
+    """Return the errors of the means by noise and the known errors of arm and sensor."""
+    return Scatter(segments.variances_rad2_s2, patterns_rad_s, allowance.instability_rad_s)
+
+
+def _steady_columns(segments: Segments) -> Array:
+    """Return orthonormal columns (N, k): a free level of each sweep and of all rests, gravity, a steady drift."""
+    segment_sets = [segments.sweep == sweep for sweep in np.unique(segments.sweep)]
+    return orthonormal_basis(np.column_stack([*segment_sets, segments.gravity_m_s2, normalised_time(segments)]))

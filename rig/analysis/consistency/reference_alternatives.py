@@ -1,6 +1,6 @@
-"""What might be wrong with readings of a constant reference: as columns of a suspicion, as damages of some size.
+"""Possible faults of readings of a constant reference: alternatives that are tested, and fault modes of a given size.
 
-As `rig.analysis.consistency.alternatives`, of accelerometers and magnetometers.
+As `rig.analysis.consistency.alternatives`, for accelerometers and magnetometers.
 """
 
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.consistency.residual_tests import Damage, Suspicions
+from rig.analysis.consistency.residual_tests import Alternatives, FaultMode
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import SECOND, Movement, cross, felt, jacobian
 from rig.estimation.reference.reading_errors import in_sweeps, of_pieces, of_sensor, per_axis
@@ -16,117 +16,122 @@ from rig.estimation.reference.reference_model import REFERENCE, matrix
 
 
 @dataclass(frozen=True, slots=True)
-class Read:
-    """What is held against its model: θ (22,) found from the `movement`, and what else is known of both.
+class ReferenceModel:
+    """The model of readings in a reference: θ (22,) estimated from the `movement`, and the known errors of both.
 
-    `known` (P, 3 K) are independent patterns of errors in the readings, each of one standard uncertainty; `times_s`
-    (N + M,) the middles of dwells and sweeps.
+    `error_patterns` (P, 3 K): independent errors of the readings, each of one standard uncertainty; `times_s` (N + M,):
+    the middles of dwells and sweeps.
     """
 
     theta: Array
     movement: Movement
-    known: Array
+    error_patterns: Array
     times_s: Array
     second_order: bool
 
     @property
     def dwells(self) -> int:
-        """Number N of dwells."""
+        """The number N of dwells."""
         return len(self.movement.dwells.readings_m_s2)
 
     @property
     def sweeps(self) -> int:
-        """Number M of sweeps."""
+        """The number M of sweeps."""
         return len(self.movement.sweeps.speeds_rad_s)
 
 
-def suspicions(read: Read) -> Suspicions:
-    """What each suspicion would add, by name of the check (3 K, k), to the readings; None is anything at all."""
-    s, f, time = felt(read.theta, read.movement), matrix(read.theta), _time(read)
-    found: dict[str, Array | None] = {
-        "bias_changed": bias_over_time(read),
+def alternatives(model: ReferenceModel) -> Alternatives:
+    """Return the columns (3 K, k) of each alternative, by the check's name; None stands for all residuals."""
+    s, f, time = felt(model.theta, model.movement), matrix(model.theta), _time(model)
+    columns: dict[str, Array | None] = {
+        "bias_changed": bias_drift_columns(model),
         "scale_changed": per_axis((s @ f.T) * time[:, None]),
         "loose_mounting": ((f @ -cross(s)) * time[:, None, None]).reshape(-1, 3),
-        "even_term": jacobian(read.theta, read.movement)[:, SECOND],
-        "odd_term": of_sensor(read.theta, read.movement, lambda along: along**3),
-        "asymmetry": of_sensor(read.theta, read.movement, np.abs),
+        "even_term": jacobian(model.theta, model.movement)[:, SECOND],
+        "odd_term": of_sensor(model.theta, model.movement, lambda component: component**3),
+        "asymmetry": of_sensor(model.theta, model.movement, np.abs),
         "residuals": None,
     }
-    if read.dwells and read.sweeps:
-        found["sweeps_against_dwells"] = in_sweeps(read.movement)
-    return found
+    if model.dwells and model.sweeps:
+        columns["sweeps_against_dwells"] = in_sweeps(model.movement)
+    return columns
 
 
-def of_piece(read: Read, piece: int) -> Array:
-    """(3 K, 3 or 9): other readings in this dwell, or sweep."""
-    first, wide = (3 * piece, 3) if piece < read.dwells else (3 * read.dwells + 9 * (piece - read.dwells), 9)
-    columns = np.zeros((read.movement.readings().size, wide))
+def segment_columns(model: ReferenceModel, segment: int) -> Array:
+    """Return columns (3 K, 3 or 9) of free readings in one dwell or sweep."""
+    first, wide = (3 * segment, 3) if segment < model.dwells else (3 * model.dwells + 9 * (segment - model.dwells), 9)
+    columns = np.zeros((model.movement.readings().size, wide))
     columns[first : first + wide] = np.eye(wide)
     return columns
 
 
-def bias_over_time(read: Read) -> Array:
-    return per_axis((_time(read) * read.movement.constant())[:, None] * np.ones(3))
+def bias_drift_columns(model: ReferenceModel) -> Array:
+    """Return columns of a bias that changes steadily."""
+    return per_axis((_time(model) * model.movement.constant())[:, None] * np.ones(3))
 
 
-def _time(read: Read) -> Array:
-    """(K,) times of the middles, from −1 to 1."""
-    middle = of_pieces(read.times_s, read.movement)
+def _time(model: ReferenceModel) -> Array:
+    """Return the times (K,) of the middles, from −1 to 1."""
+    middle = of_pieces(model.times_s, model.movement)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
     return time
 
 
-def _later(read: Read) -> Array:
-    """(K, 1) ½ in the second half of the time, −½ in the first: of what changes half-way the mean is meant."""
-    middle = (read.times_s.min() + read.times_s.max()) / 2
-    return of_pieces(np.where(read.times_s > middle, 0.5, -0.5), read.movement)[:, None]
+def _half_step(model: ReferenceModel) -> Array:
+    """Return (K, 1): ½ in the second half of the time, −½ in the first: a change half-way, about its mean."""
+    middle = (model.times_s.min() + model.times_s.max()) / 2
+    return of_pieces(np.where(model.times_s > middle, 0.5, -0.5), model.movement)[:, None]
 
 
-def _in_dwells(read: Read) -> Array:
-    """(3 K, 3 N) another reading of each axis in each dwell."""
-    count = 3 * read.dwells
-    return np.eye(read.movement.readings().size)[:, :count]
+def _dwell_columns(model: ReferenceModel) -> Array:
+    """Return columns (3 K, 3 N) of a free reading of each axis in each dwell."""
+    count = 3 * model.dwells
+    return np.eye(model.movement.readings().size)[:, :count]
 
 
-def _along(read: Read) -> Array:
-    """(K, 3) what each axis reads of the reference."""
-    along: Array = felt(read.theta, read.movement) @ matrix(read.theta).T
-    return along
+def _axis_components(model: ReferenceModel) -> Array:
+    """Return the components (K, 3) of the reference along the sensor's axes."""
+    component: Array = felt(model.theta, model.movement) @ matrix(model.theta).T
+    return component
 
 
-def _bent(change: Callable[[Array], Array]) -> Callable[[Read], Array]:
-    """What is added to the readings by a `change` of the force, both in terms of the reference."""
+def _bend_pattern(change: Callable[[Array], Array]) -> Callable[[ReferenceModel], Array]:
+    """Return the patterns of a nonlinear `change` of the specific force, both relative to the reference."""
 
-    def patterns(read: Read) -> Array:
-        size = float(np.linalg.norm(read.theta[REFERENCE]))
-        return of_sensor(read.theta, read.movement, lambda along: size * change(along / size))
+    def patterns(model: ReferenceModel) -> Array:
+        size = float(np.linalg.norm(model.theta[REFERENCE]))
+        return of_sensor(model.theta, model.movement, lambda component: size * change(component / size))
 
     return patterns
 
 
-DAMAGES: tuple[Damage[Read], ...] = (  # (3 K, k) each
-    Damage(
+FAULT_MODES: tuple[FaultMode[ReferenceModel], ...] = (  # (3 K, k) each
+    FaultMode(
         "the bias changes half-way", "bias_changed", None,
-        lambda read: per_axis(_later(read) * read.movement.constant()[:, None] * np.ones(3)),
+        lambda model: per_axis(_half_step(model) * model.movement.constant()[:, None] * np.ones(3)),
     ),
-    Damage(
+    FaultMode(
         "all scale factors change half-way", "scale_changed", "1",
-        lambda read: (_along(read) * _later(read)).reshape(-1, 1),
+        lambda model: (_axis_components(model) * _half_step(model)).reshape(-1, 1),
     ),
-    Damage(
-        "one scale factor changes half-way", "scale_changed", "1", lambda read: per_axis(_along(read) * _later(read))
+    FaultMode(
+        "one scale factor changes half-way", "scale_changed", "1",
+        lambda model: per_axis(_axis_components(model) * _half_step(model)),
     ),
-    Damage(
+    FaultMode(
         "the sensor turns on the flange half-way", "loose_mounting", "rad",
-        lambda read: (
-            (matrix(read.theta) @ -cross(felt(read.theta, read.movement))) * _later(read)[:, :, None]
+        lambda model: (
+            (matrix(model.theta) @ -cross(felt(model.theta, model.movement))) * _half_step(model)[:, :, None]
         ).reshape(-1, 3),
     ),
-    Damage("an even part, of v²/g", "even_term", "1", _bent(np.square)),
-    Damage("an odd part, of v³/g²", "odd_term", "1", _bent(lambda along: along**3)),
-    Damage("another scale upwards than downwards", "asymmetry", "1", _bent(lambda along: np.abs(along) / 2)),
-    Damage(
-        "another bias in sweeps than in dwells", "sweeps_against_dwells", None, lambda read: in_sweeps(read.movement)
+    FaultMode("an even part, of v²/g", "even_term", "1", _bend_pattern(np.square)),
+    FaultMode("an odd part, of v³/g²", "odd_term", "1", _bend_pattern(lambda component: component**3)),
+    FaultMode(
+        "another scale upwards than downwards", "asymmetry", "1",
+        _bend_pattern(lambda component: np.abs(component) / 2),
     ),
-    Damage("another reading in one dwell", "disturbed_dwell", None, _in_dwells),
+    FaultMode(
+        "another bias in sweeps than in dwells", "sweeps_against_dwells", None, lambda model: in_sweeps(model.movement)
+    ),
+    FaultMode("another reading in one dwell", "disturbed_dwell", None, _dwell_columns),
 )  # fmt: skip

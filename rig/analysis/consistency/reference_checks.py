@@ -1,9 +1,9 @@
-"""Whether what a recording tells of a sensor in a constant reference agrees with itself: dwells and sweeps, one model.
+"""The checks of readings in a constant reference against themselves: dwells and sweeps against one model.
 
-An accelerometer's readings, or a magnetometer's, which are dwells alone, must be explained by the calibration that was
-found from them (`rig.estimation.reference.accelerometer_model`), to within their noise, an arm that is not quite where
-it says, and what is stated of the rest. How far the arm is off is found anew beside every suspicion, so that what is
-wrong does not excuse itself: a suspicion is told by how much likelier it makes the readings.
+The calibration that was computed from them (`rig.estimation.reference.accelerometer_model`) must explain the readings
+of an accelerometer, or of a magnetometer, which has dwells only, within their noise, the arm's attitude error δ and
+stated errors. δ is re-estimated beside every alternative, so that a fault does not mask itself: a likelihood-ratio
+test.
 """
 
 from collections.abc import Sequence
@@ -11,15 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.consistency.reference_alternatives import DAMAGES, Read, bias_over_time, of_piece, suspicions
+from rig.analysis.consistency.reference_alternatives import (
+    FAULT_MODES,
+    ReferenceModel,
+    alternatives,
+    bias_drift_columns,
+    segment_columns,
+)
 from rig.analysis.consistency.residual_tests import (
-    Consistency,
     Statistic,
-    basis,
-    told_beside,
-    told_by,
-    told_from,
-    unlike_the_others,
+    TestResults,
+    find_outliers,
+    minimal_detectable_size,
+    orthonormal_basis,
+    remaining_directions,
+    test_alternatives,
 )
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import effects, predicted
@@ -30,137 +36,170 @@ from rig.estimation.reference.shared_errors import apart, information
 
 
 @dataclass(frozen=True, slots=True)
-class HeldReadings:
-    """What the model leaves of the readings (n,), and its columns (n, q), where noise is one and errors are apart.
+class WhitenedReference:
+    """Residuals (n,) and model columns (n, q) of readings with unit noise and decoupled errors.
 
-    `growth` (n,) of their variance with the square of the arm's error δ: see `rig.estimation.reference.shared_errors`.
+    `growth` (n,) is that of their variance with δ²: see `rig.estimation.reference.shared_errors`.
     """
 
-    left: Array
-    base: Array
-    turn: Array
+    residuals: Array
+    model: Array
+    rotation: Array
     growth: Array
 
-    def explained(self, suspicions: Sequence[Array], beside: Sequence[Array]) -> list[float]:
-        """What suspicions explain with the arm as far off as it is beside the worst of them: see `Held`."""
-        base = self._beside(beside)
-        turned = [self.turn @ columns for columns in suspicions]
-        std_rad = self._off(base)
-        worst = turned[int(np.argmax([self._explained(base, each, std_rad) for each in turned]))]
-        std_rad = self._off(np.column_stack([base, told_beside(basis(base), worst)]))
-        return [self._explained(base, each, std_rad) for each in turned]
+    def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
+        """Return the χ² of each alternative, with the δ beside the largest of them: see `WhitenedModel`."""
+        model = self._extend_model(nuisance)
+        rotated = [self.rotation @ columns for columns in alternatives]
+        delta_rad = self._estimate_delta(model)
+        worst = rotated[int(np.argmax([self._chi_square_drop(model, columns, delta_rad) for columns in rotated]))]
+        delta_rad = self._estimate_delta(
+            np.column_stack([model, remaining_directions(orthonormal_basis(model), worst)])
+        )
+        return [self._chi_square_drop(model, columns, delta_rad) for columns in rotated]
 
-    def judged(self, columns: Array | None, beside: Sequence[Array], rate: float) -> Statistic | None:
-        """Twice the logarithm of how much likelier the readings are with the columns, which is χ² where δ is known.
+    def test(
+        self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
+    ) -> Statistic | None:
+        """Return twice the log likelihood ratio with and without the columns, χ² if δ is known, and its limit.
 
-        Each with the δ that makes them likeliest, of what the model leaves (Welham and Thompson, J. R. Stat. Soc. B 59
-        (1997) 701). Where δ is not known, the limit is that of F, as far as δ is what the columns stand out against. Of
-        anything at all it is χ² of what the model leaves.
+        Both have their restricted maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is
+        estimated, the limit is that of F, in proportion to δ's part in the variance. For None as columns it is the χ²
+        of all residuals.
         """
         from scipy.special import chdtri
 
-        base = self._beside(beside)
-        std_rad, without = likeliest(self.growth, self.left, base)
+        model = self._extend_model(nuisance)
+        delta_rad, base_likelihood = likeliest(self.growth, self.residuals, model)
         if columns is None:
-            freedom = len(self.left) - base.shape[1]
-            left = self._unexplained(base, std_rad)[1]
-            return (float(left @ left), float(chdtri(freedom, rate))) if freedom else None
-        new = told_beside(basis(base), self.turn @ columns)
+            freedom = len(self.residuals) - model.shape[1]
+            residuals = self._whiten_residuals(model, delta_rad)[1]
+            return (float(residuals @ residuals), float(chdtri(freedom, false_alarm_probability))) if freedom else None
+        new = remaining_directions(orthonormal_basis(model), self.rotation @ columns)
         if not new.shape[1]:
             return None
-        _, beside_new = likeliest(self.growth, self.left, base, new)
-        return 2 * (without - beside_new), self._limit(base, new, std_rad, rate)
+        _, extended_likelihood = likeliest(self.growth, self.residuals, model, new)
+        return 2 * (base_likelihood - extended_likelihood), self._limit(model, new, delta_rad, false_alarm_probability)
 
-    def told_from(self, damages: Array, suspected: Sequence[Array], rate: float) -> float:
-        """The size from which on damages (n, k) are told by what is suspected: as `suspicion` has it."""
-        base = self._beside(())
-        std_rad = self._off(base)
-        size = np.sqrt(1 + std_rad**2 * self.growth)[:, None]
-        turned = [self.turn @ columns for columns in suspected]
-        beside = [(columns, told_beside(basis(base), columns)) for columns in turned]
-        limits = [(columns, self._limit(base, new, std_rad, rate)) for columns, new in beside if new.shape[1]]
-        found = [(columns / size, lambda _, limit=limit: limit) for columns, limit in limits]
-        return told_from(basis(base / size), self.turn @ damages / size, found)
+    def minimal_detectable_size(
+        self, fault_patterns: Array, alternatives: Sequence[Array], false_alarm_probability: float
+    ) -> float:
+        """Return the minimal detectable size of fault patterns (n, k) by the alternatives: see `residual_tests`."""
+        model = self._extend_model(())
+        delta_rad = self._estimate_delta(model)
+        size = np.sqrt(1 + delta_rad**2 * self.growth)[:, None]
+        rotated = [self.rotation @ columns for columns in alternatives]
+        nuisance = [(columns, remaining_directions(orthonormal_basis(model), columns)) for columns in rotated]
+        limits = [
+            (columns, self._limit(model, new, delta_rad, false_alarm_probability))
+            for columns, new in nuisance
+            if new.shape[1]
+        ]
+        decoupled = [(columns / size, lambda _, limit=limit: limit) for columns, limit in limits]
+        return minimal_detectable_size(
+            orthonormal_basis(model / size), self.rotation @ fault_patterns / size, decoupled
+        )
 
-    def _limit(self, base: Array, new: Array, std_rad: float, rate: float) -> float:
-        """The limit of what orthonormal columns explain beside `base`, in a share `rate` of recordings."""
+    def _limit(self, model: Array, new: Array, delta_rad: float, false_alarm_probability: float) -> float:
+        """Return the critical value of orthonormal columns beside the model."""
         from scipy.special import chdtri, fdtri
 
         count = new.shape[1]
-        of_known, freedom = float(chdtri(count, rate)), max(self._freedom(base, std_rad), count + 1.0)
-        told = count / (freedom - count) * fdtri(count, freedom - count, 1 - rate)
-        of_unknown, share = freedom * float(np.log1p(told)), self._share(base, new, std_rad)
-        return float(of_known + share * max(of_unknown - of_known, 0.0))
+        chi_square_limit, freedom = (
+            float(chdtri(count, false_alarm_probability)),
+            max(self._delta_dof(model, delta_rad), count + 1.0),
+        )
+        projections = count / (freedom - count) * fdtri(count, freedom - count, 1 - false_alarm_probability)
+        f_limit, fraction = freedom * float(np.log1p(projections)), self._delta_fraction(model, new, delta_rad)
+        return float(chi_square_limit + fraction * max(f_limit - chi_square_limit, 0.0))
 
-    def _beside(self, beside: Sequence[Array]) -> Array:
-        return basis(np.column_stack([self.base, *(self.turn @ each for each in beside)]))
+    def _extend_model(self, nuisance: Sequence[Array]) -> Array:
+        """Return the model with nuisance columns, orthonormal."""
+        return orthonormal_basis(np.column_stack([self.model, *(self.rotation @ columns for columns in nuisance)]))
 
-    def _off(self, base: Array) -> float:
-        """δ, by what `base` leaves."""
-        return likeliest(self.growth, self.left, base)[0]
+    def _estimate_delta(self, model: Array) -> float:
+        """Return δ from the residuals of the model."""
+        return likeliest(self.growth, self.residuals, model)[0]
 
-    def _unexplained(self, base: Array, std_rad: float) -> tuple[Array, Array]:
-        """`base` and what it leaves, white."""
-        size = np.sqrt(1 + std_rad**2 * self.growth)
-        known, left = basis(base / size[:, None]), self.left / size
-        return known, left - known @ (known.T @ left)
+    def _whiten_residuals(self, model: Array, delta_rad: float) -> tuple[Array, Array]:
+        """Return the model's basis and residuals, whitened with δ."""
+        size = np.sqrt(1 + delta_rad**2 * self.growth)
+        model_basis, residuals = orthonormal_basis(model / size[:, None]), self.residuals / size
+        return model_basis, residuals - model_basis @ (model_basis.T @ residuals)
 
-    def _explained(self, base: Array, columns: Array, std_rad: float) -> float:
-        known, left = self._unexplained(base, std_rad)
-        told = told_beside(known, columns / np.sqrt(1 + std_rad**2 * self.growth)[:, None]).T @ left
-        return float(told @ told)
+    def _chi_square_drop(self, model: Array, columns: Array, delta_rad: float) -> float:
+        """Return the χ² that columns explain beside the model."""
+        model_basis, residuals = self._whiten_residuals(model, delta_rad)
+        projections = (
+            remaining_directions(model_basis, columns / np.sqrt(1 + delta_rad**2 * self.growth)[:, None]).T @ residuals
+        )
+        return float(projections @ projections)
 
-    def _freedom(self, base: Array, std_rad: float) -> float:
-        """Degrees of freedom of δ²: how many readings tell it."""
-        return 2 * information(self.growth, std_rad, base) * std_rad**4
+    def _delta_dof(self, model: Array, delta_rad: float) -> float:
+        """Return the degrees of freedom of δ²."""
+        return 2 * information(self.growth, delta_rad, model) * delta_rad**4
 
-    def _share(self, base: Array, columns: Array, std_rad: float) -> float:
-        """Share of δ in the variance along columns, from 0 to 1."""
-        variance = 1 + std_rad**2 * self.growth
-        known, _ = self._unexplained(base, std_rad)
-        told = told_beside(known, columns / np.sqrt(variance)[:, None])
-        return float(np.mean(np.sum((1 - 1 / variance)[:, None] * told**2, axis=0)))
+    def _delta_fraction(self, model: Array, columns: Array, delta_rad: float) -> float:
+        """Return the fraction of δ in the variance along columns, from 0 to 1."""
+        variance = 1 + delta_rad**2 * self.growth
+        model_basis, _ = self._whiten_residuals(model, delta_rad)
+        projections = remaining_directions(model_basis, columns / np.sqrt(variance)[:, None])
+        return float(np.mean(np.sum((1 - 1 / variance)[:, None] * projections**2, axis=0)))
 
 
-def reference_consistency(read: Read, rate: float, *, drifting: bool = False) -> Consistency:
-    """Every statistic with its critical value; `rate` is that of false alarms for each.
+def check_reference(readings: ReferenceModel, false_alarm_probability: float, *, drifting: bool = False) -> TestResults:
+    """Return every statistic with its critical value, each with that false-alarm probability.
 
-    The bias may change steadily where it is `drifting`.
+    If `drifting`, the bias may change steadily.
     """
-    held, suspected = _held(read, drifting=drifting), suspicions(read)
-    pieces = range(read.dwells + read.sweeps)
-    ranked = unlike_the_others(held, pieces, lambda piece: of_piece(read, piece), rate)
-    return Consistency(
-        told_by(held, suspected, rate),
+    whitened, columns_by_name = _whiten_readings(readings, drifting=drifting), alternatives(readings)
+    segments = range(readings.dwells + readings.sweeps)
+    ranked = find_outliers(
+        whitened, segments, lambda segment: segment_columns(readings, segment), false_alarm_probability
+    )
+    return TestResults(
+        test_alternatives(whitened, columns_by_name, false_alarm_probability),
         ranked[0][1],
-        {piece: statistic for piece, statistic in ranked if statistic[0] > statistic[1]},
-        _told_from(held, read, rate),
+        {segment: statistic for segment, statistic in ranked if statistic[0] > statistic[1]},
+        _detection_limits(whitened, readings, false_alarm_probability),
     )
 
 
-def would_tell(read: Read, rate: float) -> dict[str, float]:
-    """`told_from` alone."""
-    return _told_from(_held(read, drifting=False), read, rate)
+def predict_detection_limits(readings: ReferenceModel, false_alarm_probability: float) -> dict[str, float]:
+    """Return the minimal detectable size of every fault mode."""
+    return _detection_limits(_whiten_readings(readings, drifting=False), readings, false_alarm_probability)
 
 
-def _told_from(held: HeldReadings, read: Read, rate: float) -> dict[str, float]:
-    """The size from which each damage is told, by what happens; nothing of what the model takes up."""
-    pieces = read.dwells + read.sweeps
-    asked = {name: ([columns], rate) for name, columns in suspicions(read).items() if columns is not None}
-    asked["disturbed_dwell"] = [of_piece(read, dwell) for dwell in range(read.dwells)], rate / pieces
-    found = {
-        damage.what: held.told_from(damage.patterns(read), *asked[damage.check])
-        for damage in DAMAGES
-        if damage.check in asked
+def _detection_limits(
+    whitened: WhitenedReference, readings: ReferenceModel, false_alarm_probability: float
+) -> dict[str, float]:
+    """Return the minimal detectable size of every fault mode that a check detects."""
+    segments = readings.dwells + readings.sweeps
+    tests = {
+        name: ([columns], false_alarm_probability)
+        for name, columns in alternatives(readings).items()
+        if columns is not None
     }
-    return {what: size for what, size in found.items() if np.isfinite(size)}
+    tests["disturbed_dwell"] = (
+        [segment_columns(readings, dwell) for dwell in range(readings.dwells)],
+        false_alarm_probability / segments,
+    )
+    decoupled = {
+        fault_mode.what: whitened.minimal_detectable_size(fault_mode.patterns(readings), *tests[fault_mode.check])
+        for fault_mode in FAULT_MODES
+        if fault_mode.check in tests
+    }
+    return {what: size for what, size in decoupled.items() if np.isfinite(size)}
 
 
-def _held(read: Read, *, drifting: bool) -> HeldReadings:
-    theta, movement = read.theta, read.movement
-    found = apart(noise(theta, movement) + read.known.T @ read.known, effects(theta, movement))
-    base = slopes(theta, movement, second_order=read.second_order)
+def _whiten_readings(readings: ReferenceModel, *, drifting: bool) -> WhitenedReference:
+    """Return the readings and the model of a reference, whitened and decoupled."""
+    theta, movement = readings.theta, readings.movement
+    decoupled = apart(
+        noise(theta, movement) + readings.error_patterns.T @ readings.error_patterns, effects(theta, movement)
+    )
+    model = slopes(theta, movement, second_order=readings.second_order)
     if drifting:
-        base = np.column_stack([base, bias_over_time(read)])
-    left = (movement.readings() - predicted(theta, movement)).ravel()
-    return HeldReadings(found.turn @ left, found.turn @ base, found.turn, found.growth)
+        model = np.column_stack([model, bias_drift_columns(readings)])
+    residuals = (movement.readings() - predicted(theta, movement)).ravel()
+    return WhitenedReference(decoupled.turn @ residuals, decoupled.turn @ model, decoupled.turn, decoupled.growth)

@@ -1,7 +1,8 @@
-"""Readings held against a model, and what might be wrong beside it: the one form of all checks of consistency.
+"""Tests of residuals against alternative hypotheses: the common form of all checks of consistency.
 
-A suspicion is columns: what one thing that might be wrong would add to the readings. How much of what the model leaves
-they explain is χ² with as many degrees of freedom as they are beside the model, where nothing is wrong.
+An alternative is a set of columns: the effect of one possible fault on the readings. The part of the residuals that the
+columns explain is χ² without the fault, with as many degrees of freedom as columns that the model does not span
+(Teunissen, Testing Theory, 2000).
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,131 +13,143 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
-TOLD = 1e-3  # of a column's size, what the model must leave of it
-SEEN = 1e-6  # of a damage, what a check must see of it: less is rounding
-TOLD_IN = 0.95  # of recordings, a damage of the size from which on it is told
-ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
+INDEPENDENT = 1e-3  # of a column's norm: the least that must lie outside the model
+VISIBLE = 1e-6  # of a fault's norm: a smaller projection is rounding
+DETECTION_PROBABILITY = 0.95  # of recordings with a fault of the minimal detectable size
+ALIKE = 10.0  # of χ²: an alternative within this of the best may be the cause, too
 
-Seen = TypeVar("Seen")
-Statistic = tuple[float, float]  # and its limit
-Suspected = tuple[Array, Callable[[int], float]]  # white columns, and what so many of them are beyond if they tell
-Suspicions = Mapping[str, Array | None]  # by name of the check; None is anything at all
+Subject = TypeVar("Subject")
+Statistic = tuple[float, float]  # a value and its critical value
+Alternative = tuple[Array, Callable[[int], float]]  # whitened columns; the critical value by their number
+Alternatives = Mapping[str, Array | None]  # by the check's name; None: all residuals
 
 
 @dataclass(frozen=True, slots=True)
-class Damage(Generic[Seen]):
-    """What happens, the `check` that is to tell it, and what its size is counted in; None is the reading's own unit.
+class FaultMode(Generic[Subject]):
+    """A possible fault, the `check` that detects it, and the unit of its size; None is the reading's own unit.
 
-    `patterns` are what one of that unit adds to the readings, for each way in which it may happen, less what a
-    calibration is to take up: of what changes half-way the mean is meant.
+    `patterns` return the readings' change by one unit, one for each way in which the fault may occur, without the part
+    that a calibration absorbs: a change half-way is meant about its mean.
     """
 
     what: str
     check: str
     unit: str | None
-    patterns: Callable[[Seen], Array]
+    patterns: Callable[[Subject], Array]
 
 
 @dataclass(frozen=True, slots=True)
-class Consistency:
-    """The statistics of one sensor by the name of their check, each with its limit.
+class TestResults:
+    """The statistics of one sensor by the name of their check, each with its critical value.
 
-    `piece` is that of the sweep or dwell least like the others; `disturbed` are those beyond the limit, by place.
-    `told_from` is the size from which on each damage is told, by what happens, where that is known.
+    - `worst`: the statistic of the sweep or dwell least like the others; `disturbed`: those beyond their critical
+      value, by index.
+    - `detection_limits`: the minimal detectable size of each fault mode, by its name, if it is known.
     """
 
     statistics: dict[str, Statistic]
-    piece: Statistic
+    worst: Statistic
     disturbed: dict[int, Statistic]
-    told_from: dict[str, float] = field(default_factory=dict)
+    detection_limits: dict[str, float] = field(default_factory=dict)
 
 
-class Held(Protocol):
-    """Readings and their model, whitened by what is known of both."""
+class WhitenedModel(Protocol):
+    """Readings and their model, whitened by all modelled errors."""
 
-    def explained(self, suspicions: Sequence[Array], beside: Sequence[Array]) -> list[float]:
-        """How much each explains that neither the model nor what stands `beside` it does."""
+    def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
+        """Return the χ² of each alternative, beside the model and the `nuisance` columns."""
 
-    def judged(self, columns: Array | None, beside: Sequence[Array], rate: float) -> Statistic | None:
-        """What columns explain so, and what that is beyond in a share `rate` of recordings in which nothing is wrong.
+    def test(
+        self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
+    ) -> Statistic | None:
+        """Return the χ² that columns explain, and its critical value for this false-alarm probability.
 
-        None where they explain nothing else.
+        None if the model and the nuisance columns span them.
         """
 
 
-def told_by(held: Held, suspicions: Suspicions, rate: float) -> dict[str, Statistic]:
-    """Statistic of every suspicion that the model does not hold already; `rate` is that of false alarms for each."""
-    judged = {name: held.judged(columns, (), rate) for name, columns in suspicions.items()}
-    return {name: statistic for name, statistic in judged.items() if statistic is not None}
+def test_alternatives(
+    model: WhitenedModel, alternatives: Alternatives, false_alarm_probability: float
+) -> dict[str, Statistic]:
+    """Return the statistic of every alternative that the model does not span, at that false-alarm probability each."""
+    test = {name: model.test(columns, (), false_alarm_probability) for name, columns in alternatives.items()}
+    return {name: statistic for name, statistic in test.items() if statistic is not None}
 
 
-def unlike_the_others(
-    held: Held, pieces: Iterable[int], columns: Callable[[int], Array], rate: float
+def find_outliers(
+    model: WhitenedModel, segments: Iterable[int], columns: Callable[[int], Array], false_alarm_probability: float
 ) -> list[tuple[int, Statistic]]:
-    """The piece least like the others, then the next once that is taken out, until they agree or half are out.
+    """Return the segment least like the others, then the next without it, until they agree or half are out.
 
-    Where two pieces are all that tells of something, either of the two may be the one: then both are named.
+    If only two segments determine something, either may be the outlier: then both are returned.
     """
-    left, beside = list(pieces), list[Array]()
-    each_rate, most, found = rate / len(left), (len(left) + 1) // 2, list[tuple[int, Statistic]]()
-    while len(found) < most:
-        explained = dict(zip(left, held.explained(list(map(columns, left)), beside), strict=True))
-        worst = max(left, key=lambda piece: explained[piece])
-        statistic = held.judged(columns(worst), beside, each_rate) or (0.0, 0.0)
+    remaining, nuisance = list(segments), list[Array]()
+    per_segment, most, outliers = (
+        false_alarm_probability / len(remaining),
+        (len(remaining) + 1) // 2,
+        list[tuple[int, Statistic]](),
+    )
+    while len(outliers) < most:
+        chi_square_of = dict(zip(remaining, model.chi_square_of(list(map(columns, remaining)), nuisance), strict=True))
+        worst = max(remaining, key=lambda segment: chi_square_of[segment])
+        statistic = model.test(columns(worst), nuisance, per_segment) or (0.0, 0.0)
         if statistic[0] <= statistic[1]:
-            return found or [(worst, statistic)]
-        alike = [piece for piece in left if explained[piece] > explained[worst] - ALIKE]
-        found += [(piece, statistic) for piece in alike]
-        left = [piece for piece in left if piece not in alike]
-        beside.append(columns(worst))
-    return found
+            return outliers or [(worst, statistic)]
+        alike = [segment for segment in remaining if chi_square_of[segment] > chi_square_of[worst] - ALIKE]
+        outliers += [(segment, statistic) for segment in alike]
+        remaining = [segment for segment in remaining if segment not in alike]
+        nuisance.append(columns(worst))
+    return outliers
 
 
-def basis(columns: Array) -> Array:
-    """Orthonormal columns that span the same."""
+def orthonormal_basis(columns: Array) -> Array:
+    """Return orthonormal columns with the same span."""
     sizes = np.linalg.norm(columns, axis=0)
-    left, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
-    found: Array = left[:, singular > 1e-6 * singular[0]]
-    return found
+    remaining, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
+    outliers: Array = remaining[:, singular > 1e-6 * singular[0]]
+    return outliers
 
 
-def told_beside(known: Array, columns: Array) -> Array:
-    """(n, k) orthonormal: what of white columns the `known` ones (n, p), orthonormal, do not span."""
+def remaining_directions(model_basis: Array, columns: Array) -> Array:
+    """Return orthonormal columns (n, k) of the part of whitened columns outside an orthonormal `model_basis` (n, p)."""
     sizes = np.linalg.norm(columns, axis=0)
     new = columns / np.where(sizes > 0, sizes, 1.0)
-    new = new - known @ (known.T @ new)
-    left, singular, _ = np.linalg.svd(new, full_matrices=False)
-    told: Array = left[:, singular > TOLD]
-    return told
+    new = new - model_basis @ (model_basis.T @ new)
+    remaining, singular, _ = np.linalg.svd(new, full_matrices=False)
+    detected: Array = remaining[:, singular > INDEPENDENT]
+    return detected
 
 
-def explained(seen: Array, base: Array, columns: Array | None) -> tuple[float, int]:
-    """How much of what `base` leaves of white readings these columns explain, and how many they are beside it.
+def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[float, int]:
+    """Return the χ² that columns explain of the residuals of `base`, and its degrees of freedom.
 
-    None explains all of it. (Decomposing that many columns is slow, and LAPACK's quick way does not always converge.)
+    None as columns explains all residuals. (A decomposition of so many columns is slow, and LAPACK's fast driver does
+    not always converge.)
     """
-    known = basis(base)
-    unexplained = seen - known @ (known.T @ seen)
+    model_basis = orthonormal_basis(base)
+    unexplained = readings - model_basis @ (model_basis.T @ readings)
     if columns is None:
-        return float(unexplained @ unexplained), len(seen) - known.shape[1]
-    told = told_beside(known, columns)
-    found = told.T @ unexplained
-    return float(found @ found), told.shape[1]
+        return float(unexplained @ unexplained), len(readings) - model_basis.shape[1]
+    detected = remaining_directions(model_basis, columns)
+    outliers = detected.T @ unexplained
+    return float(outliers @ outliers), detected.shape[1]
 
 
-def told_from(known: Array, patterns: Array, suspected: Iterable[Suspected]) -> float:
-    """The size from which on damages are told, whichever of `patterns` (n, k) they have: infinite where one never is.
+def minimal_detectable_size(model_basis: Array, patterns: Array, alternatives: Iterable[Alternative]) -> float:
+    """Return the smallest fault that at least one test detects in 95 of 100 recordings; inf if none does.
 
-    All is white; `known` (n, p) orthonormal is the model, and each that is `suspected` may tell. What its columns
-    explain is χ² about the damage then, no central one.
+    Minimal detectable bias (Baarda 1968): under the fault a test's statistic is non-central χ². All arguments are
+    whitened. `model_basis` (n, p): orthonormal columns of the model. `patterns` (n, k): readings per unit fault, one
+    column for each way in which it may occur; the worst counts. `alternatives`: the columns of each test, and its
+    critical value as a function of their number.
     """
     from scipy.special import chndtrinc
 
-    told = np.zeros(patterns.shape[1])
-    for columns, limit in suspected:
-        new = told_beside(known, columns)
+    detected = np.zeros(patterns.shape[1])
+    for columns, limit in alternatives:
+        new = remaining_directions(model_basis, columns)
         if count := new.shape[1]:
-            size = np.sqrt(chndtrinc(limit(count), count, 1 - TOLD_IN))
-            told = np.maximum(told, np.linalg.norm(new.T @ patterns, axis=0) / size)
-    seen = told.min() > SEEN * np.linalg.norm(patterns, axis=0).max(initial=0.0)
-    return float(1 / told.min()) if seen else float(np.inf)
+            size = np.sqrt(chndtrinc(limit(count), count, 1 - DETECTION_PROBABILITY))
+            detected = np.maximum(detected, np.linalg.norm(new.T @ patterns, axis=0) / size)
+    readings = detected.min() > VISIBLE * np.linalg.norm(patterns, axis=0).max(initial=0.0)
+    return float(1 / detected.min()) if readings else float(np.inf)

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.consistency import reference_checks
-from rig.analysis.consistency.alternatives import DAMAGES
-from rig.analysis.consistency.contradictions import rate_of_each
-from rig.analysis.consistency.detection_limits import ToldFrom, of_reference
-from rig.analysis.consistency.gyroscope_checks import would_tell
-from rig.analysis.consistency.systematic_errors import allow, allowed_of, any_earth_rate
+from rig.analysis.consistency.alternatives import FAULT_MODES
+from rig.analysis.consistency.contradictions import false_alarm_per_check
+from rig.analysis.consistency.detection_limits import DetectionLimit, find_reference_limits
+from rig.analysis.consistency.gyroscope_checks import predict_detection_limits
+from rig.analysis.consistency.systematic_errors import build_error_patterns, build_known_errors, unknown_earth_rate
 from rig.analysis.design.cut_plan import Planned, planned_segments
 from rig.analysis.design.planned_motion import PlannedRun, planned_run
 from rig.analysis.design.planned_reference import planned_accelerometers, planned_read
@@ -28,8 +28,8 @@ from rig.motion.steps import Plan, Rest
 class Told:
     """What a plan tells by sensor: gyroscopes where anything is swept, accelerometers where attitudes are held."""
 
-    rates: Mapping[str, tuple[ToldFrom, ...]]
-    accelerations: Mapping[str, tuple[ToldFrom, ...]]
+    rates: Mapping[str, tuple[DetectionLimit, ...]]
+    accelerations: Mapping[str, tuple[DetectionLimit, ...]]
 
 
 def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> Told:
@@ -42,15 +42,15 @@ def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) 
         return Told({}, {})
     run = planned_run(config, _one_set(plan), turner)
     kinds = sum(1 + (each.acceleration is not None) for each in config.to_calibrate.values())
-    rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors))
-    rates: dict[str, tuple[ToldFrom, ...]] = {}
+    rate = false_alarm_per_check(kinds + len(config.all_sensors) - len(config.sensors))
+    rates: dict[str, tuple[DetectionLimit, ...]] = {}
     if run.plan.sweeps and not run.plan.stages:  # what several mountings tell together is not foretold
         turned = planned_segments(run)
         rates = {name: _told_from(run, name, each, turned, rate) for name, each in config.to_calibrate.items()}
     on_arm = isinstance(config.turner, ArmSection) and run.plan.dwells
     read = {each.name: planned_read(each) for each in planned_accelerometers(config, run)} if on_arm else {}
-    found = {name: reference_checks.would_tell(each, rate) for name, each in read.items()}
-    return Told(rates, {name: of_reference(each, ACCELERATION) for name, each in found.items()})
+    found = {name: reference_checks.predict_detection_limits(each, rate) for name, each in read.items()}
+    return Told(rates, {name: find_reference_limits(each, ACCELERATION) for name, each in found.items()})
 
 
 def _one_set(plan: Plan) -> Plan:
@@ -59,25 +59,29 @@ def _one_set(plan: Plan) -> Plan:
     return replace(plan, steps=plan.steps[: waits[1]]) if len(waits) > 1 else plan
 
 
-def _told_from(run: PlannedRun, name: str, sensor: SensorSection, turned: Planned, rate: float) -> tuple[ToldFrom, ...]:
+def _told_from(
+    run: PlannedRun, name: str, sensor: SensorSection, turned: Planned, rate: float
+) -> tuple[DetectionLimit, ...]:
     matrix, full_scale_rad_s = mounting_matrix(sensor.mounting), float(np.radians(sensor.range_deg_s))
     seen = turned.read_by(matrix, PARTS[sensor.part].angle_random_walk_rad_sqrt_s, sensor.rate_hz)
     at_s = seen.segments.times_s.mean(axis=1)
     speeds = distinct_speeds(np.array([sweep.speed_rad_s for sweep in run.plan.sweeps]))
-    allowed = allowed_of(
+    allowed = build_known_errors(
         run.known,
         name,
         full_scale_rad_s,
         finds_curve=len(speeds) > 1,
         arcs=run.settings.has_arcs,
         jitter_s=0.0,
-        earth_rad_s=any_earth_rate(known=run.site.earth_rate_rad_s is not None or run.settings.finds_earth_rate),
+        earth_rad_s=unknown_earth_rate(is_known=run.site.earth_rate_rad_s is not None or run.settings.finds_earth_rate),
         sensor=known_sensor(run.known, name, full_scale_rad_s, np.zeros(len(at_s)), 0.0),
-        at_s=at_s,
+        temperature_times_s=at_s,
     )
-    found = would_tell(seen.segments, matrix, rate, allow(allowed, seen.segments, seen.ways, matrix))
+    found = predict_detection_limits(
+        seen.segments, matrix, rate, build_error_patterns(allowed, seen.segments, seen.ways, matrix)
+    )
     return tuple(
-        ToldFrom(each.what, each.check, found[each.what], each.unit or RATE.unit)
-        for each in DAMAGES
+        DetectionLimit(each.what, each.check, found[each.what], each.unit or RATE.unit)
+        for each in FAULT_MODES
         if each.what in found
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency.reference_alternatives import Read
+from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.design.planned_motion import PlannedRun, Timed, planned_attitude, planned_turn, timed_of
 from rig.analysis.reference.acceleration import held_out, sweeps_of
 from rig.analysis.reference.accelerometer_errors import Piece, Sheet, errors_of, sheet_of
@@ -48,7 +48,7 @@ def planned_accelerometers(config: RigConfig, run: PlannedRun) -> list[PlannedAc
     ]
 
 
-def planned_read(of: PlannedAccelerometer) -> Read:
+def planned_read(of: PlannedAccelerometer) -> ReferenceModel:
     """What an accelerometer would read, with noise as its data sheet has it.
 
     Of attitudes that are gone through several times the last is held out, as in a run.
@@ -80,7 +80,7 @@ def planned_read(of: PlannedAccelerometer) -> Read:
     lag = lag_pattern(movement, 1e-3 * run.known.acceleration_lag_ms) / np.sqrt(3)
     off = arm_patterns(theta, movement, stood, Known(run.arm, run.known.axis_deg, mounting, 0.0))
     middles_s = np.array([sum(each.window_s) / 2 for each in pieces])
-    return Read(theta, movement, np.concatenate([lag, off]), middles_s, second_order=second_order)
+    return ReferenceModel(theta, movement, np.concatenate([lag, off]), middles_s, second_order=second_order)
 
 
 def _piece(at: Timed[Dwell] | Timed[Sweep]) -> Piece:

@@ -21,7 +21,7 @@ from rig.report.terminal.shortest_words import wish_words
 from rig.station.plain_text import LONG_S, duration_words, plain
 
 if TYPE_CHECKING:
-    from rig.analysis.consistency.detection_limits import ToldFrom
+    from rig.analysis.consistency.detection_limits import DetectionLimit
     from rig.analysis.design.attitude_account import AttitudeAccount
     from rig.analysis.design.planned import Told
 
@@ -169,7 +169,7 @@ def _measured(plan: Plan) -> str:
     return sweeps + (f"{len(plan.dwells)} dwells, " if plan.dwells else "")
 
 
-def _told_table(what: str, by_sensor: "Mapping[str, Sequence[ToldFrom]]") -> Table:
+def _told_table(what: str, by_sensor: "Mapping[str, Sequence[DetectionLimit]]") -> Table:
     """A row for each thing that may happen, a column for each sensor; a dash where nothing checks it of this sensor."""
     from rig.report.words.told_words import size_words, told_from_entries
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.analysis.consistency.knocked_dwells import hold_halves_together
+from rig.analysis.consistency.knocked_dwells import compare_dwell_halves
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.consistency.raw_dwells import RawDwell
@@ -32,7 +32,7 @@ def dwells(rng: np.random.Generator, hertz: float | None, step: Array | None = N
 
 
 def told(seed: int, hertz: float | None, step: Array | None = None) -> bool:
-    found = hold_halves_together(dwells(np.random.default_rng(seed), hertz, step), 0.0, RATE, Steps(1.0))
+    found = compare_dwell_halves(dwells(np.random.default_rng(seed), hertz, step), 0.0, RATE, Steps(1.0))
     value, limit = found["knocked_dwell"]
     return value > limit
 

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import ksone
 
-from rig.analysis.consistency.reference_alternatives import Read
-from rig.analysis.consistency.reference_checks import reference_consistency
+from rig.analysis.consistency.reference_alternatives import ReferenceModel
+from rig.analysis.consistency.reference_checks import check_reference
 from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
@@ -55,7 +55,7 @@ def stood(axes: int) -> list[Stood]:
     ]
 
 
-def read_of(movement: Movement, axes: int, axis_rad: float) -> Read:
+def read_of(movement: Movement, axes: int, axis_rad: float) -> ReferenceModel:
     """With what is found of it, of an arm that is said to be good to so much."""
     found = solve_imu(movement.dwells, movement.sweeps, gravity_m_s2=NORM)
     theta = np.concatenate([found.matrix.ravel(), found.reference_m_s2, found.bias_m_s2, np.zeros(7)])
@@ -64,7 +64,9 @@ def read_of(movement: Movement, axes: int, axis_rad: float) -> Read:
     known = Known(NOMINAL, float(np.degrees(np.sqrt(3) * axis_rad)), np.eye(3), found.attitude_error.std_rad)
     swept_s = 8.0 * np.arange(len(movement.sweeps.speeds_rad_s))
     times_s = np.concatenate([100 + 5.0 * np.arange(len(JOINTS)), swept_s])
-    return Read(theta, movement, arm_patterns(theta, movement, stood(axes), known), times_s, second_order=False)
+    return ReferenceModel(
+        theta, movement, arm_patterns(theta, movement, stood(axes), known), times_s, second_order=False
+    )
 
 
 @pytest.mark.one_in(3)
@@ -81,7 +83,7 @@ def test_sound_readings_are_beyond_a_limit_as_often_as_it_says(
     for seed in range(runs):
         rng = np.random.default_rng(seed)
         movement = moved(drawn(rng), crooked_arm(arm_rad, rng), density_ug, rng, axes)
-        found = reference_consistency(read_of(movement, axes, arm_rad), rate)
+        found = check_reference(read_of(movement, axes, arm_rad), rate)
         judged += len(found.statistics) + 1
         beyond += sum(value > limit for value, limit in found.statistics.values()) + bool(found.disturbed)
         assert set(found.statistics) == {*EVERY, *(("sweeps_against_dwells",) if axes else ())}
@@ -168,5 +170,5 @@ def test_a_turn_of_one_dwell_is_named_however_far_off_the_arm_is() -> None:
     turned = movement.dwells.attitudes.copy()
     turned[7] = turned[7] @ Rotation.from_rotvec([2e-3, -3e-3, 1e-3]).as_matrix()
     damaged = replace(movement, dwells=replace(movement.dwells, attitudes=turned))
-    assert reference_consistency(read_of(movement, 6, 5e-4), 1e-5).disturbed == {}
-    assert set(reference_consistency(read_of(damaged, 6, 5e-4), 1e-5).disturbed) == {7}
+    assert check_reference(read_of(movement, 6, 5e-4), 1e-5).disturbed == {}
+    assert set(check_reference(read_of(damaged, 6, 5e-4), 1e-5).disturbed) == {7}

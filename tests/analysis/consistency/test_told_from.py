@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 import pytest
 
-from rig.analysis.consistency.contradictions import Contradictions, contradictions
-from rig.analysis.consistency.detection_limits import ToldFrom
+from rig.analysis.consistency.contradictions import ConsistencyChecks, contradictions
+from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.analysis.design.planned import planned_told_from
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.surroundings import surroundings_of
@@ -22,7 +22,7 @@ SURE = 1.3  # times the size from which on it is told in 95 of 100
 AXES = np.eye(3)
 
 
-def held(run: RunData) -> Contradictions:
+def held(run: RunData) -> ConsistencyChecks:
     recordings = observe_recordings([run])
     surroundings = surroundings_of(recordings, recordings[0].run.settings)
     results = solve_observed(run.sensors, recordings, surroundings=surroundings)
@@ -52,9 +52,9 @@ PLANTED: Mapping[str, Callable[[Drawn, int], Array]] = {
 }
 
 
-def planted(seen: Drawn, kind: str, times: float, way: int) -> Iterator[tuple[ToldFrom, bool]]:
+def planted(seen: Drawn, kind: str, times: float, way: int) -> Iterator[tuple[DetectionLimit, bool]]:
     """Each damage of so many times the size from which on it is told, and whether it was."""
-    for each in held(seen.run).told_from["gyro"]:
+    for each in held(seen.run).detection_limits["gyro"]:
         by = times * each.size * PLANTED[each.what](seen, way)
         checks = held(damaged(seen, KINDS[kind], by)).checks
         yield each, not all(check.passed for check in checks)
@@ -99,7 +99,7 @@ def test_what_a_plan_says_will_be_told_is_what_its_recording_says() -> None:
     seen = drawn(3, KINDS["quiet LSM9DS1"])
     motion = Motion(Setup(), np.random.default_rng(0))
     will = planned_told_from(parse(motion.config).config, motion.plan, NOMINAL).rates["gyro"]
-    recorded = {each.what: each for each in held(seen.run).told_from["gyro"]}
+    recorded = {each.what: each for each in held(seen.run).detection_limits["gyro"]}
     assert set(PLANTED) == set(recorded) == {each.what for each in will}
     for each in will:
         assert each.size == pytest.approx(recorded[each.what].size, rel=0.6), each.what

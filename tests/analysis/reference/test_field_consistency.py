@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from rig.analysis.consistency.reference_alternatives import Read
+from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns
 from rig.analysis.reference.reference_budgets import UNTESTED_DRIFT_T, drift_patterns
 from rig.config.procedures.attitude_sets import MAGNETIC
@@ -21,7 +21,7 @@ NOISE_T = 0.32e-6 / np.sqrt(80 * 3.0)  # of a dwell of three seconds
 ARM_RAD = 1e-4
 
 
-def read_of(seed: int) -> Read:
+def read_of(seed: int) -> ReferenceModel:
     """Of a field that drifts as it may where it is not tested, on an arm that is good to so much."""
     rng = np.random.default_rng([seed, 11])
     arm, told = crooked_arm(ARM_RAD, rng), flange_pose(JOINTS)[:, :3, :3]
@@ -40,7 +40,7 @@ def read_of(seed: int) -> Read:
     drift, _ = drift_patterns(found.matrix, told, None)
     of_arm = arm_patterns(theta, movement, [Stood(each) for each in JOINTS], arm_known)
     times_s = np.linspace(0.0, 5.0 * len(JOINTS), len(JOINTS))
-    return Read(theta, movement, np.concatenate([drift / np.sqrt(3), of_arm]), times_s, second_order=False)
+    return ReferenceModel(theta, movement, np.concatenate([drift / np.sqrt(3), of_arm]), times_s, second_order=False)
 
 
 @pytest.mark.thorough

@@ -3,7 +3,7 @@
 import pytest
 from rich.console import Console
 
-from rig.analysis.consistency.detection_limits import ToldFrom
+from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.report.terminal.plan_table import _told_table
 from support.laboratories.commands import rig_here
 from support.paths import CONFIGS
@@ -18,7 +18,10 @@ def test_a_long_instruction_leaves_every_step_its_time(monkeypatch: pytest.Monke
 
 
 def test_what_is_not_checked_of_a_sensor_is_a_dash_in_its_column() -> None:
-    scale, bias = ToldFrom("the scale changes", "scale_changed", 1e-3, "1"), ToldFrom("a jump", "bias_jumped", 2.0, "T")
+    scale, bias = (
+        DetectionLimit("the scale changes", "scale_changed", 1e-3, "1"),
+        DetectionLimit("a jump", "bias_jumped", 2.0, "T"),
+    )
     console = Console(width=80)
     with console.capture() as shown:
         console.print(_told_table("to accelerometers", {"a": (scale, bias), "b": (scale,)}))

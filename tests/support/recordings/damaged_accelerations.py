@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig.analysis.check import Check
-from rig.analysis.consistency.contradictions import in_reference
+from rig.analysis.consistency.contradictions import check_references
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.analysis.reference.acceleration import calibrate_accelerometers
 from rig.analysis.reference.magnetic_field import calibrate_magnetometers
@@ -126,7 +126,7 @@ def told_of(run: RunData) -> Told:
     accelerometers = calibrate_accelerometers(recordings, run.settings)
     magnetometers = calibrate_magnetometers(recordings, run.settings, accelerometers)
     refused = frozenset(fault.name for fault in magnetometers.faults.values())
-    return Told(in_reference(recordings, accelerometers, magnetometers.results, run.settings).checks, refused)
+    return Told(check_references(recordings, accelerometers, magnetometers.results, run.settings).checks, refused)
 
 
 def offset(by: float, where: Callable[[Readings], Mask]) -> Damage:

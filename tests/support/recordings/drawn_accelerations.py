@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency.reference_alternatives import Read
-from rig.analysis.consistency.reference_checks import reference_consistency
+from rig.analysis.consistency.reference_alternatives import ReferenceModel
+from rig.analysis.consistency.reference_checks import check_reference
 from rig.analysis.reference.accelerometer_errors import MILLI_G, STANDARD, Piece, Sheet, errors_of
 from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns, arm_turns
 from rig.analysis.reference.reference_budgets import accelerometer_budget
@@ -145,18 +145,18 @@ def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
     return solution, budget, found - session.parameters
 
 
-def read_of(session: Session, solution: ImuSolution) -> Read:
+def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
     """What is held against itself."""
     turned = planned(AXES)
     stood = [*map(Stood, JOINTS), *(Stood(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned)]
     known = Known(NOMINAL, float(np.degrees(STANDARD * session.arm_rad)), np.eye(3), solution.attitude_error.std_rad)
     patterns = arm_patterns(solution.theta, session.movement, stood, known)
-    return Read(solution.theta, session.movement, patterns, session.times_s, second_order=False)
+    return ReferenceModel(solution.theta, session.movement, patterns, session.times_s, second_order=False)
 
 
 def told_of(session: Session, solution: ImuSolution, rate: float) -> set[str]:
     """The names of what is beyond its limit."""
-    found = reference_consistency(read_of(session, solution), rate)
+    found = check_reference(read_of(session, solution), rate)
     beyond = {name for name, (value, limit) in found.statistics.items() if value > limit}
     return beyond | ({"disturbed"} if found.disturbed else set())
 
