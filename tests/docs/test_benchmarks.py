@@ -58,6 +58,7 @@ def test_every_benchmark_has_a_short_form_or_takes_hours() -> None:
     assert {path.stem for path in (ROOT / "benchmarks").glob("*/*.py")} == {*HOURS, *SHORT, *LONGER}
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("benchmark", "arguments"),
@@ -75,7 +76,7 @@ def test_a_short_benchmark_runs_to_its_end(benchmark: str, arguments: tuple[str,
     assert last
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.slow
 @pytest.mark.parametrize("benchmark", WITH_HELP, ids=lambda path: path.stem)
 def test_a_benchmark_says_what_it_can(benchmark: Path, tmp_path: Path) -> None:

@@ -38,6 +38,7 @@ def test_the_drawings_are_those_the_script_makes(monkeypatch: pytest.MonkeyPatch
     assert {name: (DOCS / "drawings" / name).read_text(encoding="utf-8") for name in drawn} == drawn, "make drawings"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
     """As `make docs` does it, but for the notebook, which is executed by tests/notebook/test_first_look.py."""

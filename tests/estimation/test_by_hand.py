@@ -294,6 +294,7 @@ def test_time_stamps_that_scatter_are_in_the_uncertainty() -> None:
     assert (uneven > 3 * usual).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     wrong = TurnAction(1, Mistake("short", 5.0))

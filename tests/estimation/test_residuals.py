@@ -46,6 +46,7 @@ def test_residuals_scatter_by_what_is_expected_of_them(walk_rad_s_sqrt_s: float,
     assert 0.92 < np.mean(np.abs(ratio) < 2) < 0.985
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465", "kvh1775"])

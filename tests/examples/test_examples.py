@@ -27,6 +27,7 @@ def test_every_example_is_run_here() -> None:
     assert {file.stem for file in EXAMPLES.glob("*.py")} == run_here
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("name", "shows"), [("solve_and_apply", "gyro: at the end"), ("own_export", "calibration.toml")]
 )
@@ -35,6 +36,7 @@ def test_a_recorded_run_is_enough(name: str, shows: str, tmp_path: Path) -> None
     assert done.returncode == 0 and shows in done.stdout, done.stderr
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("name", "arguments", "shows"),
     [("own_check", ("--out", "RUN"), "gyro.warming"), ("laboratory", ("RUN",), "gyro.scale_std")],

@@ -20,6 +20,7 @@ def test_no_conversion_is_lost_at_full_rate(case: str, simulated_s: float) -> No
     assert all(account.samples > 0.94 * simulated_s * account.rate_hz for account in result.accounts.values())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "rates_hz",
     [

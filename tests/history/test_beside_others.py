@@ -22,6 +22,7 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str,
         yield "postgresql", url
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(6 * 3600)
 def test_all_that_was_said_to_be_entered_is_there(place: tuple[str, str], tmp_path: Path, thorough: bool) -> None:
     kind, where = place

@@ -38,6 +38,7 @@ def alarms(pairs: list[tuple[dict[str, Parameter], dict[str, Parameter]]]) -> fl
     return float(np.mean([any(change.has_changed for change in changes_in([pair])[0]) for pair in pairs]))
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 @pytest.mark.parametrize("sensor", SENSORS)

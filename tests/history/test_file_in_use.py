@@ -264,6 +264,7 @@ print(type(event).__name__, late)
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_time_in_which_a_history_has_to_answer_counts_no_imports(file: Path) -> None:
     command = [sys.executable, "-c", IMPORTS, str(CONFIGS / "ci.yaml"), str(RECORDINGS / "verified")]

@@ -98,6 +98,7 @@ def pipe(folder: Path) -> None:
     os.mkfifo(folder / "config.yaml")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("state", "name", "attack"),
@@ -125,6 +126,7 @@ def test_a_file_that_is_not_what_was_entered_is_named(
         ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("statements", "named"),

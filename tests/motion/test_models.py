@@ -78,6 +78,7 @@ def test_what_was_recorded_without_a_model_was_a_ur10e() -> None:
     assert arm("ur10e") == ArmSection(host="10.0.0.2", payload_kg=0.35)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("centre_mm", FIXTURES_MM)

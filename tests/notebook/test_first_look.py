@@ -10,6 +10,7 @@ from support.processes.waiting import PATIENCE_S
 NOTEBOOK = DOCS / "notebooks" / "first_look.ipynb"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of Jupyter's own packages
 def test_the_notebook_runs_and_shows_tables_and_pictures() -> None:

@@ -36,6 +36,7 @@ class Turns:
         return inside
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("first_s", [100.0, 2500.0], ids=["from the beginning", "after forty minutes at rest"])
 def test_a_clock_of_hours_may_be_off_as_far_as_one_of_minutes(first_s: float) -> None:

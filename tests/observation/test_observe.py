@@ -629,6 +629,7 @@ def test_a_bias_too_large_for_algorithm_1_is_reported_beside_the_result() -> Non
     assert sensor_entry(result).model_dump()["algorithm_1"]["error"].startswith("algorithm_1_diverged")
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 def test_reported_uncertainties_are_those_of_many_sessions(thorough: bool) -> None:

@@ -87,6 +87,7 @@ def moving(laboratory: WorldHandle) -> bool:
     return bool(max(map(abs, laboratory.state()["qd_rad_s"])) > 10 * REST_SPEED_RAD_S)
 
 
+@pytest.mark.thorough
 def test_half_requests_end_no_run(start: Start, tmp_path: Path) -> None:
     running = start(configuration(tmp_path))
     with flooded(running.url, MANY):

@@ -45,6 +45,7 @@ def solved_in_a_notebook(folder: Path) -> None:
     assert public.solve(public.load(folder))["gyro"].scale[0] > 1
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "read",

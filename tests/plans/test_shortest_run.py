@@ -186,6 +186,7 @@ def demo() -> RigConfig:
     return load(CONFIGS / "demo.yaml", (), sections(installed()), turners.sections()).config
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3000)
@@ -319,6 +320,7 @@ def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches(part: st
         assert BIAS_RATIO[0] <= bias <= BIAS_RATIO[1], seed
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_arcs_are_tried_where_the_encoders_are_known() -> None:
     known = load(CONFIGS / "demo.yaml", ["uncertainty.angle_std_deg=0.01"], sections(installed()), turners.sections())

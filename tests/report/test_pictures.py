@@ -114,6 +114,7 @@ def filled(document: ResultDocument) -> list[float]:
     return parts
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["imu", "verified", "bias_drift", "everything"])

@@ -54,6 +54,7 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     return out, json.loads((out / "result.json").read_text(encoding="utf-8")), world
 
 
+@pytest.mark.thorough
 def test_scale_and_bias_agree_with_the_turntable(finished: Finished) -> None:
     """SIX, Tables II and III: below 1e-3 in scale; the bias, as it was on the average of the run, within 2 U."""
     out, result, turntable = finished
@@ -68,6 +69,7 @@ def test_scale_and_bias_agree_with_the_turntable(finished: Finished) -> None:
     assert np.all(np.abs(bias_error) < 4 * std[3:])
 
 
+@pytest.mark.thorough
 def test_the_board_solves_as_the_computer_does(finished: Finished) -> None:
     _, result, truth = finished
     board = result["gyroscopes"]["gyro"]["board"]
@@ -80,6 +82,7 @@ def test_the_board_solves_as_the_computer_does(finished: Finished) -> None:
     assert "board" not in result["gyroscopes"]["reference"]
 
 
+@pytest.mark.thorough
 def test_calibrated_readings_follow_the_reference(finished: Finished) -> None:
     """SIX, Tables IV and V."""
     out, result, _ = finished
@@ -93,6 +96,7 @@ def test_calibrated_readings_follow_the_reference(finished: Finished) -> None:
             assert (out / f"verification_gyro_{when}{suffix}").stat().st_size > 10_000
 
 
+@pytest.mark.thorough
 def test_gravitys_share_of_what_is_left_is_told(finished: Finished) -> None:
     """The board does not know which way is down: about the vertical axis most of what it leaves is gravity's hold."""
     out, result, _ = finished
@@ -105,6 +109,7 @@ def test_gravitys_share_of_what_is_left_is_told(finished: Finished) -> None:
     assert "of which gravity" in shown.stdout
 
 
+@pytest.mark.thorough
 def test_the_references_mounting_is_found(finished: Finished) -> None:
     """The simulated sensors sit askew by their own mounting errors; what is between them is reported.
 
@@ -125,6 +130,7 @@ def test_the_references_mounting_is_found(finished: Finished) -> None:
     assert np.abs(off).max() < 2e-4
 
 
+@pytest.mark.thorough
 def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) -> None:
     out, result, _ = finished
     log = (out / "log.txt").read_text(encoding="utf-8")
@@ -136,6 +142,7 @@ def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) ->
     assert solved_otherwise(out, again.stdout) == []
 
 
+@pytest.mark.thorough
 def test_a_verifications_recording_alone_is_no_calibration(finished: Finished) -> None:
     out, _, _ = finished
     alone = rig_here("solve", out / "verify.h5", "--json")
@@ -144,6 +151,7 @@ def test_a_verifications_recording_alone_is_no_calibration(finished: Finished) -
     assert {check["name"] for check in document["checks"]} == VERIFIED
 
 
+@pytest.mark.thorough
 def test_a_calibration_whose_verification_is_missing_has_not_passed(finished: Finished, tmp_path: Path) -> None:
     out, _, _ = finished
     shutil.copy(out / "run.h5", tmp_path)

@@ -86,6 +86,7 @@ def test_an_interrupted_script_of_ones_own_is_resumed_by_itself(interrupted: Pat
     assert "rig: another_script: " in rig_here("solve", interrupted).stderr, "it is judged as it was, or not at all"
 
 
+@pytest.mark.thorough
 def test_it_runs_as_a_script_too_and_is_planned(tmp_path: Path) -> None:
     config = own_configuration(tmp_path)
     planned = rig_here("plan", config, "--script", OWN, "--json")

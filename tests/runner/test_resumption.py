@@ -51,6 +51,7 @@ def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
     assert resumption([run], run.settings, SCRIPT).done == {0, 1, 2, 3}
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_sweep_that_only_the_accelerometer_contradicts_is_repeated() -> None:
     sound = damaged_accelerations.readings_of("imu", "gyro")

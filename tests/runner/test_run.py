@@ -88,6 +88,7 @@ def test_a_run_leaves_everything_in_its_folder(finished: tuple[Path, dict[str, A
         assert np.array_equal(sequence, np.arange(len(sequence))), "samples are missing"
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not FULL.exists(), reason="no device that is always full")
 def test_a_passed_run_stays_passed_where_stdout_takes_no_more(tmp_path: Path) -> None:
     out = tmp_path / "run"

@@ -133,7 +133,7 @@ def of_kvh(fault: str, patience: Patience) -> Iterator[Bench]:
 BENCHES = {"lines": of_lines, "mavlink": of_mavlink, "kvh1775": of_kvh}
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(("part", "fault", "name"), list(table()))
 def test_a_fault_has_its_parts_name(part: str, fault: str, name: str) -> None:

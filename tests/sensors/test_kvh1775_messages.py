@@ -116,6 +116,7 @@ def damage(data: bytes, size: int, rng: np.random.Generator, faults: int) -> byt
     return b"".join([*pieces, data[last:]])
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_of_a_hundred_thousand_damaged_here_and_there_none_is_wrong_and_no_other_is_lost(name: Format) -> None:

@@ -162,6 +162,7 @@ def test_what_is_blank_in_most_lines_is_recorded_when_it_is_there() -> None:
     assert (np.diff(of_the_imu["sequence"].astype(int)) == 1).all() and len(of_the_imu) > len(of_the_air)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("rate_hz", "text"),

@@ -187,6 +187,7 @@ def looked_at(name: str) -> tuple[Shape, Guess]:
     return shape, guess(shape, STILL_S)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_the_section_is_right_or_says_what_it_cannot_tell(name: str) -> None:

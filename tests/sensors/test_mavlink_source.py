@@ -73,7 +73,7 @@ def test_readings_are_raw_again_whatever_the_parameters(firmware: Any, imu: str)
     assert np.diff(samples["board_time_us"].astype(np.int64)).mean() == pytest.approx(1e4, rel=0.02)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("imu", "of_it"),
@@ -134,6 +134,7 @@ def test_lost_messages_are_missing_and_doubled_ones_are_not_there_twice() -> Non
     assert np.rint(np.diff(samples["board_time_us"].astype(float)) / 1e4).tolist() == np.diff(numbers).tolist()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_milliseconds_that_begin_anew_go_on() -> None:
     wrap_us = 2**32 * 1e3
@@ -175,6 +176,7 @@ def test_px4_readings_that_no_estimator_touches_are_taken_beside_one() -> None:
         Listening({"imu": section(wire.port, "SCALED_IMU")}).__exit__()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "changes", "name"),

@@ -7,6 +7,7 @@ from rig.study.budget import Effects, errors, study
 from rig.study.report import Settings
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.one_in(3)
 @pytest.mark.proof
@@ -22,6 +23,7 @@ def test_the_stated_uncertainty_covers_the_truth(speed_deg_s: float, noise_rad_s
     assert np.all(np.abs(rms - 1) < (0.1 if thorough else 0.3))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 def test_without_the_remedies_it_does_not(thorough: bool) -> None:

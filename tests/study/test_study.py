@@ -31,6 +31,7 @@ def found(name: str, quantity: str) -> float:
     return next(finding.value for finding in report(name).findings if finding.quantity == quantity)
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["normal", "extreme"])
 def test_the_published_bands_are_those_of_whole_turns_at_3_rad_s(name: str) -> None:
@@ -42,6 +43,7 @@ def test_the_published_bands_are_those_of_whole_turns_at_3_rad_s(name: str) -> N
     assert all(0.75 < ratio < 1.25 for ratio in fitting)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["normal", "extreme"])
 def test_the_speed_and_vibration_that_six_states_do_not_give_its_bands(name: str) -> None:
     for kind in ("60°/s, noise 0.035 rad/s, whole_turns", "3 rad/s, noise 0.035 rad/s, white"):
@@ -49,11 +51,13 @@ def test_the_speed_and_vibration_that_six_states_do_not_give_its_bands(name: str
         assert any(not 0.75 < ratio < 1.25 for ratio in ratios)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["normal", "extreme"])
 def test_levenberg_marquardt_and_algorithm_1_agree(name: str) -> None:
     assert found(name, "largest difference of std, Algorithm 1 and Levenberg–Marquardt") < 1e-5
 
 
+@pytest.mark.thorough
 def test_the_bias_error_is_level_in_speed_only_with_a_fixed_number_of_samples() -> None:
     assert found("speed", "power of speed in the bias MSE, fixed_samples") == pytest.approx(0, abs=0.05)
     assert found("speed", "power of speed in the scale MSE, fixed_samples") == pytest.approx(-2, abs=0.05)
@@ -126,6 +130,7 @@ def test_mounting_does_not_matter_but_right_angles_do() -> None:
     assert found("misalignment", vector) < 1e-9
 
 
+@pytest.mark.thorough
 def test_the_rate_table_gives_the_earths_rate_and_the_residual_it_was_given() -> None:
     assert found("kvh-gyro", "norm of the Earth's rate, random_walk, mean") == pytest.approx(15.4035, abs=0.05)
     assert found("kvh-gyro", "largest residual std, residual") == pytest.approx(0.0475, rel=0.03)
@@ -150,6 +155,7 @@ def test_second_order_terms_take_the_accelerometers_residual_down() -> None:
     assert ratios.mean() == pytest.approx(1, abs=0.1)
 
 
+@pytest.mark.thorough
 @pytest.mark.proof
 def test_every_study_writes_its_table_findings_and_plots(tmp_path: Path, thorough: bool) -> None:
     for name in STUDIES if thorough else sorted(STUDIES)[:3]:
@@ -161,6 +167,7 @@ def test_every_study_writes_its_table_findings_and_plots(tmp_path: Path, thoroug
         assert len(rows) == len(next(iter(report(name).columns.values())))
 
 
+@pytest.mark.thorough
 def test_a_table_as_parquet_reads_back(tmp_path: Path) -> None:
     from pyarrow import parquet
 
@@ -168,11 +175,13 @@ def test_a_table_as_parquet_reads_back(tmp_path: Path) -> None:
     assert parquet.read_table(path)["scale_mse"].to_pylist() == report("speed").columns["scale_mse"]
 
 
+@pytest.mark.thorough
 def test_results_do_not_depend_on_the_number_of_processes() -> None:
     alone, shared = (find("averaging").run(Settings(seed=3, runs=20, jobs=jobs)) for jobs in (1, 2))
     assert alone.columns == shared.columns
 
 
+@pytest.mark.thorough
 def test_results_do_not_depend_on_a_dask_cluster(tmp_path: Path) -> None:
     from distributed import LocalCluster
 

@@ -78,6 +78,7 @@ def test_its_states_come_back_as_it_told_them(recorded: Path, installed: dict[st
     assert shapes == f"{names} (1,) ['let_go', 'q_rad', 'qd_rad_s'] 1"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_its_recording_is_solved_shown_and_exported(recorded: Path, installed: dict[str, str], tmp_path: Path) -> None:
     result = json.loads((recorded / "result.json").read_text(encoding="utf-8"))

@@ -292,6 +292,7 @@ def test_a_turned_tool_frame_shows_in_every_pose() -> None:
         assert offset == pytest.approx([0, 0, 0, *np.radians(TOOL_DEG)])
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("move", ["movej", "movel"])
 def test_a_pose_that_is_asked_for_is_the_tools(move: str) -> None:
     one = laboratory(arm={"tcp_rotation_deg": TOOL_DEG})
@@ -325,6 +326,7 @@ def test_twists_turn_the_axis_that_the_sensor_feels() -> None:
     assert rates(one, 50)[-1] == pytest.approx([0, 2 * math.sin(twist), 2 * math.cos(twist)], abs=COUNT)
 
 
+@pytest.mark.thorough
 def test_an_encoders_error_shows_once_and_twice_in_a_turn_of_the_rate() -> None:
     one = laboratory(arm={"unmodelled": {"encoder_once_rad": 0.01, "encoder_twice_rad": 0.004}})
     turning(one, 5, 2.0)
@@ -335,6 +337,7 @@ def test_an_encoders_error_shows_once_and_twice_in_a_turn_of_the_rate() -> None:
     assert twice == pytest.approx(2.0 * 2 * 0.004, rel=0.02)
 
 
+@pytest.mark.thorough
 def test_hysteresis_is_missing_from_a_way_back() -> None:
     """The angle that the sensor's readings add up to, twice forth and once back, each by a radian."""
     one = laboratory(arm={"unmodelled": {"hysteresis_rad": 1e-3}})
@@ -399,6 +402,7 @@ def test_a_stopped_arm_swings_out() -> None:
     assert peak[int(0.3 * 238) :].max() == pytest.approx(peak[: int(0.1 * 238)].max() * math.exp(-1), rel=0.1)
 
 
+@pytest.mark.thorough
 def test_the_controllers_clock_is_fast_and_the_arm_with_it() -> None:
     """What it calls 3 rad/s is more by everybody else's seconds."""
     one = laboratory(arm={"clock_ppm": 1000})
@@ -430,6 +434,7 @@ def test_states_are_not_of_the_instant_they_are_stamped_with() -> None:
 
 
 # -- nothing -------------------------------------------------------------------------------------------------------
+@pytest.mark.thorough
 def test_left_out_or_written_as_its_default_an_imperfection_is_none() -> None:
     """To the byte, at both ends of the wire."""
     demo = ideal_document(DEMO)["world"]

@@ -11,6 +11,7 @@ from rig.world.process import World
 from support.laboratories.commands import configuration
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_of_a_tray_of_boards_only_the_one_that_is_laid_in_takes_memory(tmp_path: Path) -> None:
     world = World(load(configuration(tmp_path)))

@@ -81,6 +81,7 @@ def test_the_sensor_reads_the_flanges_rate_through_its_mounting_and_its_errors()
     assert abs(expected).max() > 0.5
 
 
+@pytest.mark.thorough
 def test_every_sensor_has_its_own_mounting_errors_and_noise() -> None:
     def turned(*overrides: str) -> Host:
         one = host(pair(STILL, "world.sensors.gyro.mounting_error_deg=[0, 0, 90]", *overrides))
@@ -105,6 +106,7 @@ def test_every_sensor_has_its_own_mounting_errors_and_noise() -> None:
     assert np.all(np.abs(np.corrcoef(np.column_stack(last).T) - np.eye(6)) < 0.6)
 
 
+@pytest.mark.thorough
 def test_two_sensors_too_give_the_same_bytes_from_the_same_seed() -> None:
     first, again, other = (digest_of_a_run(pair(f"world.seed={seed}")) for seed in (5, 5, 6))
     assert first == again

@@ -58,6 +58,7 @@ def test_a_protective_stop_leaves_an_asynchronous_move_running_for_ever_in_the_c
         arm.says("True 3 4")
 
 
+@pytest.mark.thorough
 def test_a_protective_stop_unlocks_after_five_seconds_and_the_script_can_be_sent_again(world: World) -> None:
     running = world()
     script = """
@@ -178,6 +179,7 @@ def test_a_silent_client_is_stopped_by_its_own_watchdog(world: World) -> None:
     assert any("watchdog" in text for text in running.state()["messages"])
 
 
+@pytest.mark.thorough
 def test_a_short_silence_is_borne_and_a_long_one_drops_the_connection(world: World) -> None:
     running = world()
     script = """

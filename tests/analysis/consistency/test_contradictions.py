@@ -179,6 +179,7 @@ def wandering(seen: Readings, rate: float) -> Readings:
     return seen.feeling(seen.felt() + np.cumsum(steps, axis=0))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 def test_an_undamaged_run_raises_no_alarm(thorough: bool) -> None:

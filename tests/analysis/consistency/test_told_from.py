@@ -60,6 +60,7 @@ def planted(seen: Drawn, kind: str, times: float, way: int) -> Iterator[tuple[De
         yield each, not all(check.passed for check in checks)
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.proof

@@ -46,6 +46,7 @@ def refused(lab: Laboratory, file: str, forge: Callable[[bytes], bytes], *beside
     return f"{status} {' '.join(sorted(set(names_of(said))))}"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("what", FORGED_XML)
 def test_a_digital_certificate_in_which_something_is_not_signed_is_refused(what: str, lab: Laboratory) -> None:
@@ -58,6 +59,7 @@ def test_a_digital_certificate_whose_signature_is_not_its_own_is_not_signed(what
     assert refused(lab, XML, MOVED_XML[what]) == f"{NOBODY_TRUSTED} not_signed"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("what", FORGED_PDF)
 def test_a_pdf_in_which_something_is_not_signed_is_refused(what: str, lab: Laboratory) -> None:
@@ -71,12 +73,14 @@ def test_a_pdf_that_nobody_trusted_answers_for_is_refused(what: str, lab: Labora
     assert refused(lab, PDF, forge) == f"{NOBODY_TRUSTED} {name}"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("what", FORGED_JSON | IN_OTHER_BYTES)
 def test_a_result_that_is_not_to_the_byte_the_attached_one_is_refused(what: str, lab: Laboratory) -> None:
     assert refused(lab, RESULT, (FORGED_JSON | IN_OTHER_BYTES)[what], PDF) == f"{ALTERED} not_as_signed"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("what", FORGED_JSON)
 def test_a_history_knows_a_result_by_each_of_its_values(what: str, lab: Laboratory) -> None:
@@ -150,6 +154,7 @@ def signed_by(lab: Laboratory, by: Holder) -> None:
     (lab.folder / PDF).write_bytes(signed_pdf(empty_pdf(), signing_as(by), Reason("A test")))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("file", [PDF, XML])
 @pytest.mark.parametrize("who", OTHERS)

@@ -111,6 +111,7 @@ def test_a_signed_digital_certificate_is_one_by_its_schema(lab: Laboratory) -> N
     assert schema_faults(lab.read(XML)) == []
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_with_revocation_lists_it_can_be_checked_long_after(
     lab: Laboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

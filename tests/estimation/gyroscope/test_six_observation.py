@@ -141,6 +141,7 @@ def test_one_sweep_with_a_badly_known_speed_does_not_make_the_design_a_bad_one()
     np.testing.assert_allclose(values(solution), [*SCALE, *BIAS], rtol=1e-7)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("repeats", "bias"),

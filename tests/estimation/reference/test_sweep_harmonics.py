@@ -79,6 +79,7 @@ def test_a_speed_that_changes_slowly_takes_nothing_from_gravity(vibration: float
     assert np.abs(expected.harmonic_m_s2).max() > 9
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("cycles", [(1,), (2,), (3,), (1, 4)])
 def test_what_a_slow_ripple_adds_is_what_the_model_makes_of_the_same_weights(cycles: tuple[int, ...]) -> None:

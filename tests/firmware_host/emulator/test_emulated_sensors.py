@@ -45,6 +45,7 @@ def test_all_sensors_at_their_full_rates_lose_nothing() -> None:
     assert set(report.items["dropped"].tolist()) == {0} and report.values["bus_errors"] == 0
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "fault", "error"),

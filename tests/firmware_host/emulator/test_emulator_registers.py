@@ -32,6 +32,7 @@ def described(peripheral: Peripheral) -> dict[int, tuple[str, int]]:
     }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODELLED)
 def test_every_modelled_register_is_the_makers(name: str) -> None:

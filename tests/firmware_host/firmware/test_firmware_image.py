@@ -82,14 +82,14 @@ DEFINES = re.findall(r"^#define (\w+(?:\(\w+\))?) (.+?)(?: /\*.*)?$", HEADER, re
 
 
 def check_base(name: str, value: str) -> None:
-    assert int(value.rstrip("u"), 16) == number(peripherals()[name.removesuffix("_BASE")], "baseAddress")
+    assert int(value.rstrip("u"), 16) == number(peripherals()[name.removesuffix("_BASE")], "baseAddress"), name
 
 
 def check_register(name: str, value: str) -> None:
     match = re.fullmatch(r"REGISTER\((\w+)_BASE, (0x\w+)u\)", value)
     assert match is not None and name.startswith(match[1] + "_")
     element = register(match[1], name.removeprefix(match[1] + "_"))
-    assert int(match[2], 16) == number(element, "addressOffset")
+    assert int(match[2], 16) == number(element, "addressOffset"), name
 
 
 def check_field(name: str, value: str) -> None:
@@ -100,12 +100,12 @@ def check_field(name: str, value: str) -> None:
     peripheral = next(b for b in BASES if owner.startswith(b + "_"))
     fields = register(peripheral, owner.removeprefix(peripheral + "_")).iter("field")
     element = next(f for f in fields if f.findtext("name") == name.removeprefix(owner + "_").removesuffix("(value)"))
-    assert int(match[2]) == number(element, "bitOffset")
-    assert match[1] == "(value)" or number(element, "bitWidth") == 1
+    assert int(match[2]) == number(element, "bitOffset"), name
+    assert match[1] == "(value)" or number(element, "bitWidth") == 1, name
 
 
 def check_interrupt(name: str, value: str) -> None:
-    assert int(value.rstrip("u")) == interrupts()[name.removesuffix("_IRQ")]
+    assert int(value.rstrip("u")) == interrupts()[name.removesuffix("_IRQ")], name
 
 
 BASES = [name.removesuffix("_BASE") for name, _ in DEFINES if name.endswith("_BASE")]
@@ -121,9 +121,10 @@ def check_of(name: str) -> Callable[[str, str], None]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "value"), [define for define in DEFINES if define[0] != "UNIQUE_ID"])
-def test_every_line_of_the_register_header_is_the_makers(name: str, value: str) -> None:
-    check_of(name)(name, value)
+def test_every_line_of_the_register_header_is_the_makers() -> None:
+    for name, value in DEFINES:
+        if name != "UNIQUE_ID":
+            check_of(name)(name, value)
 
 
 @pytest.mark.slow

@@ -177,6 +177,7 @@ def test_a_cut_at_any_operation_of_a_write_leaves_the_old_record_or_the_new_one(
     assert 0 < news < 80, "only the seal may make the new record"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_two_cuts_in_a_row_leave_what_was_there_or_the_newest(flash: HostFlash) -> None:
     for first in range(WRITE_OPERATIONS):

@@ -7,6 +7,7 @@ from firmware_host import footprint
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.thorough
 def test_flash_ram_and_stack_are_within_their_limits(capsys: pytest.CaptureFixture[str]) -> None:
     assert footprint.main() == 0
     flash, ram, stack = capsys.readouterr().out.splitlines()

@@ -37,7 +37,7 @@ MOST_KIB = 400 << 10
 DEAREST = ("a chunk of 2 GB", "a chunk of a million records", "a view without end", "packed rows of 1 GB")
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize("name", FILES)
 def test_a_file_that_was_made_to_harm_is_refused_by_name(tmp_path: Path, name: str) -> None:
     path = FILES[name](tmp_path)

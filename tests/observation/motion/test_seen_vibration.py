@@ -35,6 +35,7 @@ def errors(seen: Observation) -> Array:
     return found / np.hypot(seen.average.mean_std_rad_s, seen.speed_std_rad_s)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize(("seen_rad_s", "unseen_rad_s"), [(0.004, 0.0), (0.010, 0.0), (0.010, 0.004)])
 def test_the_scale_is_as_well_known_as_stated_whatever_the_encoders_see_of_a_vibration(

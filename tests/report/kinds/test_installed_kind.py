@@ -93,6 +93,7 @@ def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path
     assert rows[0]["sensor"] == "imu, inclinometer" and rows[0]["unit"] == "mrad" and len(rows[0]["bias"]) == 2
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_certificate_is_none_where_a_package_knows_the_noise_alone(tmp_path: Path, installed: dict[str, str]) -> None:
     run = tmp_path / "run"

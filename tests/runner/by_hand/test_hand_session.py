@@ -30,6 +30,7 @@ def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
     held(table)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
     short = Table(seed=4, settings=replace(LIST, wanted_scale_u=2e-3))
@@ -73,6 +74,7 @@ def test_a_crumb_under_it_does_no_harm_where_an_accelerometer_is_the_level() -> 
     held(table)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_wrong_side_is_read_and_the_list_goes_on_from_there() -> None:
     table = Table(seed=7, mistakes={"wrong_face": 0.2}, settings=SHORT)
@@ -81,6 +83,7 @@ def test_a_wrong_side_is_read_and_the_list_goes_on_from_there() -> None:
     held(table)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_after_ten_refusals_in_a_row_it_ends_by_the_name_of_the_last() -> None:
     with pytest.raises(Fault) as ended:
@@ -88,6 +91,7 @@ def test_after_ten_refusals_in_a_row_it_ends_by_the_name_of_the_last() -> None:
     assert ended.value.name == "clipping"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("creeps", [6, 11])
 def test_a_rest_in_which_it_creeps_costs_this_rest_and_not_the_session(creeps: int) -> None:

@@ -36,6 +36,7 @@ def shares(runs: list[Judged]) -> tuple[float, float]:
     return float(np.mean(beyond <= 1)), float(beyond.max())
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("message", MESSAGES)

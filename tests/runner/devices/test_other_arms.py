@@ -22,6 +22,7 @@ UNLIKE: tuple[ModelName, ...] = ("ur3e", "ur10_cb3")  # a small one and another 
 LOW, HIGH = 0.8, 1.2  # of the RMS of error over u, of all of them together
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("model", UNLIKE)

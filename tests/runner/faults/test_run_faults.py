@@ -139,6 +139,7 @@ def ignored(number: signal.Signals) -> Iterator[None]:
         signal.signal(number, before)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "number",
     [
@@ -232,6 +233,7 @@ def test_killing_all_processes_at_once_stops_the_arm(start: Start) -> None:
     wait_for(lambda: not rig.world.state()["program_running"], "the end of the program")
 
 
+@pytest.mark.thorough
 def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None:
     rig = start()
     rig.until_sweeping()
@@ -245,6 +247,7 @@ def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None
     assert run.states["time_s"][-1] > time_s + 0.5, "what came after the second command is lost"
 
 
+@pytest.mark.thorough
 def test_a_program_held_up_for_a_second_misses_no_state(start: Start) -> None:
     rig = start({"world": {"time_scale": 8}})
     rig.until_sweeping()
@@ -453,6 +456,7 @@ def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
     assert not state["program_running"] and not state["moving"] and state["claims"] == sorted(taken)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("fault", "name"),
     [

@@ -22,6 +22,7 @@ PROCEDURE = Procedure(name="six_observation", section=SixObservationSection, pla
 """
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("before", "status", "said"),

@@ -192,6 +192,7 @@ def saturated(counts: np.ndarray) -> np.ndarray:
     return clipped
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("damage", "name"),

@@ -14,7 +14,7 @@ from rig.data.recording.run_file import RunData, read_run
 from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
 from rig.data.result_file import read_result
 from rig.observation.finished import finished_sweeps
-from support.laboratories.commands import configuration, rig, wait_for_log
+from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 from support.laboratories.worlds import World, hardware, merge, world
 from support.processes.waiting import PATIENCE_S, alive, wait_for
 from support.processes.warm import started
@@ -176,6 +176,7 @@ def test_attitudes_in_each_set_calibrate_the_accelerometer_over_temperature_too(
         assert (4 * std[1, 1] < np.abs(bias)).all(), "a bias without slopes would not be told from this one"
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("procedure", "body", "name"),
@@ -228,6 +229,7 @@ def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
     assert 6 * len(first) in finished_sweeps(again), "one that was interrupted is, from its beginning"
 
 
+@pytest.mark.thorough
 def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tmp_path: Path, world: World) -> None:
     laboratory = world(merge(LABORATORY, {"procedure": {"order": None, "directions": None, **PROCEDURE}}))
     config = hardware(laboratory.config_path, tmp_path)
@@ -256,7 +258,7 @@ def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tm
 )
 def test_a_range_that_cannot_be_is_refused(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
     config = configuration(tmp_path, LABORATORY, {**PROCEDURE, **changes})
-    ended = rig("plan", config)
+    ended = rig_here("plan", config)
     assert ended.returncode == 2 and words in ended.stderr, ended.stderr
 
 
@@ -271,7 +273,7 @@ def test_the_plan_waits_before_each_set_and_has_attitudes_where_they_are_wanted(
     }
     procedure = {**PROCEDURE, "with_attitudes": True, "attitudes": "faces", "repeats": 3}
     config = configuration(tmp_path, merge(with_force, {"limits": limits}), procedure)
-    ended = rig("plan", config)
+    ended = rig_here("plan", config)
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.count(" wait ") == 3
     assert ended.stdout.count("dwell at") == 3 * 12

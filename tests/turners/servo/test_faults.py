@@ -48,7 +48,7 @@ FAULTS: dict[str, tuple[Act, set[str]]] = {
 }
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize("what", FAULTS)
 def test_a_fault_is_named_and_the_shaft_stands_within_a_second_of_it(what: str) -> None:
     act, names = FAULTS[what]

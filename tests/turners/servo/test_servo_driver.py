@@ -78,6 +78,7 @@ def test_a_servo_as_delivered_is_put_into_extended_position_and_time_based_profi
         assert (wire.do("register", "Operating Mode"), wire.do("register", "Drive Mode")) == (4, 4)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_after_a_trip_of_the_watchdog_the_next_run_s_move_is_no_jump() -> None:
     """Its profile is zero then, which is as fast as the servo can."""

@@ -140,6 +140,7 @@ def test_a_stop_that_every_port_refuses_is_not_confirmed_and_told_with_the_contr
     wait_for(lambda: laboratory.state()["q_rad"][WRIST_3] > 5.9, "the end of the movement")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("moment", ["move", pytest.param("rest", marks=LATER)])
 @on_all
 def test_another_payload_ends_the_run_at_once(laboratory: WorldHandle, moment: str) -> None:
@@ -188,6 +189,7 @@ def test_states_that_no_arm_is_in_are_no_lost_link(
     assert fault.name == "arm_state_impossible" and said in fault.what and "cable" not in fault.remedy
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("mode", "remedy"), [("UPDATING_FIRMWARE", "Wait until"), pytest.param("DISCONNECTED", "cable", marks=LATER)]
 )
@@ -275,6 +277,7 @@ def test_the_half_of_the_registers_that_is_free_is_used(
         assert arm.stop().at_rest
 
 
+@pytest.mark.thorough
 @on("PolyScope X", "PolyScope 5.23")
 def test_where_the_client_knows_the_lower_half_alone_that_one_must_be_free(laboratory: WorldHandle) -> None:
     laboratory.control({"do": "registers_in_use", "first": 24, "last": 47})
@@ -288,6 +291,7 @@ def test_where_the_client_knows_the_lower_half_alone_that_one_must_be_free(labor
     assert refused.value.name == "registers_in_use" and "0-23, of which the client needs some" in refused.value.what
 
 
+@pytest.mark.thorough
 @on_all
 def test_a_look_finds_registers_taken_and_takes_none(laboratory: WorldHandle) -> None:
     assert look(laboratory.host, API_PORT).registers_free

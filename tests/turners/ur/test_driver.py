@@ -174,6 +174,7 @@ def test_moves_arrive_in_time_and_states_come_without_gaps(world: World) -> None
     assert np.all(np.diff(record["host_time_s"]) > 0)
 
 
+@pytest.mark.thorough
 def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: WorldHandle) -> None:
     report = look(laboratory.host)
     procedure = SixObservationSection(speed_deg_s=120, acceleration_deg_s2=400)
@@ -234,6 +235,7 @@ def test_somebody_elses_program_in_place_of_ours_is_noticed_and_stopped(laborato
         assert stands(laboratory) and laboratory.state()["q_rad"][WRIST_3] > -3.0
 
 
+@pytest.mark.one_in(2)
 @both
 def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laboratory: WorldHandle) -> None:
     """No state confirms the stop, and a program runs again before the client is ended."""
@@ -247,6 +249,7 @@ def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laborator
     wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
 
 
+@pytest.mark.thorough
 def test_one_that_it_leaves_behind_a_stop_that_was_seen_is_stopped_too(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
         arm.take_control(PAYLOAD)
@@ -282,6 +285,7 @@ def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_long_before_t
         assert on_its_way(laboratory)
 
 
+@pytest.mark.thorough
 def test_a_hung_child_is_answered_by_a_stop_also_when_no_descriptor_is_left(laboratory: WorldHandle) -> None:
     others = set(multiprocessing.active_children())
     with Arm(laboratory.host) as arm, ExitStack() as used:
@@ -329,6 +333,7 @@ def test_ctrl_c_stops_the_arm_at_once_and_goes_on_to_the_caller(laboratory: Worl
         assert fault.value.name == "arm_stopped"
 
 
+@pytest.mark.thorough
 def test_three_ctrl_c_at_once_end_with_how_the_arm_was_left(world: World) -> None:
     laboratory = world({"world": {"time_scale": 1}})  # braking takes longer than the three
 
@@ -393,6 +398,7 @@ def outside_address() -> str | None:
     return None
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(outside_address() is None, reason="nobody else could reach this computer")
 def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_computer(
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
@@ -409,6 +415,7 @@ def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_compu
     assert fault.value.name == "arm_link_lost"
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_crowd")
 def test_a_program_that_comes_late_to_the_states_does_not_take_its_driver_for_hung(laboratory: WorldHandle) -> None:
     """The driver's heartbeats lie in the pipe meanwhile: whoever reads them is held up."""
@@ -504,6 +511,7 @@ def test_a_slow_reader_beside_and_a_controller_held_up_for_a_moment_are_no_lost_
     beside.close()
 
 
+@pytest.mark.thorough
 def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -578,7 +586,7 @@ def test_a_move_beyond_the_limits_is_refused_by_the_controller_and_named(laborat
         assert fault.value.name == "program_stopped"
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("name", "orders"),
     [
@@ -602,6 +610,7 @@ def test_control_is_refused_by_name_before_anything_moves(
     assert not laboratory.state()["program_running"]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("order", "words"),
     [

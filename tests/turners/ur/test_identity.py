@@ -59,6 +59,7 @@ def test_a_ur10e_is_what_was_meant_and_says_what_it_can_do(seen: ArmReport) -> N
     np.testing.assert_allclose(lengths_m(seen.setup.drawing), lengths_m(NOMINAL), atol=1e-12)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arm", "name", "words"),
@@ -89,6 +90,7 @@ def refusal(host: str) -> Problem:
     return problem
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(5)
 @pytest.mark.slow
 @pytest.mark.parametrize(

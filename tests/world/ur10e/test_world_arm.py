@@ -86,6 +86,7 @@ def target(wrist_3: float) -> list[float]:
     return [*HOME[:5], wrist_3]
 
 
+@pytest.mark.thorough
 def test_a_blocking_move_arrives_in_its_planned_time(home: Arm) -> None:
     control, receive = home.control, home.receive
     start = receive.getTimestamp()
@@ -140,6 +141,7 @@ def test_stop_speed_and_servo_commands(home: Arm) -> None:
     control.servoStop()
 
 
+@pytest.mark.thorough
 def test_moves_in_tool_space_as_ur_rtdes_own_tests_make_them(home: Arm) -> None:
     control, receive = home.control, home.receive
     tilted = [0.0, -1.5, 1.5, -1.5, -1.2, 0.3]  # at home the flange stands half a turn off, where signs are free
