@@ -1,1 +1,1 @@
-"""Everything about the board: its firmware, the link to it, and its emulator."""
+"""The board: its firmware, the link to it, and its emulator."""

@@ -1,4 +1,4 @@
-"""What the board tells, as the rest of the program sees it: made from frames, no I/O."""
+"""The board's answers as values for the rest of the program, decoded from frames. No I/O."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -13,7 +13,7 @@ from firmware_host.samples import FIELD_SAMPLE_DTYPE, IMU_SAMPLE_DTYPE, SAMPLE_D
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
-NOTHING: Matrix = ((0.0, 0.0, 0.0),) * 3  # of what temperature changes
+NO_CHANGE: Matrix = ((0.0, 0.0, 0.0),) * 3  # of scale or bias with temperature
 
 
 _DTYPES = {"imu_samples": IMU_SAMPLE_DTYPE, "field_samples": FIELD_SAMPLE_DTYPE}
@@ -86,7 +86,7 @@ def _goes_on(before: Frame, frame: Frame) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class SensorInfo:
-    """A sensor the firmware has a driver for; `present` says whether its identity register answered rightly.
+    """A sensor with a driver in the firmware; `present` says whether its identity register reads as expected.
 
     `quantity` is one of `protocol.QUANTITIES`.
     """
@@ -100,7 +100,7 @@ class SensorInfo:
 
 @dataclass(frozen=True, slots=True)
 class BoardIdentity:
-    """Which board this is and what it runs; `unique_id` is 24 hexadecimal digits."""
+    """The board's identity and its firmware; `unique_id` is 24 hexadecimal digits."""
 
     protocol: int
     firmware: str
@@ -109,8 +109,8 @@ class BoardIdentity:
     sensors: tuple[SensorInfo, ...]
 
     @classmethod
-    def of(cls, frame: Frame) -> Self:
-        """An `identity` frame of this protocol version."""
+    def decode(cls, frame: Frame) -> Self:
+        """Decode an `identity` frame of this protocol version."""
         return cls(
             protocol=frame.values["protocol"],
             firmware=protocol.text(frame.values["firmware"]),
@@ -125,9 +125,9 @@ class BoardIdentity:
 
 @dataclass(frozen=True, slots=True)
 class Heating:
-    """What the heater does: its `power`, 0 to 1, the `cause` of `protocol.HEATER_CAUSES` why it is off.
+    """The heater's state: its `power`, 0 to 1, and the `cause` for being off, of `protocol.HEATER_CAUSES`.
 
-    `temperature_c` is how warm the hottest part was when the board last looked.
+    `temperature_c` is the temperature of the hottest part at the board's last look.
     """
 
     power: float
@@ -135,8 +135,8 @@ class Heating:
     temperature_c: float
 
     @classmethod
-    def of(cls, frame: Frame) -> Self:
-        """A `heating` frame."""
+    def decode(cls, frame: Frame) -> Self:
+        """Decode a `heating` frame."""
         values = frame.values
         cause = protocol.HEATER_CAUSES[values["cause"]]
         return cls(values["power"] / protocol.HEATER_POWERS, cause, values["temperature_c"])
@@ -144,10 +144,13 @@ class Heating:
 
 @dataclass(frozen=True, slots=True)
 class SensorSetup:
-    """What the part really does: rate = counts · sensitivity_rad_s, temperature = counts · scale + offset.
+    """The part's actual settings; sensitivity and range are 0 for quantities that are not sent.
 
-    Acceleration = counts · sensitivity_m_s2, magnetic field = counts · sensitivity_t; of what is not sent, sensitivity
-    and range are 0.
+    - `rate_hz`: the nominal data rate.
+    - `range_deg_s`, `sensitivity_rad_s`: of rates; rate = counts · sensitivity_rad_s.
+    - `temperature_scale_c`, `temperature_offset_c`: temperature = counts · scale + offset.
+    - `range_m_s2`, `sensitivity_m_s2`: of accelerations; acceleration = counts · sensitivity_m_s2.
+    - `range_t`, `sensitivity_t`: of the magnetic field; field = counts · sensitivity_t.
     """
 
     rate_hz: float
@@ -161,14 +164,14 @@ class SensorSetup:
     sensitivity_t: float
 
     @classmethod
-    def of(cls, frame: Frame) -> Self:
-        """A `setup` frame."""
+    def decode(cls, frame: Frame) -> Self:
+        """Decode a `setup` frame."""
         return cls(**{field.name: frame.values[field.name] for field in fields(cls)})
 
 
 @dataclass(frozen=True, slots=True)
 class SensorCounts:
-    """Conversions since the start, and what became of them."""
+    """The number of conversions since the start, sent in frames, and dropped."""
 
     conversions: int
     samples: int
@@ -179,7 +182,13 @@ class SensorCounts:
 class BoardStatus:
     """The board's health; counts since its last reset.
 
-    `frames_lost` counts those this program never got, `frames_repeated` those it got twice and took once.
+    - `frames_lost`, `frames_repeated`: frames that this program never received, and those received twice.
+    - `uptime_s`: board time.
+    - `rx_errors`, `tx_overruns`, `bus_errors`: damaged frames from the host, frames without room, failed sensor reads.
+    - `stack_high_water_bytes`: the most stack ever used.
+    - `fault_pc`, `reset_cause`: the address of the last processor fault, and the cause of the last start.
+    - `clock_locked`, `streaming`: whether the clock follows the crystal, and whether it streams.
+    - `sensors`: the counts of conversions by sensor.
     """
 
     frames_lost: int
@@ -196,8 +205,8 @@ class BoardStatus:
     sensors: tuple[SensorCounts, ...]
 
     @classmethod
-    def of(cls, frame: Frame, frames_lost: int, frames_repeated: int) -> Self:
-        """A `report` frame."""
+    def decode(cls, frame: Frame, frames_lost: int, frames_repeated: int) -> Self:
+        """Decode a `report` frame."""
         values = frame.values
         return cls(
             frames_lost=frames_lost,
@@ -217,7 +226,7 @@ class BoardStatus:
 
 @dataclass(frozen=True, slots=True)
 class BoardObservation:
-    """An average the board took of what it had kept: of the samples from `start_us` up to, not including, `end_us`.
+    """An average by the board of its stored readings, from `start_us` up to, not including, `end_us`.
 
     The times are the board's, in microseconds; `mean_rad_s` is uncalibrated; `index` counts the sensor's observations.
     """
@@ -229,14 +238,14 @@ class BoardObservation:
     mean_rad_s: Vector
 
     @classmethod
-    def of(cls, frame: Frame) -> Self:
-        """An `observed` frame."""
+    def decode(cls, frame: Frame) -> Self:
+        """Decode an `observed` frame."""
         return cls(**{field.name: frame.values[field.name] for field in fields(cls)})
 
 
 @dataclass(frozen=True, slots=True)
 class BoardSolution:
-    """What the board solved for, g = K (m + b), in single precision; unless `status` is "solved", scale and bias are 0.
+    """The board's solution, g = K (m + b), in single precision; scale and bias are 0 unless `status` is "solved".
 
     `method` is one of `protocol.METHODS`, `status` of `protocol.SOLUTION_STATUSES`.
     """
@@ -249,8 +258,8 @@ class BoardSolution:
     bias_rad_s: Vector
 
     @classmethod
-    def of(cls, frame: Frame) -> Self:
-        """A `solution` frame."""
+    def decode(cls, frame: Frame) -> Self:
+        """Decode a `solution` frame."""
         values = frame.values
         return cls(
             method=protocol.METHODS[values["method"]],
@@ -264,10 +273,10 @@ class BoardSolution:
 
 @dataclass(frozen=True, slots=True)
 class StoredPolynomials:
-    """What a temperature of the part's own thermometer changes, inside `range_c` and at its ends beyond it.
+    """The changes of scale and bias with the part's own temperature inside `range_c`, constant beyond its ends.
 
-    Row n − 1 of each belongs to (T − `temperature_c`)ⁿ, n from 1 to 3, and has an axis in each column: what is added to
-    1 and multiplies m + b, and what is added to b.
+    Row n − 1 of each matrix belongs to (T − `temperature_c`)ⁿ, n from 1 to 3, with a column for each axis: what is
+    added to 1 and multiplies m + b, and what is added to b.
     """
 
     range_c: tuple[float, float]
@@ -275,17 +284,17 @@ class StoredPolynomials:
     bias_change_rad_s: Matrix
 
     def most(self) -> tuple[np.ndarray, np.ndarray]:
-        """(3,) the most that scale, as a share, and bias can change by axis, from anywhere in the range."""
+        """Return (3,) the largest change of scale, as a fraction, and bias, rad/s, by axis, within the range."""
         powers = (self.range_c[1] - self.range_c[0]) ** np.arange(1, 4)
         return powers @ np.abs(self.scale_change), powers @ np.abs(self.bias_change_rad_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """A calibration as the board keeps it: rate = `matrix` (m + `bias_rad_s`).
+    """A calibration as stored by the board: rate = `matrix` (m + `bias_rad_s`).
 
     `model` is one of `protocol.MODELS`, `serial_number` the sensor's, `temperature_c` its own during the calibration.
-    `polynomials` are there of one over temperature: matrix and bias hold at `temperature_c` then.
+    With `polynomials`, of a calibration over temperature, matrix and bias are valid at `temperature_c`.
     """
 
     model: str
@@ -298,15 +307,15 @@ class Calibration:
 
     @property
     def scale(self) -> Vector:
-        """Each axis' scale factor k: F⁻¹ being the matrix, up to a rotation, 1/‖row i of F‖."""
+        """The scale factors k by axis, 1/‖row i of F‖, with F⁻¹ the matrix up to a rotation."""
         if self.model == protocol.MODELS[1]:
             return self.matrix[0][0], self.matrix[1][1], self.matrix[2][2]
         kx, ky, kz = (1 / np.linalg.norm(np.linalg.inv(self.matrix), axis=1)).tolist()
         return kx, ky, kz
 
     @classmethod
-    def of(cls, values: dict[str, Any]) -> Self:
-        """The fields `protocol.CALIBRATION` of a frame."""
+    def decode(cls, values: dict[str, Any]) -> Self:
+        """Decode the fields `protocol.CALIBRATION` of a frame."""
         return cls(
             model=dict(enumerate(protocol.MODELS)).get(values["model"], "unknown"),
             serial_number=protocol.text(values["serial_number"]),
@@ -322,8 +331,8 @@ class Calibration:
         )
 
     def values(self) -> dict[str, Any]:
-        """The stored calibration as the fields of its message."""
-        found = self.polynomials or StoredPolynomials((self.temperature_c,) * 2, NOTHING, NOTHING)
+        """Return the calibration as the fields of its message."""
+        polynomials = self.polynomials or StoredPolynomials((self.temperature_c,) * 2, NO_CHANGE, NO_CHANGE)
         return {
             "model": protocol.MODELS.index(self.model),
             "serial_number": self.serial_number,
@@ -331,21 +340,21 @@ class Calibration:
             "temperature_c": self.temperature_c,
             "matrix": self.matrix,
             "bias_rad_s": self.bias_rad_s,
-            "lowest_c": found.range_c[0],
-            "highest_c": found.range_c[1],
-            "scale_change": found.scale_change,
-            "bias_change_rad_s": found.bias_change_rad_s,
+            "lowest_c": polynomials.range_c[0],
+            "highest_c": polynomials.range_c[1],
+            "scale_change": polynomials.scale_change,
+            "bias_change_rad_s": polynomials.bias_change_rad_s,
         }
 
-    def as_kept(self) -> Self:
-        """The stored calibration as it comes back from the board: single precision, whole seconds."""
+    def quantize(self) -> Self:
+        """Return the calibration as the board returns it: in single precision and whole seconds."""
         (frame,) = FrameReader().feed(encode("write_calibration", 1, {"sensor": 0, **self.values()}))
-        return self.of(frame.values)
+        return self.decode(frame.values)
 
 
 @dataclass(frozen=True, slots=True)
 class StoredCalibration:
-    """A calibration in the board's flash, and which part it was stored for, at which range.
+    """A calibration in the board's flash, with the part and the range it was stored for.
 
     `sequence` counts the calibrations ever stored for the sensor, from 1.
     """
@@ -357,20 +366,20 @@ class StoredCalibration:
     calibration: Calibration
 
     @classmethod
-    def of(cls, frame: Frame) -> Self:
-        """A `calibration` frame."""
+    def decode(cls, frame: Frame) -> Self:
+        """Decode a `calibration` frame."""
         values = frame.values
         return cls(
             sequence=values["sequence"],
             part=protocol.text(values["part"]),
             who_am_i=values["who_am_i"],
             range_deg_s=values["range_deg_s"],
-            calibration=Calibration.of(values),
+            calibration=Calibration.decode(values),
         )
 
     def document(self) -> dict[str, Any]:
-        """The record as plain numbers, strings and lists."""
-        calibration, found = self.calibration, self.calibration.polynomials
+        """Return the record as plain numbers, strings and lists."""
+        calibration, polynomials = self.calibration, self.calibration.polynomials
         return {
             "sequence": self.sequence,
             "part": self.part,
@@ -383,11 +392,11 @@ class StoredCalibration:
             "scale": list(calibration.scale),
             "matrix": [list(row) for row in calibration.matrix],
             "bias_rad_s": list(calibration.bias_rad_s),
-            "over_temperature": None if found is None else asdict(found),
+            "over_temperature": None if polynomials is None else asdict(polynomials),
         }
 
 
 def reset_cause(frame: Frame) -> str:
-    """Why the board last started, of an `identity` or `report` frame."""
+    """Return the cause of the board's last start from an `identity` or `report` frame."""
     causes = dict(enumerate(protocol.RESET_CAUSES))
     return causes.get(frame.values.get("reset_cause", 0), "unknown")  # another version's identity may lack it

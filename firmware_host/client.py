@@ -1,4 +1,4 @@
-"""The host end of the link: asks the board, and passes on the samples it streams."""
+"""The host end of the link: requests to the board, and the samples it streams."""
 
 import contextlib
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -43,31 +43,33 @@ __all__ = [
     "StoredPolynomials",
 ]
 
-# Erasing a flash page takes 22 ms, in which the microcontroller hears nothing: a request repeated meanwhile is lost.
+# Erasing a flash page takes 22 ms, during which the microcontroller receives nothing: a repeated request is lost.
 _FLASH_TIMEOUT_S = 4.0
-_SILENCE_S = 2.0  # without a frame in a stream, and the link is lost
-_ABOUT_THE_BOARD = ("unknown_message", "bad_length", "busy_streaming")  # errors that no sensor has a part in
+_SILENCE_S = 2.0  # longest time without a frame in a stream
+_ABOUT_THE_BOARD = ("unknown_message", "bad_length", "busy_streaming")  # errors that do not concern a sensor
 
 
 class Board:
     """The board on a serial port or `socket://host:port`; a context manager. `on_samples` runs on the reader thread.
 
-    Sensors are named by their index in `identity.sensors`. Every call that asks the board raises BoardError: with the
-    name the board's refusal has in `protocol.ERRORS` (`sensor_absent`, `no_calibration`, …), or `board_link_lost`.
+    Sensors are given by their index in `identity.sensors`. Every request raises BoardError: named as the board's
+    refusal in `protocol.ERRORS` (`sensor_absent`, `no_calibration`, …), or `board_link_lost`.
     """
 
     def __init__(self, port: str, baud: int, on_samples: Callable[[SampleBatch], None], timeout_s: float = 4.0) -> None:
-        """Opens the port and says hello. Raises BoardError: no_port, no_board, wrong_baud_rate, version_mismatch."""
+        """Open the port and identify the board. Raise BoardError no_port, no_board, wrong_baud_rate,
+        version_mismatch.
+        """
         self._on_samples = on_samples
         self._timeout_s = timeout_s
         self._streaming = False
-        self._heard = (-1, 0.0)  # frames seen at the last check, and another's clock when there was a new one
+        self._last_check = (-1, 0.0)  # frame count at the last check, and the other clock's time of its last change
         self._parts: tuple[str, ...] = ()
-        self.heating: Heating | None = None  # what the heater did when the board last said it
+        self.heating: Heating | None = None  # the heater's last reported state
         self._link = BoardLink(port, baud, self._take, self._take_samples)
         try:
             self.identity = self._hello()
-            self.stop()  # whoever was here before may have left the stream running
+            self.stop()  # an earlier program may have left the stream running
         except BaseException:
             self.close()
             raise
@@ -81,116 +83,110 @@ class Board:
         self.close()
 
     def configure(self, sensor: int, rate_hz: float, range_deg_s: float, range_g: float = 0.0) -> SensorSetup:
-        """Sets a gyroscope to the nearest data rate and the next range up.
+        """Set a gyroscope to the nearest data rate and the next range up.
 
-        With a `range_g` other than 0 its accelerations come along, in the next range up; not in a calibrated stream.
+        With a `range_g` other than 0 its accelerations are sent too, in the next range up; not in a calibrated stream.
         """
         return self._configure(sensor, rate_hz, range_deg_s=range_deg_s, range_g=range_g)
 
     def configure_magnetometer(self, sensor: int, rate_hz: float, range_gauss: float) -> SensorSetup:
-        """Sets a magnetometer to the nearest data rate and the next range up."""
+        """Set a magnetometer to the nearest data rate and the next range up."""
         return self._configure(sensor, rate_hz, range_gauss=range_gauss)
 
     def start(self, calibrated: Collection[int] = ()) -> None:
-        """Streams every configured sensor, sequences from 0; those in `calibrated` by their stored calibration."""
+        """Stream every configured sensor, sequences from 0; apply the stored calibration to those in `calibrated`."""
         self._ask("start", {"sensors": _mask(calibrated)})
 
     def stop(self) -> None:
-        """Stops the stream; when it returns, every sample that was sent has been passed on."""
+        """Stop the stream; on return all samples have been passed on."""
         self._ask("stop")
 
     def status(self) -> BoardStatus:
-        """The board's health, and the link's."""
-        return BoardStatus.of(self._ask("status"), self._link.frames_lost, self._link.frames_repeated)
+        """Return the health of the board and of the link."""
+        return BoardStatus.decode(self._ask("status"), self._link.frames_lost, self._link.frames_repeated)
 
     def keep(self, sensors: Collection[int], duration_s: float) -> None:
-        """Lets the board keep the readings of these sensors from now on, for at least so long, for `observe`."""
+        """Have the board store these sensors' readings from now on, for at least `duration_s`, for `observe`."""
         self._ask("keep", {"sensors": _mask(sensors), "duration_s": duration_s})
 
     def observe(self, sensor: int, index: int, start_us: int, end_us: int, speed_rad_s: float) -> BoardObservation:
-        """Averages what was kept between two board times and adds it to the sensor's observations.
+        """Average stored readings between two board times and add the mean to the sensor's observations.
 
-        `index` is the number of observations before; 0 begins anew. `speed_rad_s` is the turn rate's magnitude in
-        between. Raises BoardError, among others not_kept and bad_observation.
+        `index` is the number of earlier observations; 0 starts a new set. `speed_rad_s` is the magnitude of the rate
+        meanwhile. Raise BoardError, among others not_kept and bad_observation.
         """
-        values = {
-            "sensor": sensor,
-            "index": index,
-            "start_us": start_us,
-            "end_us": end_us,
-            "speed_rad_s": speed_rad_s,
-        }
-        return BoardObservation.of(self._ask("observe", values))
+        values = {"sensor": sensor, "index": index, "start_us": start_us, "end_us": end_us, "speed_rad_s": speed_rad_s}
+        return BoardObservation.decode(self._ask("observe", values))
 
     def recall(self, sensor: int, index: int, mean_rad_s: Sequence[float], speed_rad_s: float) -> BoardObservation:
-        """Adds an observation the board made before a reset: `mean_rad_s` as observed then; `index` as in `observe`."""
+        """Add an observation from before a reset: `mean_rad_s` as observed then; `index` as in `observe`."""
         values = {"sensor": sensor, "index": index, "mean_rad_s": mean_rad_s, "speed_rad_s": speed_rad_s}
-        return BoardObservation.of(self._ask("recall", values))
+        return BoardObservation.decode(self._ask("recall", values))
 
     def solve(self, sensor: int, method: str = "closed_form") -> BoardSolution:
-        """Lets the board calibrate a sensor from its observations by one of `protocol.METHODS`."""
-        return BoardSolution.of(self._ask("solve", {"sensor": sensor, "method": protocol.METHODS.index(method)}))
+        """Have the board calibrate a sensor from its observations by one of `protocol.METHODS`."""
+        return BoardSolution.decode(self._ask("solve", {"sensor": sensor, "method": protocol.METHODS.index(method)}))
 
     def begin_by_hand(self, sensor: int, moves: int, scale_std: float) -> None:
-        """Lets the board calibrate a sensor, set up with accelerations, that a hand turns while it streams.
+        """Have the board calibrate a sensor that a hand turns while it streams, set up with accelerations.
 
-        It is done after so many `moves` (1 to 255), at least, and when the scale's standard uncertainty is no larger.
+        It ends after at least `moves` (1 to 255), once the scale's standard uncertainty is at most `scale_std`.
         """
         self._ask("by_hand", {"sensor": sensor, "moves": moves, "scale_std": scale_std})
 
     def hand_report(self) -> HandReport:
-        """How the calibration by hand goes."""
-        return HandReport.of(self._ask("hand_status"))
+        """Return the progress of the calibration by hand."""
+        return HandReport.decode(self._ask("hand_status"))
 
     def hand_solution(self) -> HandSolved:
-        """What the calibration by hand has found so far."""
-        return HandSolved.of(self._ask("hand_solve"))
+        """Return the present solution of the calibration by hand."""
+        return HandSolved.decode(self._ask("hand_solve"))
 
     def read_calibration(self, sensor: int) -> StoredCalibration | None:
-        """The calibration stored on the board for a sensor; None when there is none."""
+        """Return the calibration stored on the board for a sensor; None if there is none."""
         try:
-            return StoredCalibration.of(self._ask("read_calibration", {"sensor": sensor}))
+            return StoredCalibration.decode(self._ask("read_calibration", {"sensor": sensor}))
         except BoardError as error:
             if error.name == "no_calibration":
                 return None
             raise
 
     def write_calibration(self, sensor: int, calibration: Calibration) -> None:
-        """Stores a calibration for a configured sensor; the range it is configured to belongs to the record.
+        """Store a calibration for a configured sensor; its configured range becomes part of the record.
 
-        The old record stays until the new one is whole. A repeated request stores the same once more: harmless.
+        The old record remains until the new one is complete. A repeated request stores the same again, without harm.
         """
         self._ask("write_calibration", {"sensor": sensor, **calibration.values()}, _FLASH_TIMEOUT_S)
 
     def erase_calibration(self, sensor: int) -> None:
-        """Lets the board forget a sensor's calibration; having none is no error."""
+        """Erase a sensor's calibration on the board; a missing one is no error."""
         self._ask("erase_calibration", {"sensor": sensor}, _FLASH_TIMEOUT_S)
 
     def heat(self, power: float) -> Heating:
-        """Lets the heater be on for this part of the time, 0 to 1; it goes off within two seconds unless told again."""
-        return Heating.of(self._ask("heat", {"power": _of_powers(power)}))
+        """Set the heater's duty, 0 to 1; it switches off after two seconds without a new request."""
+        return Heating.decode(self._ask("heat", {"power": _power_counts(power)}))
 
     def keep_heating(self, power: float) -> None:
-        """Says the same without waiting for the answer, which becomes `heating`."""
-        self._link.tell("heat", {"power": _of_powers(power)})
+        """Repeat that request without waiting for the answer, which becomes `heating`."""
+        self._link.tell("heat", {"power": _power_counts(power)})
 
     def reboot(self) -> None:
-        """Starts the board afresh and waits until it answers again."""
+        """Restart the board and wait until it answers again."""
         self._ask("reboot")
         self.identity = self._hello()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raises what went wrong meanwhile: the board's own error, or board_link_lost (closed, silent in a stream).
+        """Raise errors of the meantime: the board's own error, or board_link_lost (closed, silent in a stream).
 
-        `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
+        `clock_s` is the present time of another instrument's clock, if any: a silence must also be as long by that.
         """
         if self._link.fault is not None:
             raise self._link.fault
         silent_s = self._link.silent_s
         if clock_s is not None:
-            if self._link.frames_seen != self._heard[0]:
-                self._heard = self._link.frames_seen, clock_s
-            silent_s = min(silent_s, clock_s - self._heard[1])
+            if self._link.frame_count != self._last_check[0]:
+                self._last_check = self._link.frame_count, clock_s
+            silent_s = min(silent_s, clock_s - self._last_check[1])
         if self._streaming and silent_s > min(self._timeout_s, _SILENCE_S):
             raise BoardError(
                 "board_link_lost",
@@ -199,7 +195,7 @@ class Board:
             )
 
     def close(self) -> None:
-        """Tells the board to stop if it streams, and closes the port. May be called twice."""
+        """Stop the stream if the board streams, and close the port. May be called twice."""
         if self._link.closed:
             return
         if self._streaming and self._link.fault is None:
@@ -209,16 +205,18 @@ class Board:
 
     def _configure(self, sensor: int, rate_hz: float, **ranges: float) -> SensorSetup:
         values = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": 0.0, "range_g": 0.0, "range_gauss": 0.0}
-        return SensorSetup.of(self._ask("configure", values | ranges))
+        return SensorSetup.decode(self._ask("configure", values | ranges))
 
     def _hello(self) -> BoardIdentity:
-        before = self._link.bytes_seen, self._link.frames_seen
+        counts_before = self._link.byte_count, self._link.frame_count
         try:
             answer = self._ask("hello")
         except BoardError as error:
             if error.name != "board_link_lost" or self._link.fault is not None:
                 raise
-            raise self._why_no_hello(self._link.bytes_seen - before[0], self._link.frames_seen - before[1]) from error
+            raise self._why_no_hello(
+                self._link.byte_count - counts_before[0], self._link.frame_count - counts_before[1]
+            ) from error
         if answer.values["protocol"] != protocol.PROTOCOL_VERSION:
             raise BoardError(
                 "version_mismatch",
@@ -226,22 +224,22 @@ class Board:
                 f"this program {protocol.PROTOCOL_VERSION}",
                 "Flash the image that comes with this program: `rig board flash`",
             )
-        identity = BoardIdentity.of(answer)
+        identity = BoardIdentity.decode(answer)
         self._parts = tuple(sensor.part for sensor in identity.sensors)
         return identity
 
-    def _why_no_hello(self, bytes_seen: int, frames_seen: int) -> BoardError:
-        """An idle board speaks twice a second, so what was heard tells what is wrong."""
-        if frames_seen:
+    def _why_no_hello(self, byte_count: int, frame_count: int) -> BoardError:
+        """Return the reason by the data received: an idle board sends twice a second."""
+        if frame_count:
             return BoardError(
                 "no_board",
                 f"the board on {self._link.port} sends, but does not answer",
                 "Check the wire to the board's RX pin",
             )
-        if bytes_seen:
+        if byte_count:
             return BoardError(
                 "wrong_baud_rate",
-                f"{bytes_seen} bytes came from {self._link.port} at {self._link.baud} Bd and none made a "
+                f"{byte_count} bytes came from {self._link.port} at {self._link.baud} Bd and none made a "
                 "readable frame",
                 f"Set board.baud to {protocol.BAUD_RATE}, which the shipped image uses, or flash that image",
             )
@@ -256,33 +254,33 @@ class Board:
         if answer.name == "error":
             refusal = self._refusal(answer)
             if self._streaming and refusal.name == "not_configured" and not self.status().streaming:
-                # It was streaming: asked sooner than it said hello again, it answers as one that knows nothing.
-                refusal = self._restarted(self._link.ask("hello", None, self._timeout_s))
+                # It streamed before: a request that precedes its new hello meets a restarted board.
+                refusal = self._describe_restart(self._link.ask("hello", None, self._timeout_s))
                 self._link.fail(refusal)
             raise refusal
         return answer
 
     def _take_samples(self, frames: Iterable[Frame], host_time_s: float) -> None:
-        """Hand over the stream as it comes, on the reader thread; what is left of another program's is dropped."""
+        """Pass on the stream as it comes, on the reader thread; drop the rest of another program's stream."""
         if self._streaming:
             for batch in sample_batches(frames, host_time_s):
                 self._on_samples(batch)
 
     def _take(self, frame: Frame, request: str | None) -> None:
-        """Take every other frame as it comes, on the reader thread."""
+        """Handle every other frame as it comes, on the reader thread."""
         if frame.name == "ack" and request in ("start", "stop", "reboot"):
-            # Here and not in the caller's thread: the samples of a started stream may already be in the next frame.
+            # On this thread, because samples of a started stream may already be in the next frame.
             self._streaming = request == "start"
             if request == "reboot":
                 self._link.expect_restart()
         elif frame.name == "heating":
-            self.heating = Heating.of(frame)
+            self.heating = Heating.decode(frame)
         elif frame.name == "error" and frame.values["reply_to"] == 0:
             self._link.fail(self._refusal(frame))
         elif frame.name == "identity" and request is None and self._streaming:
-            self._link.fail(self._restarted(frame))
+            self._link.fail(self._describe_restart(frame))
 
-    def _restarted(self, identity: Frame) -> BoardError:
+    def _describe_restart(self, identity: Frame) -> BoardError:
         return BoardError(
             "board_error",
             f"the board on {self._link.port} restarted while streaming (reset by: {reset_cause(identity)})",
@@ -290,7 +288,7 @@ class Board:
         )
 
     def _refusal(self, frame: Frame) -> BoardError:
-        """An `error` frame as the error it is: named as in the table, and naming the part it is about."""
+        """Return the error of an `error` frame, with the name in the table and the part that it concerns."""
         code, sensor = frame.values["code"], frame.values["sensor"]
         problem = protocol.ERRORS.get(code)
         if problem is None:
@@ -304,11 +302,11 @@ class Board:
         return BoardError.of(problem._replace(what=f"the board on {self._link.port} says{about}: {problem.what}"))
 
 
-def _of_powers(power: float) -> int:
-    """A power from 0 to 1 as the board counts it."""
+def _power_counts(power: float) -> int:
+    """Return a power from 0 to 1 in the board's counts."""
     return round(protocol.HEATER_POWERS * min(max(power, 0.0), 1.0))
 
 
 def _mask(sensors: Collection[int]) -> int:
-    """Bit i for the sensor of index i."""
+    """Return a mask with bit i for the sensor of index i."""
     return sum(1 << sensor for sensor in set(sensors))

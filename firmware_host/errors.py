@@ -1,7 +1,7 @@
-"""How the board's half says no."""
+"""The error of the board and its link."""
 
 from firmware_host.problem import ProblemError
 
 
 class BoardError(ProblemError):
-    """Something the board or the link to it will not or cannot do (`no_board`, `wrong_baud_rate`, …)."""
+    """A failure of the board or of the link to it (`no_board`, `wrong_baud_rate`, …)."""

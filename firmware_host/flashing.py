@@ -1,4 +1,4 @@
-"""Puts the shipped image onto a Nucleo-L432KC: through its debug probe, or by a copy to the drive it shows over USB."""
+"""Flashing of the shipped image to a Nucleo-L432KC: through its debug probe, or by a copy to its USB drive."""
 
 import contextlib
 import hashlib
@@ -18,28 +18,30 @@ from firmware_host.errors import BoardError
 from firmware_host.installation import install_command
 from firmware_host.protocol import FIRMWARE_VERSION
 
-HERE = Path(__file__).parent
+PACKAGE = Path(__file__).parent
 TARGET = "stm32l432kc"
 FLASH_START = 0x0800_0000
 FLASH_BYTES = 256 * 1024
-CALIBRATION_BYTES = 16 * 2048  # the last pages: an image that reached into them would erase the calibrations
+CALIBRATION_BYTES = 16 * 2048  # the last pages: a longer image would erase the calibrations
 RAM_START, RAM_BYTES = 0x2000_0000, 64 * 1024
 DEVICE_ID_REGISTER, DEVICE_ID = 0xE004_2000, 0x435  # DBGMCU_IDCODE of all STM32L43x and L44x (RM0394)
-# What tells an STM32L432KC from the others of that code (RM0394, chapter 47): kilobytes of flash, and package.
+# The marks of an STM32L432KC among the chips of that code (RM0394, chapter 47): kilobytes of flash, and package.
 SIZE_REGISTER, PACKAGE_REGISTER, UFQFPN32 = 0x1FFF_75E0, 0x1FFF_7500, 0x08
-DEBUG_REGISTER = 0xE004_2004  # DBGMCU_CR: what keeps its clock while the core sleeps; a reset does not clear it
-# Under reset first: firmware that sleeps most of the time may not let a probe in. A probe that cannot do that halts it.
+DEBUG_REGISTER = (
+    0xE004_2004  # DBGMCU_CR: peripherals that keep their clock while the core sleeps; a reset does not clear it
+)
+# Under reset first: firmware that sleeps most of the time may block a probe. A probe without that mode halts it.
 CONNECT_MODES = ("under-reset", "halt")
 
 IMAGE_NAME = "rig_l432.bin"
-NUCLEO_CODE = "0770"  # of the Nucleo-L432KC in the link of its MBED.HTM, as in mbed-ls' table of platforms
+NUCLEO_CODE = "0770"  # the Nucleo-L432KC in the link of its MBED.HTM, as in mbed-ls' table of platforms
 DRIVE_TIMEOUT_S = 20.0
-LONGEST_TEXT = 10_000  # bytes of what a Nucleo's drive says in a file
+LONGEST_TEXT = 10_000  # bytes of a file on a Nucleo's drive
 _POLL_S = 0.05
 
 
 def shipped_image() -> bytes:
-    """The image that comes with this program. Raises BoardError `bad_image` when it cannot be that, or has changed."""
+    """Return the image that comes with this program. Raise BoardError `bad_image` if it is invalid or has changed."""
     folder = resources.files("firmware_host") / "firmware" / "image"
     image = (folder / IMAGE_NAME).read_bytes()
     check_image(image)
@@ -48,18 +50,18 @@ def shipped_image() -> bytes:
 
 
 def sha256(image: bytes) -> str:
-    """SHA-256 of an image, in hexadecimal."""
+    """Return the SHA-256 of an image, in hexadecimal."""
     return hashlib.sha256(image).hexdigest()
 
 
 def check_hash(image: bytes, stated: str) -> None:
-    """Raises BoardError `bad_image` where an image is not the one whose SHA-256 was `stated`, in hexadecimal."""
+    """Raise BoardError `bad_image` if an image's SHA-256 is not the `stated` one, in hexadecimal."""
     if sha256(image) != stated.lower():
         raise _bad_image(f"its SHA-256 is {sha256(image)}, and not {stated}")
 
 
 def check_image(image: bytes) -> None:
-    """Raises BoardError `bad_image` unless `image` is firmware for this microcontroller, of this program's version."""
+    """Raise BoardError `bad_image` unless `image` is firmware for this microcontroller, of this program's version."""
     if len(image) < 8 or len(image) > FLASH_BYTES - CALIBRATION_BYTES:
         raise _bad_image(f"it has {len(image)} bytes")
     stack, entry = struct.unpack_from("<II", image)
@@ -78,9 +80,9 @@ def _bad_image(why: str) -> BoardError:
 
 
 def find_probe(probe_id: str | None = None) -> Any:
-    """The only connected debug probe, or the one whose id contains `probe_id`: a pyocd probe with its `unique_id`.
+    """Return the only connected debug probe (of pyocd), or the one whose id contains `probe_id`.
 
-    Raises BoardError: flash_extra_missing, no_probe, several_probes, other_microcontroller.
+    Raise BoardError: flash_extra_missing, no_probe, several_probes, other_microcontroller.
     """
     try:
         from pyocd.core.helpers import ConnectHelper
@@ -90,7 +92,7 @@ def find_probe(probe_id: str | None = None) -> Any:
             f"the library for debug probes is not installed ({error})",
             f"Install it: {install_command('flash')}, or copy to the board's drive with --drive",
         ) from error
-    with contextlib.chdir(HERE):
+    with contextlib.chdir(PACKAGE):
         probes = ConnectHelper.get_all_connected_probes(blocking=False, unique_id=probe_id)
     if not probes:
         raise BoardError(
@@ -99,14 +101,16 @@ def find_probe(probe_id: str | None = None) -> Any:
             "Connect the Nucleo by USB and allow its use (udev rules), or copy to its drive with --drive",
         )
     if len(probes) > 1:
-        found = ", ".join(f"{probe.unique_id} ({probe.description})" for probe in probes)
-        raise BoardError("several_probes", f"several debug probes are connected: {found}", "Choose one with --probe ID")
+        listing = ", ".join(f"{probe.unique_id} ({probe.description})" for probe in probes)
+        raise BoardError(
+            "several_probes", f"several debug probes are connected: {listing}", "Choose one with --probe ID"
+        )
     _refuse_other_board(probes[0])
     return probes[0]
 
 
 def _refuse_other_board(probe: Any) -> None:
-    """A probe that is part of a board may know of which."""
+    """Raise BoardError if a probe that is part of a board reports another board."""
     board = getattr(probe, "associated_board_info", None)
     if board is not None and not board.target.startswith(TARGET):
         raise _other_microcontroller(f"the probe {probe.unique_id} is that of a {board.name}, with an {board.target}")
@@ -117,9 +121,9 @@ def _other_microcontroller(what: str) -> BoardError:
 
 
 def flash_by_probe(image: bytes, probe: Any) -> None:
-    """Program, read back and start `image` through a probe that `find_probe` found.
+    """Program, read back and start `image` through a probe of `find_probe`.
 
-    Erases only the pages the image needs, so stored calibrations stay. Raises BoardError: other_microcontroller,
+    Only the pages of the image are erased, so stored calibrations remain. Raise BoardError: other_microcontroller,
     flash_failed.
     """
     from pyocd.core.exceptions import Error
@@ -129,8 +133,8 @@ def flash_by_probe(image: bytes, probe: Any) -> None:
     for mode in CONNECT_MODES:
         options = {"target_override": TARGET, "hide_programming_progress": True, "connect_mode": mode}
         try:
-            # pyocd executes a pyocd_user.py that lies in the working folder, whoever may have sent that.
-            with contextlib.chdir(HERE), Session(probe, options=options) as session:
+            # pyocd executes a pyocd_user.py in the working folder, whatever its origin.
+            with contextlib.chdir(PACKAGE), Session(probe, options=options) as session:
                 _program(session, image)
             return
         except (Error, OSError) as error:
@@ -157,7 +161,7 @@ def _program(session: Any, image: bytes) -> None:
             f"at the probe hangs a microcontroller of the STM32L432's family with {kilobytes} KB of flash in package "
             f"{package}, not an STM32L432KC ({FLASH_BYTES // 1024} KB, {UFQFPN32})"
         )
-    # What runs there would be interrupted while its vectors are erased, and its watchdog would bite
+    # Running firmware would be interrupted while its vectors are erased, or reset by its watchdog
     session.target.reset_and_halt()
     programmer = FileProgrammer(session, chip_erase="sector", trust_crc=False)
     programmer.program(io.BytesIO(image), file_format="bin", base_address=FLASH_START)
@@ -167,7 +171,7 @@ def _program(session: Any, image: bytes) -> None:
             "the board's flash reads back otherwise than it was written",
             "Try again; if that does not help, replace the board",
         )
-    # pyocd sets its bits when it connects; left on, they wake an erratum of the chip's in every sleep until a power-off
+    # pyocd sets these bits when it connects; they trigger an erratum of the chip in every sleep until a power-off
     session.target.write32(DEBUG_REGISTER, 0)
     session.target.reset()
 
@@ -175,8 +179,8 @@ def _program(session: Any, image: bytes) -> None:
 def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S) -> None:
     """Copy `image` to the Nucleo's USB drive and wait until the board has taken it.
 
-    The drive is none: the probe programs what is copied, restarts the target, and shows the drive anew, with a
-    FAIL.TXT when it failed. Raises BoardError: no_drive, not_a_nucleo_drive, flash_failed, flash_unconfirmed.
+    The drive is virtual: the probe programs the copied file, restarts the target, and mounts the drive again, with a
+    FAIL.TXT after a failure. Raise BoardError: no_drive, not_a_nucleo_drive, flash_failed, flash_unconfirmed.
     """
     refuse_other_drive(drive)
     copied, failure = drive / IMAGE_NAME, drive / "FAIL.TXT"
@@ -185,7 +189,7 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
         with open(copied, "wb", opener=_no_link) as file:
             file.write(image)
             file.flush()
-            with contextlib.suppress(OSError):  # the drive may be gone already: then the board has it all
+            with contextlib.suppress(OSError):  # the drive may be gone already, once the board has all of it
                 os.fsync(file.fileno())
     except OSError as error:
         raise BoardError(
@@ -194,18 +198,18 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
     deadline_s = time.monotonic() + timeout_s
     while time.monotonic() < deadline_s:
         try:
-            # In this order: a drive that is away shows no image either, and with it comes what may have failed.
-            back = not copied.exists() and _code(drive) is not None
+            # In this order: an unmounted drive shows no image either, and FAIL.TXT appears with the drive.
+            is_mounted = not copied.exists() and _code(drive) is not None
             if failure.exists():
                 raise BoardError(
                     "flash_failed",
                     f"the board did not take the image: {' '.join(_short_text(failure).split())}",
                     "Unplug the board, plug it in, and try again, or flash through the probe",
                 )
-            if back:
+            if is_mounted:
                 return
         except OSError:
-            pass  # the drive is just going or coming
+            pass  # the drive is being unmounted or mounted
         time.sleep(_POLL_S)
     raise BoardError(
         "flash_unconfirmed",
@@ -215,51 +219,49 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
 
 
 def find_drive(candidates: Iterable[Path] | None = None) -> Path:
-    """The only Nucleo-L432KC's drive among `candidates`, by default all drives mounted here.
+    """Return the only Nucleo-L432KC's drive among `candidates`, by default all mounted drives.
 
-    Raises BoardError: no_drive, several_drives.
+    Raise BoardError: no_drive, several_drives.
     """
-    found = [
-        drive for drive in (_mounted_drives() if candidates is None else candidates) if _code(drive) == NUCLEO_CODE
-    ]
-    if not found:
+    drives = [drive for drive in (_list_drives() if candidates is None else candidates) if _code(drive) == NUCLEO_CODE]
+    if not drives:
         raise BoardError(
             "no_drive",
             "no drive of a Nucleo-L432KC is mounted",
             "Connect the board by USB and open its drive once, or name the drive: --drive PATH",
         )
-    if len(found) > 1:
-        listed = ", ".join(map(str, found))
-        raise BoardError("several_drives", f"several Nucleo boards show a drive: {listed}", "Choose one: --drive PATH")
-    return found[0]
+    if len(drives) > 1:
+        listing = ", ".join(map(str, drives))
+        raise BoardError("several_drives", f"several Nucleo boards show a drive: {listing}", "Choose one: --drive PATH")
+    return drives[0]
 
 
 def refuse_other_drive(drive: Path) -> None:
-    """Raises BoardError `no_drive` or `not_a_nucleo_drive` unless `drive` is a Nucleo-L432KC's."""
+    """Raise BoardError `no_drive` or `not_a_nucleo_drive` unless `drive` is a Nucleo-L432KC's."""
     if not drive.is_dir():
         raise BoardError("no_drive", f"there is no drive {drive}", "Connect the board by USB and open its drive once")
     code = _code(drive)
     if code != NUCLEO_CODE:
-        seen = "it has no MBED.HTM" if code is None else f"its board's code is {code}, not {NUCLEO_CODE}"
+        finding = "it has no MBED.HTM" if code is None else f"its board's code is {code}, not {NUCLEO_CODE}"
         raise BoardError(
             "not_a_nucleo_drive",
-            f"{drive} is not the drive of a Nucleo-L432KC: {seen}",
+            f"{drive} is not the drive of a Nucleo-L432KC: {finding}",
             "Name the drive called NODE_L432KC",
         )
 
 
 def _code(drive: Path) -> str | None:
-    """The kind of board a drive belongs to, by the link in its MBED.HTM; None when it is no such drive."""
+    """Return the board code of a drive, from the link in its MBED.HTM; None if it has no such file."""
     try:
         page = _short_text(drive / "MBED.HTM")
     except OSError:
         return None
-    found = re.search(r"code=(\w{4})", page)
-    return found[1].upper() if found else "unknown"
+    match = re.search(r"code=(\w{4})", page)
+    return match[1].upper() if match else "unknown"
 
 
 def _short_text(path: Path) -> str:
-    """The beginning of a file on a drive that may be anybody's: not of a pipe, a device or through a link."""
+    """Return the start of a file on an untrusted drive. Raise OSError for a pipe, a device or a link."""
     with open(path, "rb", opener=_no_link) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise OSError(f"{path} is no regular file")
@@ -270,7 +272,7 @@ def _no_link(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0), 0o666)
 
 
-def _mounted_drives() -> list[Path]:
+def _list_drives() -> list[Path]:
     if sys.platform == "win32":
         return [Path(f"{letter}:/") for letter in "DEFGHIJKLMNOPQRSTUVWXYZ"]
     roots = ("/Volumes/*",) if sys.platform == "darwin" else ("/media/*", "/media/*/*", "/run/media/*/*", "/mnt/*")

@@ -1,9 +1,9 @@
-"""What the image takes of the chip: `python -m firmware_host.footprint`, which `make firmware` runs after the build.
+"""The image's use of the chip: `python -m firmware_host.footprint`, which `make firmware` runs after the build.
 
-Flash and RAM are the linker's. The stack is what the board itself reports after a session on the emulator that asks
-for everything it can do: all gyroscopes streaming with accelerations, and a magnetometer, observations kept and
-averaged, both solutions, a move by hand solved, the heater on, a calibration over temperature written, read, streamed
-by and erased.
+Flash and RAM are the linker's. The stack is the board's own report after a session on the emulator with all its
+functions: all gyroscopes streaming with accelerations, and a magnetometer, observations stored and averaged, both
+solutions, a move by hand solved, the heater on, a calibration over temperature written, read, applied to a stream and
+erased.
 """
 
 import io
@@ -25,23 +25,23 @@ from firmware_host.parts import BOARD_PARTS, GYROSCOPES, MAGNETOMETERS
 from firmware_host.protocol import METHODS
 
 IMAGE = Path(__file__).parent / "firmware" / "image"
-FLASH_LIMIT_BYTES = 40 * 1024  # of the 224 KB that the image may use
-RAM_LIMIT_BYTES = 40 * 1024  # of the 48 KB that the image may use
-RANGE_G = 8.0  # which every gyroscope's accelerometer has
+FLASH_LIMIT_BYTES = 40 * 1024  # of the 224 KB for the image
+RAM_LIMIT_BYTES = 40 * 1024  # of the 48 KB for the image
+RANGE_G = 8.0  # a range of every gyroscope's accelerometer
 RAM = range(0x2000_0000, 0x2000_C000)
 RATE_HZ, RANGE_DEG_S = 200.0, 100.0  # the parts' nearest rate, their smallest range that has it
 SENSORS = range(len(GYROSCOPES))  # the board's first
 ALL = (1 << len(GYROSCOPES)) - 1  # a mask of them
 DIRECTIONS = ((0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
 STILL = (0, 0, 0)
-REST_S = 1.4  # the board takes a second of it for a rest
-SPEED_RAD_S = 1.5  # within that range for every scale of a part
+REST_S = 1.4  # the board needs a second for a rest
+SPEED_RAD_S = 1.5  # within that range for the scale of every part
 STEP_S = 0.01
-ANSWER_STEPS = 10  # at most, until the board has answered
+ANSWER_STEPS = 10  # longest wait for an answer
 
 
 class Session:
-    """A board with all its sensors, which turn about `direction`."""
+    """A board with all its sensors, which rotate about `direction`."""
 
     def __init__(self, image: bytes, elf: bytes) -> None:
         self.direction: tuple[float, ...] = DIRECTIONS[0]
@@ -71,7 +71,7 @@ class Session:
         return tuple(SPEED_RAD_S * part for part in self.direction)
 
     def run(self, duration_s: float) -> list[Frame]:
-        """Let time pass. Returns what the board sent."""
+        """Advance the time by `duration_s`, s; return the frames that the board sent."""
         frames = []
         for _ in range(math.ceil(duration_s / STEP_S)):
             self._steps += 1
@@ -80,7 +80,7 @@ class Session:
         return frames
 
     def ask(self, name: str, **values: Any) -> dict[str, Any]:
-        """The fields of the answer. Raises RuntimeError when the board refuses, or says nothing."""
+        """Send a request and return the answer's fields. Raise RuntimeError if the board refuses or does not answer."""
         self._board.receive(encode(name, 9, values))
         for _ in range(ANSWER_STEPS):
             for frame in self.run(STEP_S):
@@ -92,7 +92,7 @@ class Session:
         raise RuntimeError(f"the board does not answer {name}")
 
     def sweep(self, index: int) -> None:
-        """One direction: keep, turn, and let the board observe every sensor."""
+        """Make one sweep: store, rotate, and have the board observe every sensor."""
         self.direction = DIRECTIONS[index]
         self.run(0.1)
         self.ask("keep", sensors=ALL, duration_s=1.0)
@@ -105,17 +105,17 @@ class Session:
             self.ask("observe", sensor=sensor, index=index, **span)
 
     def turn_by_hand(self) -> None:
-        """A whole turn from rest to rest, which the board has to take."""
+        """Rotate by a whole revolution from rest to rest. Raise RuntimeError if the board does not take the move."""
         self.ask("by_hand", sensor=0, moves=1, scale_std=1.0)
-        for direction, lasts_s in ((STILL, REST_S), (DIRECTIONS[0], 2 * math.pi / SPEED_RAD_S), (STILL, REST_S)):
+        for direction, duration_s in ((STILL, REST_S), (DIRECTIONS[0], 2 * math.pi / SPEED_RAD_S), (STILL, REST_S)):
             self.direction = direction
-            self.run(lasts_s)
-        if (found := self.ask("hand_solve"))["taken"] != 1:
-            raise RuntimeError(f"the board has not taken the move: {found}")
+            self.run(duration_s)
+        if (solution := self.ask("hand_solve"))["taken"] != 1:
+            raise RuntimeError(f"the board has not taken the move: {solution}")
 
 
-def stack_used(image: bytes, elf: bytes) -> int:
-    """The most stack ever used, bytes, as the board reports it after it has done everything."""
+def measure_stack(image: bytes, elf: bytes) -> int:
+    """Return the most stack ever used, bytes, by the board's report after it has done everything."""
     session = Session(image, elf)
     for sensor in SENSORS:
         ranges = {"range_deg_s": RANGE_DEG_S, "range_g": RANGE_G, "range_gauss": 0.0}
@@ -135,10 +135,10 @@ def stack_used(image: bytes, elf: bytes) -> int:
     session.ask("stop")
     for sensor in SENSORS:
         solution = solutions[len(METHODS) * sensor]
-        found = {"matrix": np.diag(solution["scale"]), "bias_rad_s": solution["bias_rad_s"]}
-        about = {"model": 1, "serial_number": "footprint", "written_unix_s": 0, "temperature_c": 25.0}
-        changed = dict.fromkeys(("scale_change", "bias_change_rad_s"), np.full((3, 3), 1e-7))
-        session.ask("write_calibration", sensor=sensor, **about, **found, **changed, lowest_c=0.0, highest_c=50.0)
+        values = {"matrix": np.diag(solution["scale"]), "bias_rad_s": solution["bias_rad_s"]}
+        header = {"model": 1, "serial_number": "footprint", "written_unix_s": 0, "temperature_c": 25.0}
+        polynomials = dict.fromkeys(("scale_change", "bias_change_rad_s"), np.full((3, 3), 1e-7))
+        session.ask("write_calibration", sensor=sensor, **header, **values, **polynomials, lowest_c=0.0, highest_c=50.0)
         session.ask("read_calibration", sensor=sensor)
     session.ask("start", sensors=ALL)
     session.run(0.5)
@@ -148,18 +148,18 @@ def stack_used(image: bytes, elf: bytes) -> int:
     return int(session.ask("status")["stack_high_water"])
 
 
-def ram_taken(elf: bytes) -> tuple[int, int]:
-    """RAM the linker gave away, and how much of it is room for the stack, bytes."""
+def read_ram_sizes(elf: bytes) -> tuple[int, int]:
+    """Return the RAM that the linker allocated, and the part of it for the stack, bytes."""
     sections = [s for s in ELFFile(io.BytesIO(elf)).iter_sections() if s["sh_flags"] & SH_FLAGS.SHF_ALLOC]
     in_ram = {section.name: int(section["sh_size"]) for section in sections if section["sh_addr"] in RAM}
     return sum(in_ram.values()), in_ram[".stack"]
 
 
 def main() -> int:
-    """Print the three numbers. 1 when one is over its limit."""
+    """Print the three numbers. Return 1 if one is over its limit."""
     image, elf = (IMAGE / "rig_l432.bin").read_bytes(), (IMAGE / "rig_l432.elf").read_bytes()
-    ram, room = ram_taken(elf)
-    stack = stack_used(image, elf)
+    ram, room = read_ram_sizes(elf)
+    stack = measure_stack(image, elf)
     print(f"flash {len(image):6} B of {FLASH_LIMIT_BYTES}")
     print(f"RAM   {ram:6} B of {RAM_LIMIT_BYTES}, {room} of them for the stack")
     print(f"stack {stack:6} B of {room} at most, as the board reports after a session of everything")

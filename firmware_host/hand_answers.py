@@ -1,4 +1,4 @@
-"""What the board says of a calibration by hand that it makes by itself."""
+"""The board's answers on a calibration by hand that it computes itself."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -10,11 +10,19 @@ from firmware_host.frames import Frame
 
 @dataclass(frozen=True, slots=True)
 class HandReport:
-    """A `hand_report`: how a session goes, and the move that was judged last, by board times in microseconds.
+    """A `hand_report`: the progress of a session, and the last judged move. Times are board times in microseconds.
 
-    `state` is one of `protocol.HAND_STATES`, `outcome` of `protocol.HAND_OUTCOMES`; `before` and `after` are faces of
-    `protocol.HAND_FACES`, None on none. Of the rest before it, what was used begins at `rest_us` and ends where the
-    move does begin, at `move_us`; of the rest after, it begins at `after_us` and ends at `end_us`.
+    - `sensor`, `state`: its index, and one of `protocol.HAND_STATES`.
+    - `outcome`: that of the last move, one of `protocol.HAND_OUTCOMES`.
+    - `before`, `after`: the faces at its ends, of `protocol.HAND_FACES`; None for no face.
+    - `whole`: whether whole revolutions on a face count as closed.
+    - `settled`: whether the equations are linearized about the solution after that move.
+    - `judged`, `taken`: the numbers of moves judged and accepted.
+    - `angle_rad`: the rotation of that move, there and back.
+    - `noise_rad_s`: the standard deviation of a reading at rest, used as its weight.
+    - `scale_std`: the largest standard uncertainty of a scale factor.
+    - `rest_us`, `move_us`: the start of the part of the rest before that was used, and of the move.
+    - `after_us`, `end_us`: the start of the rest after, and the end of the part of it that was used.
     """
 
     sensor: int
@@ -35,8 +43,8 @@ class HandReport:
     end_us: int
 
     @classmethod
-    def of(cls, frame: Frame) -> Self:
-        """A `hand_report` frame."""
+    def decode(cls, frame: Frame) -> Self:
+        """Decode a `hand_report` frame."""
         values = dict(frame.values)
         del values["reply_to"]
         faces = dict(enumerate(protocol.HAND_FACES))
@@ -55,11 +63,13 @@ class HandReport:
 
 @dataclass(frozen=True, slots=True)
 class HandSolved:
-    """A `hand_solution`: g = C (m + b) of so many moves `taken`, in single precision; `matrix` is C.
+    """A `hand_solution`, g = C (m + b), of `taken` moves in single precision.
 
-    `g_sensitivity_rad_s` is what a reading has of the specific force, rad/s per g; `scale_std` the largest standard
-    uncertainty of a scale factor by that session. The sensor was set up to `range_deg_s`, and as warm as
-    `temperature_c` when it was last laid down.
+    - `sensor`, `state`, `taken`: its index, one of `protocol.HAND_STATES`, and the number of accepted moves.
+    - `scale_std`: the largest standard uncertainty of a scale factor by that session.
+    - `range_deg_s`, `temperature_c`: the sensor's range, and its temperature when it was last laid down.
+    - `matrix`, `bias_rad_s`: C and b.
+    - `g_sensitivity_rad_s`: the effect of specific force on a reading, rad/s per g.
     """
 
     sensor: int
@@ -73,8 +83,8 @@ class HandSolved:
     g_sensitivity_rad_s: Matrix
 
     @classmethod
-    def of(cls, frame: Frame) -> Self:
-        """A `hand_solution` frame."""
+    def decode(cls, frame: Frame) -> Self:
+        """Decode a `hand_solution` frame."""
         values = frame.values
         return cls(
             sensor=values["sensor"],

@@ -1,4 +1,4 @@
-"""How this program was installed, and so by which command an optional part of it comes there too."""
+"""The installation of this program, and the command that installs an optional part of it."""
 
 import json
 import shlex
@@ -12,26 +12,26 @@ SOURCE = Path(__file__).resolve().parents[1]
 
 
 def install_command(extra: str) -> str:
-    """The command that installs the optional part `extra` beside this very program, as one types it in a shell."""
+    """Return the shell command that installs the optional part `extra` for this very program."""
     editable, source = _source()
     return shlex.join([sys.executable, "-m", "pip", "install", *(["-e"] if editable else []), f"{source}[{extra}]"])
 
 
 def _source() -> tuple[bool, str]:
-    """Whether it runs from the folder of its sources, and what pip has to be given."""
+    """Return whether it runs from the folder of its sources, and the requirement for pip."""
     from importlib.metadata import PackageNotFoundError, distribution
 
     try:
-        found = distribution(NAME)
-        if Path(str(found.locate_file(""))).resolve() == SOURCE:  # what building leaves beside the sources
+        installed = distribution(NAME)
+        if Path(str(installed.locate_file(""))).resolve() == SOURCE:  # metadata left by a build
             return True, str(SOURCE)
-        said = json.loads(found.read_text("direct_url.json") or "{}")
+        origin = json.loads(installed.read_text("direct_url.json") or "{}")
     except PackageNotFoundError:  # run from a folder of sources that is not installed
         return True, str(SOURCE)
     except ValueError:
-        said = {}
-    place = urlsplit(said.get("url", ""))
-    path = Path(url2pathname(place.path))
-    if place.scheme == "file" and path.exists():
-        return bool(said.get("dir_info", {}).get("editable")), str(path)
+        origin = {}
+    url = urlsplit(origin.get("url", ""))
+    path = Path(url2pathname(url.path))
+    if url.scheme == "file" and path.exists():
+        return bool(origin.get("dir_info", {}).get("editable")), str(path)
     return False, NAME

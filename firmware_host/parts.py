@@ -1,8 +1,8 @@
-"""The parts that the board has drivers for: one table for Python and, through `parts_header.py`, for C.
+"""The parts with drivers on the board: one table for Python and, through `parts_header.py`, for C.
 
-A new part is one entry here, of at most eight: the messages name sensors by a mask of as many bits. What its data sheet
-says of its errors stands in the rig's catalogue (`rig/config/sensors/sensor_catalogue.py`), how it behaves at its
-registers in the model that the entry names.
+A new part is one entry here, of at most eight: the messages select sensors by a mask of eight bits. The errors of its
+data sheet are in the rig's catalogue (`rig/config/sensors/sensor_catalogue.py`), its behaviour at its registers in the
+model that the entry names.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,12 +17,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class BoardPart:
-    """A part and how it is wired.
+    """A part and its wiring.
 
-    `name`: as the board's message `identity` spells it; `driver`: its `struct sensor_driver` in `firmware/core`.
-    `who_am_i`: what its identity register reads; `in_its_place`: what other parts read there, and what they are.
-    `select`, `data_ready`: the chip's pins. `model`: module and class of its register model in `emulator/`, and `told`:
-    which arguments that model takes beside those that all models take, of `range_deg_s` and `ready_s`.
+    - `name`: its spelling in the board's message `identity`.
+    - `driver`: its `struct sensor_driver` in `firmware/core`.
+    - `who_am_i`: the value of its identity register.
+    - `select`, `data_ready`: the chip's pins.
+    - `model`: module and class of its register model in `emulator/`.
+    - `identities`: the values of that register in other parts, and those parts' names.
+    - `model_options`: further arguments of that model, of `range_deg_s` and `ready_s`.
     """
 
     name: str
@@ -31,23 +34,23 @@ class BoardPart:
     select: str
     data_ready: str
     model: str
-    in_its_place: Mapping[int, str] = field(default_factory=dict)
-    told: tuple[str, ...] = ()
+    identities: Mapping[int, str] = field(default_factory=dict)
+    model_options: tuple[str, ...] = ()
 
     @property
     def register_model(self) -> "Callable[..., SpiDevice]":
         """The class that simulates the part at its registers."""
         module, name = self.model.split(":")
-        found: Callable[..., Any] = getattr(import_module(f"firmware_host.emulator.parts.{module}"), name)
-        return found
+        model_class: Callable[..., Any] = getattr(import_module(f"firmware_host.emulator.parts.{module}"), name)
+        return model_class
 
-    def another(self, who_am_i: int) -> str:
-        """What answers in the part's place, by its identity register."""
-        known = self.in_its_place.get(who_am_i, "an unknown part")
-        return f"{known}, identity 0x{who_am_i:02x} instead of 0x{self.who_am_i:02x}"
+    def describe_other(self, who_am_i: int) -> str:
+        """Return the description of another part that answers, by its identity register."""
+        other = self.identities.get(who_am_i, "an unknown part")
+        return f"{other}, identity 0x{who_am_i:02x} instead of 0x{self.who_am_i:02x}"
 
 
-# Sources of what answers in another part's place: the identities in Linux' drivers st_gyro_core.c and st_lsm6dsx_core.c
+# Sources of the other parts' identities: the identities in Linux' drivers st_gyro_core.c and st_lsm6dsx_core.c
 # (0x0F), inv_mpu_iio.h and inv_icm42600.h (0x75) and adis16475.c, whose parts hold their own number (0x72).
 GYROSCOPES: Mapping[str, BoardPart] = MappingProxyType(
     {
@@ -58,7 +61,7 @@ GYROSCOPES: Mapping[str, BoardPart] = MappingProxyType(
             select="PA11",
             data_ready="PA8",
             model="lsm9ds1:Lsm9ds1",
-            in_its_place={
+            identities={
                 0x69: "an LSM6DS3",
                 0x6A: "an LSM6DSL or its like",
                 0x6C: "an LSM6DSO or its like",
@@ -73,7 +76,7 @@ GYROSCOPES: Mapping[str, BoardPart] = MappingProxyType(
             select="PB0",
             data_ready="PA12",
             model="mpu9250:Mpu9250",
-            in_its_place={
+            identities={
                 0x68: "an MPU-6050, MPU-6000 or MPU-9150",
                 0x70: "an MPU-6500",
                 0x73: "an MPU-9255",
@@ -88,8 +91,8 @@ GYROSCOPES: Mapping[str, BoardPart] = MappingProxyType(
             select="PA4",
             data_ready="PA1",
             model="adis16465:Adis16465",
-            in_its_place={number: f"an ADIS{number}" for number in range(16001, 17000) if number != 16465},
-            told=("range_deg_s", "ready_s"),  # it comes in three variants, one for each range, and is slow to start
+            identities={number: f"an ADIS{number}" for number in range(16001, 17000) if number != 16465},
+            model_options=("range_deg_s", "ready_s"),  # three variants, one for each range, and a slow start
         ),
         "icm42688p": BoardPart(
             name="ICM-42688-P",
@@ -98,7 +101,7 @@ GYROSCOPES: Mapping[str, BoardPart] = MappingProxyType(
             select="PA10",
             data_ready="PA9",
             model="icm42688p:Icm42688P",
-            in_its_place={
+            identities={
                 0x12: "an ICM-20602",
                 0x3B: "an ICM-40609-D",
                 0x40: "an ICM-42600",
@@ -117,7 +120,7 @@ GYROSCOPES: Mapping[str, BoardPart] = MappingProxyType(
             select="PA7",
             data_ready="PB7",
             model="lsm6dsv16x:Lsm6dsv16x",
-            in_its_place={
+            identities={
                 0x68: "an LSM9DS1",
                 0x69: "an LSM6DS3",
                 0x6A: "an LSM6DSL or its like",
@@ -138,8 +141,8 @@ MAGNETOMETERS: Mapping[str, BoardPart] = MappingProxyType(
             select="PB1",
             data_ready="PA3",
             model="lsm9ds1_magnetometer:Lsm9ds1Magnetometer",
-        ),
+        )
     }
 )
 
-BOARD_PARTS: Mapping[str, BoardPart] = MappingProxyType({**GYROSCOPES, **MAGNETOMETERS})  # in the order of the board
+BOARD_PARTS: Mapping[str, BoardPart] = MappingProxyType({**GYROSCOPES, **MAGNETOMETERS})  # in the board's order

@@ -1,13 +1,13 @@
-"""What is wrong, in three words' length: the one form in which every part of the program says no."""
+"""The form of every refusal and fault in the program: name, clause, remedy."""
 
 from typing import NamedTuple, Self
 
 
 class Problem(NamedTuple):  # no dataclass: the command line imports this, and must start at once
-    """Something that is not as it must be.
+    """A condition that prevents an operation.
 
-    `name` is stable, for programs and for looking it up (`lost_samples`, `arm_link_lost`, …), `what` one clause saying
-    what happened and where, `remedy` one clause saying what to do.
+    `name` is stable, for programs and documentation (`lost_samples`, `arm_link_lost`, …), `what` one clause on what
+    happened and where, `remedy` one clause on what to do.
     """
 
     name: str
@@ -27,7 +27,7 @@ class ProblemError(Exception):
 
     @classmethod
     def of(cls, problem: Problem) -> Self:
-        """The problem as an exception of this kind."""
+        """Return the problem as an exception of this kind."""
         return cls(problem.name, problem.what, problem.remedy)
 
     @property
@@ -37,12 +37,12 @@ class ProblemError(Exception):
 
     @property
     def what(self) -> str:
-        """One clause saying what happened and where."""
+        """One clause on what happened and where."""
         return self.problem.what
 
     @property
     def remedy(self) -> str:
-        """One clause saying what to do."""
+        """One clause on what to do."""
         return self.problem.remedy
 
     def __str__(self) -> str:

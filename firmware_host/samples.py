@@ -1,4 +1,4 @@
-"""The shape of a received sample, shared by the link that decodes it and the recorder that keeps it."""
+"""The layout of a received sample, shared by the link that decodes it and the recorder that stores it."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ SAMPLE_DTYPE = np.dtype(
         ("temperature_counts", "<i2"),
     ]
 )
-# Of a sensor whose accelerations come along: x, y, z of the same conversion, in the axes of `counts`.
+# Samples with accelerations: x, y, z of the same conversion, in the axes of `counts`.
 IMU_SAMPLE_DTYPE = np.dtype([*SAMPLE_DTYPE.descr, ("acceleration_counts", "<i4", (3,))])
-# Of a magnetometer, which has no thermometer: x, y, z of the field as the part reports them.
+# Samples of a magnetometer, which has no thermometer: x, y, z of the field as the part reports them.
 FIELD_SAMPLE_DTYPE = np.dtype([*STAMPS, ("field_counts", "<i4", (3,))])

@@ -1,52 +1,54 @@
-"""A serial port or `socket://host:port`, by pyserial: bytes, and OSError for all that goes wrong."""
+"""A serial port or `socket://host:port`, by pyserial: bytes, with OSError for all errors."""
 
 import os
 import time
 
 import serial
 
-READ_TIMEOUT_S = 0.005  # the delay of every read: bytes come a few at a time, and each of them would wake the reader
+READ_TIMEOUT_S = 0.005  # the delay of every read: bytes come a few at a time, and each would wake the reader
 _READ_SIZE = 65536
 
 
-def why_closed(port: str, error: OSError) -> str:
-    """Why `port` does not open, as the end of a sentence: in the system's words once, and which ports there are."""
-    cause = next((each for each in (error, error.__context__) if isinstance(each, OSError) and each.errno), None)
-    why = str(error) if cause is None or cause.errno is None else os.strerror(cause.errno)
+def explain_closed(port: str, error: OSError) -> str:
+    """Return why `port` does not open, as the end of a sentence: the system's reason, and the computer's ports."""
+    cause = next(
+        (failure for failure in (error, error.__context__) if isinstance(failure, OSError) and failure.errno), None
+    )
+    reason = str(error) if cause is None or cause.errno is None else os.strerror(cause.errno)
     if "://" in port:
-        return why
+        return reason
     from serial.tools import list_ports
 
-    there = [f"{each.device} ({each.description})" for each in list_ports.comports()]
-    return f"{why}; this computer has {', '.join(there) or 'no serial port'}"
+    ports = [f"{available.device} ({available.description})" for available in list_ports.comports()]
+    return f"{reason}; this computer has {', '.join(ports) or 'no serial port'}"
 
 
 class SerialPort:
-    """An open port; raises OSError from the constructor, `read` and `write`."""
+    """An open port; constructor, `read` and `write` raise OSError."""
 
     def __init__(self, port: str, baud: int) -> None:
         try:
             self._serial = serial.serial_for_url(port, baudrate=baud, timeout=0, exclusive=True)
-        except ValueError as error:  # what is no port's name, or no baud rate of it
+        except ValueError as error:  # an invalid name, or an unsupported baud rate
             raise OSError(str(error)) from error
 
     def read(self) -> bytes:
-        """What came within `READ_TIMEOUT_S`; when the port closes, what came before it first.
+        """Return the data received within `READ_TIMEOUT_S`; if the port closes, first the data from before.
 
-        pyserial would wait itself, but what it has read it drops when the port closes while it waits for more.
+        pyserial could wait itself, but drops data that it has read when the port closes during the wait.
         """
         time.sleep(READ_TIMEOUT_S)
         return bytes(self._serial.read(_READ_SIZE))
 
     def write(self, data: bytes) -> None:
-        """Send, whatever the far end makes of it."""
+        """Send data, without confirmation by the far end."""
         self._serial.write(data)
 
     def close(self) -> None:
         """Close the port."""
         sock = getattr(self._serial, "_socket", None)
         if sock is not None:
-            # pyserial would leave it open when the far end closed it first, and else wait 0.3 s after closing it.
+            # pyserial leaves it open if the far end has closed it first, and otherwise waits 0.3 s after closing it.
             sock.close()
             self._serial.is_open = False
         self._serial.close()

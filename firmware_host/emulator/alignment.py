@@ -1,4 +1,4 @@
-"""Word accesses that the chip traps when their address is no multiple of four, and that Unicorn lets pass."""
+"""The check of word accesses that the chip traps at addresses that are no multiple of four, and Unicorn does not."""
 
 from collections.abc import Callable
 
@@ -9,36 +9,38 @@ from firmware_host.emulator.engine import Engine
 from firmware_host.emulator.thumb import word_accesses
 
 _CORE_REGISTERS = [*range(UC_ARM_REG_R0, UC_ARM_REG_R0 + 13), UC_ARM_REG_SP, UC_ARM_REG_LR]
-_ENOUGH = 1_000  # an instruction that was right so often is not looked at any more: the looking costs a fifth of all
+_ENOUGH = 1_000  # aligned runs after which an instruction is trusted: the check costs a fifth of all time
 
 
 class AlignmentWatch:
-    """Looks at the base register of every such instruction before it runs, from the block's first run on.
+    """The check of the base register of every such instruction before it runs, from its block's first run on.
 
-    Not of all that the program has: at each of them Unicorn goes through the whole list of those that are looked at.
+    Only for instructions in use: Unicorn goes through the whole list of hooks at each hooked instruction.
     """
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        self._met: set[int] = set()  # addresses of those of all blocks that were to run
-        self._new: dict[int, int] = {}  # the base registers of those that are not looked at yet
-        self._watched: dict[int, _Watched] = {}
+        self._registered: set[int] = set()  # their addresses in all blocks so far
+        self._new: dict[int, int] = {}  # base registers by address, of those not hooked yet
+        self._watched: dict[int, _WatchedInstruction] = {}
         self._trusted: list[int] = []
 
-    def meet(self, address: int, code: bytes) -> bool:
-        """A block is about to run for the first time: whether it must wait until `between_runs` has seen to it."""
-        self._new = {at: base for at, base in word_accesses(code, address) if at not in self._met}
+    def add_block(self, address: int, code: bytes) -> bool:
+        """Register a block before its first run; return whether it must wait for `update`."""
+        self._new = {
+            accessed: base for accessed, base in word_accesses(code, address) if accessed not in self._registered
+        }
         return bool(self._new)
 
-    def between_runs(self) -> None:
-        """Look at what is new, and no longer at what was right often enough."""
+    def update(self) -> None:
+        """Hook new instructions, and release trusted ones. Call between two runs."""
         while self._new:
             address, base = self._new.popitem()
-            forget = self._engine.on_instruction(address, self._check)
-            self._watched[address] = _Watched(self._engine.register(_CORE_REGISTERS[base]), forget)
-            self._met.add(address)
+            release = self._engine.hook_instruction(address, self._check)
+            self._watched[address] = _WatchedInstruction(self._engine.register(_CORE_REGISTERS[base]), release)
+            self._registered.add(address)
         for address in self._trusted:
-            self._watched.pop(address).forget()
+            self._watched.pop(address).release()
         self._trusted.clear()
 
     def _check(self, address: int) -> None:
@@ -51,12 +53,12 @@ class AlignmentWatch:
             self._trusted.append(address)
 
 
-class _Watched:
-    """One instruction: how to read its base register, how to stop looking at it, how often it has run."""
+class _WatchedInstruction:
+    """One instruction: the reader of its base register, the release of its hook, and the count of its runs."""
 
-    __slots__ = ("forget", "read_base", "times")
+    __slots__ = ("read_base", "release", "times")
 
-    def __init__(self, read_base: Callable[[], int], forget: Callable[[], None]) -> None:
+    def __init__(self, read_base: Callable[[], int], release: Callable[[], None]) -> None:
         self.read_base = read_base
-        self.forget = forget
+        self.release = release
         self.times = 0

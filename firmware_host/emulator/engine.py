@@ -1,9 +1,9 @@
-"""A thin layer over Unicorn's C interface: memory, registers in batches, hooks without the binding's wrapping.
+"""A thin layer over Unicorn's C interface: memory, registers in batches, hooks without the binding's wrappers.
 
-The Python binding that ships with Unicorn wraps every callback and every register in objects of its own. Calling the
-same shared library directly halves the price of a register access by the firmware (0.2 µs instead of 0.5 µs) and
-cuts a batch of eleven core registers from 16 µs to 0.7 µs; the emulator's pace hangs on these two numbers. What happens
-far more often yet is not for Python at all: see `hooks.py`.
+The Python binding that ships with Unicorn wraps every callback and every register in objects of its own. Direct calls
+of the same shared library halve the price of a register access by the firmware (0.2 µs instead of 0.5 µs) and cut a
+batch of eleven core registers from 16 µs to 0.7 µs; these two numbers set the emulator's pace. More frequent events
+bypass Python: see `hooks.py`.
 """
 
 import ctypes
@@ -41,15 +41,15 @@ from firmware_host.emulator.timeline import Timeline
 
 _SET_CPU_MODEL = (1 << 30) | (1 << 26) | UC_CTL_CPU_MODEL  # uc_ctl: write, one argument
 _TRANSLATE_ANEW = (1 << 30) | (2 << 26) | UC_CTL_TB_REMOVE_CACHE  # write, two arguments
-# The calls that the pace hangs on, without what the binding's own do beside: while the core runs nobody else may, so
-# that the interpreter need not be given up and taken back at each call and callback; and few arguments are converted
+# The calls that set the pace, without the overhead of the binding: no other thread may run while the core runs, so
+# that the interpreter's lock need not be released at each call and callback; and few arguments are converted
 _quick = ctypes.PyDLL(uclib._name, handle=uclib._handle)
 _start = _quick.uc_emu_start
 _start.argtypes = uclib.uc_emu_start.argtypes
 _read_registers, _write_registers = _quick.uc_reg_read_batch, _quick.uc_reg_write_batch
 _NO_END = 0xFFFF_FFFF  # an address the core never executes: only stop(), WFI and faults end a run
 
-# Unicorn passes one argument more to all of these, the user's data: what is not looked at need not be converted
+# Unicorn passes one more argument to all of these, the user's data: unused arguments need no conversion
 _READ = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint)
 _WRITE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64)
 _EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_uint64)
@@ -69,14 +69,14 @@ _ATTEMPTS = {
 
 
 class EngineFault(Exception):
-    """The core cannot go on, or there is no such memory; the message is Unicorn's."""
+    """A failure of the core, or missing memory; the message is Unicorn's."""
 
 
 @dataclass(frozen=True, slots=True)
 class QuickAccess:
-    """Registers that are read and written without asking Python, see `hooks.ll`: those of `counter` and `bus`.
+    """Registers with access in machine code, see `hooks.ll`: those of `counter` and `bus`.
 
-    `exchange(pair)`: what comes back for two bytes put on the bus, the first one low.
+    `exchange(pair)` returns the answer to two bytes put on the bus, the first one low.
     """
 
     timeline: Timeline
@@ -111,7 +111,7 @@ class Registers:
 
 
 class Engine:
-    """One Cortex-M4F core with its memories. Runs code; knows nothing of peripherals and interrupts."""
+    """One Cortex-M4F core with its memories. It runs code, without peripherals and interrupts."""
 
     def __init__(self) -> None:
         self._handle = ctypes.c_void_p()
@@ -121,9 +121,9 @@ class Engine:
         self._callbacks: list[Any] = []  # ctypes callbacks live as long as the engine
         self._memories: list[tuple[int, int, mmap.mmap]] = []  # first address, the one after the last, contents
         self._raised: BaseException | None = None
-        self._fault_place: list[int] | None = None
-        self._place = self.registers([UC_ARM_REG_PC, UC_ARM_REG_LR])
-        self.paused = False  # the last run ended before a block: at the deadline, or as that was to be measured
+        self._fault_registers: list[int] | None = None
+        self._pc_and_link = self.registers([UC_ARM_REG_PC, UC_ARM_REG_LR])
+        self.paused = False  # whether the last run ended before a block: at the deadline, or to measure it
 
     def map_ram(self, address: int, size: int) -> None:
         self._map(address, size, UC_PROT_ALL)
@@ -139,38 +139,38 @@ class Engine:
         write: Callable[[int, int, int], None],
         quick: QuickAccess | None = None,
     ) -> None:
-        """Route a range to `read(offset, size)` and `write(offset, size, value)`; what they raise ends `run`.
+        """Route a range to `read(offset, size)` and `write(offset, size, value)`; their exceptions end `run`.
 
-        `quick`: what of it is not asked of them.
+        `quick`: registers of the range with access in machine code.
         """
 
-        def on_read(_handle: int, offset: int, width: int) -> int:
+        def call_read(_handle: int, offset: int, width: int) -> int:
             try:
                 return read(offset, width)
             except BaseException as error:
                 self._fail(error)
                 return 0
 
-        def on_write(_handle: int, offset: int, width: int, value: int) -> None:
+        def call_write(_handle: int, offset: int, width: int, value: int) -> None:
             try:
                 write(offset, width, value)
             except BaseException as error:
                 self._fail(error)
 
-        read_callback, write_callback = _READ(on_read), _WRITE(on_write)
+        read_callback, write_callback = _READ(call_read), _WRITE(call_write)
         self._callbacks += [read_callback, write_callback]
         reader, writer = _pointer(read_callback), _pointer(write_callback)
         user = None
         if quick is not None:
 
-            def on_exchange(pair: int) -> int:
+            def call_exchange(pair: int) -> int:
                 try:
                     return quick.exchange(pair)
                 except BaseException as error:
                     self._fail(error)
                     return 0
 
-            exchange = _EXCHANGE(on_exchange)
+            exchange = _EXCHANGE(call_exchange)
             shared = map(ctypes.addressof, (quick.timeline, quick.counter, quick.bus))
             shortcuts = Shortcuts(reader, writer, _pointer(exchange), *shared)
             self._callbacks += [exchange, quick, shortcuts]
@@ -179,70 +179,72 @@ class Engine:
         _check(uclib.uc_mmio_map(self._handle, address, size, reader, user, writer, user))
 
     def meter(self, timeline: Timeline, ticks: BlockTicks, measure: Callable[[int, int], int | None]) -> None:
-        """Let time pass with the instructions: before each block add `ticks[address]`, or stop if it must.
+        """Let time pass with the instructions: before each block add `ticks[address]`, or stop at the deadline.
 
-        A block not yet in `ticks` is given to `measure(address, size_bytes)`, which returns its ticks, or None to stop.
+        A block without `ticks` is passed to `measure(address, size_bytes)`, which returns its ticks, or None to stop.
         """
 
-        def on_block(_handle: int, address: int, size: int) -> None:
+        def call_block(_handle: int, address: int, size: int) -> None:
             try:
                 may_run = timeline.now < timeline.deadline or timeline.go_on()
-                taken = (ticks[address] or measure(address, size)) if may_run else None
-                if taken is None:
+                block_ticks = (ticks[address] or measure(address, size)) if may_run else None
+                if block_ticks is None:
                     self.paused = True
                     self.stop()
                 else:
-                    timeline.now += taken
+                    timeline.now += block_ticks
             except BaseException as error:
                 self._fail(error)
 
-        callback = _BLOCK(on_block)
-        meter = Meter(_pointer(callback), ctypes.addressof(timeline), *ticks.place)
+        callback = _BLOCK(call_block)
+        meter = Meter(_pointer(callback), ctypes.addressof(timeline), *ticks.fields)
         self._callbacks += [callback, meter, timeline, ticks]
         self._add(UC_HOOK_BLOCK, ctypes.c_void_p(address_of("block")), ctypes.byref(meter))
 
-    def on_instruction(self, address: int, hook: Callable[[int], None]) -> Callable[[], None]:
-        """Call `hook(address)` before the instruction at `address`; what this returns ends that. Between two runs."""
+    def hook_instruction(self, address: int, hook: Callable[[int], None]) -> Callable[[], None]:
+        """Call `hook(address)` before that instruction, until the returned function is called. Use between two runs."""
 
-        def on_instruction(_handle: int, address: int, _size: int) -> None:
+        def call_hook(_handle: int, address: int, _size: int) -> None:
             try:
                 hook(address)
             except BaseException as error:
                 self._fail(error)
 
-        hook_handle = self._hook(UC_HOOK_CODE, _BLOCK(on_instruction), address, address)
-        place = ctypes.c_uint64(address), ctypes.c_uint64(address + 2)
-        _check(uclib.uc_ctl(self._handle, _TRANSLATE_ANEW, *place))  # the block may have been met without the hook
+        hook_handle = self._hook(UC_HOOK_CODE, _BLOCK(call_hook), address, address)
+        addresses = ctypes.c_uint64(address), ctypes.c_uint64(address + 2)
+        _check(
+            uclib.uc_ctl(self._handle, _TRANSLATE_ANEW, *addresses)
+        )  # the block may have been translated without the hook
         return lambda: _check(uclib.uc_hook_del(self._handle, hook_handle))
 
-    def on_interrupt(self, hook: Callable[[int], None]) -> None:
+    def hook_interrupt(self, hook: Callable[[int], None]) -> None:
         """Call `hook(number)` when the core raises one of its own exceptions (supervisor call, exception return, …)."""
 
-        def on_interrupt(_handle: int, number: int, _user: int) -> None:
+        def call_hook(_handle: int, number: int, _user: int) -> None:
             try:
                 hook(number)
             except BaseException as error:
                 self._fail(error)
 
-        self._hook(UC_HOOK_INTR, _INTERRUPT(on_interrupt))
+        self._hook(UC_HOOK_INTR, _INTERRUPT(call_hook))
 
-    def on_invalid(self, hook: Callable[[str, int], None]) -> None:
-        """Call `hook(attempt, address)` when an access meets no memory it may touch; attempt is such as "read from"."""
+    def hook_invalid(self, hook: Callable[[str, int], None]) -> None:
+        """Call `hook(attempt, address)` for an access without accessible memory; attempt is such as "read from"."""
 
-        def on_invalid(_handle: int, kind: int, address: int, _size: int, _value: int, _user: int) -> bool:
+        def call_hook(_handle: int, kind: int, address: int, _size: int, _value: int, _user: int) -> bool:
             try:
                 hook(_ATTEMPTS[kind], address)
             except BaseException as error:
                 self._fail(error)
             return False
 
-        self._hook(UC_HOOK_MEM_INVALID, _INVALID(on_invalid))
+        self._hook(UC_HOOK_MEM_INVALID, _INVALID(call_hook))
 
     def registers(self, ids: Sequence[int]) -> Registers:
         return Registers(self._handle, ids)
 
     def register(self, number: int) -> Callable[[], int]:
-        """A function that reads one core register of 32 bits, by Unicorn's number."""
+        """Return a function that reads one core register of 32 bits, by Unicorn's number."""
         read, handle, value = uclib.uc_reg_read, self._handle, ctypes.c_uint32()
         pointer = ctypes.byref(value)
 
@@ -253,14 +255,14 @@ class Engine:
         return read_register
 
     def read(self, address: int, size: int) -> bytes:
-        """Read memory. Raises EngineFault where there is none."""
+        """Read memory. Raise EngineFault if there is none."""
         for first, end, memory in self._memories:
             if first <= address and address + size <= end:
                 return memory[address - first : address - first + size]
         raise EngineFault(f"memory read of {size} bytes at 0x{address:08X}, where there is none")
 
     def write(self, address: int, data: bytes) -> None:
-        """Write memory, read-only or not, where no code has run yet. Raises EngineFault where there is none."""
+        """Write memory, read-only or not, in which no code has run yet. Raise EngineFault if there is none."""
         for first, end, memory in self._memories:
             if first <= address and address + len(data) <= end:
                 memory[address - first : address - first + len(data)] = data
@@ -268,36 +270,36 @@ class Engine:
         raise EngineFault(f"memory write of {len(data)} bytes at 0x{address:08X}, where there is none")
 
     def run(self, address: int) -> None:
-        """Run from `address` until `stop`, WFI or a fault. Raises EngineFault, or what a callback raised."""
+        """Run from `address` until `stop`, WFI or a fault. Raise EngineFault, or the exception of a callback."""
         status = _start(self._handle, address | 1, _NO_END, 0, 0)
         if self._raised is not None:
             raised, self._raised = self._raised, None
             raise raised
         _check(status)
 
-    def fault_place(self) -> list[int]:
-        """Program counter and link register when a callback first raised; if none did, as they are."""
-        return self._place.read() if self._fault_place is None else self._fault_place
+    def fault_registers(self) -> list[int]:
+        """Return program counter and link register at a callback's first exception; without one, the present ones."""
+        return self._pc_and_link.read() if self._fault_registers is None else self._fault_registers
 
     def stop(self) -> None:
-        """Stop before the next block; inside a block hook, before the block that the hook announces."""
+        """Stop before the next block; inside a block hook, before the block of the hook."""
         uclib.uc_emu_stop(self._handle)
 
     def _map(self, address: int, size: int, protection: int) -> None:
-        """Memory that the engine and Python share."""
+        """Map memory that the engine and Python share."""
         memory = mmap.mmap(-1, size)
-        place = ctypes.addressof(ctypes.c_char.from_buffer(memory))
-        _check(uclib.uc_mem_map_ptr(self._handle, address, size, protection, place))
+        pointer = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+        _check(uclib.uc_mem_map_ptr(self._handle, address, size, protection, pointer))
         self._memories.append((address, address + size, memory))
 
     def _fail(self, error: BaseException) -> None:
         if self._raised is None:
             self._raised = error
-            self._fault_place = self._place.read()
+            self._fault_registers = self._pc_and_link.read()
         self.stop()
 
     def _hook(self, kind: int, callback: Any, begin: int = 1, end: int = 0) -> ctypes.c_size_t:
-        """Add a hook for addresses from `begin` to `end`; the default is Unicorn's way to say everywhere."""
+        """Add a hook for addresses from `begin` to `end`; the default is Unicorn's encoding of everywhere."""
         self._callbacks.append(callback)
         return self._add(kind, _pointer(callback), None, begin, end)
 

@@ -1,7 +1,7 @@
 """The functions of `hooks.ll` as machine code, and the structures that they share with Python.
 
 A hook in Python costs a microsecond, one of these a few nanoseconds; a second of the board's time has a quarter of a
-million blocks of instructions. LLVM translates them in a few milliseconds, and no compiler need be there.
+million blocks of instructions. LLVM translates them in a few milliseconds, without a compiler.
 """
 
 import ctypes
@@ -13,11 +13,11 @@ import llvmlite.binding as llvm
 
 Int = ctypes.c_int64
 FIFO_PAIRS = 2
-KNOWN_PAIRS = 16
+PREDICTED_PAIRS = 16
 
 
 class Time(ctypes.Structure):
-    """`now`, and the `deadline` at which Python is asked before time goes on; ticks."""
+    """`now`, and the `deadline` before which time passes without Python; ticks."""
 
     _fields_ = (("now", Int), ("deadline", Int))
     now: int
@@ -25,7 +25,7 @@ class Time(ctypes.Structure):
 
 
 class Meter(ctypes.Structure):
-    """What blocks cost: `ticks` of the one at each halfword from `first_address` on, 0 where it has to be asked for."""
+    """The cost of blocks: `ticks` of the block at each halfword from `first_address` on, 0 if unknown."""
 
     _fields_ = (
         ("ask", ctypes.c_void_p),
@@ -37,7 +37,7 @@ class Meter(ctypes.Structure):
 
 
 class BlockTicks:
-    """Ticks by address, of the blocks of instructions in `size_bytes` from `first_address` on; 0 is not known."""
+    """Ticks by address, of the blocks of instructions in `size_bytes` from `first_address` on; 0 if unknown."""
 
     def __init__(self, first_address: int, size_bytes: int) -> None:
         self._first_address = first_address
@@ -45,7 +45,7 @@ class BlockTicks:
         self._ticks = (ctypes.c_uint32 * self._halfwords)()
 
     @property
-    def place(self) -> tuple[int, int, int]:
+    def fields(self) -> tuple[int, int, int]:
         """The last fields of `Meter`."""
         return self._first_address, self._halfwords, ctypes.addressof(self._ticks)
 
@@ -63,9 +63,13 @@ class BlockTicks:
 
 
 class Counter(ctypes.Structure):
-    """A free-running counter that can be read while it is `clocked`: `counted` at the tick `since`, from where on it
-    counts `counts` in `ticks`, none while it stands; it starts anew at `modulus`. `read_at`: tick of the last read;
-    `polls`: reads in a row, one just after the other.
+    """A free-running counter.
+
+    - `clocked`: whether it can be read.
+    - `since`, `counted`: the tick of its last setting, and its value then.
+    - `counts`, `ticks`: it counts `counts` in `ticks`; none while it is stopped.
+    - `modulus`: the value at which it wraps.
+    - `read_at`, `polls`: the tick of the last read, and the number of consecutive reads.
     """
 
     _fields_ = tuple(
@@ -82,20 +86,25 @@ class Counter(ctypes.Structure):
 
 
 class Bus(ctypes.Structure):
-    """A bus master while it is `clocked`, set up to exchange while it `speaks`: it has sent everything at the tick
-    `free`, two bytes take `pair_ticks`.
+    """A bus master.
 
-    `waiting` pairs of bytes are under way or not read yet: all of one is in at `ready`, and it is `answers`. `polled`:
-    the status was read in vain. `control`: how it is set up, for the `setups`th time. What comes back for the next
-    pairs is `known` from the index `known_from` to before `known_to`, in the setup `known_in`.
+    - `clocked`, `speaks`: whether its registers are accessible, and whether it is set up to exchange.
+    - `free`: the tick at which everything has been sent.
+    - `pair_ticks`, `half_bit_ticks`: the duration of two bytes, and of half a bit.
+    - `polled`: whether the status was read in vain.
+    - `waiting`: the number of pairs of bytes that are being sent or not read yet.
+    - `ready`, `answers`: the tick at which each of these is complete, and its answer.
+    - `control`, `setups`: the control register, and the number of its changes.
+    - `predictions`: the answers to the next pairs, valid in the setup `predicted_in`.
+    - `predicted_from`, `predicted_to`: the range of unused indices of `predictions`.
     """
 
     _fields_ = (
         *((name, Int) for name in ("clocked", "speaks", "free", "pair_ticks", "half_bit_ticks", "polled", "waiting")),
         ("ready", Int * FIFO_PAIRS),
         ("answers", Int * FIFO_PAIRS),
-        *((name, Int) for name in ("control", "setups", "known_in", "known_from", "known_to")),
-        ("known", ctypes.c_uint16 * KNOWN_PAIRS),
+        *((name, Int) for name in ("control", "setups", "predicted_in", "predicted_from", "predicted_to")),
+        ("predictions", ctypes.c_uint16 * PREDICTED_PAIRS),
     )
     clocked: int
     speaks: int
@@ -106,43 +115,41 @@ class Bus(ctypes.Structure):
     waiting: int
     control: int
     setups: int
-    known_in: int
-    known_from: int
-    known_to: int
+    predicted_in: int
+    predicted_from: int
+    predicted_to: int
 
-    def foresee(self, answers: bytes) -> None:
-        """What the next pairs will bring, whatever is sent."""
-        ctypes.memmove(ctypes.addressof(self) + Bus.known.offset, answers, len(answers))
-        self.known_from, self.known_to = 0, len(answers) // 2
+    def set_predictions(self, answers: bytes) -> None:
+        """Set the answers to the next pairs of bytes, whatever is sent."""
+        ctypes.memmove(ctypes.addressof(self) + Bus.predictions.offset, answers, len(answers))
+        self.predicted_from, self.predicted_to = 0, len(answers) // 2
 
-    def foreseen(self) -> int:
-        """The next of those."""
-        self.known_from += 1
-        return int(self.known[self.known_from - 1])
+    def next_prediction(self) -> int:
+        """Return the next predicted answer."""
+        self.predicted_from += 1
+        return int(self.predictions[self.predicted_from - 1])
 
 
 class Shortcuts(ctypes.Structure):
-    """What accesses to the peripherals need not ask Python for: Python's `read` and `write`, its `exchange` with what
-    the bus connects, and where `Time`, `Counter` and `Bus` lie.
-    """
+    """The links from machine code to Python's `read`, `write`, `exchange`, and to `Time`, `Counter` and `Bus`."""
 
     _fields_ = tuple((name, ctypes.c_void_p) for name in ("read", "write", "exchange", "time", "counter", "bus"))
 
 
 def reader(function: str, *shared: ctypes.Structure) -> Callable[[], int]:
-    """A register's read in machine code, for who asks from Python; `shared` are its arguments."""
+    """Return a register's read in machine code as a Python function; `shared` are its arguments."""
     read = ctypes.CFUNCTYPE(ctypes.c_uint64, *[ctypes.c_void_p] * len(shared))(address_of(function))
     return lambda: int(read(*map(ctypes.addressof, shared)))
 
 
 @cache
 def address_of(function: str) -> int:
-    """Where the machine code of a function lies; it stays there."""
-    return int(_translated().get_function_address(function))
+    """Return the address of a function's machine code, which is permanent."""
+    return int(_translate().get_function_address(function))
 
 
 @cache
-def _translated() -> llvm.ExecutionEngine:
+def _translate() -> llvm.ExecutionEngine:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     module = llvm.parse_assembly((resources.files(__package__) / "hooks.ll").read_text("utf-8"))

@@ -30,12 +30,16 @@ _CORRECT = "Correct the firmware"
 class EmulatedBoard:
     """An STM32L432KC with the rig's wiring, running the program in `flash`.
 
-    `flash`: its contents, which outlive the board; `elf`: the same program with symbols; `devices`: what hangs on
-    SPI1; `unique_id`: 12 bytes; `crystal_ppm`: how fast the board's crystal runs, or what stands in for one that it
-    has not (`has_crystal`); `boot_time_s`: virtual time of power-up. Instructions are counted exactly and take one core
-    cycle each; every doubleword of a block is fetched anew with the wait states of the flash, as if there were neither
-    cache nor prefetch, and an exception takes its cycles.
-    The same inputs at the same virtual times give the same bytes.
+    - `flash`: its contents, which outlive the board.
+    - `elf`: the same program with symbols.
+    - `devices`: the devices on SPI1.
+    - `unique_id`: 12 bytes.
+    - `crystal_ppm`: the error of the board's crystal, or of its substitute without one (`has_crystal`).
+    - `boot_time_s`: the virtual time of power-up.
+
+    Instructions are counted exactly and take one core cycle each; every doubleword of a block is fetched with the wait
+    states of the flash, as if there were neither cache nor prefetch, and an exception takes its cycles. The same inputs
+    at the same virtual times give the same bytes.
     """
 
     def __init__(
@@ -55,7 +59,7 @@ class EmulatedBoard:
         self._engine = Engine()
         self._load_memories(flash, unique_id)
         self._costs = BlockTicks(_FLASH, STORE_OFFSET)
-        self._after_wfi: set[int] = set()  # addresses found to follow a WFI
+        self._after_wfi: set[int] = set()  # addresses after a WFI
         self._chip = Chip(
             self._engine,
             self._timeline,
@@ -68,22 +72,22 @@ class EmulatedBoard:
         )
         self._cortex = Cortex(self._engine, self._chip.nvic)
         self._engine.meter(self._timeline, self._costs, self._measure)
-        self._engine.on_interrupt(self._core_exception)
-        self._engine.on_invalid(self._invalid_access)
+        self._engine.hook_interrupt(self._core_exception)
+        self._engine.hook_invalid(self._invalid_access)
         self._alignment = AlignmentWatch(self._engine)
-        self.powered = True  # until the supply fails, as the flash may be told to let it
+        self.powered = True  # until the supply fails, by `FlashMemory.fail_power`
         self._sent = bytearray()
         self._failure: BoardError | None = None
         self._reset_cause: int | None = None
         self._asleep = False
         self._start()
 
-    # --- what the world sees
+    # --- the interface to the world
 
     def advance(self, until_s: float) -> None:
         """Run to virtual time `until_s`, at most a few instructions (under a microsecond) beyond.
 
-        Raises BoardError, now and ever after, when the firmware breaks a rule.
+        Raise BoardError, now and at every later call, if the firmware breaks a rule.
         """
         if self._failure is not None:
             raise self._failure
@@ -91,7 +95,7 @@ class EmulatedBoard:
             return
         limit = self._clock.last_tick(until_s)
         timeline = self._timeline
-        if limit < 0:  # before the board boots, its sensors live already
+        if limit < 0:  # before the board boots its sensors already run
             timeline.now = limit
             timeline.run_due()
             timeline.now = 0
@@ -104,18 +108,18 @@ class EmulatedBoard:
         except PowerLost:
             self.powered = False
         except Violation as violation:
-            self._failure = self._located(violation)
+            self._failure = self._add_location(violation)
             raise self._failure from violation
         except EngineFault as fault:
-            self._failure = self._located(Violation("firmware_fault", str(fault), _CORRECT))
+            self._failure = self._add_location(Violation("firmware_fault", str(fault), _CORRECT))
             raise self._failure from fault
 
     def receive(self, data: bytes) -> None:
-        """Bytes from the host start arriving now, one after the other at the port's pace."""
+        """Let bytes from the host arrive from now on, one after the other at the port's pace."""
         self._chip.usart.receive(data)
 
     def transmitted(self) -> bytes:
-        """The bytes whose stop bit has passed since the last call."""
+        """Return the bytes whose stop bit has passed since the last call."""
         if not self._sent:
             return self._chip.usart.transmitted()
         data = bytes(self._sent) + self._chip.usart.transmitted()
@@ -124,21 +128,21 @@ class EmulatedBoard:
 
     @property
     def baud_rate(self) -> float | None:
-        """Bits per second of the serial port as the firmware has set it, None while it is off."""
+        """The baud rate of the serial port as set by the firmware, None while it is off."""
         return self._chip.usart.baud_rate
 
     @property
     def heater_duty(self) -> float:
-        """Which part of the time the heater's pin is up, 0 to 1."""
+        """The heater's duty, 0 to 1."""
         return self._chip.heater_duty if self.powered else 0.0
 
     @property
     def peripherals(self) -> Sequence[Peripheral]:
-        """Every block of registers that has a model."""
+        """All blocks of registers that have a model."""
         return self._chip.peripherals
 
     def reset(self) -> None:
-        """Press the reset button. Flash and RAM keep their contents, the sensors stay powered."""
+        """Press the reset button. Flash and RAM hold their contents, the sensors stay powered."""
         self._reset_cause = rcc.RESET_PIN
         self._restart()
 
@@ -165,7 +169,7 @@ class EmulatedBoard:
                 self._restart()
             waits_for_flash = self._chip.flash.busy
             entry = Entry.NONE if waits_for_flash else cortex.enter_pending(self._chip.control.vectors)
-            if entry is Entry.TAKEN:
+            if entry is Entry.ENTERED:
                 cycles = _EXCEPTION_CYCLES + self._chip.flash.wait_states  # the vector comes from flash
                 timeline.now += cycles * self._chip.clocks.ticks_per_core_cycle
             if entry is not Entry.NONE:
@@ -178,17 +182,17 @@ class EmulatedBoard:
             elif timeline.now >= limit:
                 return
             else:
-                # Nothing tells when the firmware unmasks a waiting exception: look after every block
+                # No event signals that the firmware unmasks a pending exception: check after every block
                 timeline.run_until(limit, cortex.masks_pending if entry is Entry.MASKED else None)
                 self._execute()
 
     def _execute(self) -> None:
-        """Run the core until the deadline, WFI, a fault or a block that has to be looked at before it runs."""
+        """Run the core until the deadline, WFI, a fault or a block that needs a check before it runs."""
         engine, cortex = self._engine, self._cortex
         engine.paused = False
         engine.run(cortex.pc)
-        cortex.paused()
-        self._alignment.between_runs()
+        cortex.note_pause()
+        self._alignment.update()
         if engine.paused:
             return
         if cortex.pc not in self._after_wfi:
@@ -198,12 +202,12 @@ class EmulatedBoard:
         self._asleep = True
 
     def _measure(self, address: int, size: int) -> int | None:
-        """Ticks that a block takes that has not been met before; None: it has to wait until the engine has paused.
+        """Return the ticks of a new block; None if it has to wait until the engine has paused.
 
-        Refuses floating point before it is enabled.
+        Raise Violation for floating point before it is enabled.
         """
         block = self._engine.read(address, size)
-        if self._alignment.meet(address, block):
+        if self._alignment.add_block(address, block):
             return None
         code = instructions(block)
         if not self._chip.control.float_enabled and any(is_floating_point(instruction) for instruction in code):
@@ -211,7 +215,7 @@ class EmulatedBoard:
         cycles = len(code) + self._chip.flash.wait_states * _doublewords(address, size)
         ticks = cycles * self._chip.clocks.ticks_per_core_cycle
         if code == [_BRANCH_TO_SELF]:
-            return max(ticks, self._timeline.deadline - self._timeline.now)  # it turns until something happens
+            return max(ticks, self._timeline.deadline - self._timeline.now)  # it loops until the next event
         self._costs[address] = ticks
         return ticks
 
@@ -219,19 +223,19 @@ class EmulatedBoard:
         if number != _EXCEPTION_RETURN:
             raise Violation("firmware_fault", _CORE_EXCEPTIONS.get(number, f"core exception {number}"), _CORRECT)
         self._cortex.return_from_exception()
-        if self._chip.nvic.candidate() is not None:  # another has waited, or the same again
+        if self._chip.nvic.candidate() is not None:  # another one is pending, or the same again
             self._timeline.interrupt()
 
     def _invalid_access(self, attempt: str, address: int) -> None:
         raise Violation("firmware_fault", f"{attempt} address 0x{address:08X}", _CORRECT)
 
-    def _located(self, violation: Violation) -> BoardError:
-        address, link = self._engine.fault_place()
+    def _add_location(self, violation: Violation) -> BoardError:
+        address, link = self._engine.fault_registers()
         symbols = Symbols(self._elf)
-        where = symbols.where(address)
+        location = symbols.describe(address)
         if not symbols.function(address):
-            where += f", called at {symbols.where(link)}"
-        return BoardError.of(violation.problem._replace(what=f"{violation.what}, at {where}"))
+            location += f", called at {symbols.describe(link)}"
+        return BoardError.of(violation.problem._replace(what=f"{violation.what}, at {location}"))
 
     # --- reset
 
@@ -254,5 +258,5 @@ class EmulatedBoard:
 
 
 def _doublewords(address: int, size: int) -> int:
-    """How many lines of the flash, of 64 bits, a block of code lies in."""
+    """Return the number of 64-bit lines of the flash that a block of code spans."""
     return (address + size - 1) // 8 - address // 8 + 1

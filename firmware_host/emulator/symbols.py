@@ -1,4 +1,4 @@
-"""Function names from an ELF file, to say where in the firmware something happened."""
+"""Function names from an ELF file, for the location of a failure in the firmware."""
 
 import io
 from bisect import bisect_right
@@ -22,15 +22,15 @@ class Symbols:
         self._functions = [functions[start] for start in self._starts]
 
     def function(self, address: int) -> str | None:
-        """The function that `address` lies in."""
+        """Return the name of the function at `address`, or None."""
         index = bisect_right(self._starts, address) - 1
         if index < 0:
             return None
         size, name = self._functions[index]
         return name if address < self._starts[index] + max(size, 2) else None
 
-    def where(self, address: int) -> str:
-        """Where in the image an address lies, as in `0x08000412 in function usart_init`."""
+    def describe(self, address: int) -> str:
+        """Return the description of an address in the image, as in `0x08000412 in function usart_init`."""
         name = self.function(address)
-        place = f"in function {name}" if name else "outside every function of the image"
-        return f"0x{address & ~1:08X} {place}"
+        location = f"in function {name}" if name else "outside every function of the image"
+        return f"0x{address & ~1:08X} {location}"

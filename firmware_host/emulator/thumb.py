@@ -1,4 +1,4 @@
-"""The Thumb instructions, as far as one must know them to count them and to find those Unicorn is too lenient with."""
+"""The decoding of Thumb instructions that is needed to count them and to find those Unicorn is too lenient with."""
 
 import struct
 from collections.abc import Iterator
@@ -9,24 +9,24 @@ _STACK_POINTER, _PROGRAM_COUNTER = 13, 15
 def instructions(code: bytes) -> list[int]:
     """Split Thumb code: a narrow instruction is its halfword, a wide one is the first halfword << 16 | the second."""
     halfwords = iter(struct.unpack(f"<{len(code) // 2}H", code))
-    found = []
+    decoded = []
     for halfword in halfwords:
         wide = halfword >> 11 in (0b11101, 0b11110, 0b11111)
-        found.append(halfword << 16 | next(halfwords, 0) if wide else halfword)
-    return found
+        decoded.append(halfword << 16 | next(halfwords, 0) if wide else halfword)
+    return decoded
 
 
 def is_floating_point(instruction: int) -> bool:
-    """Whether it belongs to the floating-point unit, coprocessors 10 and 11."""
+    """Return whether an instruction belongs to the floating-point unit, coprocessors 10 and 11."""
     return instruction & 0xEC00_0000 == 0xEC00_0000 and instruction >> 8 & 0xF in (10, 11)
 
 
 def word_accesses(code: bytes, address: int) -> Iterator[tuple[int, int]]:
-    """The instructions that trap on the chip unless their base register is a multiple of four; Unicorn lets them pass.
+    """Yield address and base register of instructions that trap on the chip, not in Unicorn, if the base is unaligned.
 
-    `code` starts at `address`. Gives address and number of the base register. These are all loads and stores of more
-    than one word or of floating-point registers (ARMv7-M Architecture Reference Manual, A3.2.1). Accesses by the
-    stack pointer are left out, as the core itself keeps it aligned.
+    `code` starts at `address`. These are all loads and stores of more than one word or of floating-point registers
+    (ARMv7-M Architecture Reference Manual, A3.2.1), whose base must be a multiple of four. Accesses by the stack
+    pointer are omitted, as the core itself aligns it.
     """
     for instruction in instructions(code):
         base = _base(instruction)

@@ -1,39 +1,39 @@
-"""The board's time: one counter of 80 MHz ticks, and what is due when."""
+"""The board's time: one counter of 80 MHz ticks, and the ticks of scheduled actions."""
 
 from collections.abc import Callable
 
 from firmware_host.emulator.hooks import Time
 
-TICK_HZ = 80_000_000  # the core clock the firmware sets; while it runs slower, an instruction takes several ticks
+TICK_HZ = 80_000_000  # the core clock set by the firmware; at a slower clock an instruction takes several ticks
 NEVER = 1 << 62
 
 
 class Timeline(Time):
-    """Now, and one next due tick for each registered action.
+    """The present tick, and one next due tick for each registered action.
 
-    The machine's block hook reads `now` and `deadline` on every block, from machine code: `deadline` is the tick at
-    which something is due, the limit is reached, or `interrupt` was called.
+    The machine's block hook reads `now` and `deadline` on every block, in machine code: `deadline` is the tick of the
+    next action or of the limit, or 0 after `interrupt`.
     """
 
     def __init__(self) -> None:
         super().__init__(now=0, deadline=0)
         self._limit = 0
-        self._on: Callable[[], bool] | None = None
+        self._may_continue: Callable[[], bool] | None = None
         self.next_due = NEVER
         self._actions: list[Callable[[], None]] = []
         self._due: list[int] = []
 
     def register(self, action: Callable[[], None]) -> int:
-        """A slot for `action`; at equal ticks, slots registered first act first."""
+        """Return a slot for `action`; at equal ticks, slots registered first act first."""
         self._actions.append(action)
         self._due.append(NEVER)
         return len(self._due) - 1
 
     def schedule(self, slot: int, tick: int) -> None:
-        before, self._due[slot] = self._due[slot], tick
+        old_tick, self._due[slot] = self._due[slot], tick
         if tick <= self.next_due:
             self.next_due = tick
-        elif before == self.next_due:
+        elif old_tick == self.next_due:
             self.next_due = min(self._due)
         self.deadline = min(self.deadline, tick)
 
@@ -42,30 +42,30 @@ class Timeline(Time):
         self.next_due = min(self._due)
 
     def run_due(self) -> None:
-        """Do everything that is due by now, in the order of its ticks."""
+        """Run all actions that are due by now, in the order of their ticks."""
         while self.next_due <= self.now:
             slot = self._due.index(self.next_due)
             self._due[slot] = NEVER
             self.next_due = min(self._due)
             self._actions[slot]()
 
-    def run_until(self, limit: int, on: Callable[[], bool] | None = None) -> None:
-        """The core runs from now on, and is to pause at `limit`, or when `on`, asked after every block, says no."""
-        self._limit, self._on = limit, on
-        self.deadline = min(self.next_due, limit if on is None else self.now + 1)
+    def run_until(self, limit: int, may_continue: Callable[[], bool] | None = None) -> None:
+        """Let the core run until `limit`, or until `may_continue`, called after every block, returns False."""
+        self._limit, self._may_continue = limit, may_continue
+        self.deadline = min(self.next_due, limit if may_continue is None else self.now + 1)
 
     def go_on(self) -> bool:
-        """Do what is due while the core runs. Whether it may run on: nothing interrupted, the limit is still ahead."""
+        """Run due actions while the core runs; return whether it may go on: no interrupt, the limit still ahead."""
         if self.deadline:
             self.run_due()
         if not self.deadline or self.now >= self._limit:
             return False
-        if self._on is None:
+        if self._may_continue is None:
             self.deadline = min(self.next_due, self._limit)
             return True
         self.deadline = self.now + 1
-        return self._on()
+        return self._may_continue()
 
     def interrupt(self) -> None:
-        """Have the core pause at the end of the current block: an exception may have become pending."""
+        """Pause the core at the end of the current block: an exception may have become pending."""
         self.deadline = 0

@@ -1,1 +1,1 @@
-"""Headers and pages that are made from the tables of messages and parts."""
+"""Headers and pages generated from the tables of messages and parts."""

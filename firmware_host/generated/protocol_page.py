@@ -1,4 +1,4 @@
-"""Prints the message table for people, docs/protocol.md: `make -C firmware_host/firmware header`."""
+"""Print the message table as a page, docs/protocol.md: `make -C firmware_host/firmware header`."""
 
 import struct
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,7 +11,7 @@ LARGEST_BLOCK = protocol.PAYLOAD_MAX + protocol.OVERHEAD + protocol.COBS_BYTES
 
 
 def reference() -> str:
-    """The protocol as Markdown: frame, messages with the place of every field, enumerations, errors and remedies."""
+    """Return the protocol as Markdown: frame, messages with offsets of fields, enumerations, errors and remedies."""
     lines = [
         "# The protocol between host and board",
         "",
@@ -32,8 +32,8 @@ def reference() -> str:
         if message.fields:
             lines += ["", *_layout(message.fields, "byte")]
         if message.items:
-            each, room = message.item_dtype.itemsize, protocol.PAYLOAD_MAX - message.head.size
-            lines += ["", f"Then any number of items of {each} bytes, at most {room // each} a frame:"]
+            item_bytes, room = message.item_dtype.itemsize, protocol.PAYLOAD_MAX - message.head.size
+            lines += ["", f"Then any number of items of {item_bytes} bytes, at most {room // item_bytes} a frame:"]
             lines += ["", *_layout(message.items, "byte of the item")]
     lines += ["", "## Enumerations", "", *_table(("enumeration", "values"), _enumerations())]
     lines += [
@@ -76,14 +76,14 @@ def _row(message: Message) -> tuple[str, ...]:
     return f"0x{message.code:02x}", name, message.sender, message.meaning
 
 
-def _layout(fields: Sequence[Field], place: str) -> Iterator[str]:
-    """Fields follow each other without gaps."""
-    offsets, at = [], 0
+def _layout(fields: Sequence[Field], heading: str) -> Iterator[str]:
+    """Return a table of fields, which follow each other without gaps."""
+    offsets, offset = [], 0
     for field in fields:
-        offsets.append(at)
-        at += struct.calcsize("<" + protocol.KINDS[field.kind][0])
-    rows = ((str(at), field.name, field.kind, field.meaning) for at, field in zip(offsets, fields, strict=True))
-    return _table((place, "field", "kind", "meaning"), rows)
+        offsets.append(offset)
+        offset += struct.calcsize("<" + protocol.KINDS[field.kind][0])
+    rows = ((str(offset), field.name, field.kind, field.meaning) for offset, field in zip(offsets, fields, strict=True))
+    return _table((heading, "field", "kind", "meaning"), rows)
 
 
 def _enumerations() -> Iterator[tuple[str, str]]:

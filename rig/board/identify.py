@@ -57,7 +57,7 @@ def find_sensor(identity: BoardIdentity, name: str, section: ConfiguredSensor) -
     raise Refused(
         "sensor_mismatch",
         f"sensors.{name}: in the place of the {section.part} answers "
-        f"{BOARD_PARTS[section.part].another(info.who_am_i)}",
+        f"{BOARD_PARTS[section.part].describe_other(info.who_am_i)}",
         "Check which part is fitted, its chip select, and sensors.*.part in the configuration",
     )
 

@@ -85,7 +85,7 @@ def store(board: Board, index: int, calibration: Calibration) -> StoredCalibrati
     """Write a calibration of a configured sensor and read it back. Raise BoardError, among others `not_stored`."""
     board.write_calibration(index, calibration)
     stored = board.read_calibration(index)
-    if stored is None or stored.calibration != calibration.as_kept():
+    if stored is None or stored.calibration != calibration.quantize():
         raise BoardError(
             "not_stored",
             f"the board reads back another calibration for sensor {index} than was written",

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Protocol
 
-from firmware_host.serial_port import SerialPort, why_closed
+from firmware_host.serial_port import SerialPort, explain_closed
 from rig.sensors.errors import SensorError
 from rig.sensors.silence import USUAL, Patience, PortSilence
 
@@ -142,7 +142,7 @@ def open_device_port(
     except OSError as error:
         raise SensorError(
             "no_port",
-            f"{owner}the port {port} does not open: {why_closed(port, error)}",
+            f"{owner}the port {port} does not open: {explain_closed(port, error)}",
             f"Check {setting} and the cable, and that no other program has the port",
         ) from error
 

@@ -44,8 +44,8 @@ def test_what_the_configuration_offers_is_what_the_data_sheet_has() -> None:
 
 
 def test_who_answers_is_said_with_whom_was_expected() -> None:
-    assert GYROSCOPES["icm42688p"].another(0x42) == "an ICM-42605, identity 0x42 instead of 0x47"
-    assert GYROSCOPES["mpu9250"].another(0x99) == "an unknown part, identity 0x99 instead of 0x71"
+    assert GYROSCOPES["icm42688p"].describe_other(0x42) == "an ICM-42605, identity 0x42 instead of 0x47"
+    assert GYROSCOPES["mpu9250"].describe_other(0x99) == "an unknown part, identity 0x99 instead of 0x71"
     assert {name: part.who_am_i for name, part in GYROSCOPES.items()} == {
         name: sheet.identity for name, sheet in SHEETS.items()
     }

@@ -1,4 +1,4 @@
-"""Memory-mapped registers: which exist, what they do, and a named failure for everything else."""
+"""Memory-mapped registers: those that exist, their effects, and a named failure for all others."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ Write = Callable[[int], None]
 
 
 class Violation(ProblemError):
-    """The firmware did what the emulator does not model or the chip does not allow; the machine adds where."""
+    """An action of the firmware that the emulator does not model or the chip forbids; the machine adds its location."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +39,8 @@ class Peripheral(Protocol):
     def reset(self) -> None: ...
 
 
-class Stored:
-    """A register that keeps what is written. `name` begins with the peripheral's name.
+class StoredRegister:
+    """A register that holds the written value. `name` begins with the peripheral's name.
 
     Writing a one outside `modelled` fails the run by name.
     """
@@ -54,7 +54,7 @@ class Stored:
         self._modelled = modelled | initial
         self._after = after
 
-    def at(self, offset: int) -> Register:
+    def map_to(self, offset: int) -> Register:
         return Register(offset, self._name.partition(" ")[2], self.read, self.write)
 
     def read(self) -> int:
@@ -71,7 +71,7 @@ class Stored:
 
 
 def check_bits(name: str, value: int, modelled: int) -> None:
-    """Raise Violation when `value` sets a bit that has no model."""
+    """Raise Violation if `value` sets a bit that has no model."""
     if value & ~modelled:
         raise Violation(
             "unmodelled_bits",
@@ -81,28 +81,28 @@ def check_bits(name: str, value: int, modelled: int) -> None:
 
 
 class RegisterBus:
-    """Routes accesses of one address range to registers.
+    """The routing of accesses in one address range to registers.
 
-    The tables are keyed by offset and access size and hold only registers of peripherals that are clocked, so that
-    the common access costs one dictionary look-up.
+    The tables are keyed by offset and access size and hold only registers of clocked peripherals, so that the common
+    access costs one dictionary look-up.
     """
 
     def __init__(self, base: int) -> None:
         self._base = base
         self._reads: dict[int, Read] = {}
         self._writes: dict[int, Write] = {}
-        self._known: dict[int, tuple[Peripheral, Register]] = {}
+        self._modelled: dict[int, tuple[Peripheral, Register]] = {}
         self._peripherals: list[tuple[int, Peripheral]] = []
 
     def attach(self, peripheral: Peripheral, clocked: bool = True) -> None:
         offset = peripheral.base - self._base
         self._peripherals.append((offset, peripheral))
         for register in peripheral.registers():
-            self._known[_key(offset + register.offset, register.size)] = (peripheral, register)
+            self._modelled[_key(offset + register.offset, register.size)] = (peripheral, register)
         self.clock(peripheral, clocked)
 
     def clock(self, peripheral: Peripheral, on: bool) -> None:
-        """Make the peripheral's registers reachable, or not."""
+        """Make the peripheral's registers accessible, or not."""
         offset = peripheral.base - self._base
         for register in peripheral.registers():
             key = _key(offset + register.offset, register.size)
@@ -129,14 +129,14 @@ class RegisterBus:
 
     def _refusal(self, verb: str, offset: int, size: int, value: int | None = None) -> Violation:
         written = "" if value is None else f" of 0x{value:X}"
-        known = self._known.get(_key(offset, size))
-        if known is None:
+        entry = self._modelled.get(_key(offset, size))
+        if entry is None:
             return Violation(
                 "unmodelled_register",
                 f"{8 * size}-bit {verb}{written}: {self._name(offset)} is not modelled",
                 "Leave the register alone in the firmware, or model it in firmware_host/emulator",
             )
-        peripheral, register = known
+        peripheral, register = entry
         if (register.read if verb == "read" else register.write) is None:
             return Violation(
                 "register_access",
@@ -150,10 +150,12 @@ class RegisterBus:
         )
 
     def _name(self, offset: int) -> str:
-        below = [(base, peripheral.name) for base, peripheral in self._peripherals if base <= offset < base + 0x400]
-        if not below:
+        candidates = [
+            (base, peripheral.name) for base, peripheral in self._peripherals if base <= offset < base + 0x400
+        ]
+        if not candidates:
             return f"0x{self._base + offset:08X}"
-        base, name = max(below)
+        base, name = max(candidates)
         return f"{name}+0x{offset - base:02X}"
 
 

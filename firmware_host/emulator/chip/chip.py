@@ -28,8 +28,10 @@ _SENSOR_BUS_FUNCTIONS = {"PB3": 5, "PB4": 5, "PB5": 5}
 
 
 class Chip:
-    """Everything around the core. `on_reset(cause)` is called when the chip wants to be reset, `on_clock` when its
-    clock changes. Cause is one of the RESET_… flags of `rcc`.
+    """Everything around the core. `on_reset(cause)` is called to reset the chip, `on_clock` after a change of its
+    clock.
+
+    Cause is one of the RESET_… flags of `rcc`.
     """
 
     def __init__(
@@ -52,17 +54,13 @@ class Chip:
         exti = Exti(nvic, syscfg)
         dma = Dma1(engine, nvic, TDR_ADDRESS)
         self.usart = Usart2(
-            timeline=timeline,
-            clocks=clocks,
-            nvic=nvic,
-            dma=dma,
-            pins_connected=self._on_pins(_SERIAL_FUNCTIONS),
+            timeline=timeline, clocks=clocks, nvic=nvic, dma=dma, pins_connected=self._make_pin_check(_SERIAL_FUNCTIONS)
         )
         self._spi = Spi1(timeline, clocks)
-        sensor_bus = SpiBus(timeline, self._spi, self._on_pins(_SENSOR_BUS_FUNCTIONS))
+        sensor_bus = SpiBus(timeline, self._spi, self._make_pin_check(_SENSOR_BUS_FUNCTIONS))
         self._timer = Tim2(timeline, clocks)
         self._pwm = Tim16()
-        self._heater_connected = self._on_pins(_HEATER_FUNCTIONS)
+        self._heater_connected = self._make_pin_check(_HEATER_FUNCTIONS)
         self.control = SystemControl(nvic, lambda: on_reset(rcc.RESET_SOFTWARE))
         self.flash = flash = Flash(timeline, memory, nvic)
         power = rcc.Power()
@@ -94,12 +92,12 @@ class Chip:
 
     @property
     def peripherals(self) -> Sequence[Peripheral]:
-        """Every block of registers that has a model."""
+        """All blocks of registers that have a model."""
         return tuple(self._blocks)
 
     @property
     def heater_duty(self) -> float:
-        """Which part of the time the heater's pin is up, 0 to 1; a pin that nothing drives is held down."""
+        """The heater's duty, 0 to 1; a pin that is not driven counts as low."""
         return self._pwm.duty if self._heater_connected() else 0.0
 
     def reset(self) -> None:
@@ -112,7 +110,7 @@ class Chip:
             self._blocks.append(block)
 
     def _attach_gated(self, bus: RegisterBus, *blocks: Peripheral) -> None:
-        """Attach blocks that RCC has to clock first."""
+        """Attach blocks that need a clock of RCC."""
         for block in blocks:
             bus.attach(block, clocked=False)
             self._blocks.append(block)
@@ -134,17 +132,17 @@ class Chip:
     def _port_of(self, pin: str) -> Port:
         return self._ports[pin[1]]
 
-    def _on_pins(self, functions: dict[str, int]) -> Callable[[], bool]:
-        """Whether the firmware has put these functions on these pins, whenever that is asked."""
+    def _make_pin_check(self, functions: dict[str, int]) -> Callable[[], bool]:
+        """Return a function that tells whether the firmware has selected these functions on these pins."""
         wires = [(self._port_of(pin), int(pin[2:]), function) for pin, function in functions.items()]
         ports = {port for port, _pin, _function in wires}
-        seen, answer = -1, False
+        checked_count, answer = -1, False
 
-        def connected() -> bool:
-            nonlocal seen, answer
+        def is_connected() -> bool:
+            nonlocal checked_count, answer
             count = sum([port.setup_count for port in ports])
-            if count != seen:  # asked at every chip select
-                seen, answer = count, all(port.function(pin) == function for port, pin, function in wires)
+            if count != checked_count:  # called at every chip select
+                checked_count, answer = count, all(port.function(pin) == function for port, pin, function in wires)
             return answer
 
-        return connected
+        return is_connected

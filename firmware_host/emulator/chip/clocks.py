@@ -1,4 +1,4 @@
-"""How fast the buses run, as the firmware has set them."""
+"""The clock frequencies that the firmware has set."""
 
 from dataclasses import dataclass
 

@@ -1,6 +1,6 @@
-"""What Unicorn leaves out of the Cortex-M4F: exception entry and return, with and without the floating-point frame.
+"""Parts of the Cortex-M4F that Unicorn lacks: exception entry and return, with and without the floating-point frame.
 
-ARMv7-M Architecture Reference Manual, B1.5.6 to B1.5.8. The floating-point registers are stacked at once where the
+ARMv7-M Architecture Reference Manual, B1.5.6 to B1.5.8. The floating-point registers are stacked at once, although the
 chip may do so lazily: the frame is the same, only the time differs.
 """
 
@@ -33,20 +33,20 @@ _WITH_FLOAT = 1 << 4  # in EXC_RETURN, cleared when the frame holds floating-poi
 
 
 class Entry(Enum):
-    """What became of the exception that would preempt what runs."""
+    """The fate of the exception that would preempt the running code."""
 
-    NONE = auto()  # there is none
-    MASKED = auto()  # PRIMASK, FAULTMASK or BASEPRI holds it off
-    TAKEN = auto()
+    NONE = auto()  # no exception
+    MASKED = auto()  # blocked by PRIMASK, FAULTMASK or BASEPRI
+    ENTERED = auto()
 
 
 class Cortex:
-    """The core's exception model on top of the engine. `pc` is where it goes on when it runs next."""
+    """The core's exception model on top of the engine. `pc` is the address at which the next run starts."""
 
     def __init__(self, engine: Engine, nvic: Nvic) -> None:
         self._engine = engine
         self._nvic = nvic
-        self._left = engine.registers([arm.UC_ARM_REG_PC, arm.UC_ARM_REG_SP])
+        self._return_state = engine.registers([arm.UC_ARM_REG_PC, arm.UC_ARM_REG_SP])
         self._floats = engine.registers(_FLOATS)
         self._masks = engine.registers(_MASKS)
         self._everything = engine.registers([*_CALLER_SAVED, *_STATE, *_MASKS])
@@ -62,17 +62,17 @@ class Cortex:
         self._link.write([0, _THUMB, stack, 0xFFFF_FFFF])
         self._jump(entry, "the reset vector")
 
-    def paused(self) -> None:
-        """The engine stopped between two instructions: note where."""
+    def note_pause(self) -> None:
+        """Record the program counter after the engine has stopped between two instructions."""
         self.pc = self._program_counter.read()[0]
 
     def enter_pending(self, vectors: int) -> Entry:
-        """Enter the handler of the exception that preempts, if there is one. `vectors`: address of the vector table."""
+        """Enter the handler of the preempting exception, if any. `vectors`: address of the vector table."""
         number = self._nvic.candidate()
         if number is None:
             return Entry.NONE
         *scratch, control, xpsr, stack, primask, faultmask, basepri = self._everything.read()
-        if self._masked(number, primask, faultmask, basepri):
+        if self._is_masked(number, primask, faultmask, basepri):
             return Entry.MASKED
         if control & (_PROCESS_STACK | _UNPRIVILEGED):
             raise Violation(
@@ -94,23 +94,24 @@ class Cortex:
         self._nvic.enter(number)
         (entry,) = struct.unpack("<I", self._engine.read(vectors + 4 * number, 4))
         self._jump(entry, f"the vector of exception {number} (interrupt {number - FIRST_IRQ})")
-        return Entry.TAKEN
+        return Entry.ENTERED
 
     def masks_pending(self) -> bool:
-        """Whether an exception waits that is still held off."""
+        """Return whether a pending exception is still masked."""
         number = self._nvic.candidate()
-        return number is not None and self._masked(number, *self._masks.read())
+        return number is not None and self._is_masked(number, *self._masks.read())
 
-    def _masked(self, number: int, primask: int, faultmask: int, basepri: int) -> bool:
-        held_off = primask or faultmask or (basepri and self._nvic.priority(number) >= basepri)
-        return bool(held_off) and number != NMI
+    def _is_masked(self, number: int, primask: int, faultmask: int, basepri: int) -> bool:
+        is_blocked = primask or faultmask or (basepri and self._nvic.priority(number) >= basepri)
+        return bool(is_blocked) and number != NMI
 
     def return_from_exception(self) -> None:
-        """Undo `enter_pending` inside a hook, after the core branched to a return code (EXC_RETURN), and go on where
-        it was, without the price of stopping and running anew.
+        """Undo `enter_pending` inside a hook, after the core branched to a return code (EXC_RETURN).
+
+        The run goes on at the return address, without the cost of stopping and starting.
         """
-        at, base = self._left.read()
-        return_code = at | 1
+        address, base = self._return_state.read()
+        return_code = address | 1
         if return_code not in _RETURNS:
             raise Violation("bad_return", f"exception return to 0x{return_code:08X}", "Correct the firmware")
         self._nvic.leave()

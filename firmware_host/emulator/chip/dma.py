@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from firmware_host.emulator.chip.bus import Register, Stored, Violation
+from firmware_host.emulator.chip.bus import Register, StoredRegister, Violation
 from firmware_host.emulator.chip.nvic import Nvic
 
 _ENABLE, _COMPLETE_INTERRUPT, _TO_PERIPHERAL, _MEMORY_INCREMENT = 1 << 0, 1 << 1, 1 << 4, 1 << 7
-_ERROR_INTERRUPT = 1 << 3  # of transfers that meet no memory, which end the run here
+_ERROR_INTERRUPT = 1 << 3  # of transfers without memory, which end the run here
 _PRIORITY = 3 << 12
 _GLOBAL, _COMPLETE = 1 << 0, 1 << 1  # flags of a channel
 _CHANNEL, _IRQ, _REQUEST = 7, 17, 2  # channel 7 serves USART2_TX when it selects request 2
@@ -21,9 +21,10 @@ class Memory(Protocol):
 
 
 class Dma1:
-    """The controller with its one used channel. `data_register`: address of the register the channel may feed.
+    """The controller with its one used channel. `data_register`: address of the register that the channel may write.
 
-    The peripheral asks for the bytes with `fetch`; it sets `on_switched` to hear of the channel going on or off.
+    The peripheral requests the bytes with `fetch`, and sets `on_switched` to learn when the channel is switched on or
+    off.
     """
 
     name = "DMA1"
@@ -34,10 +35,10 @@ class Dma1:
         self._memory = memory
         self._nvic = nvic
         self._data_register = data_register
-        self._control = Stored("DMA1 CCR7", modes)
-        self._peripheral_address = Stored("DMA1 CPAR7", 0xFFFF_FFFF)
-        self._memory_address = Stored("DMA1 CMAR7", 0xFFFF_FFFF)
-        self._selection = Stored("DMA1 CSELR", 0xF << _FLAG_SHIFT)
+        self._control = StoredRegister("DMA1 CCR7", modes)
+        self._peripheral_address = StoredRegister("DMA1 CPAR7", 0xFFFF_FFFF)
+        self._memory_address = StoredRegister("DMA1 CMAR7", 0xFFFF_FFFF)
+        self._selection = StoredRegister("DMA1 CSELR", 0xF << _FLAG_SHIFT)
         self.on_switched: Callable[[bool], None] = lambda _on: None
         self.reset()
 
@@ -53,9 +54,9 @@ class Dma1:
             Register(0x04, "IFCR", None, self._clear_flags),
             Register(0x80, "CCR7", self._control.read, self._write_control),
             Register(0x84, "CNDTR7", lambda: self.remaining, self._write_length),
-            self._peripheral_address.at(0x88),
-            self._memory_address.at(0x8C),
-            self._selection.at(0xA8),
+            self._peripheral_address.map_to(0x88),
+            self._memory_address.map_to(0x8C),
+            self._selection.map_to(0xA8),
         )
 
     @property
@@ -64,11 +65,11 @@ class Dma1:
 
     @property
     def remaining(self) -> int:
-        """Bytes still in memory."""
+        """The number of bytes still in memory."""
         return self._length - self._moved
 
     def fetch(self, count: int) -> bytes:
-        """Read the next `count` bytes, at most `remaining`, as the memory holds them now."""
+        """Read the next `count` bytes, at most `remaining`, at their present values in memory."""
         data = self._memory.read(self._memory_address.value + self._moved, count)
         self._moved += count
         if not self.remaining:

@@ -1,11 +1,11 @@
 """The flash interface (RM0394, chapter 3): wait states, and erasing and programming of the pages for calibrations.
 
-The program runs from the same bank, so the core waits while an operation is under way (section 3.3.5).
+The program runs from the same bank, so the core waits during an operation (section 3.3.5).
 """
 
 from collections.abc import Sequence
 
-from firmware_host.emulator.chip.bus import Register, Stored, Violation, check_bits
+from firmware_host.emulator.chip.bus import Register, StoredRegister, Violation, check_bits
 from firmware_host.emulator.chip.flash_memory import (
     DOUBLEWORD_BYTES,
     PAGE_BYTES,
@@ -20,7 +20,7 @@ _KEYS = [0x4567_0123, 0xCDEF_89AB]
 _PG, _PER, _STRT, _OPTLOCK, _LOCK = 1 << 0, 1 << 1, 1 << 16, 1 << 30, 1 << 31
 _PNB_SHIFT, _PNB = 3, 0xFF << 3
 _PROGERR, _PGAERR, _SIZERR, _PGSERR, _BSY = 1 << 3, 1 << 5, 1 << 6, 1 << 7, 1 << 16
-_ERRORS = 0xC3FA  # all that SR can say went wrong, as far as the firmware may clear it
+_ERRORS = 0xC3FA  # the error flags of SR that the firmware may clear
 _ECCC, _ECCD = 1 << 30, 1 << 31
 _DATA_CACHE, _INSTRUCTION_CACHE = 1 << 10, 1 << 9
 _RESET_DATA_CACHE, _RESET_INSTRUCTION_CACHE = 1 << 12, 1 << 11
@@ -31,10 +31,10 @@ _CORRECT = "Correct the firmware"
 
 
 class Flash:
-    """The interface's registers and, through `read` and `write`, the pages it can write to.
+    """The interface's registers and, through `read` and `write`, the writable pages.
 
-    A doubleword that is torn raises the non-maskable interrupt when it is read. The flags EOP and OPERR stay clear, as
-    their interrupts are not modelled (section 3.7.5).
+    Reading a torn doubleword raises the non-maskable interrupt. The flags EOP and OPERR stay clear, as their interrupts
+    are not modelled (section 3.7.5).
     """
 
     name = "FLASH"
@@ -45,25 +45,25 @@ class Flash:
         self._memory = memory
         self._nvic = nvic
         self._slot = timeline.register(self._finish)
-        self._access = Stored("FLASH ACR", 0x1F07, initial=0x0600, after=self._check_caches)
+        self._access = StoredRegister("FLASH ACR", 0x1F07, initial=0x0600, after=self._check_caches)
         self.reset()
 
     def reset(self) -> None:
-        """An operation under way is cut off: what it worked on stays torn."""
+        """Reset the interface; a pending operation is cut off, and its doublewords stay torn."""
         self._access.reset()
         self._control = _LOCK | _OPTLOCK
         self._status = 0
         self._ecc = 0
         self._keys: list[int] = []
         self._first_word: tuple[int, int] | None = None  # offset and value of half a doubleword
-        self._operation: tuple[int, bytes] | None = None  # under way: offset and what will be there
-        self._cache_is_old = False  # what the data cache holds may have changed since
+        self._operation: tuple[int, bytes] | None = None  # pending: offset and new content
+        self._cache_is_old = False  # the data cache may hold old content
         self._timeline.cancel(self._slot)
         self._nvic.set_line(NMI - FIRST_IRQ, False)
 
     def registers(self) -> Sequence[Register]:
         return (
-            self._access.at(0x00),
+            self._access.map_to(0x00),
             Register(0x08, "KEYR", None, self._write_key),
             Register(0x10, "SR", lambda: self._status | (_BSY if self.busy else 0), self._clear_status),
             Register(0x14, "CR", lambda: self._control, self._write_control),
@@ -76,7 +76,7 @@ class Flash:
 
     @property
     def busy(self) -> bool:
-        """An operation is under way, and the core waits."""
+        """Whether an operation is pending, during which the core waits."""
         return self._operation is not None
 
     # --- the pages, by offset from the first of them
@@ -97,7 +97,7 @@ class Flash:
         return int.from_bytes(self._memory.data[offset : offset + size], "little")
 
     def write(self, offset: int, size: int, value: int) -> None:
-        """Half a doubleword arrives (section 3.3.7)."""
+        """Write half a doubleword (section 3.3.7)."""
         if self._control & _LOCK:
             raise Violation("flash_locked", f"write of 0x{value:X} to locked flash", "Write both keys to KEYR first")
         if self.busy:
@@ -153,7 +153,7 @@ class Flash:
             raise Violation("flash_locked", f"FLASH CR = 0x{value:X} while locked", "Write both keys to KEYR first")
         if self.busy:
             raise Violation("flash_busy", "FLASH CR written while an operation is under way", "Wait until BSY is clear")
-        self._control = value | self._control & _OPTLOCK  # which another key opens
+        self._control = value | self._control & _OPTLOCK  # opened by another key
         if value & _STRT:
             self._erase((value & _PNB) >> _PNB_SHIFT)
 
@@ -170,7 +170,7 @@ class Flash:
         self._start(offset, b"\xff" * PAGE_BYTES, _ERASE_TICKS)
 
     def _program(self, offset: int, value: int) -> None:
-        """Program a doubleword: only what is erased can be, except to zero."""
+        """Program a doubleword: an erased one, or any to zero."""
         if value and self._memory.data[offset : offset + DOUBLEWORD_BYTES] != b"\xff" * DOUBLEWORD_BYTES:
             self._status |= _PROGERR
             return

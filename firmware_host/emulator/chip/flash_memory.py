@@ -1,4 +1,4 @@
-"""The chip's flash as it is without power: what survives a reset, a power cut and, in a file, the simulation."""
+"""The content of the chip's flash, which survives a reset, a power cut and, in a file, the simulation."""
 
 from collections.abc import Callable
 
@@ -7,21 +7,24 @@ from firmware_host.errors import BoardError
 FLASH_BYTES = 256 * 1024
 PAGE_BYTES = 2048
 DOUBLEWORD_BYTES = 8
-STORE_PAGES = 16  # at the end: they belong to the calibrations, the others to the program
+STORE_PAGES = 16  # at the end, for the calibrations; the others for the program
 STORE_OFFSET = FLASH_BYTES - STORE_PAGES * PAGE_BYTES
 
 
 class PowerLost(Exception):
-    """The supply failed, as `FlashMemory.fail_power` asked for."""
+    """A failure of the supply, as requested by `FlashMemory.fail_power`."""
 
 
 class FlashMemory:
-    """Contents and state of the flash.
+    """The content and state of the flash.
 
-    `image`: the program, from the start; `store`: the last pages, erased when left out; `torn`: offsets of doublewords
-    whose erasing or programming was cut off: reading one is an error that the chip detects; with `flags_lost` it does
-    not say which, as the chip's errata have it of a power loss in the middle of an operation. Raises BoardError when
-    the image does not fit. `on_change` is called after every change.
+    - `image`: the program, from the start.
+    - `store`: the last pages, erased if omitted.
+    - `torn`: offsets of doublewords with an interrupted erasure or programming. Reading one is an error that the chip
+      detects; with `flags_lost` it does not report which, as in the chip's errata on a power loss during an operation.
+    - `on_change`: called after every change.
+
+    Raises BoardError if the image does not fit.
     """
 
     def __init__(self, image: bytes, store: bytes = b"", torn: frozenset[int] = frozenset()) -> None:
@@ -30,7 +33,7 @@ class FlashMemory:
         self.data = bytearray(image.ljust(STORE_OFFSET, b"\xff") + store.ljust(FLASH_BYTES - STORE_OFFSET, b"\xff"))
         self.torn = set(torn)
         self.flags_lost = False
-        self.operations = 0  # erasures and programmings begun
+        self.operations = 0  # number of erasures and programmings begun
         self.on_change: Callable[[], None] = lambda: None
         self._fails_at: int | None = None
         self._fails_torn = False
@@ -43,19 +46,19 @@ class FlashMemory:
         self._fails_at, self._fails_torn = operation, torn
 
     def begin(self, offset: int, content: bytes) -> None:
-        """Start to write so many bytes at `offset`: until `finish` they are torn. Raises PowerLost if it is to be."""
+        """Begin to write `content` at `offset`: until `finish` it is torn. Raise PowerLost if the power is to fail."""
         self.operations += 1
         fails = self.operations == self._fails_at
         if not fails or self._fails_torn:
             span = range(offset, offset + len(content))
             self.torn.update(span[::DOUBLEWORD_BYTES])
-            self.data[span.start : span.stop] = bytes(byte ^ 0x5A for byte in content)  # what it reads as: nonsense
+            self.data[span.start : span.stop] = bytes(byte ^ 0x5A for byte in content)  # torn content is arbitrary
             self.on_change()
         if fails:
             raise PowerLost
 
     def finish(self, offset: int, content: bytes) -> None:
-        """What `begin` started is done."""
+        """Complete the operation that `begin` started."""
         self.data[offset : offset + len(content)] = content
         self.torn.difference_update(range(offset, offset + len(content), DOUBLEWORD_BYTES))
         self.on_change()

@@ -1,4 +1,4 @@
-"""The Cortex-M4's interrupt controller (ARMv7-M Architecture Reference Manual, B3.4): what is pending, who wins."""
+"""The Cortex-M4's interrupt controller (ARMv7-M Architecture Reference Manual, B3.4): pending states and priorities."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -18,7 +18,7 @@ _PRIORITY_BITS = 0xF0  # the chip implements the upper four of eight
 class Nvic:
     """Exceptions by number (16 + interrupt number): enabled, pending, active, priority.
 
-    A peripheral holds its interrupt line up with `set_line`; a line still up when its handler returns pends again.
+    A peripheral sets its interrupt line with `set_line`; a line still high when its handler returns pends again.
     """
 
     name = "NVIC"
@@ -39,7 +39,7 @@ class Nvic:
         return tuple(self._registers())
 
     def set_line(self, irq: int, high: bool) -> None:
-        """A peripheral's interrupt request goes up or down."""
+        """Set the level of a peripheral's interrupt request."""
         bit = 1 << (FIRST_IRQ + irq)
         if not high:
             self._lines &= ~bit
@@ -58,7 +58,7 @@ class Nvic:
         return bool(self._pending >> number & 1)
 
     def candidate(self) -> int | None:
-        """The pending exception that preempts what runs now; BASEPRI and PRIMASK are the core's business."""
+        """Return the pending exception that preempts the running code; the core applies BASEPRI and PRIMASK."""
         waiting = self._pending & self._enabled
         if not waiting:
             return None
@@ -86,7 +86,7 @@ class Nvic:
         self._active.append(number)
 
     def leave(self) -> None:
-        """The running handler returns. Raises Violation when none is running."""
+        """End the running handler. Raise Violation if none is running."""
         if not self._active:
             raise Violation("bad_return", "exception return with no handler running", "Correct the firmware")
         number = self._active.pop()

@@ -1,8 +1,8 @@
-"""RCC and PWR of the STM32L432 (reference manual RM0394, chapters 6 and 5): clocks and what they feed."""
+"""RCC and PWR of the STM32L432 (reference manual RM0394, chapters 6 and 5): clocks and their consumers."""
 
 from collections.abc import Callable, Sequence
 
-from firmware_host.emulator.chip.bus import Register, Stored, Violation, check_bits
+from firmware_host.emulator.chip.bus import Register, StoredRegister, Violation, check_bits
 from firmware_host.emulator.chip.clocks import Clocks
 from firmware_host.emulator.chip.flash import Flash
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
@@ -22,7 +22,7 @@ _ENABLE_NAMES = {0x48: "AHB1ENR", 0x4C: "AHB2ENR", 0x58: "APB1ENR1", 0x60: "APB2
 _HZ_PER_WAIT_STATE = 16_000_000
 _DBP = 1 << 8  # PWR CR1: the backup domain may be written
 _LSEON, _LSERDY = 1 << 0, 1 << 1
-_CRYSTAL_START_TICKS = TICK_HZ // 2  # a 32 kHz crystal needs some tenths of a second to swing
+_CRYSTAL_START_TICKS = TICK_HZ // 2  # a 32 kHz crystal needs some tenths of a second to start
 RESET_POWER, RESET_PIN, RESET_SOFTWARE, RESET_WATCHDOG = 1 << 27, 1 << 26, 1 << 28, 1 << 29
 _RESET_FLAGS = 0xFF << 24
 _REMOVE_RESET_FLAGS = 1 << 23
@@ -36,14 +36,14 @@ class Power:
     base = 0x4000_7000
 
     def __init__(self) -> None:
-        self._control = Stored("PWR CR1", 1 << 9 | _DBP, initial=1 << 9)
+        self._control = StoredRegister("PWR CR1", 1 << 9 | _DBP, initial=1 << 9)
 
     def reset(self) -> None:
         self._control.reset()
 
     def registers(self) -> Sequence[Register]:
         # SR2.VOSF clear: the regulator has settled
-        return self._control.at(0x00), Register(0x14, "SR2", lambda: 0, None)
+        return self._control.map_to(0x00), Register(0x14, "SR2", lambda: 0, None)
 
     @property
     def backup_writable(self) -> bool:
@@ -75,13 +75,13 @@ class Rcc:
         self._flash = flash
         self._on_gate = on_gate
         self._on_clock = on_clock
-        self._control = Stored("RCC CR", 0x0100_01FD, initial=0x61, after=self._retune)
-        self._configuration = Stored("RCC CFGR", 0x0000_3FF3, after=self._retune)
-        self._pll = Stored("RCC PLLCFGR", 0x0700_7F73, initial=0x1000, after=self._retune)
-        self._selection = Stored("RCC CCIPR", 0)
+        self._control = StoredRegister("RCC CR", 0x0100_01FD, initial=0x61, after=self._retune)
+        self._configuration = StoredRegister("RCC CFGR", 0x0000_3FF3, after=self._retune)
+        self._pll = StoredRegister("RCC PLLCFGR", 0x0700_7F73, initial=0x1000, after=self._retune)
+        self._selection = StoredRegister("RCC CCIPR", 0)
         self._reset_flags = RESET_POWER | RESET_PIN
         self._enabled = {
-            offset: Stored(
+            offset: StoredRegister(
                 f"RCC {_ENABLE_NAMES[offset]}",
                 sum(1 << bit for bit in bits),
                 initial=1 << 8 if offset == 0x48 else 0,
@@ -97,16 +97,16 @@ class Rcc:
         self._retune()
 
     def note_reset(self, cause: int) -> None:
-        """Remember why the chip was reset, for RCC CSR. Every reset also pulls the reset pin."""
+        """Record the cause of the chip's reset for RCC CSR. Every reset also pulls the reset pin."""
         self._reset_flags |= cause | RESET_PIN
 
     def registers(self) -> Sequence[Register]:
         return (
             Register(0x00, "CR", self._read_control, self._write_control),
             Register(0x08, "CFGR", self._read_configuration, self._write_configuration),
-            self._pll.at(0x0C),
-            *(register.at(offset) for offset, register in self._enabled.items()),
-            self._selection.at(0x88),
+            self._pll.map_to(0x0C),
+            *(register.map_to(offset) for offset, register in self._enabled.items()),
+            self._selection.map_to(0x88),
             Register(0x90, "BDCR", self._read_backup, self._write_backup),
             Register(0x94, "CSR", self._read_status, self._write_status),
         )
@@ -127,8 +127,8 @@ class Rcc:
     def _read_backup(self) -> int:
         if self._crystal_since is None:
             return 0
-        swings = self._has_crystal and self._timeline.now - self._crystal_since >= _CRYSTAL_START_TICKS
-        return _LSEON | (_LSERDY if swings else 0)
+        is_ready = self._has_crystal and self._timeline.now - self._crystal_since >= _CRYSTAL_START_TICKS
+        return _LSEON | (_LSERDY if is_ready else 0)
 
     def _write_backup(self, value: int) -> None:
         check_bits("RCC BDCR", value, _LSEON | _LSERDY)

@@ -1,8 +1,8 @@
-"""SPI1 (RM0394, chapter 40): master, eight bits, two bytes an access to its FIFOs, each taking its time on the bus."""
+"""SPI1 (RM0394, chapter 40): master, eight bits, two bytes per FIFO access, with their duration on the bus."""
 
 from collections.abc import Sequence
 
-from firmware_host.emulator.chip.bus import Register, Stored, Violation
+from firmware_host.emulator.chip.bus import Register, StoredRegister, Violation
 from firmware_host.emulator.chip.clocks import Clocks
 from firmware_host.emulator.hooks import Bus, reader
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
@@ -12,8 +12,9 @@ _NEEDED = _SPE | _MSTR | _SSM | _SSI
 
 
 class Spi1:
-    """The bus master. What it puts on the bus and what comes back does not pass here, nor do reads of its status and of
-    how it is set up: see `hooks.ll`. `mode`: of SPI, 0–3, clock polarity and phase; `clock_hz`: of the bus.
+    """The bus master. `mode`: the SPI mode, 0–3, of clock polarity and phase; `clock_hz`: the bus clock.
+
+    Exchanges on the bus and reads of its status and setup bypass Python: see `hooks.ll`.
     """
 
     name = "SPI1"
@@ -23,8 +24,8 @@ class Spi1:
         self._timeline = timeline
         self._clocks = clocks
         self.bus = Bus()
-        self._control = Stored("SPI1 CR1", 0x037F, after=self.retune)
-        self._control2 = Stored("SPI1 CR2", 0, initial=0x0700)
+        self._control = StoredRegister("SPI1 CR1", 0x037F, after=self.retune)
+        self._control2 = StoredRegister("SPI1 CR2", 0, initial=0x0700)
         self.reset()
 
     def reset(self) -> None:
@@ -36,13 +37,13 @@ class Spi1:
     def registers(self) -> Sequence[Register]:
         return (
             Register(0x00, "CR1", self._control.read, self._write_control),
-            self._control2.at(0x04),
+            self._control2.map_to(0x04),
             Register(0x08, "SR", reader("read_status", self.bus, self._timeline), None),
             Register(0x0C, "DR", self._refuse_read, self._refuse_write, size=2),
         )
 
     def retune(self) -> None:
-        """Take over a new bus clock or what the control register says."""
+        """Apply a new bus clock or control register."""
         control, bus = self._control.value, self.bus
         self.mode = control & (_CPOL | _CPHA)
         self.clock_hz = self._clocks.pclk2_hz / (2 << (control >> 3 & 7))
@@ -50,11 +51,11 @@ class Spi1:
         bus.control = control
         bus.speaks = control & _NEEDED == _NEEDED
         bus.pair_ticks, bus.half_bit_ticks = pair_ticks, pair_ticks // 32
-        bus.setups += 1  # what was checked before may no longer hold
+        bus.setups += 1  # invalidates earlier checks
 
     @property
     def busy(self) -> bool:
-        """Whether something is still on the bus."""
+        """Whether a transfer is pending on the bus."""
         return self.bus.free > self._timeline.now
 
     def _write_control(self, value: int) -> None:

@@ -1,4 +1,4 @@
-"""A device on the board's SPI bus, and the wires from it to the chip."""
+"""A device on the board's SPI bus, and its wires to the chip."""
 
 import math
 from collections.abc import Callable
@@ -12,21 +12,23 @@ from firmware_host.emulator.timeline import NEVER, TICK_HZ, Timeline
 
 
 class Fault(StrEnum):
-    """What can be wrong with a part on the bus."""
+    """The fault of a part on the bus."""
 
-    ABSENT = "absent"  # it is not there, or without supply: MISO and the interrupt line are left to their pulls
+    ABSENT = "absent"  # missing or without supply: only pulls drive MISO and the interrupt line
     OTHER_PART = "other_part"  # its identity register reads as another part's
-    DAMAGED = "damaged"  # a bad contact: now and then a bit of what it sends is wrong
-    SILENT = "silent"  # its interrupt line is broken: it answers, and never says that there is something new
+    DAMAGED = "damaged"  # a bad contact: some bits of its data are wrong
+    SILENT = "silent"  # its interrupt line is broken: it answers, but never signals new data
 
 
 class SpiDevice(Protocol):
-    """A part on the SPI bus, at register level. Times are virtual seconds and never go backwards.
+    """A part on the SPI bus, at register level. Times are virtual seconds and never decrease.
 
-    `name`: the part, for messages. `chip_select`, `interrupt`: chip pins, such as "PA11". `spi_modes`, `spi_max_hz`:
-    what its bus interface accepts; the clock depends on what is accessed and is asked for after the first byte of
-    each access. `next_event_s`: when it next does something by itself, infinity for never. `fault`: what is wrong
-    with it; the wires see to all of it but the identity.
+    - `name`: the part, for messages.
+    - `chip_select`, `interrupt`: chip pins, such as "PA11".
+    - `spi_modes`, `spi_max_hz`: limits of its bus interface; the clock limit depends on the access and is read after
+      the first byte of each access.
+    - `next_event_s`: the time of its next own action, infinity for never.
+    - `fault`: its fault; the wires simulate all faults but the identity.
     """
 
     fault: Fault | None
@@ -47,25 +49,25 @@ class SpiDevice(Protocol):
     def interrupt_level(self) -> bool: ...
 
     def advance(self, time_s: float) -> None:
-        """Do everything due up to and including `time_s`."""
+        """Carry out all actions due up to and including `time_s`."""
 
     def select(self, time_s: float) -> None:
-        """Chip select falls, which neither moves the interrupt line nor `next_event_s`."""
+        """Handle the fall of chip select, which changes neither the interrupt line nor `next_event_s`."""
 
     def transfer(self, byte: int, time_s: float) -> int:
-        """Exchange one byte. Raises Violation for what the part does not allow or the model does not know."""
+        """Exchange one byte. Raise Violation for accesses that the part forbids or the model lacks."""
 
-    def foretell(self) -> bytes:
-        """What it answers to the next pairs of bytes, whatever they are and whatever happens before chip select rises.
+    def predict(self) -> bytes:
+        """Return the answers to the next pairs of bytes, whatever these are and until chip select rises.
 
-        Asked for after the first pair of an access; what it tells counts as exchanged.
+        Called after the first pair of an access; predicted bytes count as exchanged.
         """
 
     def deselect(self, time_s: float) -> None:
-        """Chip select rises, likewise."""
+        """Handle the rise of chip select, with the same restriction."""
 
 
-# The MSI locked to the 32768 Hz crystal runs at 122 times its frequency, not at the 4 MHz it is meant to have
+# The MSI locked to the 32768 Hz crystal runs at 122 times its frequency, not at the nominal 4 MHz
 LOCKED_MSI = 122 * 32_768 / 4_000_000
 
 
@@ -80,11 +82,11 @@ class BoardClock:
         self._ticks_per_s = TICK_HZ * LOCKED_MSI * (1 + crystal_ppm * 1e-6)
 
     def last_tick(self, time_s: float) -> int:
-        """The last tick at or before `time_s`."""
+        """Return the last tick at or before `time_s`."""
         return math.floor((time_s - self._boot_time_s) * self._ticks_per_s)
 
     def first_tick(self, time_s: float) -> int:
-        """The first tick at or after `time_s`."""
+        """Return the first tick at or after `time_s`."""
         return math.ceil((time_s - self._boot_time_s) * self._ticks_per_s)
 
     def seconds(self, tick: int) -> float:
@@ -105,7 +107,7 @@ class SpiBus:
         self._checked = _UNCHECKED
 
     def chip_select(self, link: "DeviceLink", low: bool) -> None:
-        """A device's chip select goes down or up. Raises Violation when the bus has not finished."""
+        """Handle the fall or rise of a device's chip select. Raise Violation if the bus is busy."""
         if self._spi.busy:
             raise Violation(
                 "spi_busy", f"the select of the {link.device.name} changes on a busy bus", "Wait until BSY is clear"
@@ -115,12 +117,12 @@ class SpiBus:
         else:
             self._selected.remove(link)
         self._checked = _UNCHECKED
-        self._spi.bus.known_to = 0
+        self._spi.bus.predicted_to = 0
 
     def exchange(self, pair: int) -> int:
-        """Pass two bytes, the first one low, to the selected device; its answers, likewise.
+        """Pass two bytes, the first one low, to the selected device; return its answers likewise.
 
-        Raises Violation when the bus is not set up as it must be.
+        Raise Violation if the bus is not set up as required.
         """
         spi, timeline, bus = self._spi, self._timeline, self._spi.bus
         if timeline.next_due <= timeline.now:
@@ -128,15 +130,15 @@ class SpiBus:
         setups, checked = bus.setups, self._checked
         if checked != setups:
             self._check_wires()
-        if bus.known_from < bus.known_to:
-            answer = bus.foreseen()
+        if bus.predicted_from < bus.predicted_to:
+            answer = bus.next_prediction()
         else:
             answer = self._selected[0].exchange(pair) if self._selected else 0xFFFF
         if checked != setups:
-            self._check_clock(spi)  # not before: the clock that a part accepts depends on what it is asked for
-            self._checked = bus.known_in = setups
-            if checked == _UNCHECKED and self._selected and (told := self._selected[0].foretell()):
-                bus.foresee(told)
+            self._check_clock(spi)  # after the first pair: the clock limit of a part depends on the access
+            self._checked = bus.predicted_in = setups
+            if checked == _UNCHECKED and self._selected and (predicted := self._selected[0].predict()):
+                bus.set_predictions(predicted)
         return answer
 
     def _check_wires(self) -> None:
@@ -157,13 +159,13 @@ class SpiBus:
                 )
 
 
-# Of a part with a bad contact, one byte in so many has a wrong bit: nearly every burst of the ADIS16465 has just one,
-# which its sum always shows
+# With a bad contact, one byte in 21 has a wrong bit: nearly every burst of the ADIS16465 has just one,
+# which its checksum always reveals
 _DAMAGED_BYTE = 21
 
 
 class DeviceLink:
-    """Connects a device to its chip select, its interrupt pin, the bus and the board's time."""
+    """The connection of a device to its chip select, its interrupt pin, the bus and the board's time."""
 
     def __init__(
         self,
@@ -200,9 +202,9 @@ class DeviceLink:
             self._settle()
         return answer
 
-    def foretell(self) -> bytes:
-        """What the device answers next, see `SpiDevice`; of a faulty one nothing is known."""
-        return self.device.foretell() if self.device.fault is None else b""
+    def predict(self) -> bytes:
+        """Return the device's next answers, see `SpiDevice.predict`; none of a faulty device."""
+        return self.device.predict() if self.device.fault is None else b""
 
     def _exchange_faulty(self, pair: int) -> int:
         if self.device.fault is Fault.ABSENT:
@@ -226,7 +228,7 @@ class DeviceLink:
             device.deselect(time_s)
         else:
             device.select(time_s)
-        if device.fault is not None:  # it may just have come
+        if device.fault is not None:  # the fault may be new
             self._settle()
 
     def _event(self) -> None:
@@ -234,7 +236,7 @@ class DeviceLink:
         self._settle()
 
     def _settle(self) -> None:
-        """Take over what the device may have changed: its interrupt line and its next event."""
+        """Apply changes of the device's interrupt line and of its next event."""
         device = self.device
         level = device.interrupt_level and device.fault not in (Fault.ABSENT, Fault.SILENT)
         if level != self._level:

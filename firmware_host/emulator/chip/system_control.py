@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from firmware_host.emulator.chip.bus import Register, Stored, Violation
+from firmware_host.emulator.chip.bus import Register, StoredRegister, Violation
 from firmware_host.emulator.chip.clocks import Clocks
 from firmware_host.emulator.chip.nvic import PENDSV, SYSTICK, Nvic
 from firmware_host.emulator.timeline import Timeline
@@ -14,7 +14,7 @@ _FLOAT_ENABLED = 0xF << 20  # CPACR: full access to coprocessors 10 and 11
 
 
 class SystemControl:
-    """The system control block. `on_reset` is called when the firmware asks for a system reset."""
+    """The system control block. `on_reset` is called when the firmware requests a system reset."""
 
     name = "SCB"
     base = 0xE000_ED00
@@ -22,8 +22,8 @@ class SystemControl:
     def __init__(self, nvic: Nvic, on_reset: Callable[[], None]) -> None:
         self._nvic = nvic
         self._on_reset = on_reset
-        self._vtor = Stored("SCB VTOR", 0xFFFF_FF80)
-        self._coprocessors = Stored("SCB CPACR", _FLOAT_ENABLED)
+        self._vtor = StoredRegister("SCB VTOR", 0xFFFF_FF80)
+        self._coprocessors = StoredRegister("SCB CPACR", _FLOAT_ENABLED)
         self._priority_group = 0
 
     def reset(self) -> None:
@@ -33,7 +33,7 @@ class SystemControl:
 
     @property
     def vectors(self) -> int:
-        """Address of the vector table; address 0 shows the flash."""
+        """The address of the vector table; address 0 maps to the flash."""
         return self._vtor.value or _FLASH
 
     @property
@@ -43,7 +43,7 @@ class SystemControl:
     def registers(self) -> Sequence[Register]:
         return (
             Register(0x04, "ICSR", self._read_icsr, self._write_icsr),
-            self._vtor.at(0x08),
+            self._vtor.map_to(0x08),
             Register(0x0C, "AIRCR", lambda: 0xFA05_0000 | self._priority_group << 8, self._write_aircr),
             Register(0x20, "SHPR3", self._read_shpr3, self._write_shpr3),
             *(
@@ -52,7 +52,7 @@ class SystemControl:
                 )
                 for offset, n in ((0x22, PENDSV), (0x23, SYSTICK))
             ),
-            self._coprocessors.at(0x88),
+            self._coprocessors.map_to(0x88),
         )
 
     def _read_icsr(self) -> int:
@@ -98,9 +98,9 @@ class SysTick:
         self._timeline = timeline
         self._clocks = clocks
         self._nvic = nvic
-        self._slot = timeline.register(self._wrapped)
-        self._control = Stored("SysTick CTRL", 7, after=self._restart)
-        self._reload = Stored("SysTick LOAD", 0xFF_FFFF)
+        self._slot = timeline.register(self._handle_wrap)
+        self._control = StoredRegister("SysTick CTRL", 7, after=self._restart)
+        self._reload = StoredRegister("SysTick LOAD", 0xFF_FFFF)
         self._origin = 0
         self._wraps_seen = 0
 
@@ -112,7 +112,7 @@ class SysTick:
     def registers(self) -> Sequence[Register]:
         return (
             Register(0x0, "CTRL", self._read_control, self._control.write),
-            self._reload.at(0x4),
+            self._reload.map_to(0x4),
             Register(0x8, "VAL", self._read_value, lambda _value: self._restart()),
         )
 
@@ -132,7 +132,7 @@ class SysTick:
         else:
             self._timeline.cancel(self._slot)
 
-    def _wrapped(self) -> None:
+    def _handle_wrap(self) -> None:
         self._nvic.pend(SYSTICK)
         wraps = (self._timeline.now - self._origin) // self._period
         self._timeline.schedule(self._slot, self._origin + (wraps + 1) * self._period)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from math import gcd
 
-from firmware_host.emulator.chip.bus import Register, Stored, Violation, check_bits
+from firmware_host.emulator.chip.bus import Register, StoredRegister, Violation, check_bits
 from firmware_host.emulator.chip.clocks import Clocks
 from firmware_host.emulator.hooks import Counter, reader
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
@@ -16,8 +16,8 @@ _START, _KICK, _UNLOCK = 0xCCCC, 0xAAAA, 0x5555
 class Tim2:
     """A free-running 32-bit up-counter. The prescaler acts from the next update event on, as on the chip.
 
-    The counter stands while the auto-reload register is 0, as it is after a reset by the maker's own file. It is
-    read by machine code: see `hooks.ll`.
+    The counter stops while the auto-reload register is 0, its value after a reset in the maker's register file. Machine
+    code reads it: see `hooks.ll`.
     """
 
     name = "TIM2"
@@ -27,9 +27,9 @@ class Tim2:
         self._timeline = timeline
         self._clocks = clocks
         self.counter = Counter()
-        self._control = Stored("TIM2 CR1", 1, after=self._switch)
-        self._prescaler = Stored("TIM2 PSC", 0xFFFF)
-        self._reload = Stored("TIM2 ARR", 0xFFFF_FFFF, after=self._switch)
+        self._control = StoredRegister("TIM2 CR1", 1, after=self._switch)
+        self._prescaler = StoredRegister("TIM2 PSC", 0xFFFF)
+        self._reload = StoredRegister("TIM2 ARR", 0xFFFF_FFFF, after=self._switch)
         self.reset()
 
     def reset(self) -> None:
@@ -44,15 +44,15 @@ class Tim2:
 
     def registers(self) -> Sequence[Register]:
         return (
-            self._control.at(0x00),
+            self._control.map_to(0x00),
             Register(0x14, "EGR", None, self._generate),
             Register(0x24, "CNT", reader("read_count", self.counter, self._timeline), None),
-            self._prescaler.at(0x28),
-            self._reload.at(0x2C),
+            self._prescaler.map_to(0x28),
+            self._reload.map_to(0x2C),
         )
 
     def retune(self) -> None:
-        """Take over a new bus clock, prescaler or reload value."""
+        """Apply a new bus clock, prescaler or reload value."""
         clocks, counter = self._clocks, self.counter
         # RM0394, section 6.2.14: timers run at twice the bus clock when the bus is divided
         timer_hz = clocks.pclk1_hz * (1 if clocks.pclk1_hz == clocks.core_hz else 2)
@@ -77,22 +77,22 @@ class Tim2:
 
 
 class Tim16:
-    """A PWM on channel 1: mode 1, counting up. What it changes acts at once, not at the next update event.
+    """A PWM on channel 1: mode 1, counting up. Changes act at once, not at the next update event.
 
-    The registers keep what is written; nothing counts, because nobody but the heater sees this pin.
+    The registers hold written values; nothing counts, because only the heater uses this pin.
     """
 
     name = "TIM16"
     base = 0x4001_4400
 
     def __init__(self) -> None:
-        self._control = Stored("TIM16 CR1", 1)
-        self._mode = Stored("TIM16 CCMR1_Output", 7 << 4 | 1 << 3)
-        self._enable = Stored("TIM16 CCER", 1)
-        self._prescaler = Stored("TIM16 PSC", 0xFFFF)
-        self._reload = Stored("TIM16 ARR", 0xFFFF)
-        self._compare = Stored("TIM16 CCR1", 0xFFFF)
-        self._output = Stored("TIM16 BDTR", 1 << 15)
+        self._control = StoredRegister("TIM16 CR1", 1)
+        self._mode = StoredRegister("TIM16 CCMR1_Output", 7 << 4 | 1 << 3)
+        self._enable = StoredRegister("TIM16 CCER", 1)
+        self._prescaler = StoredRegister("TIM16 PSC", 0xFFFF)
+        self._reload = StoredRegister("TIM16 ARR", 0xFFFF)
+        self._compare = StoredRegister("TIM16 CCR1", 0xFFFF)
+        self._output = StoredRegister("TIM16 BDTR", 1 << 15)
 
     def reset(self) -> None:
         for register in self._stored.values():
@@ -100,10 +100,10 @@ class Tim16:
 
     def registers(self) -> Sequence[Register]:
         generate = Register(0x14, "EGR", None, lambda value: check_bits("TIM16 EGR", value, 1))
-        return (generate, *(register.at(offset) for offset, register in self._stored.items()))
+        return (generate, *(register.map_to(offset) for offset, register in self._stored.items()))
 
     @property
-    def _stored(self) -> dict[int, Stored]:
+    def _stored(self) -> dict[int, StoredRegister]:
         return {
             0x00: self._control,
             0x18: self._mode,
@@ -116,7 +116,7 @@ class Tim16:
 
     @property
     def duty(self) -> float:
-        """Which part of the time the channel's output is up, 0 to 1."""
+        """The fraction of the time at which the channel's output is high, 0 to 1."""
         runs = self._control.value & self._enable.value and self._output.value and self._reload.value
         if not runs or self._mode.value >> 4 & 7 != _PWM_MODE_1:
             return 0.0
@@ -124,7 +124,7 @@ class Tim16:
 
 
 class Watchdog:
-    """IWDG: calls `on_bite` when it is not kicked in time. Once started only a reset stops it."""
+    """IWDG: calls `on_bite` if it is not kicked in time. Once started only a reset stops it."""
 
     name = "IWDG"
     base = 0x4000_3000
@@ -132,8 +132,8 @@ class Watchdog:
     def __init__(self, timeline: Timeline, on_bite: Callable[[], None]) -> None:
         self._timeline = timeline
         self._slot = timeline.register(on_bite)
-        self._prescaler = Stored("IWDG PR", 7)
-        self._reload = Stored("IWDG RLR", 0xFFF, initial=0xFFF)
+        self._prescaler = StoredRegister("IWDG PR", 7)
+        self._reload = StoredRegister("IWDG RLR", 0xFFF, initial=0xFFF)
         self.reset()
 
     def reset(self) -> None:
@@ -151,7 +151,7 @@ class Watchdog:
             Register(0x0C, "SR", lambda: 0, None),
         )
 
-    def _set(self, register: Stored, value: int) -> None:
+    def _set(self, register: StoredRegister, value: int) -> None:
         if not self._unlocked:
             raise Violation("iwdg_locked", "IWDG PR or RLR written while locked", "Write 0x5555 to KR first")
         register.write(value)

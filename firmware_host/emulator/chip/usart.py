@@ -1,9 +1,11 @@
-"""USART2 (RM0394, chapter 38): eight data bits, no parity, one stop bit, every byte taking its time on the wire."""
+"""USART2 (RM0394, chapter 38): eight data bits, no parity, one stop bit, with the duration of every byte on the
+wire.
+"""
 
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from firmware_host.emulator.chip.bus import Register, Stored, Violation
+from firmware_host.emulator.chip.bus import Register, StoredRegister, Violation
 from firmware_host.emulator.chip.clocks import Clocks
 from firmware_host.emulator.chip.dma import Dma1
 from firmware_host.emulator.chip.nvic import Nvic
@@ -19,19 +21,13 @@ _BITS_PER_BYTE = 10  # start, eight data, stop
 
 
 class Usart2:
-    """The serial port. `pins_connected()` tells whether the firmware has put TX and RX on their pins."""
+    """The serial port. `pins_connected()` returns whether the firmware has put TX and RX on their pins."""
 
     name = "USART2"
     base = 0x4000_4400
 
     def __init__(
-        self,
-        *,
-        timeline: Timeline,
-        clocks: Clocks,
-        nvic: Nvic,
-        dma: Dma1,
-        pins_connected: Callable[[], bool],
+        self, *, timeline: Timeline, clocks: Clocks, nvic: Nvic, dma: Dma1, pins_connected: Callable[[], bool]
     ) -> None:
         self._timeline = timeline
         self._clocks = clocks
@@ -41,10 +37,10 @@ class Usart2:
         dma.on_switched = self._dma_switched
         self._arrival_slot = timeline.register(self._byte_arrives)
         self._dma_slot = timeline.register(self._load)
-        self._control = Stored("USART2 CR1", _UE | _RE | _TE | _RXNEIE, after=self._control_changed)
-        self._control2 = Stored("USART2 CR2", 0)
-        self._control3 = Stored("USART2 CR3", _DMAT | _OVRDIS, after=self._control_changed)
-        self._divider = Stored("USART2 BRR", 0xFFFF)
+        self._control = StoredRegister("USART2 CR1", _UE | _RE | _TE | _RXNEIE, after=self._control_changed)
+        self._control2 = StoredRegister("USART2 CR2", 0)
+        self._control3 = StoredRegister("USART2 CR3", _DMAT | _OVRDIS, after=self._control_changed)
+        self._divider = StoredRegister("USART2 BRR", 0xFFFF)
         self.reset()
 
     def reset(self) -> None:
@@ -63,10 +59,10 @@ class Usart2:
 
     def registers(self) -> Sequence[Register]:
         return (
-            self._control.at(0x00),
-            self._control2.at(0x04),
-            self._control3.at(0x08),
-            self._divider.at(0x0C),
+            self._control.map_to(0x00),
+            self._control2.map_to(0x04),
+            self._control3.map_to(0x08),
+            self._divider.map_to(0x0C),
             Register(0x1C, "ISR", self._read_status, None),
             Register(0x20, "ICR", None, self._clear_flags),
             Register(0x24, "RDR", self._read_data, None),
@@ -75,7 +71,7 @@ class Usart2:
 
     @property
     def baud_rate(self) -> float | None:
-        """Bits per second as set, None while the port is off."""
+        """The baud rate as set, None while the port is off."""
         if not self._control.value & _UE or not self._divider.value:
             return None
         return self._clocks.pclk1_hz / self._divider.value
@@ -89,7 +85,7 @@ class Usart2:
     # --- the host's side
 
     def receive(self, data: bytes) -> None:
-        """Bytes start arriving now, after those still on their way. A port that is off does not hear them."""
+        """Let bytes arrive from now on, after those still in transit. A port that is off ignores them."""
         if not data or not self._listening:
             return
         if not self._incoming:
@@ -97,7 +93,7 @@ class Usart2:
         self._incoming.extend(data)
 
     def transmitted(self) -> bytes:
-        """The bytes whose stop bit has passed since the last call."""
+        """Return the bytes whose stop bit has passed since the last call."""
         if self._dma_start is not None:
             self._load()
         out = b""
@@ -150,13 +146,13 @@ class Usart2:
         self._load()
 
     def _load(self) -> None:
-        """Move what the wire has asked for by now from memory to the wire."""
+        """Move the bytes that the wire has requested by now from memory to the wire."""
         if self._dma_start is None:
             return
         now, step = self._timeline.now, self._byte_ticks
-        started = (now - self._dma_start) // step + 1 if now >= self._dma_start else 0
+        started_bytes = (now - self._dma_start) // step + 1 if now >= self._dma_start else 0
         loaded = max(0, (self._line_free - self._dma_start) // step)
-        count = min(started + 1 - loaded, self._dma.remaining)
+        count = min(started_bytes + 1 - loaded, self._dma.remaining)
         if count > 0:
             self._put_on_wire(self._dma.fetch(count), self._dma_start + loaded * step)
         if not self._dma.remaining:

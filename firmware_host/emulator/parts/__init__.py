@@ -1,1 +1,1 @@
-"""The sensors on the board's bus, at their registers."""
+"""The sensors on the board's bus, at register level."""

@@ -6,20 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from firmware_host.emulator.parts.triad import Die, Seed, Temperature, Triad, TriadErrors, spawned
+from firmware_host.emulator.parts.triad import Die, Seed, Temperature, Triad, TriadErrors, spawn_seed
 
-STANDARD_GRAVITY_M_S2 = 9.80665  # what a data sheet's g is
+STANDARD_GRAVITY_M_S2 = 9.80665  # the g of data sheets
 _AT_REST_G = (0.0, 0.0, 1.0)  # with z up
-_SEED_KEY = 2  # of its randomness beside the gyroscope's and its drift's
+_SEED_KEY = 2  # the key of its random stream, apart from the gyroscope's and its drift's
 
 
 @dataclass(frozen=True, slots=True)
 class AccelerometerTruth:
-    """What the simulated accelerometer really does: s = K (m + b) as for the gyroscope, m the reading, in m/s².
+    """The true errors of a simulated accelerometer: s = K (m + b) as for the gyroscope, m the reading, in m/s².
 
-    `scale`, `non_orthogonality_rad`, `holds_at_c`, `bandwidth_hz`, `delay_s`, all of temperature, and the bias' drift:
-    as in `GyroTruth`. `second_order_s2_m`: φ, by which each component of the specific force feels as s + φ s² before
-    anything else becomes of it (TRIAX, a_m = F (s + φ s²) + b, where b is the negative of this one).
+    - `scale`, `bias_m_s2`, `noise_m_s2`, `non_orthogonality_rad`: as in `GyroTruth`.
+    - `second_order_s2_m`: φ; each component of the specific force is sensed as s + φ s² before the other errors (TRIAX,
+      a_m = F (s + φ s²) + b, whose b is the negative of this one).
+    - `holds_at_c`, `bandwidth_hz`, `delay_s`, the bias' drift and all fields of temperature: as in `GyroTruth`.
     """
 
     scale: Sequence[float] = (1.0, 1.0, 1.0)
@@ -42,9 +43,9 @@ class AccelerometerTruth:
 
 
 class Accelerometer:
-    """Three sensing axes with the errors of `truth`, or with none and without noise.
+    """Three sensing axes with the errors of `truth`; without errors and noise if it is None.
 
-    `motion_at`, `seed`, `temperature_c`: those of the part's `Gyroscope`, whose noise stays what it is. A motion of 3
+    `motion_at`, `seed`, `temperature_c`: those of the part's `Gyroscope`, whose noise is independent. A motion of 3
     components has no force: then the part rests with z up.
     """
 
@@ -60,15 +61,15 @@ class Accelerometer:
         self._triad = _triad(truth, seed, temperature_c) if truth is not None else None
 
     def read(self, time_s: float, settled: float = 1.0) -> list[float]:
-        """The next reading, (3,) m/s², taken at `time_s`; of the force only the fraction `settled` is felt."""
+        """Return the next reading, (3,) m/s², at `time_s`; only the fraction `settled` of the force is sensed."""
         delay_s = self._truth.delay_s if self._truth is not None else 0.0
         force_g = self._motion_at(time_s - delay_s)[3:] or _AT_REST_G
         force = [settled * STANDARD_GRAVITY_M_S2 * component for component in force_g]
         if self._truth is None or self._triad is None:
             return force
         warmer_k = self._triad.warmer_k(time_s)
-        felt = self._triad.sense(_bent(self._truth, force), warmer_k)
-        return self._triad.read(time_s, felt, warmer_k)
+        sensed = self._triad.sense(_apply_second_order(self._truth, force), warmer_k)
+        return self._triad.read(time_s, sensed, warmer_k)
 
 
 def accelerations(
@@ -78,17 +79,18 @@ def accelerations(
     seed: Seed,
     temperature_c: float | Temperature = 25.0,
 ) -> np.ndarray:
-    """The readings (n, 3) m/s² that an `Accelerometer` would take at `time_s` (n,) of a specific force (n, 3), before
-    rounding to counts. The force of `truth.delay_s` before is interpolated in straight lines.
+    """Return the unrounded readings (n, 3), m/s², of an `Accelerometer` at `time_s` (n,) for a specific force (n, 3).
+
+    The force is delayed by `truth.delay_s`, with linear interpolation.
     """
     late_s = time_s - truth.delay_s
     force = [np.interp(late_s, time_s, column) for column in force_m_s2.T] if truth.delay_s else list(force_m_s2.T)
     triad = _triad(truth, seed, temperature_c)
     warmer_k = triad.all_warmer_k(time_s)
-    return triad.readings(time_s, triad.sense(_bent(truth, force), warmer_k), warmer_k)
+    return triad.readings(time_s, triad.sense(_apply_second_order(truth, force), warmer_k), warmer_k)
 
 
-def _bent(truth: AccelerometerTruth, force: Sequence[Any]) -> list[Any]:
+def _apply_second_order(truth: AccelerometerTruth, force: Sequence[Any]) -> list[Any]:
     return [s + phi * s * s for s, phi in zip(force, truth.second_order_s2_m, strict=True)]
 
 
@@ -110,4 +112,4 @@ def _triad(truth: AccelerometerTruth, seed: Seed, temperature_c: float | Tempera
         hysteresis=truth.hysteresis_m_s2,
         die=truth.die,
     )
-    return Triad(errors, spawned(seed, _SEED_KEY), temperature_c)
+    return Triad(errors, spawn_seed(seed, _SEED_KEY), temperature_c)

@@ -1,7 +1,7 @@
 """The ADIS16465's gyroscope, accelerometer and thermometer at register level (Analog Devices data sheet ADIS16465).
 
-What the data sheet leaves open is taken from the maker's own driver (no-OS, drivers/imu/adis1646x.c: update times,
-defaults) and from Linux (drivers/iio/imu/adis16475.c: 32-bit format, burst, checksum).
+Details missing there come from the maker's driver (no-OS, drivers/imu/adis1646x.c: update times, defaults) and from
+Linux (drivers/iio/imu/adis16475.c: 32-bit format, burst, checksum).
 """
 
 import math
@@ -13,9 +13,9 @@ import numpy as np
 from firmware_host.emulator.chip.bus import Violation
 from firmware_host.emulator.chip.spi_device import Fault
 from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer, AccelerometerTruth
-from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
+from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturate
 from firmware_host.emulator.parts.part_registers import PartRegisters
-from firmware_host.emulator.parts.triad import Remembered
+from firmware_host.emulator.parts.triad import CachedMotion
 from firmware_host.parts import GYROSCOPES
 
 WIRED = GYROSCOPES["adis16465"]
@@ -26,7 +26,7 @@ _FILT_CTRL, _RANG_MDL, _MSC_CTRL, _DEC_RATE, _GLOB_CMD, _PROD_ID = 0x5C, 0x5E, 0
 # Registers that can be written, with their values after reset and the bits that have a model. Writing a one to any
 # other bit that is zero after reset fails the run: it would switch on a correction or clock that is not simulated.
 _RESET_AND_BITS = {
-    **dict.fromkeys(range(0x40, 0x4C, 2), (0x0000, 0xFFFF)),  # what the user wants added to the rates, 32 bits an axis
+    **dict.fromkeys(range(0x40, 0x4C, 2), (0x0000, 0xFFFF)),  # the user's bias of the rates, 32 bits an axis
     **dict.fromkeys(range(0x4C, 0x58, 2), (0x0000, 0x0000)),  # the same of the accelerations
     _FILT_CTRL: (0x0000, 0x0007),
     _MSC_CTRL: (0x00C1, 0x00C1),  # data-ready polarity, alignment and acceleration compensation; no sync
@@ -34,7 +34,7 @@ _RESET_AND_BITS = {
     _DEC_RATE: (0x0000, 0x07FF),
     0x66: (0x070A, 0x070A),  # NULL_CNFG
 }
-# A setting acts, and reads back, only so long after its last byte was written (no-OS, adis1646x_timeouts)
+# The delay after which a setting acts and reads back (no-OS, adis1646x_timeouts)
 _UPDATE_S = {_FILT_CTRL: 30e-6, _DEC_RATE: 30e-6, _MSC_CTRL: 200e-6}
 _DR_ACTIVE_HIGH = 0x0001
 _XG_BIAS_LOW = 0x40
@@ -47,25 +47,28 @@ _OUTPUTS = 6  # x, y, z of the rates, then of the accelerations: two words each,
 _RATE_HZ = 2000
 _STALL_S = 16e-6  # data sheet, table 2, tSTALL
 _RESET_S = 0.255  # no-OS: after a software reset
-_UPDATING_S = 20e-6  # the data-ready line rests so long while the registers change: the model's own, no figure known
+_UPDATING_S = (
+    20e-6  # inactive time of the data-ready line during an update; assumed, without a figure in the data sheet
+)
 _BURST_WORDS = 10
 
 
-_WORDS = struct.Struct(">9H")  # of a burst, without their sum
+_WORDS = struct.Struct(">9H")  # of a burst, without the checksum
 
 
 class Adis16465:
     """The module on the SPI bus, in the variant of the range `range_deg_s`: 125 (-1), 500 (-2) or 2000 (-3).
 
-    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each update of the
-    output registers, at its instant, and noise is drawn per update. `acceleration`: see `Accelerometer`.
-    `oscillator_ppm`: how fast its sample clock runs.
-    `ready_s`: when it has started up (the maker's driver allows 310 ms from power-up); before, it is silent.
+    - `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`. The motion is evaluated once for each update of
+      the output registers, at its instant, and noise is drawn per update.
+    - `acceleration`: see `Accelerometer`.
+    - `oscillator_ppm`: the error of its sample clock.
+    - `ready_s`: the end of its start-up (the maker's driver allows 310 ms from power-up), until which it is silent.
 
-    The part samples from power-up on and cannot be told to be quiet. With averaging (DEC_RATE, FILT_CTRL) its outputs
-    have 32 bits, and the upper 16 alone, which a burst carries, are rounded down. Averages and filters themselves are
-    not simulated: `truth` states the noise of an output. What was written to its bias registers it keeps until its next
-    software reset, whatever becomes of the board; a data path that was `overrun` says so until then.
+    The part samples from power-up on and cannot be stopped. With averaging (DEC_RATE, FILT_CTRL) its outputs have 32
+    bits, and the upper 16 alone, in a burst, are rounded down. Averages and filters themselves are not simulated:
+    `truth` states the noise of an output. Its bias registers hold their values until its next software reset,
+    independent of the board; `overrun` sets the flag of an overrun data path until then.
     """
 
     name = "ADIS16465"
@@ -90,16 +93,16 @@ class Adis16465:
         self.fault: Fault | None = None
         self._range_model, counts_per_deg_s = _RANGES[range_deg_s]
         self._per_count = math.radians(1 / counts_per_deg_s) / 65536  # of the 32-bit number
-        motion = Remembered(motion_at)
+        motion = CachedMotion(motion_at)
         self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
         self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)
         self._speed = 1 + oscillator_ppm * 1e-6
         self._registers = PartRegisters(self.name, "adis16465.py", _RESET_AND_BITS, digits=4)
         self._show_temperature(ready_s)
-        self._command: int | None = None  # first byte of the frame under way
-        self._burst: bytes | None = None  # what is left to be clocked out
-        self._answer = 0  # to the frame before
-        self._ended_s = -math.inf  # when chip select last rose
+        self._command: int | None = None  # first byte of the pending frame
+        self._burst: bytes | None = None  # rest to be clocked out
+        self._answer = 0  # to the previous frame
+        self._ended_s = -math.inf  # time of the last rise of chip select
         self._frames = 0  # since chip select fell
         self._diagnosis = 0
         self._counter = 0
@@ -107,11 +110,11 @@ class Adis16465:
         self._next_update_s = self._next_change_s = math.inf
         self._reset(ready_s)
 
-    # --- what the board sees
+    # --- the board's side
 
     @property
     def spi_max_hz(self) -> float:
-        """A burst goes at 1 MHz, all else at 2 MHz (data sheet, table 2)."""
+        """The clock limit: 1 MHz in a burst, otherwise 2 MHz (data sheet, table 2)."""
         return 1e6 if self._burst is not None or self._command == _GLOB_CMD else 2e6
 
     @property
@@ -164,10 +167,10 @@ class Adis16465:
             self._answer = self._read(address & ~1)
         return answer
 
-    def foretell(self) -> bytes:
-        """All of a burst: it is of the moment at which it began."""
-        told, self._burst = self._burst or b"", self._burst and b""
-        return told
+    def predict(self) -> bytes:
+        """Return all of a burst, whose data are of its start."""
+        predicted, self._burst = self._burst or b"", self._burst and b""
+        return predicted
 
     # --- frames
 
@@ -181,7 +184,7 @@ class Adis16465:
             )
 
     def _burst_data(self) -> bytes:
-        words = [self._take_diagnosis(), *(self._shown(output) >> 16 for output in range(_OUTPUTS))]
+        words = [self._take_diagnosis(), *(self._read_output(output) >> 16 for output in range(_OUTPUTS))]
         data = _WORDS.pack(*[word & 0xFFFF for word in (*words, self._temperature, self._counter)])
         return data + (sum(data) & 0xFFFF).to_bytes(2, "big")
 
@@ -217,33 +220,33 @@ class Adis16465:
             return self._take_diagnosis()
         if _X_GYRO_LOW <= address < _TEMP_OUT:
             output, high = divmod(address - _X_GYRO_LOW, 4)
-            return self._shown(output) >> (16 if high else 0) & 0xFFFF
+            return self._read_output(output) >> (16 if high else 0) & 0xFFFF
         fixed = {
-            0x00: 0,  # reserved: what drivers ask for to clock an answer out
+            0x00: 0,  # reserved: drivers read it to clock an answer out
             _TEMP_OUT: self._temperature,
             _DATA_CNTR: self._counter,
             _RANG_MDL: self._range_model,
             _PROD_ID: _ADIS16470 if self.fault is Fault.OTHER_PART else PROD_ID,
         }
         if address not in fixed:
-            raise self._registers.unmodelled("read of", address)
+            raise self._registers.describe_unmodelled("read of", address)
         return fixed[address]
 
     def _take_diagnosis(self) -> int:
-        """Reading clears what does not stand."""
+        """Return the diagnosis and clear all flags but a persistent one."""
         diagnosis, self._diagnosis = self._diagnosis, 0
         return diagnosis | (_OVERRUN if self.overrun else 0)
 
     def _write(self, address: int, byte: int, time_s: float) -> None:
-        """One byte of a register; an odd address is its upper byte."""
+        """Write one byte of a register; an odd address is its upper byte."""
         register, shift = address & ~1, 8 * (address & 1)
         if register == _GLOB_CMD:
             self._command_part(byte << shift, time_s)
             return
         if register not in self._registers.values:
-            raise self._registers.unmodelled("write to", address)
-        _when, before = self._waiting.get(register, (0.0, self._registers.values[register]))
-        value = before & ~(0xFF << shift) | byte << shift
+            raise self._registers.describe_unmodelled("write to", address)
+        _when, waiting_value = self._waiting.get(register, (0.0, self._registers.values[register]))
+        value = waiting_value & ~(0xFF << shift) | byte << shift
         self._registers.check(register, value)
         self._waiting[register] = time_s + _UPDATE_S.get(register, 0.0), value
 
@@ -258,7 +261,7 @@ class Adis16465:
             self._reset(time_s + _RESET_S)
 
     def _settle_settings(self, time_s: float) -> None:
-        """Let the settings act whose time has come."""
+        """Apply the settings that are due."""
         if not self._waiting:
             return
         for register, (when_s, value) in list(self._waiting.items()):
@@ -280,14 +283,14 @@ class Adis16465:
         return samples / (_RATE_HZ * self._speed)
 
     def _update(self, time_s: float) -> None:
-        """New output registers; the data-ready line tells of them and rests shortly before the next."""
+        """Set new output registers; the data-ready line signals them and is inactive shortly before the next."""
         self._show_temperature(time_s)
         rates = self._gyroscope.read(time_s)
         self._counts = [
-            saturated(round(rate / self._per_count) + self._user_bias(axis), bits=32) for axis, rate in enumerate(rates)
+            saturate(round(rate / self._per_count) + self._user_bias(axis), bits=32) for axis, rate in enumerate(rates)
         ]
         force_m_s2 = self._accelerometer.read(time_s)
-        self._counts += [saturated(round(component / _M_S2_PER_COUNT), bits=32) for component in force_m_s2]
+        self._counts += [saturate(round(component / _M_S2_PER_COUNT), bits=32) for component in force_m_s2]
         self._counter = self._counter + 1 & 0xFFFF
         self._data_valid = True
         self._samples += 1 + self._registers.values[_DEC_RATE]
@@ -295,15 +298,15 @@ class Adis16465:
         self._next_change_s = self._next_update_s - _UPDATING_S
 
     def _user_bias(self, axis: int) -> int:
-        """The user's bias of an axis in the 32-bit rate's counts (Linux, adis16475.c: calibbias)."""
+        """Return the user's bias of an axis in counts of the 32-bit rate (Linux, adis16475.c: calibbias)."""
         low, high = (self._registers.values[_XG_BIAS_LOW + 4 * axis + half] for half in (0, 2))
         return (high << 16 | low) - (1 << 32 if high >> 15 else 0)
 
     def _show_temperature(self, time_s: float) -> None:
-        self._temperature = saturated(round(self._gyroscope.temperature_c(time_s) * 10)) & 0xFFFF
+        self._temperature = saturate(round(self._gyroscope.temperature_c(time_s) * 10)) & 0xFFFF
 
-    def _shown(self, output: int) -> int:
-        """An output as the 32-bit register pair shows it: without averaging, the lower 16 bits are empty."""
+    def _read_output(self, output: int) -> int:
+        """Return an output as its 32-bit register pair: without averaging, the lower 16 bits are empty."""
         if self._registers.values[_DEC_RATE] or self._registers.values[_FILT_CTRL]:
             return self._counts[output]
-        return saturated(self._counts[output] + 0x8000 >> 16) << 16
+        return saturate(self._counts[output] + 0x8000 >> 16) << 16

@@ -1,32 +1,28 @@
-"""The bias of a triad in the run: flicker noise and a random walk, functions of time that begin at zero.
+"""The bias drift of a triad: flicker noise and a random walk, functions of time that begin at zero.
 
 Flicker noise is a sum of Gauss-Markov processes with correlation times a decade apart (IEEE Std 952-1997, annexes B and
-C): a variance of σ² for each makes a floor of the Allan deviation of √(2 ln 2 / ln 10) σ.
+C): a variance of σ² for each gives a floor of the Allan deviation of √(2 ln 2 / ln 10) σ.
 """
 
 from math import exp, log, sqrt
 
 import numpy as np
 
-STEP_S = 0.1  # between knots; in between, straight lines
+STEP_S = 0.1  # between knots, with linear interpolation
 _BLOCK = 256
-_CORRELATION_TIMES = (0.01, 0.1, 1.0, 10.0)  # of the time in whose middle the floor lies
+_CORRELATION_TIMES = (0.01, 0.1, 1.0, 10.0)  # relative to the time at the middle of the floor
 _SIGMA_PER_FLOOR = sqrt(log(10.0) / (2.0 * log(2.0)))
 
 
 class Drift:
-    """Three axes that drift apart, in the units of their readings. `time_s` of its methods: since the world began.
+    """The drift of three axes, in the units of their readings. `time_s` of its methods: since the world began.
 
     `instability`: floor of the Allan deviation, flat around an averaging time of `instability_time_s`;
-    `random_walk_per_sqrt_s`: standard deviation of what a second adds, growing with the root of time.
+    `random_walk_per_sqrt_s`: standard deviation of the change in a second, growing with the root of time.
     """
 
     def __init__(
-        self,
-        instability: float,
-        instability_time_s: float,
-        random_walk_per_sqrt_s: float,
-        seed: np.random.SeedSequence,
+        self, instability: float, instability_time_s: float, random_walk_per_sqrt_s: float, seed: np.random.SeedSequence
     ) -> None:
         self._random = np.random.default_rng(seed)
         times_s = instability_time_s * np.array(_CORRELATION_TIMES)
@@ -37,22 +33,22 @@ class Drift:
         self._walk = np.zeros(3)
         self._knots = [[0.0, 0.0, 0.0]]
 
-    def at(self, time_s: float) -> list[float]:
-        """The bias at one time, (3,)."""
-        before, part = divmod(time_s / STEP_S, 1.0)
-        knot = max(int(before), 0)
-        self._reach(knot)
-        return [a + part * (b - a) for a, b in zip(self._knots[knot], self._knots[knot + 1], strict=True)]
+    def evaluate(self, time_s: float) -> list[float]:
+        """Return the bias at one time, (3,)."""
+        position, fraction = divmod(time_s / STEP_S, 1.0)
+        knot = max(int(position), 0)
+        self._extend(knot)
+        return [a + fraction * (b - a) for a, b in zip(self._knots[knot], self._knots[knot + 1], strict=True)]
 
-    def at_times(self, time_s: np.ndarray) -> np.ndarray:
-        """The bias at times (n,), (n, 3)."""
-        self._reach(int(np.max(time_s, initial=0.0) / STEP_S))
+    def evaluate_all(self, time_s: np.ndarray) -> np.ndarray:
+        """Return the bias at times (n,), (n, 3)."""
+        self._extend(int(np.max(time_s, initial=0.0) / STEP_S))
         knots = np.array(self._knots)
-        places = np.arange(len(knots)) * STEP_S
-        return np.column_stack([np.interp(time_s, places, knots[:, axis]) for axis in range(3)])
+        knot_times_s = np.arange(len(knots)) * STEP_S
+        return np.column_stack([np.interp(time_s, knot_times_s, knots[:, axis]) for axis in range(3)])
 
-    def _reach(self, knot: int) -> None:
-        """Go on until there are knots on both sides."""
+    def _extend(self, knot: int) -> None:
+        """Add knots until there are some on both sides."""
         while len(self._knots) < knot + 2:
             fresh = self._random.standard_normal((_BLOCK, len(self._flicker) + 1, 3))
             flickers, steps = self._fresh * fresh[:, 1:], self._step * fresh[:, 0]

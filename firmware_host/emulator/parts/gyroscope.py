@@ -1,4 +1,4 @@
-"""What all simulated gyroscopes share: from the true motion, through the part's errors and its noise, to counts."""
+"""The common part of all simulated gyroscopes: from the true motion, through errors and noise, to counts."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -7,27 +7,32 @@ from typing import Any
 
 import numpy as np
 
-from firmware_host.emulator.parts.triad import Bend, Die, Seed, Temperature, Triad, TriadErrors, saturated
+from firmware_host.emulator.parts.triad import Die, Nonlinearity, Seed, Temperature, Triad, TriadErrors, saturate
 
-__all__ = ["GyroTruth", "Gyroscope", "Temperature", "Warming", "readings", "saturated"]
+__all__ = ["GyroTruth", "Gyroscope", "Temperature", "Warming", "readings", "saturate"]
 
 
 @dataclass(frozen=True, slots=True)
 class GyroTruth:
-    """What the simulated gyroscope really does, in the model g = K (m + b) with m the reading (SIX, Eq. (3)).
+    """The true errors of a simulated gyroscope, in the model g = K (m + b) with m the reading (SIX, Eq. (3)).
 
-    `scale`: diagonal of K; `bias_rad_s`: b, in the units of the reading; `noise_rad_s`: standard deviation of one
-    reading; `non_orthogonality_rad` (xy, xz, yz): the y axis leans by xy towards x, the z axis by xz towards x and
-    by yz towards y.
+    - `scale`: the diagonal of K.
+    - `bias_rad_s`: b, in the units of the reading.
+    - `noise_rad_s`: the standard deviation of one reading.
+    - `non_orthogonality_rad` (xy, xz, yz): the y axis is tilted by xy towards x, the z axis by xz towards x and by yz
+      towards y.
 
-    What the model leaves out, and a real part has: `scale_per_k` and `bias_rad_s_per_k`, by how much K (as a fraction)
-    and b grow per degree above `holds_at_c`; `g_sensitivity_rad_s_per_g` (3 rows, or none): what a reading gains per g
-    of specific force along x, y, z; `nonlinearity_even_per_rad_s` and `nonlinearity_odd_per_rad_s`: by which fraction
-    a reading grows with the rate along its axis, and with the rate's magnitude; a low-pass of first order with
-    `bandwidth_hz` (none: no filter), `delay_s` late, that noise and bias do not pass; the bias' drift, see `Drift`;
-    what K and b grow by with the square of these degrees (`…_per_k2`); `hysteresis_rad_s`, by which b is larger after
-    warming and smaller after cooling; the `die`, whose temperature all this follows, where it is not that of the
-    thermometer.
+    Errors beyond the model:
+
+    - `scale_per_k`, `bias_rad_s_per_k`, `scale_per_k2`, `bias_rad_s_per_k2`: the change of K (as a fraction) and b with
+      the degrees above `holds_at_c`, and with their square.
+    - `g_sensitivity_rad_s_per_g` (3 rows, or none): the change of a reading per g of specific force along x, y, z.
+    - `nonlinearity_even_per_rad_s`, `nonlinearity_odd_per_rad_s`: the fraction by which a reading grows with the rate
+      along its axis, and with the rate's magnitude.
+    - `bandwidth_hz`, `delay_s`: a low-pass of first order (None: no filter) and a delay, which noise and bias bypass.
+    - `instability_rad_s`, `instability_time_s`, `random_walk_rad_s_per_sqrt_s`: the bias drift, see `Drift`.
+    - `hysteresis_rad_s`: b is larger by it after warming and smaller after cooling.
+    - `die`: the temperature that all this follows, if it is not the thermometer's.
     """
 
     scale: Sequence[float] = (1.0, 1.0, 1.0)
@@ -53,7 +58,7 @@ class GyroTruth:
 
 @dataclass(frozen=True, slots=True)
 class Warming:
-    """The temperature of a part that gets power at `begins_s`: from `start_c` to `final_c`, exponentially."""
+    """The temperature of a part with power from `begins_s` on: from `start_c` to `final_c`, exponentially."""
 
     start_c: float
     final_c: float
@@ -61,16 +66,16 @@ class Warming:
     begins_s: float = 0.0
 
     def __call__(self, time_s: float) -> float:
-        since_s = max(0.0, time_s - self.begins_s)
-        return self.final_c + (self.start_c - self.final_c) * math.exp(-since_s / self.time_constant_s)
+        powered_s = max(0.0, time_s - self.begins_s)
+        return self.final_c + (self.start_c - self.final_c) * math.exp(-powered_s / self.time_constant_s)
 
 
 class Gyroscope:
     """Three sensing axes with the errors of `truth`.
 
-    `motion_at(time_s)`: true angular rate in the part's own axes, 3 floats, rad/s, and for a part with g-sensitivity
-    the specific force there, 3 floats more, g; asked once for each reading, `truth.delay_s` back. `seed`: of noise and
-    drift; the noise is drawn per reading. `temperature_c`: the die's, or a function of time.
+    `motion_at(time_s)`: the true angular rate in the part's own axes, 3 floats, rad/s, and for a part with
+    g-sensitivity the specific force there, 3 more floats, g; evaluated once for each reading, `truth.delay_s` earlier.
+    `seed`: of noise and drift; the noise is drawn per reading. `temperature_c`: the die's, or a function of time.
     """
 
     def __init__(
@@ -83,48 +88,49 @@ class Gyroscope:
         self._motion_at = motion_at
         self._truth = truth
         self._triad = _triad(truth, seed, temperature_c)
-        self._bend = _bend(truth)
+        self._nonlinearity = _nonlinearity(truth)
         self.temperature_c = self._triad.temperature_c
 
     def read(self, time_s: float, settled: float = 1.0) -> list[float]:
-        """The next reading, (3,) rad/s, taken at `time_s`; of the motion only the fraction `settled` is felt."""
+        """Return the next reading, (3,) rad/s, at `time_s`; only the fraction `settled` of the motion is sensed."""
         motion = self._motion_at(time_s - self._truth.delay_s)
         if settled != 1.0:
             motion = [settled * component for component in motion]
         warmer_k = self._triad.warmer_k(time_s)
-        return self._triad.read(time_s, _felt(self._triad, self._truth, motion, warmer_k, self._bend), warmer_k)
+        return self._triad.read(
+            time_s, _sense_motion(self._triad, self._truth, motion, warmer_k, self._nonlinearity), warmer_k
+        )
 
 
 def readings(
-    truth: GyroTruth,
-    time_s: np.ndarray,
-    motion: np.ndarray,
-    seed: Seed,
-    temperature_c: float | Temperature = 25.0,
+    truth: GyroTruth, time_s: np.ndarray, motion: np.ndarray, seed: Seed, temperature_c: float | Temperature = 25.0
 ) -> np.ndarray:
-    """The readings (n, 3) rad/s that a `Gyroscope` would take at `time_s` (n,) of a `motion` (n, 3 or 6), before
-    rounding to counts. The motion of `truth.delay_s` before is interpolated in straight lines.
+    """Return the unrounded readings (n, 3), rad/s, of a `Gyroscope` at `time_s` (n,) for a `motion` (n, 3 or 6).
+
+    The motion is delayed by `truth.delay_s`, with linear interpolation.
     """
     late_s = time_s - truth.delay_s
-    then = [np.interp(late_s, time_s, column) for column in motion.T] if truth.delay_s else list(motion.T)
+    delayed = [np.interp(late_s, time_s, column) for column in motion.T] if truth.delay_s else list(motion.T)
     triad = _triad(truth, seed, temperature_c)
     warmer_k = triad.all_warmer_k(time_s)
-    return triad.readings(time_s, _felt(triad, truth, then, warmer_k, _bend(truth)), warmer_k)
+    return triad.readings(time_s, _sense_motion(triad, truth, delayed, warmer_k, _nonlinearity(truth)), warmer_k)
 
 
-def _felt(triad: Triad, truth: GyroTruth, motion: Sequence[Any], warmer_k: Any, bend: Bend | None) -> list[Any]:
-    """What the elements make of a motion of 3 or 6 components, floats or arrays, before bias and noise."""
-    felt = triad.sense(motion[:3], warmer_k, bend)
+def _sense_motion(
+    triad: Triad, truth: GyroTruth, motion: Sequence[Any], warmer_k: Any, nonlinearity: Nonlinearity | None
+) -> list[Any]:
+    """Return the sensed rates for a motion of 3 or 6 components, floats or arrays, before bias and noise."""
+    sensed = triad.sense(motion[:3], warmer_k, nonlinearity)
     if truth.g_sensitivity_rad_s_per_g:
         x, y, z = motion[3:]
-        rows = zip(felt, truth.g_sensitivity_rad_s_per_g, strict=True)
-        felt = [value + (row[0] * x + row[1] * y + row[2] * z) for value, row in rows]
-    return felt
+        rows = zip(sensed, truth.g_sensitivity_rad_s_per_g, strict=True)
+        sensed = [value + (row[0] * x + row[1] * y + row[2] * z) for value, row in rows]
+    return sensed
 
 
-def _bend(truth: GyroTruth) -> Bend | None:
+def _nonlinearity(truth: GyroTruth) -> Nonlinearity | None:
     even, odd = truth.nonlinearity_even_per_rad_s, truth.nonlinearity_odd_per_rad_s
-    return (lambda along: along * (1.0 + even * along + odd * abs(along))) if even or odd else None
+    return (lambda rate: rate * (1.0 + even * rate + odd * abs(rate))) if even or odd else None
 
 
 def _triad(truth: GyroTruth, seed: Seed, temperature_c: float | Temperature) -> Triad:

@@ -1,6 +1,6 @@
 """The ICM-42688-P's gyroscope, accelerometer and thermometer at register level (data sheet DS-000347, revision 1.8).
 
-Its FIFO, motion functions, time stamp, I2C and I3C, and the register banks 1 to 4 are left out.
+Not modelled: its FIFO, motion functions, time stamp, I2C and I3C, and the register banks 1 to 4.
 """
 
 import math
@@ -12,14 +12,14 @@ import numpy as np
 from firmware_host.emulator.chip.bus import Violation
 from firmware_host.emulator.chip.spi_device import Fault
 from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer, AccelerometerTruth
-from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
+from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturate
 from firmware_host.emulator.parts.part_registers import Conversions, PartRegisters
-from firmware_host.emulator.parts.triad import Remembered
+from firmware_host.emulator.parts.triad import CachedMotion
 from firmware_host.parts import GYROSCOPES
 
 WIRED = GYROSCOPES["icm42688p"]
 WHO_AM_I = 0x47
-_ICM42605 = 0x42  # what a sibling with the same registers answers
+_ICM42605 = 0x42  # the identity of a sibling with the same registers
 _DEVICE_CONFIG, _INT_CONFIG = 0x11, 0x14
 _TEMP_DATA1, _GYRO_DATA_Z0, _INT_STATUS = 0x1D, 0x2A, 0x2D
 _INTF_CONFIG0, _PWR_MGMT0, _GYRO_CONFIG0, _ACCEL_CONFIG0 = 0x4C, 0x4E, 0x4F, 0x50
@@ -50,7 +50,7 @@ _RESET_AND_BITS = {
 _SOFT_RESET, _PUSH_PULL_HIGH, _HOLD_LAST, _BIG_ENDIAN = 0x01, 0x03, 0x80, 0x10
 _ASYNC_RESET, _DRDY, _RESET_DONE = 0x10, 0x08, 0x10
 _BOTH_LOW_NOISE = 0x0F
-_RATES_HZ = {  # GYRO_ODR and ACCEL_ODR in low-noise mode (sections 14.37 and 14.38), as far as pulses of 100 µs go
+_RATES_HZ = {  # GYRO_ODR and ACCEL_ODR in low-noise mode (sections 14.37 and 14.38), up to pulses of 100 µs
     0x5: 2000.0, 0x6: 1000.0, 0xF: 500.0, 0x7: 200.0, 0x8: 100.0, 0x9: 50.0, 0xA: 25.0, 0xB: 12.5,
 }  # fmt: skip
 _COUNTS_PER_DEG_S = (16.4, 32.8, 65.5, 131.0, 262.0, 524.3, 1048.6, 2097.2)  # table 1; 2000, 1000, … 15.625 °/s
@@ -58,7 +58,7 @@ _COUNTS_PER_G = (2048, 4096, 8192, 16384)  # table 2; 16, 8, 4, 2 g
 _COUNTS_PER_DEG_C, _ROOM_C = 132.48, 25.0  # section 4.13
 _PULSE_S = 100e-6  # of the interrupt line (section 14.50)
 _RESET_S = 1e-3  # section 14.1: no other register may be accessed before
-_QUIET_S = 200e-6  # section 14.36: no register may be written so long after a sensor was switched on
+_QUIET_S = 200e-6  # section 14.36: no register may be written in this time after a sensor was switched on
 _START_S = 0.030  # table 1: from enabling the gyroscope until its drive is ready
 _BURST_S = 60e-6  # no reading of the outputs takes longer
 
@@ -66,14 +66,14 @@ _BURST_S = 60e-6  # no reading of the outputs takes longer
 class Icm42688P:
     """The part on the SPI bus.
 
-    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each conversion, at
-    its instant, and noise is drawn per conversion. `acceleration`: see `Accelerometer`. `oscillator_ppm`: how fast the
-    part's own oscillator makes its data rate; the data sheet allows a percent (section 4.10).
+    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is evaluated once for each conversion, at
+    its instant, and noise is drawn per conversion. `acceleration`: see `Accelerometer`. `oscillator_ppm`: the error of
+    the part's own oscillator, and so of its data rate; the data sheet allows a percent (section 4.10).
 
     It converts while both sensors are in low-noise mode at one data rate and the data-ready interrupt is routed to
-    INT1; otherwise it converts nothing, and reading its outputs fails the run. The data sheet does not say that outputs
-    stand still while they are read: here a conversion in the middle of a reading shows in what is left of it. The
-    motion comes in linearly while the gyroscope starts.
+    INT1; otherwise it does not convert, and reading its outputs fails the run. The data sheet does not state that
+    outputs are frozen during a read: here a conversion during a read changes the rest of it. The motion ramps up
+    linearly while the gyroscope starts.
     """
 
     name = "ICM-42688-P"
@@ -96,7 +96,7 @@ class Icm42688P:
         self.interrupt = interrupt
         self.fault: Fault | None = None
         self._pulse_end_s = math.inf
-        motion = Remembered(motion_at)
+        motion = CachedMotion(motion_at)
         self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
         self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)
         self._registers = PartRegisters(self.name, "icm42688p.py", _RESET_AND_BITS)
@@ -107,7 +107,7 @@ class Icm42688P:
         self._reset()
         self._usable_s = self._writable_s = -math.inf
 
-    # --- what the board sees
+    # --- the board's side
 
     @property
     def next_event_s(self) -> float:
@@ -151,17 +151,17 @@ class Icm42688P:
         self._write(address, byte, time_s)
         return 0xFF
 
-    def foretell(self) -> bytes:
-        """Reading the outputs changes nothing; they stand still if no conversion is due before any reading ends."""
+    def predict(self) -> bytes:
+        """Return the outputs if no conversion is due before any read ends; reading them changes nothing."""
         address = self._address
         if address is None or not self._reading or not _TEMP_DATA1 <= address <= _GYRO_DATA_Z0:
             return b""
         if self._bank or not self._converts or self._conversions.next_s < self._selected_s + _BURST_S:
             return b""
-        told = self._output[address - _TEMP_DATA1 :]
-        told = told[: len(told) & ~1]
-        self._address = address + len(told)
-        return told
+        predicted = self._output[address - _TEMP_DATA1 :]
+        predicted = predicted[: len(predicted) & ~1]
+        self._address = address + len(predicted)
+        return predicted
 
     # --- registers
 
@@ -186,7 +186,7 @@ class Icm42688P:
         if address == _REG_BANK_SEL:  # in all banks
             return registers[address]
         if self._bank:
-            raise self._registers.unmodelled(f"read in bank {self._bank} of", address)
+            raise self._registers.describe_unmodelled(f"read in bank {self._bank} of", address)
         if address in registers:
             return registers[address]
         if address == _WHO_AM_I:
@@ -194,10 +194,10 @@ class Icm42688P:
         if address == _INT_STATUS:
             status, self._status = self._status, 0
             return status
-        if address == _GYRO_DATA_Z0 + 1:  # TMST_FSYNCH: nothing comes at FSYNC
+        if address == _GYRO_DATA_Z0 + 1:  # TMST_FSYNCH: no signal at FSYNC
             return 0
         if not _TEMP_DATA1 <= address <= _GYRO_DATA_Z0:
-            raise self._registers.unmodelled("read of", address)
+            raise self._registers.describe_unmodelled("read of", address)
         if not self._converts:
             raise Violation(
                 "sensor_setup",
@@ -209,7 +209,7 @@ class Icm42688P:
     def _write(self, address: int, value: int, time_s: float) -> None:
         registers = self._registers.values
         if self._bank and address != _REG_BANK_SEL:
-            raise self._registers.unmodelled(f"write in bank {self._bank} to", address)
+            raise self._registers.describe_unmodelled(f"write in bank {self._bank} to", address)
         self._registers.check(address, value)
         if time_s < self._writable_s:
             raise Violation(
@@ -222,11 +222,11 @@ class Icm42688P:
             self._reset()
             self._usable_s = time_s + _RESET_S
             return
-        before, registers[address] = registers[address], value
-        if address == _PWR_MGMT0 and value != before and value:
+        old_value, registers[address] = registers[address], value
+        if address == _PWR_MGMT0 and value != old_value and value:
             self._on_s = time_s
             self._writable_s = time_s + _QUIET_S
-        elif value != before and registers[_PWR_MGMT0] and address not in (
+        elif value != old_value and registers[_PWR_MGMT0] and address not in (
             _PWR_MGMT0, _GYRO_CONFIG0, _ACCEL_CONFIG0, _REG_BANK_SEL,
         ):  # fmt: skip
             raise Violation(
@@ -237,7 +237,7 @@ class Icm42688P:
         self._start(time_s)
 
     def _start(self, time_s: float) -> None:
-        """Conversions begin anew, if the part is to convert at all."""
+        """Restart conversions, if the part is set up to convert."""
         registers = self._registers.values
         code = registers[_GYRO_CONFIG0] & 0x0F
         runs = registers[_PWR_MGMT0] == _BOTH_LOW_NOISE and registers[_INT_SOURCE0] & _DRDY
@@ -258,7 +258,7 @@ class Icm42688P:
     # --- measuring
 
     def _convert(self, time_s: float) -> None:
-        """One conversion of all axes, in the output registers from now on."""
+        """Convert all axes, into the output registers."""
         registers = self._registers.values
         settled = min(1.0, (time_s - self._on_s) / _START_S)
         counts_per_g = _COUNTS_PER_G[registers[_ACCEL_CONFIG0] >> 5 & 3]
@@ -269,7 +269,7 @@ class Icm42688P:
             *(component / STANDARD_GRAVITY_M_S2 * counts_per_g for component in force_m_s2),
             *(rate_rad_s / self._per_count for rate_rad_s in rates),
         )
-        counts = [saturated(round(number)) for number in numbers]
+        counts = [saturate(round(number)) for number in numbers]
         if not registers[_INTF_CONFIG0] & _HOLD_LAST:  # section 14.34: the two lowest numbers would mean "invalid"
             counts = [max(-32766, count) for count in counts]
         self._output = struct.pack(">7h", *counts)

@@ -1,6 +1,6 @@
 """The LSM6DSV16X's gyroscope, accelerometer and thermometer at register level (data sheet DS13510, revision 4).
 
-Its FIFO, embedded functions, sensor hub, OIS and EIS chains, Qvar, I2C and I3C are left out.
+Not modelled: its FIFO, embedded functions, sensor hub, OIS and EIS chains, Qvar, I2C and I3C.
 """
 
 import math
@@ -12,14 +12,14 @@ import numpy as np
 from firmware_host.emulator.chip.bus import Violation
 from firmware_host.emulator.chip.spi_device import Fault
 from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer, AccelerometerTruth
-from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
+from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturate
 from firmware_host.emulator.parts.part_registers import Conversions, OutputRegisters, PartRegisters
-from firmware_host.emulator.parts.triad import Remembered
+from firmware_host.emulator.parts.triad import CachedMotion
 from firmware_host.parts import GYROSCOPES
 
 WIRED = GYROSCOPES["lsm6dsv16x"]
 WHO_AM_I = 0x70
-_LSM6DSO = 0x6C  # what an older part of the maker answers
+_LSM6DSO = 0x6C  # the identity of an older part of the maker
 _FUNC_CFG_ACCESS, _IF_CFG, _INT1_CTRL, _WHO_AM_I = 0x01, 0x03, 0x0D, 0x0F
 _CTRL1, _CTRL2, _CTRL3, _CTRL4, _CTRL6, _CTRL8, _HAODR_CFG = 0x10, 0x11, 0x12, 0x13, 0x15, 0x17, 0x62
 _STATUS_REG, _OUTX_L_G, _OUTZ_H_G, _OUTX_L_A = 0x1E, 0x22, 0x27, 0x28
@@ -27,14 +27,14 @@ _EIS_X_L = 0x2E  # of a chain that is off
 # Values after reset (section 8) and the bits that have a model. Writing a one to any other bit fails the run: it would
 # switch on a FIFO, filter, function or chain that is not simulated.
 _RESET_AND_BITS = {
-    _FUNC_CFG_ACCESS: (0x00, 0xC0),  # EMB_FUNC_REG_ACCESS, SHUB_REG_ACCESS: other registers in the place of these
+    _FUNC_CFG_ACCESS: (0x00, 0xC0),  # EMB_FUNC_REG_ACCESS, SHUB_REG_ACCESS: maps other registers here
     0x02: (0x23, 0x23),  # PIN_CTRL
     _IF_CFG: (0x00, 0x01),  # I2C_I3C_disable; pins push-pull, active high; four wires
     0x06: (0x00, 0x00),  # ODR_TRIG_CFG
     **dict.fromkeys(range(0x07, 0x0D), (0x00, 0x00)),  # FIFO_CTRL1 … 4, COUNTER_BDR_REG1 and 2
     _INT1_CTRL: (0x00, 0x02),  # INT1_DRDY_G
     0x0E: (0x00, 0x00),  # INT2_CTRL
-    _CTRL1: (0x00, 0x1F),  # OP_MODE_XL as far as high-accuracy ODR, ODR_XL
+    _CTRL1: (0x00, 0x1F),  # OP_MODE_XL up to high-accuracy ODR, ODR_XL
     _CTRL2: (0x00, 0x1F),  # OP_MODE_G, ODR_G
     _CTRL3: (0x44, 0x45),  # BDU, IF_INC, SW_RESET
     _CTRL4: (0x00, 0x02),  # DRDY_PULSED
@@ -53,26 +53,26 @@ _KEPT_BY_RESET = (0x02, _IF_CFG)  # sections 9.2 and 9.3
 _BDU, _IF_INC, _SW_RESET, _DRDY_PULSED, _DRDY_G = 0x40, 0x04, 0x01, 0x02, 0x02
 _XLDA, _GDA, _TDA = 0x01, 0x02, 0x04
 _HIGH_ACCURACY = 0x10  # OP_MODE: high-accuracy ODR
-_FASTEST_HZ = {0: 7680.0, 1: 8000.0, 2: 6400.0}  # table 20: at code 12, of each HAODR_SEL; each code less halves it
+_FASTEST_HZ = {0: 7680.0, 1: 8000.0, 2: 6400.0}  # table 20: at code 12, by HAODR_SEL; each lower code halves it
 _SLOWEST_CODE, _FASTEST_CODE = 3, 12
 _MDPS = {0: 4.375, 1: 8.75, 2: 17.5, 3: 35.0, 4: 70.0, 12: 140.0}  # table 3; 125, 250, 500, 1000, 2000, 4000 °/s
 _MG = (0.061, 0.122, 0.244, 0.488)  # table 3; 2, 4, 8, 16 g
 _COUNTS_PER_DEG_C, _ROOM_C = 256.0, 25.0  # table 6
 _PULSE_S = 65e-6  # section 9.17
-_RESET_S = 50e-6  # assumed: the data sheet has no figure; the bit says when it is over
+_RESET_S = 50e-6  # assumed, without a figure in the data sheet; the bit clears at its end
 _START_S = 0.030  # table 4: turn-on time of the gyroscope
 
 
 class Lsm6dsv16x:
     """The part on the SPI bus.
 
-    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each conversion, at
-    its instant, and noise is drawn per conversion. `acceleration`: see `Accelerometer`. `oscillator_ppm`: how fast the
-    part's own oscillator makes its data rate; in the high-accuracy mode within a percent (table 3).
+    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is evaluated once for each conversion, at
+    its instant, and noise is drawn per conversion. `acceleration`: see `Accelerometer`. `oscillator_ppm`: the error of
+    the part's own oscillator, and so of its data rate; within a percent in the high-accuracy mode (table 3).
 
-    It converts while both sensors are in that mode at one data rate; other modes fail the run. Each sensor's flag falls
-    when a high byte of its outputs is read. With pulses the line does not follow the flag, without them it does. The
-    motion comes in linearly while the gyroscope starts.
+    It converts while both sensors are in that mode at one data rate; other modes fail the run. A read of a high byte of
+    a sensor's outputs clears its flag. The interrupt line follows the flag unless it is pulsed. The motion ramps up
+    linearly while the gyroscope starts.
     """
 
     name = "LSM6DSV16X"
@@ -95,7 +95,7 @@ class Lsm6dsv16x:
         self.interrupt = interrupt
         self.fault: Fault | None = None
         self._pulse_end_s = math.inf
-        motion = Remembered(motion_at)
+        motion = CachedMotion(motion_at)
         self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
         self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)
         self._registers = PartRegisters(self.name, "lsm6dsv16x.py", _RESET_AND_BITS)
@@ -105,7 +105,7 @@ class Lsm6dsv16x:
         self._reset_end_s = -math.inf
         self._reset()
 
-    # --- what the board sees
+    # --- the board's side
 
     @property
     def next_event_s(self) -> float:
@@ -145,8 +145,8 @@ class Lsm6dsv16x:
         self._write(address, byte, time_s)
         return 0xFF
 
-    def foretell(self) -> bytes:
-        """No bytes: reading the outputs lowers flags, and a conversion may come in between."""
+    def predict(self) -> bytes:
+        """Return nothing: reading the outputs clears flags, and a conversion may occur in between."""
         return b""
 
     # --- registers
@@ -164,18 +164,18 @@ class Lsm6dsv16x:
     def _read(self, address: int, time_s: float) -> int:
         registers = self._registers.values
         if registers[_FUNC_CFG_ACCESS] and address != _FUNC_CFG_ACCESS:
-            raise self._registers.unmodelled("read, with FUNC_CFG_ACCESS set, of", address)
+            raise self._registers.describe_unmodelled("read, with FUNC_CFG_ACCESS set, of", address)
         if address in registers:
             resetting = address == _CTRL3 and time_s < self._reset_end_s
             return registers[address] | _SW_RESET * resetting
         if address == _WHO_AM_I:
             return _LSM6DSO if self.fault is Fault.OTHER_PART else WHO_AM_I
         if not _STATUS_REG <= address <= _EIS_X_L:
-            raise self._registers.unmodelled("read of", address)
+            raise self._registers.describe_unmodelled("read of", address)
         return self._read_output(address)
 
     def _read_output(self, address: int) -> int:
-        """One of the registers from the status on; what is between them and behind them reads 0."""
+        """Read one of the registers from the status on; those between and after them read 0."""
         if address < _OUTX_L_G:
             return int((self._status, 0, *self._temperature)[address - _STATUS_REG])
         if address == _EIS_X_L:
@@ -191,7 +191,7 @@ class Lsm6dsv16x:
     def _write(self, address: int, value: int, time_s: float) -> None:
         registers = self._registers.values
         if registers[_FUNC_CFG_ACCESS] and address != _FUNC_CFG_ACCESS:
-            raise self._registers.unmodelled("write, with FUNC_CFG_ACCESS set, to", address)
+            raise self._registers.describe_unmodelled("write, with FUNC_CFG_ACCESS set, to", address)
         self._registers.check(address, value)
         if time_s < self._reset_end_s:
             raise Violation(
@@ -203,10 +203,10 @@ class Lsm6dsv16x:
             self._reset()
             self._reset_end_s = time_s + _RESET_S
             return
-        before, registers[address] = registers[address], value
-        if value == before:
+        old_value, registers[address] = registers[address], value
+        if value == old_value:
             return
-        if address in (_CTRL1, _CTRL2) and before and (before ^ value) & _HIGH_ACCURACY:
+        if address in (_CTRL1, _CTRL2) and old_value and (old_value ^ value) & _HIGH_ACCURACY:
             raise Violation(
                 "sensor_setup",
                 f"LSM6DSV16X register 0x{address:02X} changes to or from the high-accuracy mode while it runs",
@@ -218,7 +218,7 @@ class Lsm6dsv16x:
             self._start(time_s)
 
     def _start(self, time_s: float) -> None:
-        """Conversions begin anew, if the part is to convert at all."""
+        """Restart conversions, if the part is set up to convert."""
         registers = self._registers.values
         self._conversions.stop()
         if not registers[_CTRL1] or not registers[_CTRL2]:
@@ -243,13 +243,13 @@ class Lsm6dsv16x:
     # --- measuring
 
     def _convert(self, time_s: float) -> None:
-        """One conversion of all axes, in the output registers from now on."""
+        """Convert all axes, into the output registers."""
         settled = min(1.0, (time_s - self._on_s) / _START_S)
         self._rates.show(self._gyroscope.read(time_s, settled), self._per_count)
         force_m_s2 = self._accelerometer.read(time_s, settled)
         self._forces.show([component / STANDARD_GRAVITY_M_S2 for component in force_m_s2], self._g_per_count)
         temperature = (self._gyroscope.temperature_c(time_s) - _ROOM_C) * _COUNTS_PER_DEG_C
-        self._temperature = struct.pack("<h", saturated(round(temperature)))
+        self._temperature = struct.pack("<h", saturate(round(temperature)))
         self._status |= _XLDA | _GDA | _TDA
         if self._registers.values[_CTRL4] & _DRDY_PULSED:
             self._pulse_end_s = time_s + _PULSE_S

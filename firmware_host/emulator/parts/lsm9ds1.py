@@ -1,5 +1,6 @@
-"""The LSM9DS1's gyroscope, accelerometer and thermometer at register level (datasheet DocID025715, sections 2, 3, 5, 6
-and 7).
+"""The LSM9DS1's gyroscope, accelerometer and thermometer at register level (data sheet DocID025715).
+
+By its sections 2, 3, 5, 6 and 7.
 """
 
 import math
@@ -10,14 +11,14 @@ import numpy as np
 from firmware_host.emulator.chip.bus import Violation
 from firmware_host.emulator.chip.spi_device import Fault
 from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer, AccelerometerTruth
-from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
+from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturate
 from firmware_host.emulator.parts.part_registers import Conversions, OutputRegisters, PartRegisters
-from firmware_host.emulator.parts.triad import Remembered
+from firmware_host.emulator.parts.triad import CachedMotion
 from firmware_host.parts import GYROSCOPES
 
 WIRED = GYROSCOPES["lsm9ds1"]
 WHO_AM_I = 0x68
-_LSM6DS3 = 0x69  # what another part of the maker answers
+_LSM6DS3 = 0x69  # the identity of another part of the maker
 _INT1_CTRL, _WHO_AM_I, _CTRL_REG1_G = 0x0C, 0x0F, 0x10
 _OUT_TEMP_L, _OUT_TEMP_H, _STATUS_REG, _OUT_X_L_G, _OUT_Z_H_G = 0x15, 0x16, 0x17, 0x18, 0x1D
 _CTRL_REG6_XL, _CTRL_REG8 = 0x20, 0x22
@@ -25,17 +26,17 @@ _STATUS_REG_AGAIN, _OUT_X_L_XL, _OUT_Z_H_XL = 0x27, 0x28, 0x2D
 # Registers of the accelerometer and gyroscope, with their values after reset and the bits that have a model. Writing
 # one to any other bit fails the run: it would switch on a filter, FIFO, sleep or format that is not simulated.
 _RESET_AND_BITS = {
-    0x04: (0x00, 0x00),  # ACT_THS: no sleep while nothing turns
+    0x04: (0x00, 0x00),  # ACT_THS: no sleep at rest
     0x05: (0x00, 0x00),  # ACT_DUR
     _INT1_CTRL: (0x00, 0x02),  # INT_DRDY_G
     0x0D: (0x00, 0x00),  # INT2_CTRL
-    _CTRL_REG1_G: (0x00, 0xFB),  # ODR_G, FS_G; BW_G acts on the second filter, which is not in the path
+    _CTRL_REG1_G: (0x00, 0xFB),  # ODR_G, FS_G; BW_G acts on the second filter, which is bypassed
     0x11: (0x00, 0x00),  # CTRL_REG2_G: output straight after the first filter
     0x12: (0x00, 0x00),  # CTRL_REG3_G: no high-pass filter, no low-power mode
     0x13: (0x00, 0x00),  # ORIENT_CFG_G
     0x1E: (0x38, 0x38),  # CTRL_REG4: all three axes
     0x1F: (0x38, 0x38),  # CTRL_REG5_XL
-    _CTRL_REG6_XL: (0x00, 0xFF),  # ODR_XL, FS_XL, and which filter, which is part of the truth
+    _CTRL_REG6_XL: (0x00, 0xFF),  # ODR_XL, FS_XL, and the filter, which is part of the truth
     0x21: (0x00, 0x00),  # CTRL_REG7_XL
     _CTRL_REG8: (0x04, 0x45),  # BDU, IF_ADD_INC, SW_RESET
     0x23: (0x00, 0x04),  # CTRL_REG9: I2C_DISABLE
@@ -54,18 +55,18 @@ _BDU, _IF_ADD_INC, _SW_RESET = 0x40, 0x04, 0x01
 class Lsm9ds1:
     """The accelerometer-gyroscope die on the SPI bus.
 
-    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each conversion, at
-    its instant, and noise is drawn per conversion, so that readings do not depend on when they are read.
-    `acceleration`: see `Accelerometer`. `oscillator_ppm`: how fast the part's own oscillator makes its data rate.
+    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is evaluated once for each conversion, at
+    its instant, and noise is drawn per conversion, so that readings do not depend on the time of reading.
+    `acceleration`: see `Accelerometer`. `oscillator_ppm`: the error of the part's own oscillator, and so of its data
+    rate.
 
-    Motion and truth are in right-handed axes, those of the part's magnetometer: the registers of both triads show x
-    with the other sign (figure 1). The accelerometer runs with the gyroscope or not at all: writing its control
-    register leaves it alone (section 3.1), and alone it has no model, so that nothing converts until CTRL_REG1_G is
-    written.
+    Motion and truth are in right-handed axes, those of the part's magnetometer: in the registers of both triads x has
+    the opposite sign (figure 1). The accelerometer runs only with the gyroscope: writing its control register selects
+    it alone (section 3.1), which has no model, so that conversions stop until CTRL_REG1_G is written.
 
-    The data-ready line stays high until the high byte of the z rate is read: a conversion that nobody read is
-    replaced by the next without a new edge. The datasheet says how many conversions after a start to discard, not how
-    wrong they are: here the turn rate comes in linearly over them.
+    The data-ready line stays high until the high byte of the z rate is read: the next conversion replaces an unread one
+    without a new edge. The data sheet states the number of conversions to discard after a start, not their error: here
+    the rate ramps up linearly over them.
     """
 
     name = "LSM9DS1"
@@ -87,7 +88,7 @@ class Lsm9ds1:
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None
-        motion = Remembered(motion_at)
+        motion = CachedMotion(motion_at)
         self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
         self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)
         self._registers = PartRegisters(self.name, "lsm9ds1.py", _RESET_AND_BITS)
@@ -96,7 +97,7 @@ class Lsm9ds1:
         self._reading = False
         self._reset()
 
-    # --- what the board sees
+    # --- the board's side
 
     @property
     def next_event_s(self) -> float:
@@ -129,8 +130,8 @@ class Lsm9ds1:
         self._write(address, byte, time_s)
         return 0xFF
 
-    def foretell(self) -> bytes:
-        """What the chip answers next: nothing is foretold, for what is read decides what is shown."""
+    def predict(self) -> bytes:
+        """Return nothing: each read changes the following data."""
         return b""
 
     # --- registers
@@ -160,7 +161,7 @@ class Lsm9ds1:
             if address == _OUT_TEMP_H:
                 self._status &= ~_TDA
             return self._temperature[address - _OUT_TEMP_L]
-        raise self._registers.unmodelled("read of", address)
+        raise self._registers.describe_unmodelled("read of", address)
 
     def _read_output(self, outputs: OutputRegisters, index: int, flag: int) -> int:
         if index == _LAST_OUTPUT:
@@ -180,7 +181,7 @@ class Lsm9ds1:
             self._conversions.stop()
 
     def _start(self, control: int, time_s: float) -> None:
-        """A new data rate or range: conversions begin anew."""
+        """Restart conversions with a new data rate or range."""
         rate_code, range_code = control >> 5, control >> 3 & 3
         if rate_code == 7 or range_code == 2:
             raise Violation(
@@ -208,19 +209,19 @@ class Lsm9ds1:
     # --- measuring
 
     def _convert(self, time_s: float) -> None:
-        """One conversion of all axes and the thermometer, as the output registers will show it."""
+        """Convert all axes and the thermometer, into the output registers."""
         settled = min(1.0, self._conversions.count / (self._settling + 1))
-        self._rates.show(_left_handed(self._gyroscope.read(time_s, settled)), self._per_count)
-        temperature = saturated(round((self._gyroscope.temperature_c(time_s) - 25) * 16), bits=12)
+        self._rates.show(_flip_x(self._gyroscope.read(time_s, settled)), self._per_count)
+        temperature = saturate(round((self._gyroscope.temperature_c(time_s) - 25) * 16), bits=12)
         self._temperature = temperature.to_bytes(2, "little", signed=True)
         self._status |= _GDA | _TDA
         if self._accelerating:
             force_m_s2 = self._accelerometer.read(time_s, settled)
-            self._accelerations.show(_left_handed(force_m_s2), self._g_per_count * STANDARD_GRAVITY_M_S2)
+            self._accelerations.show(_flip_x(force_m_s2), self._g_per_count * STANDARD_GRAVITY_M_S2)
             self._status |= _XLDA
 
 
-def _left_handed(vector: Sequence[float]) -> Sequence[float]:
-    """A vector in right-handed axes as both triads have it."""
+def _flip_x(vector: Sequence[float]) -> Sequence[float]:
+    """Return a vector of right-handed axes in the axes of both triads."""
     x, y, z = vector
     return -x, y, z

@@ -1,4 +1,4 @@
-"""The LSM9DS1's magnetometer at register level (datasheet DocID025715, sections 2, 5, 6 and 8)."""
+"""The LSM9DS1's magnetometer at register level (data sheet DocID025715, sections 2, 5, 6 and 8)."""
 
 from collections.abc import Callable, Sequence
 
@@ -12,13 +12,13 @@ from firmware_host.parts import MAGNETOMETERS
 
 WIRED = MAGNETOMETERS["lsm9ds1_magnetometer"]
 WHO_AM_I = 0x3D
-_LIS2MDL = 0x40  # what another magnetometer of the maker answers, at another address
+_LIS2MDL = 0x40  # the identity of another magnetometer of the maker, at another address
 _WHO_AM_I, _STATUS_REG_M, _OUT_X_L_M, _OUT_Z_H_M = 0x0F, 0x27, 0x28, 0x2D
 _CTRL_REG1_M, _CTRL_REG2_M, _CTRL_REG3_M, _CTRL_REG5_M = 0x20, 0x21, 0x22, 0x24
 # Registers with their values after reset and the bits that have a model; writing a one to any other fails the run.
 _RESET_AND_BITS = {
-    **dict.fromkeys(range(0x05, 0x0B), (0x00, 0x00)),  # OFFSET_X_REG_L_M …: what the part would take away
-    _CTRL_REG1_M: (0x10, 0xFC),  # TEMP_COMP, OM, DO; how quiet a mode is is part of the truth
+    **dict.fromkeys(range(0x05, 0x0B), (0x00, 0x00)),  # OFFSET_X_REG_L_M …: an offset that the part subtracts
+    _CTRL_REG1_M: (0x10, 0xFC),  # TEMP_COMP, OM, DO; the noise of a mode is part of the truth
     _CTRL_REG2_M: (0x00, 0x64),  # FS, SOFT_RST
     _CTRL_REG3_M: (0x03, 0x83),  # I2C_DISABLE, MD; SIM stays 0: four wires
     0x23: (0x00, 0x0C),  # CTRL_REG4_M: OMZ
@@ -27,17 +27,18 @@ _RESET_AND_BITS = {
 _RATES_HZ = (0.625, 1.25, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0)
 _SENSITIVITIES_MGAUSS = (0.14, 0.29, 0.43, 0.58)  # table 3; 4, 8, 12 and 16 gauss
 _SOFT_RST, _MODE, _CONTINUOUS, _SINGLE, _BDU = 0x04, 0x03, 0x00, 0x01, 0x40
-_EACH, _ALL = 0x07, 0x08  # STATUS_REG_M: new data of an axis, of all; four bits up the same of data overrun
+_AXES, _ALL = 0x07, 0x08  # STATUS_REG_M: new data of one axis, of all; the same for overrun four bits up
 
 
 class Lsm9ds1Magnetometer:
     """The magnetometer die on the SPI bus: its own select, data-ready line and oscillator.
 
-    `field_at`, `truth`, `seed`: see `Magnetometer`, in the axes of the datasheet's figure 1, which are right-handed
-    (docs/board.md, "Axes"). `oscillator_ppm`: how fast the part's own oscillator makes its data rate.
+    `field_at`, `truth`, `seed`: see `Magnetometer`, in the axes of the data sheet's figure 1, which are right-handed
+    (docs/board.md, "Axes"). `oscillator_ppm`: the error of the part's own oscillator, and so of its data rate.
 
-    DRDY_M follows ZYXDA: up with a conversion, down when the high bytes of all three axes have been read (as of the
-    LIS3MDL, a part of the same registers; not looked up). Of wrong first conversions nothing is known: here are none.
+    DRDY_M follows ZYXDA: high after a conversion, low when the high bytes of all three axes have been read (as in the
+    LIS3MDL, a part with the same registers; not verified). The data sheet does not mention wrong first conversions;
+    here there are none.
     """
 
     name = "LSM9DS1-M"
@@ -64,7 +65,7 @@ class Lsm9ds1Magnetometer:
         self._reading = self._counts_up = False
         self._reset()
 
-    # --- what the board sees
+    # --- the board's side
 
     @property
     def next_event_s(self) -> float:
@@ -97,8 +98,8 @@ class Lsm9ds1Magnetometer:
         self._write(address, byte, time_s)
         return 0xFF
 
-    def foretell(self) -> bytes:
-        """What the magnetometer answers next: nothing is foretold, for what is read decides what is shown."""
+    def predict(self) -> bytes:
+        """Return nothing: each read changes the following data."""
         return b""
 
     # --- registers
@@ -118,13 +119,13 @@ class Lsm9ds1Magnetometer:
             return _LIS2MDL if self.fault is Fault.OTHER_PART else WHO_AM_I
         if address == _STATUS_REG_M:
             return self._status
-        raise self._registers.unmodelled("read of", address)
+        raise self._registers.describe_unmodelled("read of", address)
 
     def _read_output(self, index: int) -> int:
         axis, high = divmod(index, 2)
         if high:
             self._status &= ~(0x11 << axis)
-            if not self._status & _EACH:
+            if not self._status & _AXES:
                 self._status = 0
         return self._field.read(index, block_update=bool(self._registers.values[_CTRL_REG5_M] & _BDU))
 
@@ -143,7 +144,7 @@ class Lsm9ds1Magnetometer:
             self._start(time_s)
 
     def _start(self, time_s: float) -> None:
-        """Another data rate, range or mode: conversions begin anew, or end."""
+        """Restart conversions with another data rate, range or mode, or stop them."""
         values = self._registers.values
         self._status = 0
         if values[_CTRL_REG3_M] & _MODE == _CONTINUOUS:
@@ -154,8 +155,8 @@ class Lsm9ds1Magnetometer:
     # --- measuring
 
     def _convert(self, time_s: float) -> None:
-        """One conversion of all axes, as the output registers will show it."""
+        """Convert all axes, into the output registers."""
         per_count_mgauss = _SENSITIVITIES_MGAUSS[self._registers.values[_CTRL_REG2_M] >> 5 & 3]
         self._field.show(self._magnetometer.read(time_s), per_count_mgauss * 1e-3 * GAUSS_T)
-        overrun = self._status & (_EACH | _ALL)
-        self._status |= _EACH | _ALL | overrun << 4
+        overrun = self._status & (_AXES | _ALL)
+        self._status |= _AXES | _ALL | overrun << 4

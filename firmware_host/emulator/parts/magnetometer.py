@@ -11,10 +11,10 @@ _NONE = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class MagnetometerTruth:
-    """What the simulated magnetometer really does, in the model m = F B + b (TRIAX), m the reading, in tesla.
+    """The true errors of a simulated magnetometer, in the model m = F B + b (TRIAX), m the reading, in tesla.
 
-    `scale`: 1 over the length of each row of F; `bias_t`: b, hard iron that turns with the part included;
-    `noise_t`: standard deviation of one reading; `non_orthogonality_rad`: as in `GyroTruth`.
+    `scale`: 1 over the length of each row of F; `bias_t`: b, including hard iron fixed to the part; `noise_t`: standard
+    deviation of one reading; `non_orthogonality_rad`: as in `GyroTruth`.
     """
 
     scale: Sequence[float] = (1.0, 1.0, 1.0)
@@ -44,5 +44,5 @@ class Magnetometer:
         self._triad = Triad(errors, seed, errors.holds_at_c)
 
     def read(self, time_s: float) -> list[float]:
-        """The next reading, (3,) T, taken at `time_s`."""
+        """Return the next reading, (3,) T, at `time_s`."""
         return self._triad.read(time_s, self._triad.sense(self._field_at(time_s), 0.0), 0.0)

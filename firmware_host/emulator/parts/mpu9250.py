@@ -1,5 +1,7 @@
-"""The MPU-9250's gyroscope, accelerometer and thermometer at register level (product specification PS-MPU-9250A-01,
-register map RM-MPU-9250A-00). Its magnetometer, FIFO, I2C master and motion processor are left out.
+"""The MPU-9250's gyroscope, accelerometer and thermometer at register level.
+
+Product specification PS-MPU-9250A-01, register map RM-MPU-9250A-00. Not modelled: its magnetometer, FIFO, I2C master
+and motion processor.
 """
 
 import math
@@ -11,14 +13,14 @@ import numpy as np
 from firmware_host.emulator.chip.bus import Violation
 from firmware_host.emulator.chip.spi_device import Fault
 from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer, AccelerometerTruth
-from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
+from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Temperature, saturate
 from firmware_host.emulator.parts.part_registers import Conversions, PartRegisters
-from firmware_host.emulator.parts.triad import Remembered
+from firmware_host.emulator.parts.triad import CachedMotion
 from firmware_host.parts import GYROSCOPES
 
 WIRED = GYROSCOPES["mpu9250"]
 WHO_AM_I = 0x71
-_MPU6500 = 0x70  # what the part without magnetometer answers
+_MPU6500 = 0x70  # the identity of the part without magnetometer
 _SMPLRT_DIV, _CONFIG, _GYRO_CONFIG, _ACCEL_CONFIG = 0x19, 0x1A, 0x1B, 0x1C
 _INT_PIN_CFG, _INT_ENABLE, _INT_STATUS = 0x37, 0x38, 0x3A
 _ACCEL_XOUT_H, _GYRO_ZOUT_L = 0x3B, 0x48
@@ -52,20 +54,20 @@ _COUNTS_PER_DEG_C, _ROOM_C = 333.87, 21.0  # specification, table 3, and registe
 _OUTPUTS = struct.Struct(">7h")  # the three accelerations, the temperature, the three rates
 _PULSE_S = 50e-6  # of the interrupt line when it is not latched (register map, register 55)
 _RESET_S = 0.1  # specification, table 3: registers can be read and written after 11 ms, at most 100 ms
-_START_S = 0.035  # specification, table 1: the gyroscope after it left sleep
+_START_S = 0.035  # specification, table 1: start-up of the gyroscope after sleep
 
 
 class Mpu9250:
     """The die with accelerometer and gyroscope on the SPI bus.
 
-    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each conversion, at
-    its instant, and noise is drawn per conversion. `acceleration`: see `Accelerometer`. `oscillator_ppm`: how fast the
-    part's own oscillator makes its data rate; the specification allows a percent.
+    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is evaluated once for each conversion, at
+    its instant, and noise is drawn per conversion. `acceleration`: see `Accelerometer`. `oscillator_ppm`: the error of
+    the part's own oscillator, and so of its data rate; the specification allows a percent.
 
     The part runs from power-up, but here it converts only while its data-ready interrupt is enabled; reading data
     without it fails the run. Its filter settings have neither effect nor delay (a filter is part of the truth), except
-    that the motion comes in linearly while the gyroscope starts. The accelerometer's offset registers hold the
-    factory's trim: whoever writes to them fails the run.
+    that the motion ramps up linearly while the gyroscope starts. The accelerometer's offset registers hold the
+    factory's trim: writing to them fails the run.
     """
 
     name = "MPU-9250"
@@ -86,7 +88,7 @@ class Mpu9250:
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None
-        motion = Remembered(motion_at)
+        motion = CachedMotion(motion_at)
         self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
         self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)
         self._registers = PartRegisters(self.name, "mpu9250.py", _RESET_AND_BITS)
@@ -100,11 +102,11 @@ class Mpu9250:
         self._awake_s = -math.inf
         self._usable_s = -math.inf
 
-    # --- what the board sees
+    # --- the board's side
 
     @property
     def spi_max_hz(self) -> float:
-        """Sensor and interrupt data may be read at 20 MHz, all else goes at 1 MHz (specification, section 7.5)."""
+        """The clock limit: 20 MHz for sensor and interrupt data, otherwise 1 MHz (specification, section 7.5)."""
         data = self._reading and self._first >= _INT_STATUS and self._first <= _GYRO_ZOUT_L
         return 20e6 if data else 1e6
 
@@ -126,7 +128,7 @@ class Mpu9250:
 
     def select(self, time_s: float) -> None:
         self._address = None
-        self._output = self._latest  # the registers stand still while the bus is in use (register map, section 4.22)
+        self._output = self._latest  # the registers are frozen while the bus is in use (register map, section 4.22)
 
     def deselect(self, time_s: float) -> None:
         self._address = None
@@ -150,18 +152,18 @@ class Mpu9250:
         self._write(address, byte, time_s)
         return 0xFF
 
-    def foretell(self) -> bytes:
-        """Data stand still while the bus is in use; unless any access clears the status, reading them does nothing."""
+    def predict(self) -> bytes:
+        """Return the data, frozen while the bus is in use, unless an access clears the status."""
         address = self._address
         if address is None or not self._reading or not _ACCEL_XOUT_H <= address <= _GYRO_ZOUT_L:
             return b""
         registers = self._registers.values
         if registers[_INT_PIN_CFG] & _INT_ANYRD_2CLEAR or not registers[_INT_ENABLE] & _RAW_RDY:
             return b""
-        told = self._output[address - _ACCEL_XOUT_H :]
-        told = told[: len(told) & ~1]
-        self._address = address + len(told)
-        return told
+        predicted = self._output[address - _ACCEL_XOUT_H :]
+        predicted = predicted[: len(predicted) & ~1]
+        self._address = address + len(predicted)
+        return predicted
 
     # --- registers
 
@@ -170,7 +172,7 @@ class Mpu9250:
         self._status = 0
         self._pin = False
         self._pulse_end_s = math.inf
-        self._first = 0  # register that the access under way began with
+        self._first = 0  # first register of the pending access
         self._latest = self._output = bytes(14)  # ACCEL_XOUT_H … GYRO_ZOUT_L
         self._conversions.stop()
 
@@ -185,7 +187,7 @@ class Mpu9250:
         if address == _WHO_AM_I:
             return _MPU6500 if self.fault is Fault.OTHER_PART else WHO_AM_I
         if not _INT_STATUS <= address <= _GYRO_ZOUT_L:
-            raise self._registers.unmodelled("read of", address)
+            raise self._registers.describe_unmodelled("read of", address)
         if not self._registers.values[_INT_ENABLE] & _RAW_RDY:
             raise Violation(
                 "sensor_setup",
@@ -201,16 +203,16 @@ class Mpu9250:
             self._usable_s = time_s + _RESET_S
             self._awake_s = time_s
             return
-        before, self._registers.values[address] = self._registers.values[address], value
-        if value == before:
+        old_value, self._registers.values[address] = self._registers.values[address], value
+        if value == old_value:
             return
-        if address == _PWR_MGMT_1 and before & _SLEEP and not value & _SLEEP:
+        if address == _PWR_MGMT_1 and old_value & _SLEEP and not value & _SLEEP:
             self._awake_s = time_s
         if address in (_SMPLRT_DIV, _CONFIG, _GYRO_CONFIG, _INT_ENABLE, _PWR_MGMT_1):
             self._start(time_s)
 
     def _start(self, time_s: float) -> None:
-        """Conversions begin anew, if the part is to convert at all."""
+        """Restart conversions, if the part is set up to convert."""
         registers = self._registers.values
         if registers[_PWR_MGMT_1] & _SLEEP or not registers[_INT_ENABLE] & _RAW_RDY:
             self._conversions.stop()
@@ -219,7 +221,7 @@ class Mpu9250:
         self._per_count = math.radians(1 / _COUNTS_PER_DEG_S[registers[_GYRO_CONFIG] >> 3 & 3])
 
     def _rate_hz(self) -> float:
-        """Register map, registers 25 to 27: the divider acts on the output of the filters 1 to 6 only."""
+        """Return the data rate (register map, registers 25 to 27): the divider acts on filters 1 to 6 only."""
         registers = self._registers.values
         if registers[_GYRO_CONFIG] & 0x03:  # FCHOICE_B: around the filters
             return 32_000.0
@@ -230,7 +232,7 @@ class Mpu9250:
     # --- measuring
 
     def _convert(self, time_s: float) -> None:
-        """One conversion of all axes, as the output registers will show it from the next access on."""
+        """Convert all axes, into the output registers of the next access."""
         settled = min(1.0, (time_s - self._awake_s) / _START_S)
         counts_per_g = _COUNTS_PER_G[self._registers.values[_ACCEL_CONFIG] >> 3 & 3]
         rates = self._gyroscope.read(time_s, settled)
@@ -240,7 +242,7 @@ class Mpu9250:
             (self._gyroscope.temperature_c(time_s) - _ROOM_C) * _COUNTS_PER_DEG_C,
             *(rate_rad_s / self._per_count for rate_rad_s in rates),
         )
-        self._latest = _OUTPUTS.pack(*[saturated(round(number)) for number in numbers])
+        self._latest = _OUTPUTS.pack(*[saturate(round(number)) for number in numbers])
         self._status = _RAW_RDY
         self._pin = True
         if not self._registers.values[_INT_PIN_CFG] & _LATCH_INT_EN:

@@ -1,23 +1,23 @@
-"""What the models of the parts share: registers that keep what is written, those that show what was measured, and the
-clock that conversions follow.
-"""
+"""The common part of the register models: writable registers, output registers, and the clock of conversions."""
 
 import math
 import struct
 from collections.abc import Mapping, Sequence
 
 from firmware_host.emulator.chip.bus import Violation
-from firmware_host.emulator.parts.triad import saturated
+from firmware_host.emulator.parts.triad import saturate
 
 _COUNTS = struct.Struct("<3h")
 
 
 class PartRegisters:
-    """The registers of a part that can be written.
+    """The writable registers of a part.
 
-    `part`: its name, for messages; `model`: the file that models it; `reset_and_bits`: address → value after reset, and
-    the bits that have a model; `digits`: of a value in hexadecimal. Writing a one to any other bit fails the run: it
-    would switch on something that is not simulated.
+    - `part`: its name, for messages.
+    - `model`: the file of its model.
+    - `reset_and_bits`: by address, the value after reset and the bits that have a model. Writing a one to another bit
+      fails the run: it would switch on a function that is not simulated.
+    - `digits`: the hexadecimal digits of a value.
     """
 
     def __init__(
@@ -31,13 +31,13 @@ class PartRegisters:
         self.reset()
 
     def reset(self) -> None:
-        """Every register has its value after reset."""
+        """Set every register to its value after reset."""
         self.values = {address: initial for address, (initial, _bits) in self._reset_and_bits.items()}
 
     def check(self, address: int, value: int) -> None:
-        """Raises Violation when `value` cannot be written to a register, or the part has none there."""
+        """Raise Violation if the part has no such register, or `value` sets a bit without a model."""
         if address not in self._reset_and_bits:
-            raise self.unmodelled("write to", address)
+            raise self.describe_unmodelled("write to", address)
         _initial, bits = self._reset_and_bits[address]
         if value & ~bits:
             raise Violation(
@@ -46,15 +46,15 @@ class PartRegisters:
                 f"Clear them in the firmware, or model them in {self._model}",
             )
 
-    def unmodelled(self, access: str, address: int) -> Violation:
-        """The refusal of an access, "read of" or "write to", to a register without a model."""
+    def describe_unmodelled(self, access: str, address: int) -> Violation:
+        """Return the refusal of an access, "read of" or "write to", to a register without a model."""
         return Violation(
             "unmodelled_register", f"{access} {self._part} register 0x{address:02X}", f"Model it in {self._model}"
         )
 
 
 class Conversions:
-    """When a part converts: evenly by its own oscillator, which is `oscillator_ppm` fast, from a start on."""
+    """The times of a part's conversions, evenly by its own oscillator, which is `oscillator_ppm` fast."""
 
     def __init__(self, oscillator_ppm: float) -> None:
         self._speed = 1 + oscillator_ppm * 1e-6
@@ -64,18 +64,18 @@ class Conversions:
         self.next_s = math.inf
 
     def start(self, time_s: float, rate_hz: float) -> None:
-        """Convert anew, first one period of the nominal rate from now."""
+        """Restart, with the first conversion one period of the nominal rate from now."""
         self._started_s = time_s
         self._period_s = 1 / (rate_hz * self._speed)
         self.count = 0
         self.next_s = time_s + self._period_s
 
     def stop(self) -> None:
-        """Convert no more."""
+        """Stop converting."""
         self.next_s = math.inf
 
     def take(self) -> float:
-        """The instant of the conversion that is due; counts it."""
+        """Count the conversion that is due, and return its instant."""
         now_s = self.next_s
         self.count += 1
         self.next_s = self._started_s + (self.count + 1) * self._period_s
@@ -83,26 +83,26 @@ class Conversions:
 
 
 class OutputRegisters:
-    """The output registers of one triad of the LSM9DS1: two bytes an axis, low byte first, x and y and z."""
+    """The output registers of one triad of the LSM9DS1: two bytes an axis, low byte first, x, y, z."""
 
     def __init__(self) -> None:
         self._latest = bytes(6)
         self._output = bytearray(6)
-        self._held = [False, False, False]  # block update: low byte read, high byte not yet
+        self._is_locked = [False, False, False]  # block update: low byte read, high byte not yet
 
     def show(self, vector: Sequence[float], per_count: float) -> None:
-        """A new conversion of a vector in the part's own axes."""
-        self._latest = data = _COUNTS.pack(*[saturated(round(component / per_count)) for component in vector])
-        for axis, held in enumerate(self._held):
-            if not held:
+        """Show a new conversion of a vector in the part's own axes."""
+        self._latest = data = _COUNTS.pack(*[saturate(round(component / per_count)) for component in vector])
+        for axis, is_locked in enumerate(self._is_locked):
+            if not is_locked:
                 self._output[2 * axis : 2 * axis + 2] = data[2 * axis : 2 * axis + 2]
 
     def read(self, index: int, *, block_update: bool) -> int:
-        """One byte of the outputs."""
+        """Return one byte of the outputs."""
         axis, high = divmod(index, 2)
         value = self._output[index]
         if block_update:
-            self._held[axis] = not high
+            self._is_locked[axis] = not high
             if high:
                 self._output[index - 1 : index + 1] = self._latest[index - 1 : index + 1]
         return value

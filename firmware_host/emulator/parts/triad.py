@@ -1,6 +1,4 @@
-"""Three sensing elements of a part, for turn rate, specific force or magnetic field: from a true vector,
-through their errors and their noise, to a reading.
-"""
+"""Three sensing elements of a part, for angular rate, specific force or magnetic field: from true vector to reading."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -15,13 +13,13 @@ _NOISE_BLOCK = 3 * 256
 
 Seed = int | np.random.SeedSequence
 Temperature = Callable[[float], float]
-Bend = Callable[[Any], Any]
+Nonlinearity = Callable[[Any], Any]
 
 
 class Die(Protocol):
-    """What moves in a part, where it is not as warm as the part's thermometer says.
+    """The sensing structure of a part, if its temperature differs from the thermometer's.
 
-    `branch` is where it is on its hysteresis: 1 after warming, -1 after cooling.
+    `branch` is its branch of the hysteresis: 1 after warming, -1 after cooling.
     """
 
     def temperature_c(self, time_s: float, /) -> float: ...
@@ -33,9 +31,9 @@ _NONE = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class TriadErrors:
-    """What `GyroTruth`, `AccelerometerTruth` and `MagnetometerTruth` have in common, and explain.
+    """The common fields of `GyroTruth`, `AccelerometerTruth` and `MagnetometerTruth`, which document them.
 
-    Everything in the units of a reading.
+    All are in the units of a reading.
     """
 
     scale: Sequence[float]
@@ -58,7 +56,8 @@ class TriadErrors:
 class Triad:
     """Three elements with these errors, of a part whose temperature is one number or a function of time.
 
-    A reading is made of `sense`, whatever else the part feels, and `read`; `readings` makes many in one go.
+    `read` makes a reading of the vector that `sense` returns, plus other sensed quantities; `readings` makes many at
+    once.
     """
 
     def __init__(self, errors: TriadErrors, seed: Seed, temperature_c: float | Temperature) -> None:
@@ -74,83 +73,83 @@ class Triad:
             for axis, k, per_k, per_k2 in zip(axes, errors.scale, errors.scale_per_k, errors.scale_per_k2, strict=True)
         ]
         self._bias = list(errors.bias)
-        self._warms = callable(temperature_c) or errors.die is not None
-        self._bias_moves = any((*errors.bias_per_k, *errors.bias_per_k2, *errors.hysteresis))
+        self._temperature_varies = callable(temperature_c) or errors.die is not None
+        self._bias_varies = any((*errors.bias_per_k, *errors.bias_per_k2, *errors.hysteresis))
         self.temperature_c: Temperature = temperature_c if callable(temperature_c) else lambda _time_s: temperature_c
         self._low_pass = LowPass(errors.bandwidth_hz) if errors.bandwidth_hz is not None else None
         self._drift = _drift(errors, seed)
         self._random = np.random.default_rng(seed)
         self._noise: list[float] = []
 
-    def sense(self, true: Sequence[Any], warmer_k: Any, bend: Bend | None = None) -> list[Any]:
-        """What the elements make of a vector before bias and noise: three floats or arrays, as `true` and `warmer_k`.
+    def sense(self, true: Sequence[Any], warmer_k: Any, nonlinearity: Nonlinearity | None = None) -> list[Any]:
+        """Return the sensed vector before bias and noise: three floats or arrays, as `true` and `warmer_k`.
 
-        `bend`: what becomes of the component along an element's axis.
+        `nonlinearity` maps the component along an element's axis.
         """
         x, y, z = true
-        felt = []
+        sensed = []
         for a, b, c, inverse_scale, per_k, per_k2 in self._elements:
-            along = a * x + b * y + c * z
-            if bend is not None:
-                along = bend(along)
-            value = along * inverse_scale
+            component = a * x + b * y + c * z
+            if nonlinearity is not None:
+                component = nonlinearity(component)
+            value = component * inverse_scale
             if per_k or per_k2:
                 value = value / (1.0 + per_k * warmer_k + per_k2 * warmer_k**2)
-            felt.append(value)
-        return felt
+            sensed.append(value)
+        return sensed
 
     def warmer_k(self, time_s: float) -> float:
-        """How much warmer the part is than where its errors hold."""
-        if not self._warms:
+        """Return the temperature of the part above that of its stated errors, K."""
+        if not self._temperature_varies:
             return 0.0
         die = self._errors.die
-        felt_c = self.temperature_c(time_s) if die is None else die.temperature_c(time_s)
-        return felt_c - self._errors.holds_at_c
+        sensed_c = self.temperature_c(time_s) if die is None else die.temperature_c(time_s)
+        return sensed_c - self._errors.holds_at_c
 
-    def read(self, time_s: float, felt: list[float], warmer_k: float) -> list[float]:
-        """The next reading, (3,), at `time_s`, of what the elements felt then."""
+    def read(self, time_s: float, sensed: list[float], warmer_k: float) -> list[float]:
+        """Return the next reading, (3,), at `time_s`, of the sensed vector."""
         if len(self._noise) < 3:
             self._noise = self._random.standard_normal(_NOISE_BLOCK).tolist()[::-1]
         if self._low_pass is not None:
-            felt = self._low_pass.step(time_s, felt)
+            sensed = self._low_pass.step(time_s, sensed)
         bias = self._bias
-        if self._bias_moves:
-            bias = self._moved(warmer_k, self._branch(time_s))
+        if self._bias_varies:
+            bias = self._compute_bias(warmer_k, self._branch(time_s))
         if self._drift is not None:
-            bias = [b + drift for b, drift in zip(bias, self._drift.at(time_s), strict=True)]
+            bias = [b + drift for b, drift in zip(bias, self._drift.evaluate(time_s), strict=True)]
         scale, draw = self._errors.noise, self._noise.pop
-        return [value - b + scale * draw() for value, b in zip(felt, bias, strict=True)]
+        return [value - b + scale * draw() for value, b in zip(sensed, bias, strict=True)]
 
     def _branch(self, time_s: float) -> float:
         return 0.0 if self._errors.die is None else self._errors.die.branch(time_s)
 
-    def _moved(self, warmer_k: Any, branch: Any) -> list[Any]:
-        """The bias where the part is so much warmer, on that branch of its hysteresis: three floats or arrays."""
+    def _compute_bias(self, warmer_k: Any, branch: Any) -> list[Any]:
+        """Return the bias at `warmer_k`, on that branch of the hysteresis: three floats or arrays."""
         errors = self._errors
         rows = zip(self._bias, errors.bias_per_k, errors.bias_per_k2, errors.hysteresis, strict=True)
         return [b + per_k * warmer_k + per_k2 * warmer_k**2 + size * branch for b, per_k, per_k2, size in rows]
 
     def all_warmer_k(self, time_s: np.ndarray) -> np.ndarray | float:
-        """How much warmer the part is than where its errors hold, (n,) or one number for all times."""
-        return np.array([self.warmer_k(t) for t in time_s.tolist()]) if self._warms else 0.0
+        """Return the temperature of the part above that of its stated errors, K: (n,), or one number for all times."""
+        return np.array([self.warmer_k(t) for t in time_s.tolist()]) if self._temperature_varies else 0.0
 
-    def readings(self, time_s: np.ndarray, felt: Sequence[np.ndarray], warmer_k: np.ndarray | float) -> np.ndarray:
-        """All readings (n, 3) at times (n,) of what the elements felt, three arrays (n,)."""
-        columns = np.column_stack(felt)
+    def readings(self, time_s: np.ndarray, sensed: Sequence[np.ndarray], warmer_k: np.ndarray | float) -> np.ndarray:
+        """Return all readings (n, 3) at times (n,) of the sensed vectors, three arrays (n,)."""
+        columns = np.column_stack(sensed)
         if self._low_pass is not None:
             rows = zip(time_s.tolist(), columns.tolist(), strict=True)
             columns = np.array([self._low_pass.step(t, row) for t, row in rows])
         branch = np.array([self._branch(t) for t in time_s.tolist()]) if self._errors.die is not None else 0.0
-        bias = np.column_stack(self._moved(np.broadcast_to(warmer_k, time_s.shape), branch))
+        bias = np.column_stack(self._compute_bias(np.broadcast_to(warmer_k, time_s.shape), branch))
         if self._drift is not None:
-            bias = bias + self._drift.at_times(time_s)
+            bias = bias + self._drift.evaluate_all(time_s)
         noise = self._random.standard_normal(columns.shape)
-        taken: np.ndarray = columns - bias + self._errors.noise * noise
-        return taken
+        noisy: np.ndarray = columns - bias + self._errors.noise * noise
+        return noisy
 
 
-class Remembered:
-    """A part's motion, asked for once for each time although two triads feel it."""
+class CachedMotion:
+    """A part's motion, evaluated once for each time although two triads sense it."""
 
     def __init__(self, motion_at: Callable[[float], Sequence[float]]) -> None:
         self._motion_at = motion_at
@@ -164,7 +163,7 @@ class Remembered:
 
 
 class LowPass:
-    """A low-pass of first order, exact for inputs that are straight lines between the times they are given at."""
+    """A low-pass of first order, exact for inputs that are linear between their times."""
 
     def __init__(self, bandwidth_hz: float) -> None:
         self._time_constant_s = 1.0 / (2.0 * math.pi * bandwidth_hz)
@@ -173,23 +172,23 @@ class LowPass:
         self._outputs: list[float] = []
 
     def step(self, time_s: float, inputs: list[float]) -> list[float]:
-        """The outputs at `time_s`, when the inputs have come to these."""
-        since_s = time_s - self._time_s
-        if math.isinf(since_s):
+        """Return the outputs at `time_s`, at which the inputs have reached these values."""
+        step_s = time_s - self._time_s
+        if math.isinf(step_s):
             self._outputs = inputs
-        elif since_s > 0.0:
-            forgotten = math.exp(-since_s / self._time_constant_s)
-            late = self._time_constant_s / since_s  # by how much of the step the output of a straight line lags
+        elif step_s > 0.0:
+            decay = math.exp(-step_s / self._time_constant_s)
+            lag = self._time_constant_s / step_s  # the lag of a linear input's response, as a fraction of the step
             self._outputs = [
-                new - late * (new - old) + (output - old + late * (new - old)) * forgotten
+                new - lag * (new - old) + (output - old + lag * (new - old)) * decay
                 for new, old, output in zip(inputs, self._inputs, self._outputs, strict=True)
             ]
         self._time_s, self._inputs = time_s, inputs
         return self._outputs
 
 
-def spawned(seed: Seed, key: int) -> np.random.SeedSequence:
-    """A seed of its own that depends on `seed` alone: what draws from it changes nothing for the others."""
+def spawn_seed(seed: Seed, key: int) -> np.random.SeedSequence:
+    """Return a derived seed that depends on `seed` alone, so that draws from it do not affect others."""
     sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
     return np.random.SeedSequence(sequence.entropy, spawn_key=(*sequence.spawn_key, key))
 
@@ -197,10 +196,10 @@ def spawned(seed: Seed, key: int) -> np.random.SeedSequence:
 def _drift(errors: TriadErrors, seed: Seed) -> Drift | None:
     if not (errors.instability or errors.random_walk_per_sqrt_s):
         return None
-    return Drift(errors.instability, errors.instability_time_s, errors.random_walk_per_sqrt_s, spawned(seed, 1))
+    return Drift(errors.instability, errors.instability_time_s, errors.random_walk_per_sqrt_s, spawn_seed(seed, 1))
 
 
-def saturated(counts: int, bits: int = 16) -> int:
-    """The nearest number that a two's complement register of so many bits holds."""
+def saturate(counts: int, bits: int = 16) -> int:
+    """Return the nearest number in a two's complement register of `bits`."""
     limit = 1 << bits - 1
     return max(-limit, min(limit - 1, counts))

@@ -1,6 +1,6 @@
-"""Writes the fuzzer's first inputs: `python -m firmware_host.firmware.fuzz.seeds FOLDER`.
+"""Write the fuzzer's first inputs: `python -m firmware_host.firmware.fuzz.seeds FOLDER`.
 
-Every request of the table once, as zeros and as the plays a board is made for: streams, observations, calibrations.
+Every request of the table once, as zeros and in typical sessions: streams, observations, calibrations.
 """
 
 import sys
@@ -10,34 +10,36 @@ from typing import Any
 from firmware_host.parts import BOARD_PARTS, GYROSCOPES
 from firmware_host.protocol import MESSAGES, Message
 
-# What fuzz_board.c does at these bytes
+# Actions of fuzz_board.c by byte
 NOISE, FRAME, CONVERT, WAIT, DISTURB, LINE, FLASH = range(7)
 
 _BY_NAME = {message.name: message for message in MESSAGES}
 
 
 def frame(name: str, *values: Any) -> bytes:
-    """A request with these values, one for each place of its layout."""
+    """Return a request with these values, one for each field of its layout."""
     message = _BY_NAME[name]
     payload = message.head.pack(*values)
     return bytes((FRAME, message.code, 1, len(payload))) + payload
 
 
 def convert(sensors: int, times: int, period_us: int) -> bytes:
-    """An input that makes the sensors in the mask convert so many times."""
+    """Return an input that makes the sensors in the mask convert `times` times."""
     return bytes((CONVERT, sensors, 7, times, period_us // 50))
 
 
 def zeros(message: Message) -> bytes:
-    """A request of zeros."""
+    """Return a request of zeros."""
     return bytes((FRAME, message.code, 1, message.head.size)) + bytes(message.head.size)
 
 
 def setup(range_g: float) -> bytes:
-    """All sensors set up."""
+    """Return the requests that set up all sensors."""
     gyroscopes = (frame("configure", sensor, 200.0, 100.0, range_g, 0.0) for sensor in range(len(GYROSCOPES)))
-    beside = (frame("configure", sensor, 80.0, 0.0, 0.0, 4.0) for sensor in range(len(GYROSCOPES), len(BOARD_PARTS)))
-    return b"".join((*gyroscopes, *beside))
+    magnetometers = (
+        frame("configure", sensor, 80.0, 0.0, 0.0, 4.0) for sensor in range(len(GYROSCOPES), len(BOARD_PARTS))
+    )
+    return b"".join((*gyroscopes, *magnetometers))
 
 
 SETUP = setup(0.0)
@@ -48,7 +50,7 @@ OBSERVATIONS = b"".join(
     frame("recall", 0, index, *(speed_rad_s * (i == index // 2) + 0.01 for i in range(3)), abs(speed_rad_s))
     for index, speed_rad_s in enumerate((0.5, -0.5, 0.5, -0.5, 0.5, -0.5))
 )
-PLAYS = {
+SESSIONS = {
     "requests": b"".join(zeros(message) for message in MESSAGES if message.sender == "host"),
     "stream": SETUP
     + frame("start", 0)
@@ -80,10 +82,10 @@ PLAYS = {
 
 
 def main(folder: Path) -> None:
-    """One file for each play."""
+    """Write one file for each session."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, play in PLAYS.items():
-        (folder / name.replace(" ", "_")).write_bytes(play)
+    for name, session in SESSIONS.items():
+        (folder / name.replace(" ", "_")).write_bytes(session)
 
 
 if __name__ == "__main__":

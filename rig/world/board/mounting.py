@@ -109,5 +109,5 @@ def _build_sensor(
         seed=seed,
         acceleration=truth.accelerometer,
         oscillator_ppm=truth.data_rate_ppm,
-        **{name: options[name] for name in part.told},
+        **{name: options[name] for name in part.model_options},
     )

@@ -70,12 +70,12 @@ def test_a_burst_can_be_told_beforehand() -> None:
     part.select(time_s)
     part.transfer(GLOB_CMD, time_s)
     part.transfer(0, time_s)
-    assert part.foretell() == spoken.burst()
+    assert part.predict() == spoken.burst()
     with pytest.raises(Violation, match="10 words"):
         part.transfer(0, time_s)
     part.deselect(time_s)
     part.select(time_s + 1e-3)
-    assert part.foretell() == b""
+    assert part.predict() == b""
 
 
 def test_a_burst_is_slow() -> None:

@@ -126,7 +126,7 @@ def test_what_reading_does_not_change_can_be_told_beforehand(pin: int, told_pair
     part, time_s = driver.part, driver.time_s
     part.select(time_s)
     part.transfer(0x80 | GYRO_OUT, time_s)
-    told = part.foretell()
+    told = part.predict()
     assert told == spoken[: 2 * told_pairs]
     assert told + bytes([part.transfer(0, time_s) for _ in range(6 - len(told))]) == spoken
 

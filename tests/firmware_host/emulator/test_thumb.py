@@ -81,5 +81,5 @@ def test_addresses_have_the_names_of_their_functions() -> None:
     entry = {name: int(address, 16) for address, name in re.findall(r"^([0-9a-f]+) T (\w+)$", listing, re.MULTILINE)}
     for name in ("reset_handler", "main", "board_run", "exti9_5_handler"):
         assert symbols().function(entry[name]) == symbols().function(entry[name] + 3) == name
-    assert symbols().where(entry["board_run"] + 1) == f"0x{entry['board_run']:08X} in function board_run"
-    assert symbols().where(0x60000000) == "0x60000000 outside every function of the image"
+    assert symbols().describe(entry["board_run"] + 1) == f"0x{entry['board_run']:08X} in function board_run"
+    assert symbols().describe(0x60000000) == "0x60000000 outside every function of the image"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from firmware_host.answers import NOTHING
+from firmware_host.answers import NO_CHANGE
 from firmware_host.frames import Frame
 from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import text
@@ -26,8 +26,8 @@ CALIBRATION: dict[str, Any] = {
     "bias_rad_s": tuple(BIAS_RAD_S),
     "lowest_c": 23.5,
     "highest_c": 23.5,
-    "scale_change": NOTHING,
-    "bias_change_rad_s": NOTHING,
+    "scale_change": NO_CHANGE,
+    "bias_change_rad_s": NO_CHANGE,
 }
 MATRIX = np.array([[1.1771, -0.0052, 0.0031], [-0.0053, 1.1554, 0.0047], [0.0032, 0.0048, 1.1440]])
 WHOLE = CALIBRATION | {"model": 2, "matrix": MATRIX}

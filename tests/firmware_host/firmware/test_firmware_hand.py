@@ -173,15 +173,15 @@ def test_what_is_asked_of_a_board_that_cannot_is_refused() -> None:
     assert error_of(board.ask("by_hand", sensor=0, moves=12, scale_std=1e-3)) == "not_configured"
     configured(board, 0, 119.0, 500.0)
     assert error_of(board.ask("by_hand", sensor=0, moves=12, scale_std=1e-3)) == "bad_range"
-    assert HandReport.of(asked(board, "hand_status")).state == "idle"
+    assert HandReport.decode(asked(board, "hand_status")).state == "idle"
 
 
 def test_a_sensor_set_up_anew_ends_its_session_and_no_other() -> None:
     board, _ = begun()
     configured(board, 1, 200.0, 250.0)
-    assert HandReport.of(asked(board, "hand_status")).state == "starting"
+    assert HandReport.decode(asked(board, "hand_status")).state == "starting"
     configured(board, 0, 119.0, 500.0, 4.0)
-    assert HandReport.of(asked(board, "hand_status")).state == "idle"
+    assert HandReport.decode(asked(board, "hand_status")).state == "idle"
 
 
 def test_the_lamp_tells_rest_taken_again_and_done() -> None:
@@ -193,7 +193,7 @@ def test_the_lamp_tells_rest_taken_again_and_done() -> None:
     end = np.searchsorted(times_us, times_us[-1] - 3_000_000)
     for number, (time_us, rate, force) in enumerate(zip(times_us[:end].tolist(), counts, forces, strict=False)):
         give(board, time_us, number, rate, force)
-        report = HandReport.of(asked(board, "hand_status"))
+        report = HandReport.decode(asked(board, "hand_status"))
         if report.judged != judged:
             judged, since_us = report.judged, time_us
         told = "settled" if report.state == "resting" and time_us > since_us + 2_000_000 else report.state
@@ -208,7 +208,7 @@ def test_the_lamp_tells_rest_taken_again_and_done() -> None:
 
 
 def state_of(board: HostBoard) -> str:
-    return HandReport.of(asked(board, "hand_status")).state
+    return HandReport.decode(asked(board, "hand_status")).state
 
 
 def test_the_button_sets_a_gyroscope_up_starts_it_and_begins_a_session() -> None:
@@ -222,14 +222,14 @@ def test_the_button_sets_a_gyroscope_up_starts_it_and_begins_a_session() -> None
 
 def test_what_was_found_alone_stays_until_the_next_session() -> None:
     board = handled_alone(twelve())
-    kept = HandSolved.of(asked(board, "hand_solve"))
+    kept = HandSolved.decode(asked(board, "hand_solve"))
     assert (kept.state, kept.taken, kept.sensor, kept.range_deg_s) == ("done", 12, 0, 500.0)
     assert kept.temperature_c == 25.0, "the middle of the part's scale, as was given"
     assert 1e-5 < kept.scale_std < 1e-3
     board.ask("stop", 2)
     configured(board, 0, 119.0, 245.0)
     configured(board, 1, 200.0, 250.0)
-    assert HandSolved.of(asked(board, "hand_solve")) == kept
+    assert HandSolved.decode(asked(board, "hand_solve")) == kept
     pressed(board, 100_000_000)
     assert state_of(board) == "starting"
 
@@ -272,8 +272,8 @@ def test_the_button_of_the_shipped_image_lights_the_lamp_at_the_first_rest() -> 
     session.run(0.1)
     port.drive(BUTTON, high=False)
     assert session.ask("status").values["streaming"] == 1
-    assert HandReport.of(session.ask("hand_status")).state == "starting"
+    assert HandReport.decode(session.ask("hand_status")).state == "starting"
     assert port.is_input(BUTTON)
     session.run(1.8)
-    assert HandReport.of(session.ask("hand_status")).state == "resting"
+    assert HandReport.decode(session.ask("hand_status")).state == "resting"
     assert not port.is_input(BUTTON), "the lamp is lit"

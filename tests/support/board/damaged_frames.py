@@ -110,11 +110,11 @@ class Heard:
 # What the host makes of a frame, as firmware_host/client.py does.
 _READ: dict[str, Callable[[Frame], object]] = {
     **{name: lambda frame: SampleBatch.of([frame], 0.0) for name in protocol.SAMPLES},
-    "setup": SensorSetup.of,
-    "report": lambda frame: BoardStatus.of(frame, 0, 0),
-    "observed": BoardObservation.of,
-    "solution": BoardSolution.of,
-    "calibration": StoredCalibration.of,
+    "setup": SensorSetup.decode,
+    "report": lambda frame: BoardStatus.decode(frame, 0, 0),
+    "observed": BoardObservation.decode,
+    "solution": BoardSolution.decode,
+    "calibration": StoredCalibration.decode,
 }
 
 
@@ -126,7 +126,7 @@ def listen(stream: IO[bytes]) -> Heard:
             names[frame.name] += 1
             digest.update(repr((frame.name, frame.sequence, frame.values, frame.items.tobytes())).encode())
             if frame.name == "identity" and frame.values["protocol"] == protocol.PROTOCOL_VERSION:
-                BoardIdentity.of(frame)
+                BoardIdentity.decode(frame)
             elif read := _READ.get(frame.name):
                 read(frame)
     return Heard(names, digest.hexdigest(), reader.damaged, reader.repeated)

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
-from firmware_host.answers import NOTHING
+from firmware_host.answers import NO_CHANGE
 from firmware_host.frames import Frame, encode
 from support.board.emulated_session import PARTS, Session
 
@@ -26,8 +26,8 @@ CALIBRATION = {
     "bias_rad_s": (0.0077, -0.0100, -0.0051),
     "lowest_c": 22.0,
     "highest_c": 22.0,
-    "scale_change": NOTHING,
-    "bias_change_rad_s": NOTHING,
+    "scale_change": NO_CHANGE,
+    "bias_change_rad_s": NO_CHANGE,
 }
 STARTING = 80  # conversions that may be no samples: those a part makes while it settles
 STOPPING = 5  # samples that may come from later conversions than the request to stop

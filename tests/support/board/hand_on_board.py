@@ -99,10 +99,10 @@ def play(recorded: Recorded, moves: int = 12, scale_std: float = 1e-3, number: n
         give(board, time_us, each, rate, force)
         if time_us >= asked_us + POLLED_US:
             asked_us = time_us
-            report = HandReport.of(asked(board, "hand_status"))
+            report = HandReport.decode(asked(board, "hand_status"))
             if report.judged > len(reports):
                 reports.append(report)
-    solved = HandSolved.of(asked(board, "hand_solve"))
+    solved = HandSolved.decode(asked(board, "hand_solve"))
     return Played(times_us, counts * setup["sensitivity_rad_s"], reports, solved)
 
 

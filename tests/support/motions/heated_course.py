@@ -84,7 +84,7 @@ def seen(of: Warmed, seed: int) -> RepeatedMeans:
     places = np.tile(np.arange(12), len(of.starts_s))
     drift = Drift(INSTABILITY_RAD_S, 100.0, WALK_RAD_S_SQRT_S, np.random.SeedSequence([31, seed]))
     powers = (of.element_c[:, None] - REFERENCE_C) ** np.arange(3)
-    bias = powers @ BIAS_RAD_S + of.branch[:, None] * HYSTERESIS_RAD_S + drift.at_times(of.time_s)
+    bias = powers @ BIAS_RAD_S + of.branch[:, None] * HYSTERESIS_RAD_S + drift.evaluate_all(of.time_s)
     inverse = 1 / (SCALE[0] * (1 + powers[:, 1:] @ SCALE[1:]))
 
     def mean(values: Array) -> Array:

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from firmware_host.answers import NOTHING
+from firmware_host.answers import NO_CHANGE
 from firmware_host.frames import Frame
 from support.board.emulated_session import FIELD_T, MAGNETIC, Session
 from support.board.host_board import PERIOD_US, HostBoard, configured, convert, error_of, sample_sequences, settle
@@ -23,8 +23,8 @@ CALIBRATION = {
     "bias_rad_s": [0, 0, 0],
     "lowest_c": 25.0,
     "highest_c": 25.0,
-    "scale_change": NOTHING,
-    "bias_change_rad_s": NOTHING,
+    "scale_change": NO_CHANGE,
+    "bias_change_rad_s": NO_CHANGE,
 }
 
 

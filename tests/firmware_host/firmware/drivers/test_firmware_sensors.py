@@ -54,7 +54,7 @@ def test_a_missing_part_is_told_in_the_identity_and_refused(board: HostBoard, pa
 
 @pytest.mark.parametrize(
     ("part", "identity"),
-    [(name, other) for name, part in GYROSCOPES.items() for other in list(part.in_its_place)[:8]],
+    [(name, other) for name, part in GYROSCOPES.items() for other in list(part.identities)[:8]],
 )
 def test_another_part_is_told_in_the_identity_and_refused(board: HostBoard, part: str, identity: int) -> None:
     sensor = NUMBER[part]
