@@ -12,26 +12,26 @@
 #include "setups.h"
 
 #define RING 64u              /* a power of two */
-#define FIELD_RING 16u        /* another, of a magnetometer: it is slower */
-#define SILENCE_PERIODS 10u   /* so many conversions missing in a row is a fault, not jitter */
-#define SILENCE_US 100000u    /* and time for a part that is just starting up */
-#define BAD_READS 10u         /* so many in a row are worth a word, */
-#define GOOD_READS 8u         /* and as good as one less after so many good ones */
+#define FIELD_RING 16u        /* a power of two, for a magnetometer, which is slower */
+#define SILENCE_PERIODS 10u   /* more conversions missing in a row are a fault, not jitter */
+#define SILENCE_US 100000u    /* plus the start-up time of a part */
+#define BAD_READS 10u         /* bad reads in a row that are reported */
+#define GOOD_READS 8u         /* good reads that cancel a bad one */
 
 struct stream {
-    volatile uint32_t edges; /* by the interrupt */
+    volatile uint32_t edges; /* written by the interrupt */
     volatile uint32_t captured_us;
     uint32_t edges_seen;
     uint32_t period_us; /* 0: not configured */
     uint64_t last_us;   /* latest conversion, or the start */
-    uint64_t watched_us; /* from when on silence counts */
-    uint32_t settling;  /* conversions still to throw away */
+    uint64_t watched_us; /* time from which a silence is measured */
+    uint32_t settling;  /* conversions still to discard */
     uint32_t distrust;  /* grows by bad reads, shrinks by good ones */
-    bool overtaken;     /* the next edge came while a reading was under way */
+    bool overtaken;     /* the next edge came during a read */
     bool silence_reported, bad_reads_reported;
     uint32_t conversions, sent, dropped;
     uint64_t good_us; /* latest good reading, 0: none since the start */
-    int16_t temperature_counts; /* of it */
+    int16_t temperature_counts; /* of that reading */
     struct sample *ring;
     uint32_t ring_size, written, read;
     const struct batch_layout *layout;
@@ -76,10 +76,10 @@ static enum read_result read_sensor(unsigned sensor, struct reading *reading)
     return drivers[sensor]->read(sensor, setups_of(sensor), reading);
 }
 
-#define TRIES 3u /* a line that only rattles is left alone */
+#define TRIES 3u /* a bouncing line is left alone */
 
-/* Reads what was converted before the start. A part that holds its line makes no edge until that is down. A part with pulses
-   is read once and no more: an ADIS16465 bears only so many words from one conversion to the next. */
+/* Discards the conversion from before the start. A part with a level on its line makes no edge until a read lowers it. A part
+   with pulses is read only once: an ADIS16465 allows a limited number of words between conversions. */
 static void rearm(unsigned sensor)
 {
     const struct sensor_driver *driver = drivers[sensor];
@@ -91,10 +91,10 @@ static void rearm(unsigned sensor)
         read_sensor(sensor, &discarded);
     } while (--tries != 0 && (stream->edges != stream->edges_seen || port_line_is_high(sensor)));
     if (!driver->holds_line)
-        stream->edges_seen = stream->edges; /* it has been read, or the next tells of itself */
+        stream->edges_seen = stream->edges; /* it has been read, or the next makes an edge */
 }
 
-/* A held line that rose again before it was seen to fall has made no edge, and would make none any more. */
+/* A line that rose again before a low level was detected made no edge, and would stay high. */
 static void lower_line(unsigned sensor)
 {
     const struct stream *stream = &streams[sensor];
@@ -143,7 +143,7 @@ bool acquisition_start(uint8_t calibrated)
 void acquisition_stop(void)
 {
     running = false;
-    port_listen(0); /* an ADIS16465 cannot be told to be quiet */
+    port_listen(0); /* an ADIS16465 cannot be stopped */
 }
 
 bool acquisition_is_running(void)
@@ -159,7 +159,7 @@ bool acquisition_is_empty(void)
     return true;
 }
 
-/* Conversions since the last one. A line held high by an unread conversion makes no edges, so time tells what edges cannot. */
+/* Conversions since the last one. A line kept high by an unread conversion makes no edges, so the time counts too. */
 static uint32_t conversions_until(const struct stream *stream, uint32_t edges, uint64_t time_us)
 {
     if (stream->conversions == 0)
@@ -174,7 +174,7 @@ static bool complain(unsigned sensor, enum error_code code)
     return link_send(MESSAGE_ERROR, &error, sizeof error);
 }
 
-/* Tries to wake a line that was left high, but not in every pass: the other sensors have to be read too. */
+/* Tries to release a line that stayed high, but not in every pass: the other sensors have to be read too. */
 static void watch_silence(unsigned sensor)
 {
     struct stream *stream = &streams[sensor];
@@ -232,8 +232,8 @@ static void acquire(unsigned sensor)
     struct reading reading;
     uint32_t began_us = port_time_us();
     enum read_result result = read_sensor(sensor, &reading);
-    /* An edge between the look at them and the moment the values were taken: they may be the next conversion's, under the
-       time of the one before. Then the next reading is the same again. What was taken is safe from later edges. */
+    /* After an edge between the check and the latching of the values they may belong to the next conversion, with the time of
+       the one before. Then the next reading repeats them. Later edges do not change latched values. */
     bool again = stream->overtaken && result == READ_STALE;
     stream->overtaken = stream->edges != edges && (int32_t)(stream->captured_us - began_us) <= driver->latched_within_us;
     if (driver->holds_line)

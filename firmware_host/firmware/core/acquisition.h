@@ -13,10 +13,10 @@ void acquisition_reset(void);
 /* Called from the data-ready interrupt with the counter value captured there. */
 void acquisition_data_ready(unsigned sensor, uint32_t captured_us);
 
-/* Sensor has just been configured to this rate; 0 takes it out of the stream. */
+/* Sets the rate of a newly configured sensor; 0 removes it from the stream. */
 void acquisition_set_rate(unsigned sensor, double rate_hz);
 
-/* Where the correction of a sensor's rates is kept: to be filled in before a start that names it. */
+/* The correction of a sensor's rates, to be set before a calibrated start of it. */
 struct correction *acquisition_correction(unsigned sensor);
 
 /* Starts counting at sequence 0 with the first conversion of a settled part; false when no sensor is configured. Those with
@@ -25,17 +25,17 @@ bool acquisition_start(uint8_t calibrated);
 void acquisition_stop(void);
 bool acquisition_is_running(void);
 
-/* Nothing is left to send. */
+/* True if no sample waits to be sent. */
 bool acquisition_is_empty(void);
 
-/* Reads what is ready, sends what is due. */
+/* Reads new conversions and sends batches that are due. */
 void acquisition_run(void);
 
 void acquisition_report(unsigned sensor, struct report_item *item);
 uint32_t acquisition_bus_errors(void);
 
-/* What a sensor's thermometer told with its newest good reading, and when; false when that was before the latest start, or
-   nothing streams. */
+/* The temperature and the time of a sensor's newest good reading; false without one since the latest start, or without a
+   stream. */
 bool acquisition_temperature(unsigned sensor, int16_t *counts, uint64_t *read_us);
 
 #endif

@@ -1,4 +1,4 @@
-/* What a stream sends of its samples, and in which layout. */
+/* The layouts of a stream's batches. */
 #ifndef BATCH_H
 #define BATCH_H
 
@@ -18,7 +18,7 @@ struct batch_layout {
     uint8_t mode;
     uint8_t item_size;
 
-    /* Writes one item. Only calibrated rates look at the correction. */
+    /* Writes one item. Only calibrated rates use the correction. */
     void (*write)(const struct sample *sample, uint32_t delta_us, struct correction *correction, uint8_t *item);
 };
 

@@ -18,9 +18,9 @@
 #define BEACON_US 500000u
 
 static uint64_t last_beacon_us;
-static uint8_t stop_to_acknowledge; /* sequence of a stop whose last samples are still waiting */
+static uint8_t stop_to_acknowledge; /* sequence of a stop whose last samples are not sent yet */
 static bool restart_wanted;
-static uint8_t calibrated; /* sensors, since the latest start */
+static uint8_t calibrated; /* mask of sensors, since the latest start */
 
 void board_reset(void)
 {
@@ -89,7 +89,7 @@ static void on_configure(const struct frame *request)
     link_send(MESSAGE_SETUP, &setup, sizeof setup);
 }
 
-/* Those with their bit in `mask` send calibrated rates. */
+/* Starts the stream; sensors with their bit in `mask` send calibrated rates. */
 static void start(const struct frame *request, uint8_t mask)
 {
     uint8_t sensor;
@@ -202,7 +202,7 @@ static void send_beacon(void)
     bool idle = !acquisition_is_running();
     if (idle && clock_now() - last_beacon_us < BEACON_US)
         return;
-    last_beacon_us = clock_now(); /* the first a while after a stop, when its last samples have left */
+    last_beacon_us = clock_now(); /* so that the first follows a stop's last samples */
     if (idle)
         send_identity(0);
 }

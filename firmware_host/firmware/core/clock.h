@@ -6,10 +6,10 @@
 
 void clock_reset(void);
 
-/* Board time now, µs; to be called at least once in 35 minutes, which every tick of the main loop does. */
+/* Returns the present board time, µs; every tick of the main loop calls it, as it must be called every 35 minutes. */
 uint64_t clock_now(void);
 
-/* Board time of a counter value captured within 35 minutes of the last clock_now(). Does not read the counter. */
+/* Returns the board time of a counter value captured within 35 minutes of the last clock_now(), without reading the counter. */
 uint64_t clock_at(uint32_t captured_us);
 
 #endif

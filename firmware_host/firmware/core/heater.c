@@ -10,11 +10,11 @@
 #include "sensors.h"
 #include "setups.h"
 
-#define THERMOMETER_SILENT_US 1000000u /* many readings, at any rate a part has */
+#define THERMOMETER_SILENT_US 1000000u /* many readings, at any rate of a part */
 
 static uint8_t power;
-static uint8_t cause; /* enum heater_cause: why it is off */
-static uint64_t word_us; /* the host's latest */
+static uint8_t cause; /* enum heater_cause: the reason for being off */
+static uint64_t word_us; /* time of the host's latest request */
 static float hottest_c;
 
 static void switch_off(enum heater_cause why)
@@ -31,8 +31,8 @@ void heater_reset(void)
     switch_off(HEATER_NOT_WANTED);
 }
 
-/* Looks at every thermometer there is. False where there is none, or one that has told nothing of late: what heats blindly
-   must not heat. */
+/* Reads every thermometer. False if there is none, or one without a recent reading: without a temperature the heater must be
+   off. */
 static bool feel(uint64_t now_us)
 {
     bool felt = false;
@@ -52,7 +52,7 @@ static bool feel(uint64_t now_us)
     return felt;
 }
 
-/* What is too hot stays off until the host has said so itself: it would else be switched on again by the next word. */
+/* After overheating it stays off until the host has switched it off: otherwise the next request would switch it on again. */
 static void guard(void)
 {
     uint64_t now_us = clock_now();

@@ -12,7 +12,7 @@ void setups_reset(void)
     memset(setups, 0, sizeof setups);
 }
 
-/* Why what was asked for makes no sense for any part that measures this, or 0. */
+/* Returns why a request is invalid for every part that measures this quantity, or 0. */
 static enum error_code refuse_wanted(const struct configure_payload *wanted, uint8_t quantity)
 {
     if (!(wanted->rate_hz > 0.0f && wanted->rate_hz < 1e6f))

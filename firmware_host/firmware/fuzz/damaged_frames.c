@@ -1,9 +1,10 @@
-/* Very many damaged frames: `damaged_frames COUNT SEED FRAMES [VALID]`. FRAMES holds sound frames, delimiters included.
+/* A stress test with damaged frames: `damaged_frames COUNT SEED FRAMES [VALID]`. FRAMES holds sound frames, delimiters
+   included.
 
-   The firmware's receiver must make of every block what a second receiver makes of it that is written from the protocol's
-   description alone, bit by bit; what both accept goes to the board, which must answer or refuse it. With VALID the stream
-   goes to stdout instead, for another receiver, and what the second receiver accepts of it to that file. The counts go to
-   stderr, as JSON. */
+   The firmware's receiver must decode every block as a second receiver does, which is written bit by bit from the protocol's
+   description alone; accepted blocks go to the board, which must answer or refuse them. With VALID the stream goes to stdout
+   instead, for another receiver, and the blocks that the second receiver accepts go to that file. The counts go to stderr, as
+   JSON. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -17,7 +18,7 @@
 
 #define SOUND_MAX 4096u
 #define BLOCK_MAX 4096u
-#define BURST 200u /* bytes that come before the board gets round to them */
+#define BURST 200u /* bytes that arrive before the board processes them */
 
 typedef void (*bus_function)(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);
 
@@ -30,10 +31,10 @@ struct block {
     size_t size;
 };
 
-static struct block sound[SOUND_MAX], wire; /* without their delimiters; `wire`: what has come since the last zero */
-static struct block made; /* the last frame with a right CRC on purpose */
+static struct block sound[SOUND_MAX], wire; /* without their delimiters; `wire`: bytes since the last zero */
+static struct block made; /* the last damaged frame with a corrected CRC */
 static size_t sound_count;
-static FILE *valid; /* NULL: the firmware's receiver is meant */
+static FILE *valid; /* NULL: test of the firmware's receiver */
 
 static struct {
     unsigned long frames, blocks, valid, as_sent, made, chance, refused, answers, errors;
@@ -65,10 +66,10 @@ static uint32_t crc_by_bits(const uint8_t *bytes, size_t size)
     return ~crc;
 }
 
-/* Type, sequence, payload and CRC into `body`; their size, 0 when it is no frame. */
+/* Writes type, sequence, payload and CRC into `body`; returns their size, 0 if it is no frame. */
 static size_t body_of(const struct block *block, uint8_t body[BLOCK_MAX])
 {
-    size_t size = 0, left = 0; /* bytes to the next zero that was taken out */
+    size_t size = 0, left = 0; /* `left`: bytes to the next replaced zero */
     if (block->size < FRAME_OVERHEAD + 1 || block->size > FRAME_MAX + 1)
         return 0;
     for (size_t i = 0; i < block->size; i++) {
@@ -111,7 +112,7 @@ static bool same(const struct block *one, const struct block *other)
     return one->size == other->size && memcmp(one->bytes, other->bytes, one->size) == 0;
 }
 
-/* `size` bytes of `from`, or random ones, in place of `gone` at a place. */
+/* Replaces `gone` bytes at an offset by `size` bytes of `from`, or random ones. */
 static void replace(struct block *block, size_t place, size_t gone, const uint8_t *from, size_t size)
 {
     if (place + gone > block->size || block->size - gone + size > BLOCK_MAX)
@@ -162,7 +163,7 @@ static void damage(struct block *block)
     case 2: /* the end is cut off */
         block->size = place;
         break;
-    case 3: /* a run is lost, doubled, overwritten, inserted, swapped with the one before */
+    case 3: /* a run of bytes is lost, doubled, overwritten, inserted, or swapped with the one before */
         replace(block, place, size, NULL, 0);
         break;
     case 4:
@@ -178,7 +179,7 @@ static void damage(struct block *block)
         replace(block, place, size, NULL, 0);
         replace(block, below(place + 1), 0, run, size);
         break;
-    case 8: /* it goes on as another */
+    case 8: /* it continues as another frame */
         size = below(other->size);
         replace(block, place, block->size - place, &other->bytes[size], other->size - size);
         break;
@@ -222,7 +223,7 @@ static void restart(void)
     board_reset();
 }
 
-/* A block has ended: what the second receiver makes of it must have come out of the first. */
+/* Compares both receivers at the end of a block. */
 static void judge(void)
 {
     uint8_t body[BLOCK_MAX];
@@ -236,7 +237,7 @@ static void judge(void)
         return;
     }
     count.valid++;
-    bool as_sent = false; /* one of all: where it ends and another begins is damaged too */
+    bool as_sent = false; /* all blocks as one: delimiters are damaged too */
     for (size_t i = 0; i < sound_count && !as_sent; i++)
         as_sent = same(&wire, &sound[i]);
     count.as_sent += as_sent;
@@ -248,7 +249,7 @@ static void judge(void)
     }
     must(taken && frame.type == body[0] && frame.sequence == body[1] && frame.size == size - FRAME_OVERHEAD);
     must(memcmp(frame.payload, &body[2], frame.size) == 0);
-    /* Once more for the board, which takes its frames from the line itself. */
+    /* Repeats the block for the board, which reads the line itself. */
     for (size_t i = 0; i < wire.size; i++)
         link_byte_received(wire.bytes[i]);
     link_byte_received(0);

@@ -1,6 +1,6 @@
-/* The whole core under a fuzzer. An input is a play: bytes and frames from the host, conversions, time, broken parts, a
-   busy line, a flash that fails. Beside what the sanitizers see, the board must send whole frames with consecutive sequence
-   numbers and leave alone what the transmitter is sending. */
+/* The complete core under a fuzzer. An input is a session: bytes and frames from the host, conversions, time, broken parts, a
+   busy line, a failing flash. In addition to the sanitizers' checks, the board must send complete frames with consecutive
+   sequence numbers and not change bytes during their transmission. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,7 +30,7 @@ static struct {
     const uint8_t *bytes; /* NULL: the line is free */
     size_t size;
     uint8_t copy[1024];
-    bool busy;     /* nothing leaves until the play says so */
+    bool busy;     /* nothing is sent until the session releases the line */
     int sequence; /* of the next frame; -1: any */
 } line;
 
@@ -132,7 +132,7 @@ static void receive_noise(void)
     for (size_t i = 0; i < size; i++)
         bytes[i] = next();
     receive(bytes, size);
-    if (size != sizeof bytes) /* so much noise may come before the board gets round to it */
+    if (size != sizeof bytes) /* noise may overrun the ring before the board processes it */
         pass(100);
 }
 

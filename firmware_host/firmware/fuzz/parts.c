@@ -11,8 +11,8 @@
 #define READ 0x80u
 #define WORDS 0u /* in the place of a mask: words of 16 bits, high byte first, answered a frame later */
 
-/* A part: which bits of the first byte are the address, and are answered by the bytes from there on; what its memory holds
-   after power-up, such as its identity and that there are new data, always; where its outputs lie. */
+/* A part: the address bits of the first byte, which selects the bytes of the answer; its memory after power-up, such as its
+   identity and a constant flag of new data; and the addresses of its outputs. */
 static const struct part {
     uint8_t mask;
     struct {
@@ -51,7 +51,7 @@ static void burst(uint8_t *bytes, size_t size)
 {
     uint8_t data[BURST_SIZE];
     memcpy(data, &memory[ADIS16465][BURST_DATA], sizeof data);
-    uint16_t sum = (uint16_t)(data[18] << 8 | data[19]); /* what the fuzzer put there damages it */
+    uint16_t sum = (uint16_t)(data[18] << 8 | data[19]); /* a byte from the fuzzer damages it */
     for (size_t i = 0; i < 18; i++)
         sum = (uint16_t)(sum + data[i]);
     data[18] = (uint8_t)(sum >> 8);

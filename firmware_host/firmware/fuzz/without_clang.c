@@ -1,5 +1,5 @@
-/* A driver for machines without libFuzzer: `… SECONDS SEED_FILE …` plays the seeds, then random changes of them. The same
-   seeds give the same inputs in every run. An input that fails is left in the file fuzz-failure. */
+/* A driver for machines without libFuzzer: `… SECONDS SEED_FILE …` runs the seeds, then random changes of them. The same seeds
+   give the same inputs in every run. A failing input is written to the file fuzz-failure. */
 #include <sanitizer/common_interface_defs.h>
 #include <signal.h>
 #include <stdint.h>
@@ -27,7 +27,7 @@ static size_t below(size_t limit)
     return limit == 0 ? 0 : (size_t)(state >> 33) % limit;
 }
 
-/* Puts `size` bytes in place of `gone` at a random place: some of another seed, or random ones. */
+/* Replaces `gone` bytes at a random offset by `size` bytes of another seed, or random ones. */
 static void replace(size_t gone, size_t size)
 {
     const struct input *other = &seeds[below(seed_count)];

@@ -1,12 +1,12 @@
-/* Flash in RAM. The caller may watch each operation and cut the power in the middle of it. */
+/* Flash in RAM. The caller may observe each operation and cut the power during it. */
 #include <string.h>
 
 #include "port.h"
 
 #define DOUBLEWORD 8u
 
-/* Called before an erase (`doubleword` NULL) or the programming of a doubleword. False: the power fails in the middle. What
-   that leaves behind the caller writes into the memory; until power is back it goes on answering false. */
+/* Called before an erase (`doubleword` NULL) or the programming of a doubleword. False: the power fails during it. The caller
+   then writes the torn content into the memory, and answers false until power is back. */
 typedef bool (*flash_function)(unsigned page, size_t offset, const uint64_t *doubleword);
 
 static struct {

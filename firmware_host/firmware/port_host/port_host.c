@@ -34,7 +34,7 @@ void host_connect(bus_function bus, transmit_function transmit, restart_function
     on_restart = restart;
 }
 
-/* Who knows the data-ready lines' levels; without, they are down. */
+/* The caller's function for the data-ready lines' levels; without it they are low. */
 void host_watch_lines(line_function line)
 {
     on_line = line;
@@ -86,7 +86,7 @@ void port_heat(uint8_t power)
     heating = power;
 }
 
-/* What the heater's pin does, of 255. */
+/* The duty of the heater's pin, of 255. */
 uint8_t host_heating(void)
 {
     return heating;
@@ -94,7 +94,7 @@ uint8_t host_heating(void)
 
 void port_listen(uint8_t mask)
 {
-    (void)mask; /* the caller knows what it started */
+    (void)mask; /* the caller controls the lines itself */
 }
 
 bool port_line_is_high(unsigned sensor)

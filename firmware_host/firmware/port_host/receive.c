@@ -1,4 +1,4 @@
-/* The receiver's two ends in one call, for tests of very many frames. */
+/* The receiver's two ends in one call, for tests of many frames. */
 #include "link.h"
 
 typedef void (*frame_function)(uint8_t type, uint8_t sequence, const uint8_t *payload, size_t size);

@@ -31,7 +31,7 @@ static void setup_power_to_peripherals(void)
     RCC_AHB2ENR |= RCC_AHB2ENR_GPIOAEN | RCC_AHB2ENR_GPIOBEN;
     RCC_APB1ENR1 |= RCC_APB1ENR1_TIM2EN | RCC_APB1ENR1_USART2EN | RCC_APB1ENR1_PWREN;
     RCC_APB2ENR |= RCC_APB2ENR_SYSCFGEN | RCC_APB2ENR_SPI1EN | RCC_APB2ENR_TIM16EN;
-    (void)RCC_APB2ENR; /* the reading back lets the clocks start before the first access */
+    (void)RCC_APB2ENR; /* the read lets the clocks start before the first access */
 }
 
 static void start_crystal(void)
@@ -40,7 +40,7 @@ static void start_crystal(void)
     while (!(PWR_CR1 & PWR_CR1_DBP)) /* until then a write to BDCR is lost */
         ;
     if (!(RCC_BDCR & RCC_BDCR_LSEON))
-        RCC_BDCR &= ~RCC_BDCR_LSEBYP; /* it outlives resets, and would call a clock ready that is not there */
+        RCC_BDCR &= ~RCC_BDCR_LSEBYP; /* it survives resets, and would report a missing clock as ready */
     RCC_BDCR |= RCC_BDCR_LSEON;
 }
 
@@ -68,21 +68,21 @@ static void setup_pins(void)
                   PER_PIN(4u, PIN_ALTERNATE) | PER_PIN(5u, PIN_ALTERNATE);
 
     GPIOB_PUPDR = (GPIOB_PUPDR & ~PIN_MASK(LAMP_PIN)) | PER_PIN(LAMP_PIN, PULL_DOWN);
-    GPIOB_BSRR = 1u << LAMP_PIN; /* it is an output while the lamp is lit, and no other time */
+    GPIOB_BSRR = 1u << LAMP_PIN; /* it is an output only while the lamp is lit */
     wiring_setup();
 }
 
 static void setup_microseconds(void)
 {
     TIM2_PSC = CLOCK_HZ / 1000000u - 1u;
-    TIM2_ARR = 0xFFFFFFFFu; /* the maker's own file says it comes up 0, which would hold the counter */
+    TIM2_ARR = 0xFFFFFFFFu; /* 0 after reset by the maker's register file, which would stop the counter */
     TIM2_EGR = TIM2_EGR_UG; /* loads the prescaler */
     TIM2_CR1 = TIM2_CR1_CEN;
 }
 
-#define HEATER_PERIODS 255u /* of one cycle, as many as powers: the highest never lets the pin down */
+#define HEATER_PERIODS 255u /* per cycle, equal to the highest power, at which the pin stays high */
 
-/* After a reset the pin is an input, which the heater's own resistor holds down; from here on the timer does, at power 0. */
+/* After a reset the pin is an input, pulled down by the heater's own resistor; from here on the timer drives it, at power 0. */
 static void setup_heater(void)
 {
     TIM16_PSC = CLOCK_HZ / (1000u * HEATER_PERIODS) - 1u;
@@ -96,7 +96,7 @@ static void setup_heater(void)
     GPIOA_MODER = (GPIOA_MODER & ~PIN_MASK(6u)) | PER_PIN(6u, PIN_ALTERNATE);
 }
 
-/* Mode 3, which all the sensors take; eight bits, which the FIFO takes two at a time. The slowest clock until bus_xfer. */
+/* Mode 3, supported by all sensors; eight bits, two at a time in the FIFO. The slowest clock until bus_xfer. */
 static void setup_spi(void)
 {
     SPI1_CR2 = SPI1_CR2_DS(7u);
@@ -104,7 +104,7 @@ static void setup_spi(void)
     SPI1_CR1 |= SPI1_CR1_SPE;
 }
 
-/* Without OVRDIS one late byte would stop the receiver; the CRC finds the hole anyway. */
+/* Without OVRDIS one late byte would stop the receiver; the CRC detects the gap anyway. */
 static void setup_serial(void)
 {
     DMA1_CSELR |= DMA1_CSELR_C7S(2u);
@@ -114,21 +114,21 @@ static void setup_serial(void)
     USART2_CR1 = USART2_CR1_UE | USART2_CR1_RE | USART2_CR1_TE | USART2_CR1_RXNEIE;
 }
 
-#define LATER 0x10u /* the next priority after the data-ready edges', whose time stamps wait for nobody */
+#define LATER 0x10u /* the next priority after the data-ready edges', whose time stamps must not be delayed */
 
 static void setup_interrupts(void)
 {
     NVIC_IPR4 = NVIC_IPR4_IPR_N1(LATER); /* DMA1_CH7 */
     NVIC_IPR9 = NVIC_IPR9_IPR_N2(LATER); /* USART2 */
     NVIC_ISER0 = 1u << EXTI0_IRQ | 1u << EXTI1_IRQ | 1u << EXTI2_IRQ | 1u << EXTI3_IRQ | 1u << EXTI4_IRQ |
-                 1u << EXTI9_5_IRQ | 1u << DMA1_CH7_IRQ; /* those of lines without a sensor stay quiet */
+                 1u << EXTI9_5_IRQ | 1u << DMA1_CH7_IRQ; /* lines without a sensor are not enabled */
     NVIC_ISER1 = 1u << (USART2_IRQ - 32u) | 1u << (EXTI15_10_IRQ - 32u);
     STK_LOAD = CLOCK_HZ / TICK_HZ - 1u;
     STK_VAL = 0;
     STK_CTRL = STK_CTRL_ENABLE | STK_CTRL_TICKINT | STK_CTRL_CLKSOURCE;
 }
 
-/* About one second of the 32 kHz oscillator; the main loop's tick answers it 20 times as often. */
+/* About one second of the 32 kHz oscillator; the main loop's tick resets it 20 times in that time. */
 static void setup_watchdog(void)
 {
     IWDG_KR = 0xCCCCu; /* start */

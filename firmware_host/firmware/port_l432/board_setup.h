@@ -1,4 +1,4 @@
-/* Brings clock, pins and peripherals up. */
+/* Initializes clock, pins and peripherals. */
 #ifndef BOARD_SETUP_H
 #define BOARD_SETUP_H
 
@@ -8,7 +8,7 @@
 
 void setup_hardware(void);
 
-/* Lets the clock follow the 32768 Hz crystal once that runs, which takes up to two seconds; true from then on. */
+/* Locks the clock to the 32768 Hz crystal once that runs, after up to two seconds; true from then on. */
 bool setup_lock_clock(void);
 
 #endif

@@ -1,7 +1,8 @@
-/* The last sixteen pages of the flash. RM0394, section 3.3: keys, page erase (3.3.5), standard programming (3.3.7), ECC (3.3.2).
+/* The last sixteen pages of the flash. RM0394, section 3.3: keys, page erase (3.3.5), standard programming (3.3.7), ECC
+   (3.3.2).
 
-   While the flash is busy, every fetch from it waits: the processor stands still, 25 ms for a page, and interrupts with it. The
-   watchdog allows a second. Nothing here may run while sensors stream. */
+   While the flash is busy, every fetch from it waits: the processor stops, 25 ms for a page, and interrupts too. The watchdog
+   allows a second. No function here may run while sensors stream. */
 #include "flash.h"
 
 #include "port.h"
@@ -13,12 +14,12 @@
 
 extern volatile uint8_t store_start[FLASH_PAGES][FLASH_PAGE_BYTES]; /* the linker script's */
 
-/* Images up to firmware 0.5 had the last six pages alone: what they stored is still where it was. */
+/* Images up to firmware 0.5 had the last six pages alone: their records are still there. */
 #define FIRST_PAGE (FLASH_PAGES - 6u)
 
 static volatile bool reading, torn;
 
-/* The data cache does not see what is erased and programmed, and may hold a doubleword whose error has been told already. */
+/* The data cache does not follow erasing and programming, and may contain a doubleword whose error was already reported. */
 static void switch_cache_off(void)
 {
     FLASH_ACR &= ~FLASH_ACR_DCEN;
@@ -36,7 +37,7 @@ static volatile uint8_t *place_of(unsigned page)
     return store_start[(FIRST_PAGE + page) % FLASH_PAGES];
 }
 
-/* An error left over from before, such as by a stray write, would refuse the next operation. */
+/* An earlier error, such as of a stray write, would block the next operation. */
 static void begin(void)
 {
     switch_cache_off();
@@ -47,7 +48,7 @@ static void begin(void)
 
 static bool finish(void)
 {
-    __asm volatile("dsb" ::: "memory"); /* what starts it has arrived before anybody looks whether it is busy */
+    __asm volatile("dsb" ::: "memory"); /* the start has arrived before the busy flag is read */
     while (FLASH_SR & FLASH_SR_BSY)
         ;
     bool done = (FLASH_SR & ERRORS) == 0;
@@ -85,19 +86,20 @@ bool port_flash_read(unsigned page, size_t offset, void *bytes, size_t size)
     reading = true;
     for (size_t i = 0; i < size && !torn; i++)
         to[i] = from[i];
-    __asm volatile("dsb\n isb" ::: "memory"); /* an error of the last byte has come by now */
+    __asm volatile("dsb\n isb" ::: "memory"); /* an error of the last byte has occurred by now */
     reading = false;
     switch_cache_on();
     return !torn;
 }
 
-/* Not asked is the flag: a power loss in the middle of an erase or a programming may spoil the register that holds it (ST's
+/* The flag is not evaluated: a power loss in the middle of an erase or a programming may spoil the register that holds it (ST's
    errata of the L4), and a record that cannot be read must not keep the board from starting. */
 bool flash_take_torn_read(void)
 {
     if (!reading)
         return false;
-    FLASH_ECCR = FLASH_ECCR_ECCD | FLASH_ECCR_ECCC; /* written 1 to clear; standing on return it would bring the NMI again */
+    FLASH_ECCR = FLASH_ECCR_ECCD | FLASH_ECCR_ECCC; /* written 1 to clear; a flag still set on return would raise the NMI again
+                                                       */
     __asm volatile("dsb" ::: "memory");
     torn = true;
     return true;

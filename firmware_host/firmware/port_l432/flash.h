@@ -1,10 +1,10 @@
-/* What the NMI asks of the flash. */
+/* The flash's part of the NMI handler. */
 #ifndef FLASH_H
 #define FLASH_H
 
 #include <stdbool.h>
 
-/* True when the NMI tells of an uncorrectable error where port_flash_read() reads, which then reports it. */
+/* Returns true if the NMI signals an uncorrectable error in port_flash_read(), which then reports it. */
 bool flash_take_torn_read(void);
 
 #endif

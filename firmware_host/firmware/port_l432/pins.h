@@ -1,4 +1,4 @@
-/* What a pin is set to: two bits of each of its port's registers. */
+/* A pin's settings: two bits of each of its port's registers. */
 #ifndef PINS_H
 #define PINS_H
 

@@ -26,7 +26,7 @@ uint32_t port_time_us(void)
     return TIM2_CNT;
 }
 
-/* The counter may tick just after the first look, so one more tick than asked for. */
+/* The counter may tick just after the first read, so wait for one more tick. */
 void port_wait_us(uint32_t duration_us)
 {
     uint32_t start_us = TIM2_CNT;
@@ -34,13 +34,14 @@ void port_wait_us(uint32_t duration_us)
         ;
 }
 
-/* PWM at 1 kHz, by the hardware: a program that hangs leaves it as it is until the watchdog bites, within a second. */
+/* PWM at 1 kHz, by the hardware: after a hang of the program it continues until the watchdog resets the chip, within a second.
+   */
 void port_heat(uint8_t power)
 {
     TIM16_CCR1 = power;
 }
 
-/* An edge pends its line also while that is masked. */
+/* An edge also pends a masked line. */
 void port_listen(uint8_t mask)
 {
     for (unsigned i = 0; i < SENSOR_COUNT; i++) {
@@ -56,7 +57,7 @@ bool port_line_is_high(unsigned sensor)
     return (*ready_lines[sensor].level & ready_lines[sensor].bit) != 0;
 }
 
-/* The wire is high when the lamp is to be lit, or when the button joins it with the supply; nothing ever drives it low. */
+/* The wire is high for a lit lamp, or while the button connects it to the supply; nothing drives it low. */
 void port_set_lamp(bool lit)
 {
     uint32_t mode = PER_PIN(LAMP_PIN, lit ? PIN_OUTPUT : PIN_INPUT);
@@ -83,7 +84,7 @@ static void wait_for_selected(void)
     __asm volatile(".rept 16\n nop\n .endr");
 }
 
-/* The last bit has its second half still to go when it has been received: no deselect and no other clock before. */
+/* The second half of the last bit is still on the bus when it has been received: no deselect or clock change before its end. */
 void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
 {
     set_bus_clock(max_hz);
@@ -153,8 +154,8 @@ static void remember_reset(void)
     RCC_CSR |= RCC_CSR_RMVF;
 }
 
-/* The barrier: were a flag still set on return, the same edge would come again and count as a second conversion. Lines that
-   share a handler are told apart by their flags; those of other handlers the compiler leaves out. */
+/* The barrier: a flag still set on return would repeat the same edge, which would count as a second conversion. Lines that
+   share a handler are distinguished by their flags; the compiler removes those of other handlers. */
 static inline void data_ready(uint32_t lines)
 {
     uint32_t captured_us = TIM2_CNT; /* before anything else */

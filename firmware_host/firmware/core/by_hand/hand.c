@@ -10,21 +10,22 @@
 #include "sensors.h"
 #include "setups.h"
 
-#define BLOCK_S 0.1f          /* readings are looked at in blocks */
-#define BLOCK_LEAST 4u        /* readings in one */
-#define REST_US 1000000u      /* so long a rest lasts at least */
-#define SETTLED_RAD_S 0.05f   /* no larger is the scatter of a rest, */
-#define NOISIER 4.0f          /* nor so many times the quietest one's, as squares, */
-#define TREMOR_RAD_S 0.002f   /* beyond this */
-#define WANDERS 5.0f          /* standard deviations of a block's mean; more, */
-#define WANDERS_RAD_S 0.0015f /* and this, and it has begun to move */
-#define TURNING_RAD_S 0.03f   /* from the first rest's mean; more is no bias that wandered, and no g-sensitivity */
+#define BLOCK_S 0.1f          /* duration of a block of readings */
+#define BLOCK_LEAST 4u        /* fewest readings in a block */
+#define REST_US 1000000u      /* shortest rest */
+#define SETTLED_RAD_S 0.05f   /* largest scatter of readings at rest, */
+#define NOISIER 4.0f          /* and largest ratio of its square to that of the quietest rest, */
+#define TREMOR_RAD_S 0.002f   /* plus this */
+#define WANDERS 5.0f          /* change of a block's mean, in its standard deviations, */
+#define WANDERS_RAD_S 0.0015f /* plus this, beyond which a move has begun */
+#define TURNING_RAD_S 0.03f   /* from the first rest's mean; more is neither bias drift nor g-sensitivity */
 #define ON_FACE 0.97f         /* cosine squared of the reading's angle from an axis: 10 degrees */
-#define NUDGE_RAD 0.5f        /* so little on one face is no move */
-#define WHOLE_RAD 3.1415927f  /* turned further on its face, it is meant to be a whole turn */
-#define REFUSED_IN_A_ROW 10u  /* and the session ends: something else is wrong */
+#define NUDGE_RAD 0.5f        /* a smaller rotation on one face is no move */
+#define WHOLE_RAD 3.1415927f  /* a larger rotation on one face is intended as a whole revolution */
+#define REFUSED_IN_A_ROW 10u  /* the session ends after so many, because something else is wrong */
 #define NO_FACE 255u
-#define CRYSTALS_US (1e-6f * 4e6f / (122.0f * 32768.0f)) /* the clock that follows the crystal makes 122 of 4 MHz */
+#define CRYSTALS_US (1e-6f * 4e6f / (122.0f * 32768.0f)) /* the clock locked to the crystal runs at 122 times its frequency, not
+                                                            4 MHz */
 
 /* Sums of readings, in counts. */
 struct block {
@@ -32,7 +33,7 @@ struct block {
     int32_t sums[3], acceleration[3];
     int64_t squares; /* of all three axes */
     uint32_t samples;
-    float lasts_s; /* from the reading before it to its last */
+    float lasts_s; /* from the last reading before it to its last one */
 };
 
 struct rest {
@@ -41,29 +42,29 @@ struct rest {
     uint32_t samples, blocks;
     float variance; /* of a reading: the sum over its blocks */
     uint8_t face;
-    bool counted; /* its mean is in the estimate */
+    bool counted; /* whether its mean is in the estimate */
 };
 
-/* Of two rests that follow each other; what is between them is the move. */
+/* The sums of two consecutive rests and of the move between them. */
 static struct {
     uint8_t sensor, state, wanted, taken, refused;
     float wanted_std, scale_std, sensitivity, microsecond_s, noise_rad_s, first_rad_s[3];
-    float range_deg_s, temperature_c; /* of the sensor: as set up; when it was last laid down */
+    float range_deg_s, temperature_c; /* of the sensor: as configured; when it was last laid down */
     int16_t temperature_counts;
     int32_t end_of_range;
     uint32_t per_block, sequence;
     uint64_t last_us, judged_us;
-    bool begun, lies; /* readings have come; the block before was still */
-    bool lost, clipped; /* in the move */
+    bool begun, lies; /* whether readings have come, and whether the last block was at rest */
+    bool lost, clipped; /* flags of the move */
 
-    struct block block, pending; /* `pending`: of a rest, but the move may already have begun in it */
-    struct rest before, now;     /* `now` has not lasted long enough yet */
-    uint64_t pending_since_us;   /* of the move that goes on, its first reading */
+    struct block block, pending; /* `pending` is of a rest, but the move may have begun in it */
+    struct rest before, now;     /* `now` is still too short */
+    uint64_t pending_since_us;   /* the first reading of the present move */
     float level[3], bias[3], up[3];
-    struct motion motion, ended; /* `ended` as it was when the rest after it began */
+    struct motion motion, ended; /* `ended` is the motion at the start of the rest after it */
     struct estimate estimate;
 
-    struct hand_report_payload report; /* what is told of the move judged last */
+    struct hand_report_payload report; /* the report on the last judged move */
 } hand;
 
 _Static_assert(sizeof hand <= 4096u, "a session by hand takes 4 KB of RAM at most");
@@ -75,7 +76,7 @@ void hand_reset(void)
 
 void hand_forget(unsigned sensor)
 {
-    if (hand.state < HAND_DONE && hand.sensor == sensor) /* an answer stays until the next session */
+    if (hand.state < HAND_DONE && hand.sensor == sensor) /* an answer remains until the next session */
         hand_reset();
 }
 
@@ -135,7 +136,7 @@ static void rest_add(struct rest *rest, const struct block *block, float varianc
     rest->variance += variance;
 }
 
-/* The face that is up, by the largest of three accelerations. */
+/* Returns the upper face, by the largest of three accelerations. */
 static uint8_t face_of(const struct rest *rest)
 {
     float square = 0.0f, largest = 0.0f;
@@ -151,7 +152,7 @@ static uint8_t face_of(const struct rest *rest)
     return largest * largest > ON_FACE * square ? face : NO_FACE;
 }
 
-/* The move that may follow begins with the last block of the rest, taken as one step. */
+/* Starts a possible move with the last block of the rest, as one step. */
 static void begin_move(void)
 {
     const struct block *block = &hand.pending;
@@ -230,7 +231,7 @@ static void judge(struct rest *after)
         hand.refused = outcome == MOVE_TAKEN ? 0 : hand.refused + 1;
 }
 
-/* It has lain still for long enough. */
+/* Completes a rest that has lasted long enough. */
 static void settled(void)
 {
     struct rest *after = &hand.now;
@@ -257,7 +258,7 @@ static void settled(void)
         hand.state = hand.refused < REFUSED_IN_A_ROW ? HAND_RESTING : HAND_FAILED;
 }
 
-/* Whether a block is of a rest, and of the one that goes on. */
+/* Returns whether a block belongs to a rest, and to the present one. */
 static bool is_still(const float mean_rad_s[3], float variance)
 {
     bool first = hand.before.samples == 0;
@@ -281,7 +282,7 @@ static void moves(void)
     hand.lies = false;
 }
 
-/* A rest takes a block in when the next one has been seen to be of it too. */
+/* Adds a block to a rest once the next one belongs to it too. */
 static void take_pending(struct rest *rest)
 {
     if (hand.pending.samples != 0) {
@@ -341,7 +342,7 @@ void hand_add(unsigned sensor, uint64_t time_us, uint32_t sequence, const struct
     bool follows = hand.begun && sequence == hand.sequence + 1u;
     if (follows) {
         take(time_us, reading);
-    } else { /* neither a block nor a rest goes over a gap */
+    } else { /* neither a block nor a rest may contain a gap */
         hand.lost = true;
         memset(&hand.block, 0, sizeof hand.block);
         moves();

@@ -10,17 +10,17 @@
 
 void hand_reset(void);
 
-/* A sensor is about to be set up: a session with it that goes on ends. What another has found stays until the next begins. */
+/* Ends the session of a sensor that is about to be configured. The result of another sensor remains until the next session. */
 void hand_forget(unsigned sensor);
 
-/* Begins anew with a sensor that is set up; done after so many moves at least, when the scale is known so well. */
+/* Begins a session with a configured sensor; done after at least so many moves, at this standard uncertainty of the scale. */
 void hand_begin(uint8_t sensor, uint8_t moves, float scale_std);
 
-/* Takes a good reading, which is the conversion of number `sequence`. */
+/* Adds a good reading, the conversion of number `sequence`. */
 void hand_add(unsigned sensor, uint64_t time_us, uint32_t sequence, const struct reading *reading);
 
-/* Whether a lamp that tells how it goes is lit now. At rest it is on, and blinks slowly for a while when a move has been
-   taken, fast when it is to be made again. Done, it flashes once a second. */
+/* Returns whether the status lamp is lit now. At rest it is on, and blinks slowly after an accepted move, fast after one to
+   repeat. When done, it flashes once a second. */
 bool hand_lamp(uint64_t now_us);
 
 void hand_on_begin(const struct frame *request);

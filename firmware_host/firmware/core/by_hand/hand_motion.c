@@ -24,7 +24,7 @@ void motion_attitude(const float attitude[4], float r[3][3])
     r[2][1] = 2.0f * (y * z + w * x);
 }
 
-/* q becomes q p. Its length would wander by rounding: one step of Newton's brings it back. */
+/* q becomes q p. One step of Newton's method corrects its length, which would drift by rounding. */
 static void times(float q[4], const float p[4])
 {
     float w = q[0] * p[0] - q[1] * p[1] - q[2] * p[2] - q[3] * p[3];
@@ -38,8 +38,8 @@ static void times(float q[4], const float p[4])
     q[3] = z * length;
 }
 
-/* The rate is taken for constant over dt. As a move begins and ends at rest, when in dt the reading was taken does not matter.
-   What is integrated is taken in the middle of the step. */
+/* The rate counts as constant over dt. As a move begins and ends at rest, the time of the reading within dt does not matter.
+   Integrands are evaluated in the middle of the step. */
 void motion_add(struct motion *motion, const float matrix[9], const float up[3], const float rate[3], float dt_s, unsigned samples)
 {
     float step[3], square = 0.0f;
@@ -52,7 +52,7 @@ void motion_add(struct motion *motion, const float matrix[9], const float up[3],
     motion->duration_s += dt_s;
     motion->samples += samples;
 
-    float s = square / 16.0f, half = 0.25f * (1.0f - s / 6.0f); /* half the step is the half of its half angle */
+    float s = square / 16.0f, half = 0.25f * (1.0f - s / 6.0f); /* half of the step's half angle */
     float by[4] = {1.0f - s * (0.5f - s / 24.0f), half * step[0], half * step[1], half * step[2]};
     float r[3][3], vertical[3];
     times(motion->attitude, by);

@@ -2,15 +2,15 @@
 
 #include <string.h>
 
-/* What is known beforehand, as standard deviations: of an element of C, of G (rad/s per g: 0.1 degrees per second), of b
-   (rad/s), of how far a face is out of square (0.2 degrees). */
+/* Prior standard deviations: of an element of C, of G (rad/s per g: 0.1 degrees per second), of b (rad/s), of a face's error of
+   squareness (0.2 degrees). */
 #define MATRIX_STD 0.2f
 #define GRAVITY_STD 1.75e-3f
 #define BIAS_STD 1.0f
 #define FACE_STD 3.5e-3f
 
-/* What a hand and a part do, as in rig/estimation/by_hand: a face laid down again, the heading after a whole turn, the angle
-   of a move by nonlinearity and of a quarter turn by itself, what the Earth leaves of a rest and of a move. */
+/* Errors of hand and part, as in rig/estimation/by_hand: of a face laid down again, of the heading after a whole revolution, of
+   the angle of a move by nonlinearity and of a quarter revolution by itself, of a rest and of a move by the Earth's rate. */
 #define REPEAT_RAD 3e-4f
 #define CLOSURE_RAD 3e-3f
 #define NONLINEARITY 1e-4f
@@ -19,10 +19,10 @@
 #define EARTH_RAD_S 7e-5f
 #define EARTH_ALONG_RAD_S 3e-5f
 
-#define CURVED 0.02f   /* of the square of what is missed: the equations are linear, and a turn is not */
-#define FARTHEST 0.8f  /* rad; no part is so far off that a move misses by more */
-#define KNOWN_STD 0.01f /* of each element of C; then it is a centre */
-#define TOO_FAR 25.0f /* of the variance: 5 standard deviations */
+#define CURVED 0.02f   /* of the squared residual: the equations are linear, a rotation is not */
+#define FARTHEST 0.8f  /* rad; the largest residual of a move with any part */
+#define KNOWN_STD 0.01f /* of each element of C, below which the solution becomes the centre */
+#define TOO_FAR 25.0f /* in units of the variance: 5 standard deviations */
 
 struct equation {
     float row[HAND_UNKNOWNS];
@@ -80,7 +80,7 @@ void estimate_up(const struct estimate *estimate, uint8_t face, float up[3])
     up[(axis + 2u) % 3u] = leans[1];
 }
 
-/* Turns an equation into the triangle. */
+/* Rotates an equation into the triangle (Givens). */
 static void fold(struct estimate *estimate, struct equation *equation)
 {
     float weight = 1.0f / __builtin_sqrtf(equation->variance), missed = equation->missed * weight, *row = equation->row;
@@ -103,7 +103,7 @@ static void fold(struct estimate *estimate, struct equation *equation)
     }
 }
 
-/* x: the solution, counted from the centre. */
+/* x: the solution, relative to the centre. */
 static void solve(const struct estimate *estimate, float x[HAND_UNKNOWNS])
 {
     const float *r = &estimate->r[HAND_UNKNOWNS * (HAND_UNKNOWNS + 1u) / 2u];
@@ -123,7 +123,7 @@ void estimate_solution(const struct estimate *estimate, float found[HAND_UNKNOWN
         found[i] += estimate->centre[i];
 }
 
-/* The variance of row times what is sought: the square of R^-T row. */
+/* Returns the variance of row times the unknowns: the square of R^-T row. */
 static float variance_of(const struct estimate *estimate, const float row[HAND_UNKNOWNS])
 {
     float rest[HAND_UNKNOWNS], sum = 0.0f;
@@ -138,7 +138,7 @@ static float variance_of(const struct estimate *estimate, const float row[HAND_U
     return sum;
 }
 
-/* The largest variance of every `step`th element of C. */
+/* Returns the largest variance of every `step`th element of C. */
 static float largest_variance(const struct estimate *estimate, unsigned step)
 {
     float largest = 0.0f;
@@ -166,7 +166,7 @@ static void settle(struct estimate *estimate)
     memset(estimate->amiss, 0, sizeof estimate->amiss);
 }
 
-/* A rest's mean reading on one axis: b + G u. */
+/* Adds a rest's mean reading on one axis: b + G u. */
 static void of_rest(const struct estimate *estimate, const struct hand_rest *rest, float noise_rad_s, unsigned axis, struct equation *found)
 {
     float up[3];
@@ -179,18 +179,18 @@ static void of_rest(const struct estimate *estimate, const struct hand_rest *res
     found->variance = noise_rad_s * noise_rad_s / (float)rest->samples + EARTH_RAD_S * EARTH_RAD_S;
 }
 
-/* A move made ready for its equations: how it turned by what is known, and by what it changes. */
+/* A move prepared for its equations: its rotation by the present solution, and its derivatives. */
 struct turn {
-    float up[3];             /* the vertical before, in the body before */
-    float there[3];          /* the vertical after, where the turn takes it to in the body before: it should be `up` */
+    float up[3];             /* the vertical before, in the body before the move */
+    float there[3];          /* the vertical after, rotated back into the body before: it should equal `up` */
     float middle[3];         /* between the two */
     float r[3][3];           /* body after to body before */
     float by_gravity[3][9];
-    float corrected[3];      /* by the bias' way and G */
-    float variance;          /* but for what its ends are worth, and how curved it is */
+    float corrected[3];      /* for the derivative of the bias, and G */
+    float variance;          /* without those of its ends and of its curvature */
 };
 
-/* The bias is the mean of the two rests': G u of the two is in it, and what u(t) has else along the move is not. */
+/* The bias is the mean of the two rests: it includes G u of both, but not the change of u(t) during the move. */
 static void prepare(const struct estimate *estimate, const struct hand_move *move, struct turn *turn)
 {
     const struct motion *motion = move->motion;
@@ -227,7 +227,7 @@ static void prepare(const struct estimate *estimate, const struct hand_move *mov
                      path * (NONLINEARITY * NONLINEARITY * path + OF_ANGLE * OF_ANGLE * QUARTER_RAD);
 }
 
-/* What turning about `about` has to say, which was missed by so much. */
+/* Adds the equation of the rotation about `about`, with its residual. */
 static void about(const struct turn *turn, const struct hand_move *move, const float about[3], float missed, struct equation *found)
 {
     memset(found, 0, sizeof *found);
@@ -240,14 +240,15 @@ static void about(const struct turn *turn, const struct hand_move *move, const f
     found->variance = turn->variance + CURVED * CURVED * missed * missed * missed * missed;
 }
 
-/* The two equations across the vertical: what turns it from where it got to where it should be, and the faces' own part. */
+/* Adds the two equations perpendicular to the vertical: the rotation from its computed to its true direction, with the faces'
+   errors. */
 static void across(const struct turn *turn, const struct hand_move *move, struct equation found[2])
 {
     float missed[3], ways[2][3], aside[3], half2 = 0.0f, smallest[3] = {0};
     for (unsigned i = 0; i < 3; i++)
         half2 += 0.25f * (turn->up[i] - turn->there[i]) * (turn->up[i] - turn->there[i]);
     cross(turn->there, turn->up, missed);
-    float stretched = (1.0f + half2 * (1.0f / 6.0f + half2 * 0.075f)) / __builtin_sqrtf(1.0f - half2); /* asin of the half */
+    float stretched = (1.0f + half2 * (1.0f / 6.0f + half2 * 0.075f)) / __builtin_sqrtf(1.0f - half2); /* arcsine of the half */
     unsigned least = 0;
     for (unsigned i = 1; i < 3; i++)
         if (__builtin_fabsf(turn->middle[i]) < __builtin_fabsf(turn->middle[least]))
@@ -269,7 +270,7 @@ static void across(const struct turn *turn, const struct hand_move *move, struct
     }
 }
 
-/* The heading after whole turns. */
+/* Adds the equation of the heading after whole revolutions. */
 static void closed(const struct turn *turn, const struct hand_move *move, struct equation *found)
 {
     const float *attitude = move->motion->attitude;
@@ -279,7 +280,7 @@ static void closed(const struct turn *turn, const struct hand_move *move, struct
     found->variance += CLOSURE_RAD * CLOSURE_RAD;
 }
 
-/* Held against what is known so far; `x` is the solution from the centre. */
+/* Tests a move against the present solution; `x` is relative to the centre. */
 static bool fits(const struct estimate *estimate, const float x[HAND_UNKNOWNS], const struct equation *equation)
 {
     float left = equation->missed;
@@ -295,7 +296,7 @@ bool estimate_take(struct estimate *estimate, const struct hand_move *move, bool
     struct equation equations[3], rest;
     prepare(estimate, move, &turn);
     if (dot(turn.middle, turn.middle) < 2.0f)
-        return false; /* more than a quarter turn from where it should be */
+        return false; /* more than a quarter revolution from its true direction */
     unit(turn.middle);
     across(&turn, move, equations);
     unsigned count = 2;

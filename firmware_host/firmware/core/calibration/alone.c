@@ -11,16 +11,16 @@
 #include "sensors.h"
 #include "setups.h"
 
-#define PRESSED_US 30000u /* so long a button is down that does not only rattle */
+#define PRESSED_US 30000u /* shortest press, longer than contact bounce */
 #define MOVES 12u
 #define SCALE_STD 1e-3f
-#define RATE_HZ 200.0f /* of a sensor that nobody has set up; the nearest it has */
+#define RATE_HZ 200.0f /* of a sensor that is not configured; the nearest is set */
 #define RANGE_DEG_S 500.0f
-#define RANGE_G 8.0f /* every part has it */
+#define RANGE_G 8.0f /* a range of every part */
 #define NONE SENSOR_COUNT
 
-static uint64_t up_us; /* when the button was last seen up */
-static bool heard;     /* and has been down for long enough since */
+static uint64_t up_us; /* time at which the button was last up */
+static bool heard;     /* whether it has been down for long enough since */
 
 void alone_reset(void)
 {
@@ -28,8 +28,8 @@ void alone_reset(void)
     heard = false;
 }
 
-/* The first gyroscope that streams its accelerations too; nobody's stream is changed. Where none runs, the first that is
-   there and can be set up. */
+/* Returns the first gyroscope that streams accelerations too; no stream is changed. If none streams, the first that answers and
+   can be configured. */
 static uint8_t gyroscope(void)
 {
     for (uint8_t i = 0; i < GYROSCOPE_COUNT; i++) {
@@ -46,7 +46,8 @@ static void begin(void)
 {
     struct port_health health;
     port_health(&health);
-    uint8_t sensor = health.clock_locked ? gyroscope() : NONE; /* no reading shows that a clock without its crystal is wrong */
+    uint8_t sensor = health.clock_locked ? gyroscope() : NONE; /* readings do not reveal the error of a clock without its
+                                                                  crystal */
     if (sensor == NONE)
         return;
     if (!acquisition_is_running()) {

@@ -1,4 +1,4 @@
-/* The board without a computer: a button begins a calibration by hand, and a lamp tells how it goes. */
+/* The board without a computer: a button begins a calibration by hand, and a lamp shows its status. */
 #ifndef ALONE_H
 #define ALONE_H
 

@@ -12,7 +12,7 @@
 
 static struct session {
     struct accumulator accumulator;
-    uint8_t type; /* of the request last taken, and its payload: a host that missed the answer asks again */
+    uint8_t type; /* type and payload of the last executed request: a host that missed the answer repeats it */
     uint8_t request[sizeof(struct observe_payload)];
     struct observed_payload answer;
 } sessions[GYROSCOPE_COUNT];
@@ -51,7 +51,8 @@ void calibrating_on_keep(const struct frame *request)
         reply_refused(request, ERROR_BAD_OBSERVATION, 0);
 }
 
-/* The session of a request about one configured sensor; NULL when the request has been answered: refused, or a repetition. */
+/* Returns the session of a request for one configured sensor; NULL if the request has been answered: refused, or a repetition.
+   */
 static struct session *session_of(const struct frame *request)
 {
     uint8_t sensor = request->payload[0];

@@ -1,4 +1,4 @@
-/* The board calibrates by itself: requests keep, observe, recall and solve. */
+/* Calibration by the board itself: requests keep, observe, recall and solve. */
 #ifndef CALIBRATING_H
 #define CALIBRATING_H
 
@@ -6,7 +6,7 @@
 
 void calibrating_reset(void);
 
-/* A sensor is about to be set up: what was kept and observed of it belongs to the old setting. */
+/* Discards stored readings and observations of a sensor that is about to be configured. */
 void calibrating_forget(unsigned sensor);
 
 void calibrating_on_keep(const struct frame *request);

@@ -59,7 +59,7 @@ static int32_t rounded(float value)
     return (int32_t)(value < 0.0f ? value - 0.5f : value + 0.5f);
 }
 
-/* From the temperature at which matrix and bias hold, no farther than the polynomials go. */
+/* Returns the difference from the temperature of matrix and bias, limited to the polynomials' range. */
 static float warmer_k(const struct correction *correction, int16_t temperature_counts)
 {
     float warmer = temperature_counts * correction->kelvin_per_count + correction->kelvin_at_zero;

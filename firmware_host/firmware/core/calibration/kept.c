@@ -4,7 +4,7 @@
 
 #define BLOCKS 1024u
 #define RATE_TOLERANCE 1.1f    /* a part's oscillator may run this much faster than its nominal rate */
-#define BLOCKS_TO_SPARE 2u     /* of each sensor: the block begun, and the one after the span, which tells where it ends */
+#define BLOCKS_TO_SPARE 2u     /* of each sensor: the block in progress, and the one after the span, which marks its end */
 
 struct block {
     uint32_t first_us; /* low bits */
@@ -15,7 +15,7 @@ static struct block blocks[BLOCKS];
 
 static struct share {
     struct block *blocks;
-    uint32_t room;      /* in readings; 0: not kept */
+    uint32_t room;      /* in readings; 0: not stored */
     uint32_t readings;
     uint64_t origin_us; /* time of the first reading */
 } shares[SENSOR_COUNT];
@@ -72,7 +72,7 @@ bool kept_sum(unsigned sensor, uint64_t start_us, uint64_t end_us, struct kept_s
     const struct share *share = &shares[sensor];
     if (share->readings == 0)
         return false;
-    uint32_t first = 0, after = (share->readings - 1) / per_block; /* the last block may not be whole */
+    uint32_t first = 0, after = (share->readings - 1) / per_block; /* the last block may be incomplete */
     if (time_of(share, first) > start_us || time_of(share, after) < end_us)
         return false;
     while (first < after && time_of(share, first) < start_us)

@@ -1,4 +1,4 @@
-/* Remembers the readings of a sweep, until the host knows which of them were the revolution.
+/* Stores the readings of a sweep, until the host knows the interval of the revolution.
 
    There is not room for every reading, so a block is the sum of several in a row and the time of the first. */
 #ifndef KEPT_H
@@ -9,8 +9,8 @@
 
 #include "sensors.h"
 
-/* What was kept goes. From now on, keeps the sensors whose data rate is not 0, for at least so long; then the room is full.
-   False, and nothing is kept, when the duration is no positive number or longer than KEPT_LONGEST_S. */
+/* Discards stored readings, and stores those of the sensors whose data rate is not 0, for at least the duration. False, without
+   storing, if the duration is not positive or longer than KEPT_LONGEST_S. */
 #define KEPT_LONGEST_S 1800.0f
 bool kept_begin(const float rates_hz[SENSOR_COUNT], float duration_s);
 
@@ -25,7 +25,7 @@ struct kept_span {
     int64_t sums[3];
 };
 
-/* Adds up the whole blocks between two board times; false unless all of that time was kept and holds a block. */
+/* Sums the complete blocks between two board times; false unless all of that time was stored and contains a block. */
 bool kept_sum(unsigned sensor, uint64_t start_us, uint64_t end_us, struct kept_span *span);
 
 #endif

@@ -7,7 +7,7 @@
 #define SPEED SOLVER_UNKNOWNS /* the column of ω² */
 
 /* The host refuses designs whose condition number is above 30. What is_well_conditioned() estimates is then at most 30 √13.5:
-   what the host accepts is solved here too. A direction that was not swept gives hundreds. */
+   what the host accepts is solved here too. A missing direction of rotation gives hundreds. */
 #define MAX_CONDITION 115.0f
 
 #define NEWTON_LIMIT 20u
@@ -15,15 +15,15 @@
 #define ALGORITHM_1_LIMIT 255u
 #define ALGORITHM_1_TOLERANCE 2e-6f /* of Σ|β|: SIX has 1e-6, absolute, which single precision does not always resolve */
 
-/* Written out by the compiler, and small functions inlined: counting and indexing would be two thirds of all instructions. */
+/* Unrolled by the compiler, and small functions inlined: counting and indexing would be two thirds of all instructions. */
 #define EACH(i, from, to) _Pragma("GCC unroll 6") for (unsigned i = (from); i < (to); i++)
 
-/* X β = ω² − γ for γ as yet unknown. X has the columns [m m²] and is given by its triangle, in blocks of three:
-   [linear mixed; 0 squares]. The right-hand sides ω² and 1 are turned alike. */
+/* X β = ω² − γ for γ as yet unknown. X has the columns [m m²] and is given by its triangle, in blocks of three: [linear mixed;
+   0 squares]. The right-hand sides ω² and 1 are rotated alike. */
 struct design {
     float linear[3][3], mixed[3][3], squares[3][3];
     float speeds[PARAMETERS], ones[PARAMETERS];
-    float centre[3]; /* what readings are counted from, rad/s */
+    float centre[3]; /* origin of the readings, rad/s */
 };
 
 void solver_begin(struct accumulator *accumulator)
@@ -31,7 +31,7 @@ void solver_begin(struct accumulator *accumulator)
     memset(accumulator, 0, sizeof *accumulator);
 }
 
-/* The Givens rotation that takes `b` into `a`. Where squaring would leave too few digits, there is nothing to take. */
+/* Returns the Givens rotation of `b` into `a`; the identity if `b` is negligible in single precision. */
 struct rotation {
     float c, s;
 };
@@ -108,7 +108,7 @@ static void reduce(const struct accumulator *accumulator, bool centred, struct d
     }
 }
 
-/* The inverse of a triangle, in its place. */
+/* Inverts a triangle in place. */
 static inline void invert(float r[3][3])
 {
     EACH(i, 0, 3)
@@ -128,10 +128,10 @@ static inline float norm2_of(float r[3][3])
     return sum;
 }
 
-/* Whether the revolutions tell all six parameters apart, from the inverses of the design's two triangles. Readings are measured
-   in their own RMS length, so that squares and linear terms compare and X is about √(2 N) long. `mixed`, whose columns are
-   no longer than that, does not make X singular. Beyond MAX_SCALE the revolutions are all alike: only noise is left to compare.
-   What is not a number is refused too. */
+/* Returns whether the revolutions identify all six parameters, from the inverses of the design's two triangles. Readings are
+   measured in their own RMS length, so that squares and linear terms compare and X is about √(2 N) long. `mixed`, whose columns
+   are no longer than that, does not make X singular. Beyond MAX_SCALE the revolutions are all alike: only noise is left to
+   compare. NaN is refused too. */
 static inline bool is_well_conditioned(struct design *inverted, float length2, uint16_t count, float speed2)
 {
     if (!(length2 < MAX_SCALE * MAX_SCALE * speed2 && speed2 < MAX_SCALE * MAX_SCALE * length2))
@@ -171,7 +171,7 @@ static void beta_at(const struct line *line, float gamma, float beta[PARAMETERS]
         beta[i] = line->p[i] - gamma * line->q[i];
 }
 
-/* Γ(β) = Σ β_l² / (4 β_s), which β0 has to be. */
+/* Γ(β) = Σ β_l² / (4 β_s), which must equal β0. */
 static float gamma_of(const float beta[PARAMETERS])
 {
     float gamma = 0.0f;
@@ -202,8 +202,8 @@ static inline enum solution_status by_newton(const struct line *line, float spee
     return SOLUTION_NOT_CONVERGED;
 }
 
-/* SIX, Algorithm 1, as published: γ ← Γ(β), β ← β(γ), from γ = 0, until β stays. Each pass changes β by β0 / (ω² − β0) times
-   what the pass before did, so it diverges when β0 > ω²/2. Held against the first change and not the last: in a slow
+/* SIX, Algorithm 1, as published: γ ← Γ(β), β ← β(γ), from γ = 0, until β converges. Each pass changes β by β0 / (ω² − β0)
+   times what the pass before did, so it diverges when β0 > ω²/2. Compared with the first change, not with the last: in a slow
    convergence two neighbours differ by less than rounding. */
 static enum solution_status by_algorithm_1(const struct line *line, float beta[PARAMETERS], uint8_t *passes)
 {

@@ -6,20 +6,20 @@
 #include "port.h"
 #include "sensors.h"
 
-/* Each sensor has two pages, slots, and a write goes to the slot that does not hold the newest record: that one stays
-   untouched until the new one is whole. The seal comes last and says that everything before it is there; its CRC also finds
-   a page whose erasing was cut off and that still looks like a record. */
+/* Each sensor has two pages, slots, and a write goes to the slot without the newest record, which stays unchanged until the new
+   one is complete. The seal comes last and marks a complete record; its CRC also detects a page with an interrupted erasure
+   that still looks like a record. */
 
 #define SLOTS 2u
-#define SEAL 0x334C4143u          /* "CAL3": another layout takes another number, and an older image finds no record then */
-#define CONSTANT_SEAL 0x324C4143u /* "CAL2", up to firmware 0.8.0: it ends before what temperature changes */
-#define DIAGONAL_SEAL 0x314C4143u /* "CAL1", up to firmware 0.2.1: three scale factors in the place of the matrix besides */
+#define SEAL 0x334C4143u          /* "CAL3": another layout has another number, so that an older image finds no record */
+#define CONSTANT_SEAL 0x324C4143u /* "CAL2", up to firmware 0.8.0: it ends before the polynomials of temperature */
+#define DIAGONAL_SEAL 0x314C4143u /* "CAL1", up to firmware 0.2.1: and has three scale factors instead of the matrix */
 
 struct slot {
     struct calibration_payload record;
     uint8_t unused[3]; /* up to whole doublewords */
     uint32_t seal;
-    uint32_t crc; /* of all before the seal */
+    uint32_t crc; /* of all bytes before the seal */
 };
 
 #define DOUBLEWORDS (sizeof(struct slot) / sizeof(uint64_t))
@@ -52,7 +52,7 @@ static unsigned page_of(unsigned sensor, unsigned slot)
     return SLOTS * sensor + slot;
 }
 
-/* A slot of whichever layout, which ends with its seal and the CRC of all before. */
+/* Checks a slot of any layout, which ends with its seal and the CRC of all bytes before. */
 static bool read_sealed(unsigned page, void *slot, size_t size, uint32_t seal)
 {
     uint32_t end[2];
@@ -85,7 +85,7 @@ static bool read_constant(unsigned page, struct calibration_payload *record)
     return true;
 }
 
-/* One of before, which knows one temperature alone. */
+/* Converts a record of an older layout, without polynomials. */
 static bool read_older(unsigned page, struct calibration_payload *record)
 {
     if (!read_constant(page, record) && !read_diagonal(page, record))
@@ -103,13 +103,13 @@ static bool read_record(unsigned page, struct calibration_payload *record)
     return true;
 }
 
-/* Sequence numbers may wrap: the difference tells. */
+/* Compares sequence numbers by their difference, because they may wrap. */
 static bool is_newer(const struct calibration_payload *a, const struct calibration_payload *b)
 {
     return (int32_t)(a->sequence - b->sequence) > 0;
 }
 
-/* The slot of the newest record, which is then in `newest`; SLOTS when there is none. */
+/* Returns the slot of the newest record and reads that into `newest`; SLOTS if there is none. */
 static unsigned find_newest(unsigned sensor, struct calibration_payload *newest)
 {
     struct calibration_payload record;
@@ -149,7 +149,7 @@ bool store_write(unsigned sensor, struct calibration_payload *record)
     slot.crc = frame_crc(0, (const uint8_t *)&slot, offsetof(struct slot, seal));
     bool stored = port_flash_erase(page) && program(page, &slot) && read_sealed(page, &written, sizeof written, SEAL) &&
                   memcmp(&written, &slot, sizeof slot) == 0;
-    /* An image that knows only an older layout would correct by the calibration before, which it can still read. */
+    /* An older image would apply the previous calibration, whose layout it can read. */
     if (stored && found != SLOTS && read_older(page_of(sensor, found), &newest))
         port_flash_erase(page_of(sensor, found));
     return stored;

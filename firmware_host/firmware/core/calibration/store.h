@@ -6,13 +6,13 @@
 
 #include "protocol.h"
 
-/* A record is the answer to read_calibration, without whom it answers. False when there is none. */
+/* Reads a record in the form of the answer to read_calibration, without `reply_to`. False if there is none. */
 bool store_read(unsigned sensor, struct calibration_payload *record);
 
-/* The record's sequence is given here. False when the flash did not take it: the old record is still there. */
+/* Writes a record and sets its sequence. False if the flash failed; the old record is still there. */
 bool store_write(unsigned sensor, struct calibration_payload *record);
 
-/* False when the flash refused. */
+/* Erases a record. False if the flash failed. */
 bool store_erase(unsigned sensor);
 
 #endif

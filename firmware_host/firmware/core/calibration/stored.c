@@ -25,9 +25,9 @@ void stored_on_read(const struct frame *request)
     }
 }
 
-#define LARGEST 1e6f /* matrix, or bias in rad/s: far beyond any sensor's, and no product of two overflows */
+#define LARGEST 1e6f /* matrix, or bias in rad/s: far beyond any sensor's, so that no product of two overflows */
 
-/* K, or a matrix that some sensor may have: its axes are nearer to right angles than to each other. */
+/* Returns whether a matrix is K, or possible for a sensor: its axes are nearer to right angles than to each other. */
 static bool is_usable_matrix(const struct write_calibration_payload *calibration)
 {
     bool whole = calibration->model == MODEL_MATRIX_TIMES_M_PLUS_B;
@@ -42,16 +42,16 @@ static bool is_usable_matrix(const struct write_calibration_payload *calibration
     return usable;
 }
 
-/* How much a polynomial can change an axis, at most, that far away. */
+/* Returns the largest change of an axis by a polynomial within a distance of temperature. */
 static float most_change(const float change[3][3], unsigned axis, float away_k)
 {
     return away_k * (__builtin_fabsf(change[0][axis]) +
                      away_k * (__builtin_fabsf(change[1][axis]) + away_k * __builtin_fabsf(change[2][axis])));
 }
 
-#define MOST_SCALE_CHANGE 0.5f /* of any sensor over any temperatures */
+#define MOST_SCALE_CHANGE 0.5f /* largest change for any sensor over any temperatures */
 
-/* NaN is larger and smaller than nothing. */
+/* NaN fails every comparison. */
 static bool is_usable(const struct write_calibration_payload *calibration)
 {
     float scale_change[3][3], bias_change_rad_s[3][3], reference_c = calibration->temperature_c;
@@ -67,7 +67,7 @@ static bool is_usable(const struct write_calibration_payload *calibration)
     return usable;
 }
 
-/* Which part a calibration is of: what the driver and the identity register say, and the range it is set to. */
+/* Writes the part of a calibration: the driver's name and the identity register, and the configured range. */
 static enum error_code describe(unsigned sensor, struct calibration_payload *record)
 {
     uint16_t who_am_i;
@@ -83,7 +83,7 @@ static enum error_code describe(unsigned sensor, struct calibration_payload *rec
     return 0;
 }
 
-/* A host that missed the ack asks again: what is already stored is not written twice, for the flash wears. */
+/* A host that missed the ack repeats the request: a stored record is not written twice, because the flash wears. */
 static bool is_stored(const struct calibration_payload *record)
 {
     struct calibration_payload stored;

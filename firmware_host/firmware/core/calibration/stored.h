@@ -1,4 +1,4 @@
-/* The board remembers: requests read_calibration, write_calibration and erase_calibration, and what a start makes of them. */
+/* Stored calibrations: requests read_calibration, write_calibration and erase_calibration, and their use at a start. */
 #ifndef STORED_H
 #define STORED_H
 
@@ -9,7 +9,7 @@ void stored_on_read(const struct frame *request);
 void stored_on_write(const struct frame *request);
 void stored_on_erase(const struct frame *request);
 
-/* The correction of a configured sensor by its stored calibration; 0, or why there is none. */
+/* Prepares the correction of a configured sensor by its stored calibration; 0, or the reason why there is none. */
 enum error_code stored_correction(unsigned sensor, struct correction *correction);
 
 #endif

@@ -10,7 +10,8 @@
 #define FRAME_HZ 2000000u /* of all other frames, the same table */
 #define STALL_US 16u /* between frames (table 2; Linux's cs_change_delay) */
 
-#define LATCHED_US 50u /* a pause of STALL_US, then the frame that begins the burst, 26 µs; later words know themselves */
+#define LATCHED_US 50u /* a pause of STALL_US, then the frame that begins the burst, 26 µs; later words are checked by their
+                          counter */
 
 enum register_address {
     DIAG_STAT = 0x02,
@@ -28,21 +29,21 @@ enum register_address {
 };
 
 #define RANG_MDL_RANGE(value) ((value) >> 2 & 3u)
-#define MSC_CTRL_AS_DELIVERED 0x00C1u /* data-ready rises, own clock, corrected for acceleration and place */
-#define DIAG_STAT_UPDATE_FAILED 0x0004u /* a write to its flash, which nobody does here: no reading suffers */
+#define MSC_CTRL_AS_DELIVERED 0x00C1u /* data-ready rises, own clock, corrected for acceleration and the sensors' positions */
+#define DIAG_STAT_UPDATE_FAILED 0x0004u /* a failed write to its flash, which is not used here: readings are not affected */
 #define BASE_HZ 2000.0
 #define DIVIDER_MAX 2000u
-#define SETTLING 2u /* the conversion under way when the rate changed, and one more */
+#define SETTLING 2u /* the conversion in progress at the change of rate, and one more */
 
-/* A setting reads back only when the part has worked it in, 30 µs after its writing, MSC_CTRL 200 µs (Analog's no-OS,
-   drivers/imu/adis1646x.c); more than 60 was seen (EngineerZone, thread 581040). Two conversions are time enough. */
+/* A setting reads back only after its update, 30 µs after the write, MSC_CTRL 200 µs (Analog's no-OS, drivers/imu/adis1646x.c);
+   more than 60 was observed (EngineerZone, thread 581040). Two conversions suffice. */
 #define TAKEN_WITHIN_US 1000u
-#define POLL_US 100u /* between two looks: the part bears a dozen words from one conversion to the next */
+#define POLL_US 100u /* between two reads: the part allows a dozen words between conversions */
 
 #define GLOB_CMD_RESET 0x0080u
 #define RESET_US 260000u /* Analog's no-OS: 255 ms */
 
-/* By what RANG_MDL says: the model decides the range. */
+/* By the value of RANG_MDL: the model determines the range. */
 static const struct range ranges[] = {
     {125.0, 0, RADIANS(1.0 / 160.0)},
     {500.0, 1, RADIANS(1.0 / 40.0)},
@@ -121,8 +122,8 @@ static bool is_well(unsigned device)
     return (read_register(device, DIAG_STAT) & ~DIAG_STAT_UPDATE_FAILED) == 0;
 }
 
-/* A flag that stands, such as of a data path that was overrun, may stand until the part is reset (data sheet, DIAG_STAT), and
-   its RST pin is not connected. Half a second at most: the watchdog allows one. */
+/* A persistent flag, such as of an overrun data path, may remain set until the part is reset (data sheet, DIAG_STAT), and its
+   RST pin is not connected. Half a second at most: the watchdog allows one. */
 static bool cure(unsigned device)
 {
     if (is_well(device))
@@ -133,7 +134,7 @@ static bool cure(unsigned device)
     return identify(device) == IDENTITY && is_well(device);
 }
 
-/* What somebody stored there would be added to every reading, and a calibration would be one of the part with it. */
+/* A stored user bias would be added to every reading and so enter the calibration. */
 static bool clear_biases(unsigned device)
 {
     for (uint8_t address = XG_BIAS_LOW; address <= ZA_BIAS_HIGH; address += 2)
@@ -164,11 +165,11 @@ static enum error_code configure(unsigned device, const struct configure_payload
     return 0;
 }
 
-/* Outputs that average have 32 bits, of which a burst carries the upper 16: on their own they would be rounded down, half a
-   count off in the mean. The lower ones are read after it, each answer with the frame that asks for the next, and then the
-   counter, which tells whether they were of the same conversion. Without averaging they are empty. The part bears only so
-   much between two conversions: a dozen frames at full speed, 288 of 500 µs, without averaging, in proportion more with it
-   (data sheet of the ADIS16467, maximum throughput). At 1000 Hz burst and eight frames take 564 of 576 µs. */
+/* Outputs that average have 32 bits, of which a burst carries the upper 16: alone they would be rounded down, with a mean error
+   of half a count. The lower ones are read after it, each answer with the request for the next, and then the counter, which
+   shows whether they belong to the same conversion. Without averaging they are empty. The part allows a limited number of words
+   between two conversions: a dozen frames at full speed, 288 of 500 µs, without averaging, in proportion more with it (data
+   sheet of the ADIS16467, maximum throughput). At 1000 Hz burst and eight frames take 564 of 576 µs. */
 static enum read_result round_to_nearest(unsigned device, const struct setup_payload *setup, struct reading *reading)
 {
     unsigned words = setup->range_m_s2 > 0.0 ? 6 : 3;
@@ -183,8 +184,8 @@ static enum read_result round_to_nearest(unsigned device, const struct setup_pay
     return exchange(device, 0, 0) == states[device].counter ? READ_FRESH : READ_TORN;
 }
 
-/* A burst: after the command, ten words, namely DIAG_STAT, rates, accelerations, temperature, a counter of conversions and
-   the sum of all bytes before. The sum is 0 only on a wire that is held low: gravity would show. */
+/* A burst: after the command, ten words, namely DIAG_STAT, rates, accelerations, temperature, a counter of conversions and the
+   sum of all bytes before. The sum is 0 only on a wire that is stuck low: gravity makes it nonzero. */
 static enum read_result read(unsigned device, const struct setup_payload *setup, struct reading *reading)
 {
     uint8_t bytes[22] = {GLOB_CMD};

@@ -1,4 +1,4 @@
-/* Parts whose registers are bytes at 7-bit addresses, the first bit of a transfer telling reading from writing. */
+/* Parts whose registers are bytes at 7-bit addresses, with a first bit of a transfer that selects read or write. */
 #ifndef BYTE_REGISTERS_H
 #define BYTE_REGISTERS_H
 
@@ -10,14 +10,14 @@
 
 uint8_t byte_register_read(unsigned device, uint32_t max_hz, uint8_t address);
 
-/* True when the register then reads back as written. */
+/* Writes a register; true if it then reads back as written. */
 bool byte_register_write(unsigned device, uint32_t max_hz, uint8_t address, uint8_t value);
 
 struct byte_setting {
     uint8_t address, value;
 };
 
-/* Writes them in their order, up to the first that does not read back; true when all do. */
+/* Writes registers in order, up to the first that does not read back; true if all do. */
 bool byte_registers_write(unsigned device, uint32_t max_hz, const struct byte_setting *settings, size_t count);
 
 #endif

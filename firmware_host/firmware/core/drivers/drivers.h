@@ -1,4 +1,4 @@
-/* The drivers of the board's sensors, by number: they know one another by this, and nothing of what is done with them. */
+/* The drivers of the board's sensors, by number: they depend on each other only through this. */
 #ifndef DRIVERS_H
 #define DRIVERS_H
 

@@ -27,25 +27,25 @@ enum register_address { /* of bank 0; section 13.1 */
 
 #define DEVICE_CONFIG_SOFT_RESET 0x01u
 #define RESET_US 2000u /* section 14.1: 1 ms */
-#define INT_CONFIG_INT1_RISES 0x03u /* a pulse, push-pull, active high: a reading that is missed costs no edge */
+#define INT_CONFIG_INT1_RISES 0x03u /* a pulse, push-pull, active high: a missed read does not cost an edge */
 #define INT_STATUS_DATA_RDY 0x08u
-#define INT_STATUS_ALWAYS_0 0x80u /* reads 1 when nothing drives the wire */
-#define INTF_CONFIG0_FULL_RANGE 0x80u /* -32768 is a reading: saturation looks like that of other parts (section 12.8) */
+#define INT_STATUS_ALWAYS_0 0x80u /* reads 1 if no part drives the wire */
+#define INTF_CONFIG0_FULL_RANGE 0x80u /* -32768 is a reading: saturation as in other parts (section 12.8) */
 #define INTF_CONFIG0_BIG_ENDIAN 0x30u
 #define INTF_CONFIG0_I2C_OFF 0x03u
-#define INTF_CONFIG1_BEST_CLOCK 0x91u /* the gyroscope's oscillator, which alone keeps what section 3 says (section 4.10) */
+#define INTF_CONFIG1_BEST_CLOCK 0x91u /* the gyroscope's oscillator, required for the accuracy of section 3 (section 4.10) */
 #define PWR_MGMT0_BOTH_LOW_NOISE 0x0Fu
-#define SWITCHING_US 200u /* section 14.36: no writing so soon after */
-#define GYRO_ACCEL_CONFIG0_HALF_RATE 0x00u /* both low-passes at half the data rate, the widest there is below 1 kHz */
+#define SWITCHING_US 200u /* section 14.36: no write within this time */
+#define GYRO_ACCEL_CONFIG0_HALF_RATE 0x00u /* both low-passes at half the data rate, the widest below 1 kHz */
 #define INT_SOURCE0_DATA_RDY 0x08u
 
-/* Table 1: the gyroscope's drive is ready after 30 ms; then what passes the low-pass at 25 Hz, 26 ms, three times. */
+/* Table 1: the gyroscope's drive is ready after 30 ms; then the settling of the low-pass at 25 Hz, 26 ms, three times. */
 #define SETTLING_US 100000u
-/* The data sheet does not say that outputs stand still while they are read, so none are believed that a conversion came
-   into: from the status to the last byte of both transfers. */
+/* The data sheet does not state that outputs are frozen during a read, so a reading with a conversion between the status and
+   the last byte of both transfers is discarded. */
 #define LATCHED_US 60u
 
-/* Section 14.37. Slower ones let through more than half of themselves (section 5.5), faster ones need other pulses. */
+/* Section 14.37. Slower ones have a bandwidth above half their rate (section 5.5), faster ones need shorter pulses. */
 static const struct {
     double hz;
     uint8_t code;
@@ -64,8 +64,8 @@ static const struct range accelerations[] = {
     {8.0, 1, 1.0 / 4096.0}, {16.0, 0, 1.0 / 2048.0},
 };
 
-/* Another image may have left another bank selected, in which this register is none. Only what looks like one is touched:
-   the part is not known yet. */
+/* An earlier image may have selected another bank, without this register. Only a plausible value is changed, because the part
+   is not identified yet. */
 static uint16_t identify(unsigned device)
 {
     uint8_t bank = byte_register_read(device, BUS_HZ, REG_BANK_SEL);
@@ -79,7 +79,7 @@ static bool is_told(unsigned device, uint8_t address, uint8_t value)
     return byte_register_read(device, BUS_HZ, address) == value;
 }
 
-/* While a sensor is on, only its rate, range and mode may change (section 12.9), and it keeps to SPI by then. */
+/* While a sensor is on, only its rate, range and mode may change (section 12.9); by then it is set to SPI. */
 static void keep_to_spi(unsigned device)
 {
     uint8_t setting = INTF_CONFIG0_FULL_RANGE | INTF_CONFIG0_BIG_ENDIAN | INTF_CONFIG0_I2C_OFF;
@@ -96,8 +96,8 @@ static size_t nearest_rate(float hz)
     return best;
 }
 
-/* The reset brings everything to what it is as delivered, in all banks, also the user's offsets (section 5.4), the self-test
-   and the filters before the one that is set here. */
+/* The reset restores the defaults in all banks, also of the user's offsets (section 5.4), the self-test and the filters before
+   the one that is set here. */
 static void reset_part(unsigned device)
 {
     uint8_t bytes[2] = {DEVICE_CONFIG, DEVICE_CONFIG_SOFT_RESET};
@@ -105,8 +105,8 @@ static void reset_part(unsigned device)
     port_wait_us(RESET_US);
 }
 
-/* Both sensors run, at one rate, whether accelerations are asked for or not: so a conversion is one of both. They start last,
-   when the interrupt is set up. INT_CONFIG1: INT_ASYNC_RESET must be cleared (section 12.6). */
+/* Both sensors always run, at one rate: so a conversion is one of both. They start last, after the setup of the interrupt.
+   INT_CONFIG1: INT_ASYNC_RESET must be cleared (section 12.6). */
 static bool write_settings(unsigned device, uint8_t rate, uint8_t range, uint8_t acceleration_range)
 {
     const struct byte_setting settings[] = {
@@ -147,13 +147,13 @@ static int16_t int16_at(const uint8_t *bytes)
     return (int16_t)(bytes[0] << 8 | bytes[1]);
 }
 
-/* The status comes first: reading it after the outputs would lower the flag of a conversion that came in between. The axes of
-   both triads are right-handed (figure 16; PX4's driver turns two signs of each). */
+/* The status comes first: reading it after the outputs would clear the flag of a conversion in between. The axes of both triads
+   are right-handed (figure 16; PX4's driver turns two signs of each). */
 static enum read_result read(unsigned device, const struct setup_payload *setup, struct reading *reading)
 {
     (void)setup;
     uint8_t status = byte_register_read(device, BUS_HZ, INT_STATUS);
-    uint8_t bytes[16] = {TEMP_DATA1 | BYTE_REGISTER_READ}; /* and one register more, for an even number */
+    uint8_t bytes[16] = {TEMP_DATA1 | BYTE_REGISTER_READ}; /* and one more register, for an even number */
     bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
     reading->temperature_counts = int16_at(&bytes[1]);
     for (unsigned axis = 0; axis < 3; axis++) {

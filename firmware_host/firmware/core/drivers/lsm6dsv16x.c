@@ -6,7 +6,7 @@
 #include "settings.h"
 
 #define IDENTITY 0x70u /* section 9.13 */
-#define BUS_HZ 5000000u /* half of what table 7 allows: the wires are loose */
+#define BUS_HZ 5000000u /* half the limit of table 7: the wires are loose */
 
 enum register_address {
     FUNC_CFG_ACCESS = 0x01,
@@ -30,21 +30,22 @@ enum register_address {
 #define CTRL3_BDU 0x40u    /* low and high byte of one conversion */
 #define CTRL3_IF_INC 0x04u /* the address counts up in a burst */
 #define CTRL3_SW_RESET 0x01u
-#define CTRL4_DRDY_PULSED 0x02u /* 65 µs: a reading that is missed costs no edge */
-#define HIGH_ACCURACY 0x10u /* OP_MODE of both: the data rate within 1 % of what is asked for (table 3) */
+#define CTRL4_DRDY_PULSED 0x02u /* 65 µs: a missed read does not cost an edge */
+#define HIGH_ACCURACY 0x10u /* OP_MODE of both: the data rate within 1 % of the nominal one (table 3) */
 #define STATUS_GDA 0x02u
-#define STATUS_ALWAYS_0 0x40u /* bit 6 (table 82); reads 1 when nothing drives the wire */
-#define RESETTING_US 1000u /* the data sheet has no figure; ST's driver waits until the bit has fallen, so does this one */
+#define STATUS_ALWAYS_0 0x40u /* bit 6 (table 82); reads 1 if no part drives the wire */
+#define RESETTING_US 1000u /* the data sheet has no figure; like ST's driver, this one waits for the bit to clear */
 #define POLL_US 50u
 
-/* Table 4: the gyroscope turns on within 30 ms; then what passes its low-pass at 12.5 Hz, 5.5 Hz wide: some 30 ms, twice. */
+/* Table 4: the gyroscope turns on within 30 ms; then the settling of its low-pass at 12.5 Hz, 5.5 Hz wide: some 30 ms, twice.
+   */
 #define SETTLING_US 90000u
 #define SETTLING 2u
-/* The words of one conversion may be followed by those of the next in the middle of a burst of 29 µs: none is believed then. */
+/* A burst of 29 µs may contain words of two conversions; such a burst is discarded. */
 #define LATCHED_US 45u
 
-/* Table 20: three sets of rates, of each HAODR_SEL those of the codes 4 to 10 and, of two, 3. The gyroscope's own low-pass lets
-   through less than half of each (table 21), the accelerometer's half (table 69). */
+/* Table 20: three sets of rates, codes 4 to 10 of each HAODR_SEL, and code 3 of two. The gyroscope's low-pass is narrower than
+   half of each rate (table 21), the accelerometer's is half (table 69). */
 static const struct {
     double hz;
     uint8_t set, code;
@@ -55,8 +56,8 @@ static const struct {
     {2000.0, 1, 10},
 };
 
-/* Table 3, not range / 32768: that would be 14 % off. FS_G: table 63. What the table says of noise and tolerance holds up to
-   2000 °/s, so 4000 is left out. */
+/* Table 3, not range / 32768: that would be 14 % off. FS_G: table 63. The table's noise and tolerance are valid up to 2000 °/s,
+   so 4000 is not used. */
 static const struct range ranges[] = {
     {125.0, 0, RADIANS(4.375e-3)}, {250.0, 1, RADIANS(8.75e-3)},  {500.0, 2, RADIANS(17.5e-3)},
     {1000.0, 3, RADIANS(35.0e-3)}, {2000.0, 4, RADIANS(70.0e-3)},
@@ -67,8 +68,8 @@ static const struct range accelerations[] = {
     NO_ACCELERATION, {2.0, 0, 0.061e-3}, {4.0, 1, 0.122e-3}, {8.0, 2, 0.244e-3}, {16.0, 3, 0.488e-3},
 };
 
-/* Another image may have left other registers in the place of these. Only what looks like it is touched: the part is not
-   known yet. */
+/* An earlier image may have mapped other registers here. Only a plausible value is changed, because the part is not identified
+   yet. */
 static uint16_t identify(unsigned device)
 {
     uint8_t access = byte_register_read(device, BUS_HZ, FUNC_CFG_ACCESS);
@@ -92,7 +93,7 @@ static size_t nearest_rate(float hz)
     return best;
 }
 
-/* Everything but the interface is as delivered after it: FIFO, filters, self-test, the user's offset, embedded functions. */
+/* After it everything but the interface has its default: FIFO, filters, self-test, the user's offset, embedded functions. */
 static bool reset_part(unsigned device)
 {
     uint8_t bytes[2] = {CTRL3, CTRL3_BDU | CTRL3_IF_INC | CTRL3_SW_RESET};
@@ -105,8 +106,8 @@ static bool reset_part(unsigned device)
     return false;
 }
 
-/* Both sensors run, at one rate, whether accelerations are asked for or not: the mode wants it (section 6.5), and so a
-   conversion is one of both. Rates last: with them the part starts. */
+/* Both sensors always run, at one rate: the mode requires it (section 6.5), and so a conversion is one of both. Rates come
+   last, because they start the part. */
 static bool write_settings(unsigned device, uint8_t set, uint8_t code, uint8_t range, uint8_t acceleration_range)
 {
     const struct byte_setting settings[] = {
@@ -150,7 +151,7 @@ static int16_t int16_at(const uint8_t *bytes)
 static enum read_result read(unsigned device, const struct setup_payload *setup, struct reading *reading)
 {
     (void)setup;
-    uint8_t bytes[18] = {STATUS_REG | BYTE_REGISTER_READ}; /* and one register more, for an even number */
+    uint8_t bytes[18] = {STATUS_REG | BYTE_REGISTER_READ}; /* and one more register, for an even number */
     bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
     reading->temperature_counts = int16_at(&bytes[3]);
     for (unsigned axis = 0; axis < 3; axis++) {

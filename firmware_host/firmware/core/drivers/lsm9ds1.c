@@ -5,7 +5,7 @@
 #include "settings.h"
 
 #define IDENTITY 0x68u
-#define BUS_HZ 5000000u /* half of what section 5.2.1 allows: the wires are loose */
+#define BUS_HZ 5000000u /* half the limit of section 5.2.1: the wires are loose */
 
 enum register_address {
     ACT_THS = 0x04,
@@ -32,17 +32,17 @@ enum register_address {
 #define INT1_CTRL_DRDY_G 0x02u
 #define CTRL_REG4_AXES 0x38u       /* z, y, x on */
 #define CTRL_REG5_XL_AXES 0x38u
-#define CTRL_REG6_XL_BW_SCAL_ODR 0x04 /* the filter is the one that is named, not the data rate's */
+#define CTRL_REG6_XL_BW_SCAL_ODR 0x04 /* the filter is selected explicitly, not by the data rate */
 #define CTRL_REG8_BDU 0x40u        /* low and high byte of one conversion */
 #define CTRL_REG8_IF_ADD_INC 0x04u /* the address counts up in a burst */
 #define CTRL_REG9_I2C_DISABLE 0x04u
 #define STATUS_XLDA 0x01u
 #define STATUS_GDA 0x02u
-#define STATUS_ALWAYS_0 0x80u /* reads 1 when nothing drives the wire */
+#define STATUS_ALWAYS_0 0x80u /* reads 1 if no part drives the wire */
 #define SETTLING 8u           /* table 12: 2 at 14.9 Hz to 8 at 952 Hz, without the second filter */
 
-/* With the accelerometer's filter, which left to the data rate is as wide for the slowest as for the fastest: 408, 211, 105
-   or, of code 3, 50 Hz. */
+/* With the accelerometer's filter, whose default is as wide for the slowest rate as for the fastest: 408, 211, 105 or, of code
+   3, 50 Hz. */
 static const struct {
     double hz;
     uint8_t code, bandwidth_code;
@@ -69,7 +69,7 @@ static uint16_t identify(unsigned device)
     return byte_register_read(device, BUS_HZ, WHO_AM_I);
 }
 
-/* Of both dies: the magnetometer listens even where its own wire to answer on is not connected. */
+/* For both dies: the magnetometer receives even if its own output wire is not connected. */
 static void keep_to_spi(unsigned device)
 {
     byte_register_write(device, BUS_HZ, CTRL_REG9, CTRL_REG9_I2C_DISABLE);
@@ -85,8 +85,8 @@ static size_t nearest_rate(float hz)
     return best;
 }
 
-/* Data rate last: with it a part that was off starts, and the accelerometer at the same rate, which a write to its own
-   register would leave running alone (section 3.1). What an image flashed before left on, such as the self-test, goes off. */
+/* Data rate last: it starts a part that was off, with the accelerometer at the same rate; a write to the accelerometer's
+   register would run that alone (section 3.1). Settings of an earlier image, such as the self-test, are cleared. */
 static bool write_settings(unsigned device, uint8_t control_g, uint8_t control_xl)
 {
     const struct byte_setting settings[] = {
@@ -94,11 +94,11 @@ static bool write_settings(unsigned device, uint8_t control_g, uint8_t control_x
         {CTRL_REG8, CTRL_REG8_BDU | CTRL_REG8_IF_ADD_INC},
         {CTRL_REG4, CTRL_REG4_AXES},
         {CTRL_REG2_G, 0}, /* output before the second filter */
-        {CTRL_REG3_G, 0}, /* no high-pass: it would remove the bias that is to be measured */
+        {CTRL_REG3_G, 0}, /* no high-pass: it would remove the bias to be measured */
         {ORIENT_CFG_G, 0},
         {CTRL_REG10, 0}, /* no self-test: it would add a rate */
         {FIFO_CTRL, 0},
-        {ACT_THS, 0}, /* no sleep while nothing turns */
+        {ACT_THS, 0}, /* no sleep at rest */
         {ACT_DUR, 0},
         {INT1_CTRL, INT1_CTRL_DRDY_G},
         {CTRL_REG5_XL, CTRL_REG5_XL_AXES}, /* every conversion, not a mean of some */
@@ -133,9 +133,9 @@ static int16_t int16_at(const uint8_t *bytes)
     return (int16_t)(bytes[0] | bytes[1] << 8);
 }
 
-/* Both triads of this die are left-handed: by figure 1 their x points the other way than the magnetometer's, y and z the
-   same. ArduPilot's driver, which has flown, turns one sign of theirs and none of the magnetometer's (docs/board.md, "Axes",
-   has more witnesses). Turned here, all are in the axes of the magnetometer. */
+/* Both triads of this die are left-handed: by figure 1 their x is opposite to the magnetometer's, y and z are the same.
+   ArduPilot's driver, proven in flight, inverts one of their signs and none of the magnetometer's (docs/board.md, "Axes", has
+   more evidence). After the inversion here, all are in the axes of the magnetometer. */
 static void take_right_handed(const uint8_t *bytes, int16_t counts[3])
 {
     for (unsigned axis = 0; axis < 3; axis++)
@@ -143,18 +143,18 @@ static void take_right_handed(const uint8_t *bytes, int16_t counts[3])
     counts[0] = counts[0] == INT16_MIN ? INT16_MAX : (int16_t)-counts[0];
 }
 
-/* The rates have been read, which lowered their flag, and reading these lowers theirs. When one of them is up again, the
-   next conversion came in between. */
+/* Reading the rates cleared their flag, and reading the accelerations clears theirs. If one of them is set again, the next
+   conversion came in between. */
 static enum read_result read_acceleration(unsigned device, struct reading *reading)
 {
-    uint8_t bytes[8] = {OUT_X_L_XL | BYTE_REGISTER_READ}; /* and one register more, for an even number */
+    uint8_t bytes[8] = {OUT_X_L_XL | BYTE_REGISTER_READ}; /* and one more register, for an even number */
     bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
     take_right_handed(&bytes[1], reading->acceleration);
     uint8_t status = byte_register_read(device, BUS_HZ, STATUS_REG);
     return status & (STATUS_GDA | STATUS_XLDA) ? READ_TORN : READ_FRESH;
 }
 
-/* One chip select for temperature, status and rates: they lie side by side, and one burst is one moment. */
+/* One chip select for temperature, status and rates: they are adjacent, and one burst is of one instant. */
 static enum read_result read(unsigned device, const struct setup_payload *setup, struct reading *reading)
 {
     uint8_t bytes[10] = {OUT_TEMP_L | BYTE_REGISTER_READ};

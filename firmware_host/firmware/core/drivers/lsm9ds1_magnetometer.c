@@ -7,7 +7,7 @@
 #include "settings.h"
 
 #define IDENTITY 0x3Du
-#define BUS_HZ 5000000u /* half of what section 5.2.1 allows: the wires are loose */
+#define BUS_HZ 5000000u /* half the limit of section 5.2.1: the wires are loose */
 
 enum register_address {
     OFFSET_X_REG_L_M = 0x05, /* and five more, to 0x0A */
@@ -20,18 +20,18 @@ enum register_address {
     STATUS_REG_M = 0x27, /* then the six bytes of OUT_X_M … OUT_Z_M */
 };
 
-#define COUNT_UP 0x40u /* of an address: this die has it there, the other one in CTRL_REG8 */
+#define COUNT_UP 0x40u /* bit of an address; the other die has this in CTRL_REG8 */
 
 #define CTRL_REG1_M_BEST 0xE0u /* temperature compensation, x and y of ultra-high performance */
 #define CTRL_REG1_M_DO(code) ((code) << 2)
 #define CTRL_REG2_M_FS(code) ((code) << 5)
-#define CTRL_REG3_M_I2C_DISABLE 0x80u /* and converting all the time */
-#define CTRL_REG3_M_QUIET 0x83u       /* the same powered down, as after a start */
+#define CTRL_REG3_M_I2C_DISABLE 0x80u /* and continuous conversion */
+#define CTRL_REG3_M_QUIET 0x83u       /* and powered down, as after a start */
 #define CTRL_REG4_M_BEST 0x0Cu        /* z of ultra-high performance, low byte first */
 #define CTRL_REG5_M_BDU 0x40u         /* low and high byte of one conversion */
 #define STATUS_ZYXDA 0x08u
-#define NOTHING 0xFFu /* what nobody drives */
-#define SETTLING 2u   /* no figure known: the first conversions after a change */
+#define NOTHING 0xFFu /* reading of an undriven wire */
+#define SETTLING 2u   /* first conversions after a change; assumed, without a figure in the data sheet */
 
 static const double rates_hz[] = {0.625, 1.25, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0}; /* by code */
 
@@ -43,7 +43,7 @@ static uint16_t identify(unsigned device)
     return byte_register_read(device, BUS_HZ, WHO_AM_I_M);
 }
 
-/* Blindly where the die's answers do not arrive. One that has been told goes on with what it does. */
+/* Also without answers of the die. It continues its present operation. */
 static void keep_to_spi(unsigned device)
 {
     uint8_t control = byte_register_read(device, BUS_HZ, CTRL_REG3_M);
@@ -60,8 +60,8 @@ static unsigned nearest_rate(float hz)
     return best;
 }
 
-/* Off, then on again last: so conversions begin with all of it. The offsets, which the part takes away from what it measures,
-   are the user's and go. */
+/* Off first, and on again last, so that conversions begin with all settings. The user's offsets, which the part subtracts, are
+   cleared. */
 static enum error_code configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
 {
     const struct range *range = choose_range(wanted->range_gauss, ranges, COUNT(ranges));
@@ -90,7 +90,7 @@ static enum error_code configure(unsigned device, const struct configure_payload
     return 0;
 }
 
-/* One chip select for status and field. Any status may be a true one, but not one of all ones before a field of all ones. */
+/* One chip select for status and field. Any status may be valid, except all ones before a field of all ones. */
 static enum read_result read(unsigned device, const struct setup_payload *setup, struct reading *reading)
 {
     uint8_t bytes[8] = {STATUS_REG_M | BYTE_REGISTER_READ | COUNT_UP}, all = NOTHING;

@@ -5,9 +5,9 @@
 #include "port.h"
 #include "settings.h"
 
-#define IDENTITY 0x71u /* the MPU-9255 says 0x73, the MPU-6500 0x70: other parts with other figures */
+#define IDENTITY 0x71u /* 0x73 is an MPU-9255, 0x70 an MPU-6500: parts with other figures */
 #define REGISTERS_HZ 1000000u /* section 7.5 */
-#define DATA_HZ 5000000u /* sensor and interrupt registers take 20 MHz to read (section 3.6); loose wires do not */
+#define DATA_HZ 5000000u /* sensor and interrupt registers can be read at 20 MHz (section 3.6), but not over loose wires */
 
 enum register_address {
     XG_OFFSET_H = 0x13, /* and five more, to 0x18 */
@@ -29,20 +29,20 @@ enum register_address {
 
 #define INT_ENABLE_RAW_RDY 0x01u
 #define INT_STATUS_RAW_DATA_RDY 0x01u
-#define INT_STATUS_ALWAYS_0 0x80u /* reads 1 when nothing drives the wire */
+#define INT_STATUS_ALWAYS_0 0x80u /* reads 1 if no part drives the wire */
 #define USER_CTRL_I2C_IF_DIS 0x10u
 #define PWR_MGMT_1_SLEEP 0x40u
-#define PWR_MGMT_1_CLKSEL_BEST 0x01u /* the gyroscope's own clock: what full performance needs (map, register 107) */
+#define PWR_MGMT_1_CLKSEL_BEST 0x01u /* the gyroscope's own clock, required for full performance (map, register 107) */
 
-/* The low-pass filter is always on: without it the part converts at 8 kHz whatever SMPLRT_DIV says (map, register 25),
-   which is more than the serial line carries. With it the divider acts on 1 kHz. */
+/* The low-pass filter is always on: without it the part converts at 8 kHz independent of SMPLRT_DIV (map, register 25), too
+   fast for the serial line. With it the divider acts on 1 kHz. */
 #define BASE_HZ 1000.0
-#define DIVIDER_MAX 250u /* 4 Hz, the slowest the specification has */
+#define DIVIDER_MAX 250u /* 4 Hz, the slowest in the specification */
 
-/* Section 3.1: the gyroscope starts within 35 ms; Linux's INV_MPU6500_GYRO_STARTUP_TIME is 70 ms, which also holds the
-   slowest filter's 33 ms delay (map, register 26). */
+/* Section 3.1: the gyroscope starts within 35 ms; Linux's INV_MPU6500_GYRO_STARTUP_TIME is 70 ms, which also covers the slowest
+   filter's 33 ms delay (map, register 26). */
 #define SETTLING_US 70000u
-#define LATCHED_US 2u /* the registers stand still from the select on (map, section 4.22) */
+#define LATCHED_US 2u /* the registers are frozen from the select on (map, section 4.22) */
 #define WAKING_US 10000u /* until registers can be written: Linux's INV_MPU6050_REG_UP_TIME_MAX */
 
 /* Sensitivities are those of section 3.1, not range / 32768. FS_SEL: map, register 27. */
@@ -75,7 +75,7 @@ static void keep_to_spi(unsigned device)
     byte_register_write(device, REGISTERS_HZ, USER_CTRL, USER_CTRL_I2C_IF_DIS);
 }
 
-/* The widest filter that keeps what it lets through below half the data rate. */
+/* Returns the widest filter with a bandwidth below half the data rate. */
 static uint8_t filter_code(double rate_hz)
 {
     uint8_t i = 0;
@@ -93,10 +93,9 @@ static bool wake(unsigned device)
     return taken;
 }
 
-/* What an image flashed before left on, such as an offset or the self-test, goes off. Interrupts last.
-   The interrupt is a pulse for each conversion, not a level that a read lowers: a read that is missed costs no edge.
-   The offsets of the gyroscope are the user's; those of the accelerometer (registers 119 to 126) are the factory's trim
-   and stay as they are. */
+/* Settings of an earlier image, such as an offset or the self-test, are cleared. Interrupts last. The interrupt is a pulse for
+   each conversion, not a level that a read clears: a missed read does not cost an edge. The offsets of the gyroscope are the
+   user's; those of the accelerometer (registers 119 to 126) are the factory's trim and remain unchanged. */
 static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, uint8_t range, uint8_t acceleration_range)
 {
     const struct byte_setting settings[] = {
@@ -139,7 +138,7 @@ static int16_t int16_at(const uint8_t *bytes)
     return (int16_t)(bytes[0] << 8 | bytes[1]);
 }
 
-/* One chip select for status, acceleration, temperature and rates: they lie side by side, and one burst is one moment. */
+/* One chip select for status, acceleration, temperature and rates: they are adjacent, and one burst is of one instant. */
 static enum read_result read(unsigned device, const struct setup_payload *setup, struct reading *reading)
 {
     (void)setup;

@@ -21,7 +21,7 @@ enum error_code sensors_check_gyroscope(uint8_t sensor)
     return sensor < GYROSCOPE_COUNT ? 0 : ERROR_NOT_A_GYROSCOPE;
 }
 
-/* A wire that nobody drives reads as all zeros or all ones. */
+/* An undriven wire reads as all zeros or all ones. */
 static bool is_nobody(uint16_t who_am_i)
 {
     return who_am_i == 0 || who_am_i == 0xFFu || who_am_i == 0xFFFFu;

@@ -1,4 +1,4 @@
-/* What configuring any of the parts has in common. */
+/* Common functions for configuring the parts. */
 #ifndef SETTINGS_H
 #define SETTINGS_H
 
@@ -13,29 +13,29 @@
 
 #define TESLA(gauss) ((gauss) * 1e-4)
 
-#define STANDARD_GRAVITY_M_S2 9.80665 /* what a data sheet's g is */
+#define STANDARD_GRAVITY_M_S2 9.80665 /* the g of data sheets */
 
-/* Of turn rates, in degrees per second and rad/s per count, of accelerations, in g and g per count, or of the magnetic
+/* Of angular rates, in degrees per second and rad/s per count, of accelerations, in g and g per count, or of the magnetic
    field, in gauss and gauss per count. */
 struct range {
     double full_scale;
-    uint8_t code; /* as the part's register has it */
+    uint8_t code; /* in the part's register */
     double per_count;
 };
 
-/* What a table of ranges of accelerations begins with: they need not be read. */
+/* The first entry of a table of ranges of accelerations: none requested. */
 #define NO_ACCELERATION {0.0, 0, 0.0}
 
-/* The smallest of the part's ranges that holds the wanted one; NULL when there is none. The table ascends. */
+/* Returns the part's smallest range that covers the wanted one; NULL if there is none. The table ascends. */
 const struct range *choose_range(float wanted, const struct range *ranges, size_t count);
 
-/* Tells of the chosen ranges in `setup`. */
+/* Writes the chosen ranges into `setup`. */
 void tell_ranges(const struct range *rate, const struct range *acceleration, struct setup_payload *setup);
 
-/* Is `a` nearer to `wanted` than `b`? */
+/* Returns whether `a` is nearer to `wanted` than `b`. */
 bool is_nearer(double a, double b, float wanted);
 
-/* The divider 1 … `max` that brings base_hz / divider nearest to `wanted_hz`. */
+/* Returns the divider 1 … `max` with base_hz / divider nearest to `wanted_hz`. */
 uint16_t nearest_divider(double base_hz, float wanted_hz, uint16_t max);
 
 #endif

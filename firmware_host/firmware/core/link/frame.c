@@ -17,7 +17,7 @@ uint32_t frame_crc(uint32_t crc, const uint8_t *bytes, size_t size)
     return ~crc;
 }
 
-/* The one COBS block of a frame as it grows: `code` is where the distance to the next zero goes. */
+/* The one COBS block of a frame under construction: `code` points to the distance to the next zero. */
 struct stuffer {
     uint8_t *wire;
     size_t code;

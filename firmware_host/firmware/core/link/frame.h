@@ -20,7 +20,7 @@ struct frame {
     const uint8_t *payload;
 };
 
-/* CRC-32 as zlib's of `size` bytes, going on from `crc`; start with 0. */
+/* Returns zlib's CRC-32 of `size` bytes, continued from `crc`; start with 0. */
 uint32_t frame_crc(uint32_t crc, const uint8_t *bytes, size_t size);
 
 /* Writes the frame, delimiter included, to `wire` (WIRE_MAX bytes); returns its length. */

@@ -4,12 +4,12 @@
 
 #include "port.h"
 
-#define RX_RING 256u /* a power of two, and more than the host sends before it waits for an answer */
+#define RX_RING 256u /* a power of two, larger than the host's data before an answer */
 #define TX_BUFFER (2u * WIRE_MAX + 16u)
 
 static struct {
     volatile uint8_t ring[RX_RING];
-    volatile uint32_t written; /* by the interrupt */
+    volatile uint32_t written; /* written by the interrupt */
     uint32_t read;
     uint8_t block[WIRE_MAX];
     size_t filled;
@@ -67,7 +67,7 @@ static bool take_byte(uint8_t byte, struct frame *frame)
 
 bool link_receive(struct frame *frame)
 {
-    if (rx.written - rx.read > RX_RING) { /* overtaken: what is left is a mixture */
+    if (rx.written - rx.read > RX_RING) { /* overrun: the rest is a mixture */
         rx.read = rx.written;
         rx.too_long = true;
     }

@@ -10,10 +10,10 @@ void link_reset(void);
 void link_byte_received(uint8_t byte);
 void link_sent(void);
 
-/* Takes the next whole frame; it stays valid until the next call. */
+/* Takes the next complete frame; it stays valid until the next call. */
 bool link_receive(struct frame *frame);
 
-/* Queues a frame; false, and counted as an overrun, when there is no room. */
+/* Queues a frame; false, counted as an overrun, if there is no room. */
 bool link_send(enum message_type type, const void *payload, size_t size);
 bool link_has_room(void);
 
