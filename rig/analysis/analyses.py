@@ -49,7 +49,7 @@ def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
     """
     from rig.analysis.by_hand import judging as hand_judging
 
-    return hand_judging.calibrated_by_hand(runs)
+    return hand_judging.calibrate_by_hand(runs)
 
 
 @solvable()

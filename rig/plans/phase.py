@@ -47,9 +47,9 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
             if not isinstance(made, Plan):
                 raise TypeError(f"its planner gives {type(made).__name__}, no Plan")
         if not done:
-            from rig.analysis.design.attitude_account import refuse_untelling
+            from rig.analysis.design.attitude_account import refuse_undetermined
 
-            refuse_untelling(config, made)
+            refuse_undetermined(config, made)
         return made
 
     following = procedure.following(procedures) if config.procedure.then_verify else None

@@ -15,10 +15,19 @@ from typing import Protocol, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from rig.analysis.by_hand.predicted import duration_s, predicted_by_hand
-from rig.analysis.design.predicted import predicted
-from rig.analysis.design.predicted_accelerations import predicted_accelerations
-from rig.analysis.design.shortest import SIZES, Budgets, Candidate, Planned, Searched, Shortest, Wanted, shortest
+from rig.analysis.by_hand.predicted import duration_s, predict_hand_budgets
+from rig.analysis.design.predicted import predict_budgets
+from rig.analysis.design.predicted_accelerations import predict_accelerometer_budgets
+from rig.analysis.design.shortest import (
+    SIZES,
+    Budgets,
+    Candidate,
+    Planned,
+    Searched,
+    Shortest,
+    TargetUncertainty,
+    find_shortest,
+)
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.procedures.hand_sections import ByHandSection
 from rig.config.procedures.procedure_sections import SixObservationSection, StaticAttitudesSection
@@ -62,10 +71,10 @@ class Tried(Protocol):
     def finer(self, best: Candidate) -> Sequence[Candidate]: ...
     def duration_s(self, procedure: ProcedureSection) -> float: ...
     def predict(self, candidate: Candidate) -> Budgets | None: ...
-    def ending(self, procedure: ProcedureSection, wanted: Wanted) -> Mapping[str, float]: ...
+    def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]: ...
 
 
-def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
+def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     """The shortest run of this configuration that is predicted to reach what is wanted.
 
     Raises Refused `not_foretold` where its procedure is none whose uncertainty is predicted, or not of what is wanted.
@@ -78,15 +87,15 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
         for each in what.made_endless(candidates)
         if (once := what.predict(each)) is not None
     ]
-    able = {family for family, floor in floors if wanted.share(floor.reached) <= HOPELESS}
-    least = min(floors, key=lambda each: wanted.share(each[1].reached))[0]
+    able = {family for family, floor in floors if wanted.ratio_to_target(floor.reached) <= HOPELESS}
+    least = min(floors, key=lambda each: wanted.ratio_to_target(each[1].reached))[0]
     hopeful = [each for each in candidates if each.family in able] or _longest(candidates, least, wanted.at_most_s)
-    found = shortest(hopeful, what.predict, wanted)
-    looked = [*(floor for _, floor in floors), *found.looked]
-    cannot_be_had = not any(wanted.met_by(each.reached) for each in looked)
-    if found.best is None and cannot_be_had and able and wanted.at_most_s < inf:
-        cannot_be_had = shortest(hopeful, what.predict, replace(wanted, at_most_s=inf)).best is None
-    fine = shortest(what.finer(found.best.candidate), what.predict, wanted) if found.best else Searched()
+    found = find_shortest(hopeful, what.predict, wanted)
+    evaluated = [*(floor for _, floor in floors), *found.evaluated]
+    unreachable = not any(wanted.is_met_by(each.reached) for each in evaluated)
+    if found.best is None and unreachable and able and wanted.at_most_s < inf:
+        unreachable = find_shortest(hopeful, what.predict, replace(wanted, at_most_s=inf)).best is None
+    fine = find_shortest(what.finer(found.best.candidate), what.predict, wanted) if found.best else Searched()
     best = fine.best or found.best
     best = best and _ending(best, what.ending(best.candidate.procedure, wanted))
     shown = best or found.nearest
@@ -97,9 +106,9 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
         None if own is None else Planned(before, own),
         best,
         found.nearest,
-        looked,
-        cannot_be_had,
-        len(found.looked) + len(fine.looked),
+        evaluated,
+        unreachable,
+        len(found.evaluated) + len(fine.evaluated),
         len(candidates),
         None if shown is None else _directions(plan_of(config, shown.candidate.procedure)),
     )
@@ -124,7 +133,7 @@ def _not_foretold(what: str) -> Refused:
     )
 
 
-def _refuse_others(wanted: Wanted, config: RigConfig) -> None:
+def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
     """Raise Refused `not_foretold` where something is wanted of a kind of sensor that is not calibrated."""
     kinds = {"gyroscope": not isinstance(config.procedure, StaticAttitudesSection)}
     kinds["accelerometer"] = config.procedure.accelerometer_order > 0 and any(
@@ -238,12 +247,12 @@ class _Swept:
         config = _changed(self.config, procedure=candidate.procedure)
         plan, made = plan_of(config, candidate.procedure), kind_of(config.turner).meant(config.turner)
         try:
-            rates = predicted(config, plan, made) if plan.sweeps else {}
-            return Budgets(rates, predicted_accelerations(config, plan, made.kinematics))
+            rates = predict_budgets(config, plan, made) if plan.sweeps else {}
+            return Budgets(rates, predict_accelerometer_budgets(config, plan, made.kinematics))
         except (Fault, np.linalg.LinAlgError):  # so few sweeps and rests, or such attitudes, tell nothing
             return None
 
-    def ending(self, procedure: ProcedureSection, wanted: Wanted) -> Mapping[str, float]:
+    def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
         """The wish, after an earlier repeat."""
         if not isinstance(procedure, SixObservationSection) or procedure.repeats == 1 or procedure.stages:
             return {}
@@ -288,11 +297,11 @@ class _ByHand:
 
     def predict(self, candidate: Candidate) -> Budgets | None:
         try:
-            return Budgets(predicted_by_hand(self.config, *_session(candidate.procedure)))
+            return Budgets(predict_hand_budgets(self.config, *_session(candidate.procedure)))
         except Fault:
             return None
 
-    def ending(self, procedure: ProcedureSection, wanted: Wanted) -> Mapping[str, float]:
+    def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
         """The wish, before the list is done: beside what no session shows of hands."""
         own = wanted.scale**2 - (2 * REAL_HANDS) ** 2
         return {"target_scale_u": round(own**0.5, 7)} if 0 < own < inf else {}

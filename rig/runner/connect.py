@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from firmware_host.client import Calibration
-from rig.analysis.design.shortest import wanted_by
+from rig.analysis.design.shortest import target_of
 from rig.board.crystal import follows_crystal
 from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
@@ -121,7 +121,7 @@ class Connector:
         section, procedure = self.loaded.config.procedure, self.phase.procedure
         if procedure.reads_corrected or not isinstance(section, SixObservationSection):
             return None
-        if (wanted := wanted_by(section)) is None:
+        if (wanted := target_of(section)) is None:
             return None
         return EndingEarly(wanted, plan, sweeps, section.repeats, self.path, self.resumed.earlier, procedure.estimator)
 

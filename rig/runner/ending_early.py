@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.analysis.design.reached import reached_so_far
-from rig.analysis.design.shortest import Reached, Wanted
+from rig.analysis.design.reached import assess_reached
+from rig.analysis.design.shortest import ReachedUncertainty, TargetUncertainty
 from rig.data.recording.run_file import RunData, read_run
 from rig.errors import RigError
 from rig.motion.state import Joints
@@ -32,7 +32,7 @@ class EndingEarly:
     end before anything moves. Nothing here moves anything.
     """
 
-    wanted: Wanted
+    wanted: TargetUncertainty
     plan: Plan
     sweeps: int
     repeats: int
@@ -65,7 +65,7 @@ class EndingEarly:
         return self._due and not self.ended
 
     @contextmanager
-    def looking(self) -> Iterator["Future[Reached | None]"]:
+    def looking(self) -> Iterator["Future[ReachedUncertainty | None]"]:
         """The uncertainty so far, as it will be found meanwhile."""
         pool = ThreadPoolExecutor(max_workers=1)
         try:
@@ -73,13 +73,13 @@ class EndingEarly:
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
-    def found(self, looked: "Future[Reached | None]") -> UncertaintySoFar | None:
+    def found(self, looked: "Future[ReachedUncertainty | None]") -> UncertaintySoFar | None:
         """What was found, which may end the run; what takes too long ends nothing."""
         self._due = False
         reached = looked.result() if looked.done() else None
         if reached is None:
             return None
-        self.ended = self.wanted.share(reached) <= ENOUGH
+        self.ended = self.wanted.ratio_to_target(reached) <= ENOUGH
         return UncertaintySoFar(reached.scale, reached.bias_rad_s, self._repeats_left, self.ended)
 
     def passes_over(self, motion: Motion) -> bool:
@@ -87,10 +87,10 @@ class EndingEarly:
         place, self._motions = self._motions, self._motions + 1
         return self.ended and place != self._home
 
-    def _look(self) -> Reached | None:
+    def _look(self) -> ReachedUncertainty | None:
         time.sleep(WRITTEN_S)
         try:
-            return reached_so_far([*self.earlier, *([read_run(self.path)] if self._recorded else [])], self.estimator)
+            return assess_reached([*self.earlier, *([read_run(self.path)] if self._recorded else [])], self.estimator)
         except RigError:  # what is wrong with the recording, the end of the run will say
             return None
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from rig.analysis.design.planned_motion import (
-    planned_attitude,
-    planned_motion,
-    planned_run,
-    planned_turn,
-    timed,
-    timed_of,
+    plan_run,
+    predict_attitude,
+    predict_motion,
+    predict_revolution,
+    time_steps,
+    time_steps_of,
 )
 from rig.config.load import load
 from rig.motion.geometry import NOMINAL
@@ -26,23 +26,23 @@ AS_THE_FLANGE = np.eye(3)
 @pytest.mark.parametrize("said", [(), ("procedure.arc_deg=90", "uncertainty.angle_std_deg=0.01")])
 def test_a_planned_turn_is_what_the_motion_shows(said: tuple[str, ...]) -> None:
     config = load(CONFIGS / "demo.yaml", said, sections(installed()), turners.sections()).config
-    run = planned_run(config, plan_of(config, config.procedure), NOMINAL)
-    motion = planned_motion(run.plan, run.arm)
-    for each in timed_of(run.plan, Sweep):
-        will = planned_turn(each, run.arm, AS_THE_FLANGE)
+    run = plan_run(config, plan_of(config, config.procedure), NOMINAL)
+    motion = predict_motion(run.plan, run.arm)
+    for each in time_steps_of(run.plan, Sweep):
+        will = predict_revolution(each, run.arm, AS_THE_FLANGE)
         found = motion.turn(each.step, Window(each.start_s, each.end_s), run.settings.observation)
         for what in ("start_s", "end_s", "axis_flange", "attitude", "axis_errors", "arm_m", "station", "angle_rad"):
             assert getattr(will, what) == pytest.approx(getattr(found, what), abs=1e-5), what
         attitude = motion.attitude(found.start_s, found.end_s)
-        assert planned_attitude(each, run.arm, AS_THE_FLANGE) == pytest.approx(attitude, abs=1e-5)
+        assert predict_attitude(each, run.arm, AS_THE_FLANGE) == pytest.approx(attitude, abs=1e-5)
 
 
 def test_a_planned_rest_is_where_the_last_motion_ends() -> None:
     config = load(CONFIGS / "demo.yaml", (), sections(installed()), turners.sections()).config
     plan = plan_of(config, config.procedure)
-    motion = planned_motion(plan, NOMINAL)
-    rests = [each for each in timed(plan) if isinstance(each.step, Rest)]
+    motion = predict_motion(plan, NOMINAL)
+    rests = [each for each in time_steps(plan) if isinstance(each.step, Rest)]
     assert rests
     for each in rests:
         attitude = motion.attitude(each.start_s, each.end_s)
-        assert planned_attitude(each, NOMINAL, AS_THE_FLANGE) == pytest.approx(attitude, abs=1e-5)
+        assert predict_attitude(each, NOMINAL, AS_THE_FLANGE) == pytest.approx(attitude, abs=1e-5)

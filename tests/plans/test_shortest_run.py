@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.analysis.design.predicted_accelerations import predicted_accelerations
-from rig.analysis.design.shortest import Budgets, Candidate, Reached, Wanted, shortest
+from rig.analysis.design.predicted_accelerations import predict_accelerometer_budgets
+from rig.analysis.design.shortest import Budgets, Candidate, ReachedUncertainty, TargetUncertainty, find_shortest
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.surroundings import surroundings_of
 from rig.cli import main
@@ -104,7 +104,7 @@ def noise_of(of: Run) -> float:
     return float(DATA_SHEETS[sensor.part].angle_random_walk_rad_sqrt_s * np.sqrt(rate_hz))
 
 
-def reached(of: Run, seed: int) -> Reached:
+def reached(of: Run, seed: int) -> ReachedUncertainty:
     """U as the budget of a whole recording of that run states it."""
     rng = np.random.default_rng([seed, 31])
     if of.turner == "hand":
@@ -132,17 +132,17 @@ def reached(of: Run, seed: int) -> Reached:
     seen = observe_recordings(runs)
     found = solve_observed(sensors, seen, surroundings_of(seen, seen[0].run.settings), estimator)["gyro"]
     assert found.uncertainty is not None
-    return Reached.by({"gyro": found.uncertainty})
+    return ReachedUncertainty.of_budgets({"gyro": found.uncertainty})
 
 
-def reached_by_hand(of: Run, seed: int) -> Reached:
+def reached_by_hand(of: Run, seed: int) -> ReachedUncertainty:
     keys = dict(of.keys)
     asked = listed(Asked(int(keys["flips"]), int(keys["turns"])))
     actions: list[Action] = [TurnAction(each.turns) if each.turns else FlipAction(each.face) for each in asked]
     part = Part(SAMPLED_HZ, noise_of(of), clock_ppm=20.0)
     told = handle(actions, seed, part, rest_s=1.5)
     session = handled(told.time_s, told.rates, told.acceleration)
-    return Reached.by({"gyro": solve_by_hand(session, SessionConditions(50.0)).budget})
+    return ReachedUncertainty.of_budgets({"gyro": solve_by_hand(session, SessionConditions(50.0)).budget})
 
 
 def off(rng: np.random.Generator, angle_deg: float) -> tuple[float, ...]:
@@ -151,7 +151,7 @@ def off(rng: np.random.Generator, angle_deg: float) -> tuple[float, ...]:
     return found
 
 
-def predicted_of(of: Run) -> Reached:
+def predicted_of(of: Run) -> ReachedUncertainty:
     config = config_of(of)
     budgets = tried(config).predict(Candidate(config.procedure, (), (), 0.0))
     assert budgets is not None
@@ -178,7 +178,7 @@ def test_a_run_that_is_ten_times_as_noisy_is_not_what_was_predicted() -> None:
     seen = observe_recordings([noisy])
     found = solve_observed(noisy.sensors, seen, surroundings_of(seen, seen[0].run.settings))["gyro"]
     assert found.uncertainty is not None
-    assert Reached.by({"gyro": found.uncertainty}).scale > 2 * predicted_of(each).scale
+    assert ReachedUncertainty.of_budgets({"gyro": found.uncertainty}).scale > 2 * predicted_of(each).scale
 
 
 @cache
@@ -200,15 +200,15 @@ def test_no_plan_of_the_grid_is_shorter(thorough: bool) -> None:
     scales = np.quantile([each.scale for each in reached.values()], [0.002, 0.01, 0.05, 0.2, 0.5])
     biases = np.quantile([each.bias_rad_s for each in reached.values()], [0.002, 0.01, 0.05, 0.2, 0.5])
     looked = []
-    for wanted in (Wanted(*each) for each in product((np.inf, *scales), (np.inf, *biases))):
-        does = [each.duration_s for each in grid if id(each) in reached and wanted.met_by(reached[id(each)])]
-        found = shortest(grid, lambda each: known[id(each)], wanted)
+    for wanted in (TargetUncertainty(*each) for each in product((np.inf, *scales), (np.inf, *biases))):
+        does = [each.duration_s for each in grid if id(each) in reached and wanted.is_met_by(reached[id(each)])]
+        found = find_shortest(grid, lambda each: known[id(each)], wanted)
         assert (found.best is None) == (not does)
         assert found.best is None or found.best.candidate.duration_s <= 1.05 * min(does)
-        looked.append(len(found.looked))
+        looked.append(len(found.evaluated))
     assert np.mean(looked) < len(grid) / 2
     if thorough:
-        floor = shortest_run(demo(), Wanted(scale=1.3e-4)).at_any_length
+        floor = shortest_run(demo(), TargetUncertainty(scale=1.3e-4)).at_any_length
         assert all(floor.scale < each.scale and floor.bias_rad_s < each.bias_rad_s for each in reached.values())
 
 
@@ -222,7 +222,7 @@ def coarse(each: Candidate) -> bool:
 def test_more_than_the_rest_is_chosen() -> None:
     """By the scale factors the speed is found, by the biases repeats or rests."""
     config = demo()
-    quick = shortest_run(config, Wanted(scale=1.3e-4))
+    quick = shortest_run(config, TargetUncertainty(scale=1.3e-4))
     assert quick.best is not None and quick.before is not None
     assert quick.best.candidate.procedure.speed_deg_s > 60  # type: ignore[attr-defined]
     assert quick.best.candidate.duration_s < quick.before.candidate.duration_s < 90
@@ -232,10 +232,10 @@ def test_more_than_the_rest_is_chosen() -> None:
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_what_no_run_reaches_is_told_from_what_takes_too_long() -> None:
-    never = shortest_run(demo(), Wanted(scale=1e-6))
-    assert never.best is None and never.cannot_be_had and never.nearest is not None
-    late = shortest_run(demo(), Wanted(bias_rad_s=3e-5, at_most_s=60))
-    assert late.best is None and not late.cannot_be_had
+    never = shortest_run(demo(), TargetUncertainty(scale=1e-6))
+    assert never.best is None and never.unreachable and never.nearest is not None
+    late = shortest_run(demo(), TargetUncertainty(bias_rad_s=3e-5, at_most_s=60))
+    assert late.best is None and not late.unreachable
     assert late.nearest is not None and late.nearest.candidate.duration_s <= 60
 
 
@@ -255,9 +255,9 @@ def test_the_search_takes_the_least_of_a_grid_it_has_not_seen_whole() -> None:
             return float(np.exp(-slopes @ np.log(each.sizes)))
 
         does = [each.duration_s for each in grid if tells(each) <= 0.02]
-        found = shortest(grid, budgets_of(tells), Wanted(scale=0.02))
+        found = find_shortest(grid, budgets_of(tells), TargetUncertainty(scale=0.02))
         assert (found.best.candidate.duration_s if found.best else None) == min(does, default=None)
-        assert len(found.looked) < len(grid) / 3
+        assert len(found.evaluated) < len(grid) / 3
 
 
 Tells = Callable[[Candidate], float]
@@ -292,7 +292,7 @@ def test_attitudes_are_chosen_for_an_accelerometer() -> None:
     """The scale factors are known soonest in the twelve, the biases better in the eighteen."""
     scale, bias = (
         shortest_run(in_attitudes(), wanted)
-        for wanted in (Wanted(acceleration_scale=3e-4), Wanted(acceleration_bias_m_s2=2.8e-3))
+        for wanted in (TargetUncertainty(acceleration_scale=3e-4), TargetUncertainty(acceleration_bias_m_s2=2.8e-3))
     )
     assert scale.best is not None and bias.best is not None and scale.before is not None
     assert [len(each.candidate.procedure.attitudes) for each in (scale.best, bias.best)] == [12, 18]  # type: ignore[attr-defined]
@@ -311,10 +311,10 @@ def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches(part: st
     others = [f"{where}sensors.{name}=null" for where in ("", "world.") for name in unasked]
     config = load(CONFIGS / "imu.yaml", [*said, *others], sections(installed()), turners.sections()).config
     made = turners.kind_of(config.turner).meant(config.turner)
-    budgets = predicted_accelerations(config, plan_of(config, config.procedure), made.kinematics)
-    foretold = Reached.by({}, budgets)
+    budgets = predict_accelerometer_budgets(config, plan_of(config, config.procedure), made.kinematics)
+    foretold = ReachedUncertainty.of_budgets({}, budgets)
     for seed in range(5 if thorough else 1):
-        found = Reached.by({}, {"drawn": solved(drawn(part, seed, ARM_RAD, warmer_k=0.0))[1]})
+        found = ReachedUncertainty.of_budgets({}, {"drawn": solved(drawn(part, seed, ARM_RAD, warmer_k=0.0))[1]})
         assert RATIO[0] <= found.acceleration_scale / foretold.acceleration_scale <= RATIO[1], seed
         bias = found.acceleration_bias_m_s2 / foretold.acceleration_bias_m_s2
         assert BIAS_RATIO[0] <= bias <= BIAS_RATIO[1], seed
@@ -342,9 +342,9 @@ def test_a_candidate_lasts_as_long_as_its_plan() -> None:
 def test_a_procedure_that_is_not_predicted_is_refused() -> None:
     config = load(CONFIGS / "bias_drift.yaml", (), sections(installed()), turners.sections()).config
     with pytest.raises(Refused, match="not predicted"):
-        shortest_run(config, Wanted(scale=1e-3))
+        shortest_run(config, TargetUncertainty(scale=1e-3))
     with pytest.raises(Refused, match="no accelerometer"):
-        shortest_run(demo(), Wanted(acceleration_scale=1e-3))
+        shortest_run(demo(), TargetUncertainty(acceleration_scale=1e-3))
 
 
 @pytest.mark.slow

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analysis.design.reached import reached_so_far
-from rig.analysis.design.shortest import Reached, Wanted
+from rig.analysis.design.reached import assess_reached
+from rig.analysis.design.shortest import ReachedUncertainty, TargetUncertainty
 from rig.config.load import parse
 from rig.data.recording.run_file import RunData
 from rig.motion.state import Joints
@@ -41,13 +41,13 @@ def resumed(start_q_rad: Joints | None, done: Collection[int], /, **keys: object
 
 def made_of(plan: Plan, enough: int) -> list[Motion]:
     """The motions that are made, where so many repeats are enough."""
-    early = EndingEarly(Wanted(scale=1.0), plan, len(plan.sweeps), REPEATS, Path(), (), "vector")
+    early = EndingEarly(TargetUncertainty(scale=1.0), plan, len(plan.sweeps), REPEATS, Path(), (), "vector")
     made, looked = list[Motion](), 0
     for motion in plan.motions:
         if early.due():
             looked += 1
-            so_far = Future[Reached | None]()
-            so_far.set_result(Reached(0.5 if looked >= enough else 2.0, 0.0))
+            so_far = Future[ReachedUncertainty | None]()
+            so_far.set_result(ReachedUncertainty(0.5 if looked >= enough else 2.0, 0.0))
             said = early.found(so_far)
             assert said is not None and said.as_wanted == (looked >= enough)
         if not early.passes_over(motion):
@@ -71,11 +71,13 @@ def test_resumed_after_whole_repeats_that_are_enough_it_only_goes_home(
     """Else the repeat that was begun is completed first, and sweeps that do not count are made again."""
     home = planned().home_q_rad
     plan = resumed((home[0] + away_rad, *home[1:]), done)
-    early = EndingEarly(Wanted(scale=1.0), plan, 6 * REPEATS, REPEATS, Path(), [synthetic_run(Setup())], "vector")
+    early = EndingEarly(
+        TargetUncertainty(scale=1.0), plan, 6 * REPEATS, REPEATS, Path(), [synthetic_run(Setup())], "vector"
+    )
     assert early.due() == whole
     if whole:
-        so_far = Future[Reached | None]()
-        so_far.set_result(Reached(0.5, 0.0))
+        so_far = Future[ReachedUncertainty | None]()
+        so_far.set_result(ReachedUncertainty(0.5, 0.0))
         assert early.found(so_far) == UncertaintySoFar(0.5, 0.0, 3, as_wanted=True)
         made = [motion.name for motion in plan.motions if not early.passes_over(motion)]
         assert made == ["approach home"] * (away_rad > 0)
@@ -107,10 +109,10 @@ def test_no_motion_begins_where_the_arm_does_not_stand(keys: dict[str, object]) 
 @pytest.mark.slow
 def test_what_is_recorded_so_far_says_what_is_reached() -> None:
     whole = synthetic_run(Setup(noise_rad_s=0.002, repeats=2))
-    found = reached_so_far([whole], "vector")
+    found = assess_reached([whole], "vector")
     assert found is not None and found.scale < 2e-4
     nothing = synthetic_run(Setup(noise_rad_s=0.002))
-    assert reached_so_far([without_sweeps(nothing)], "vector") is None
+    assert assess_reached([without_sweeps(nothing)], "vector") is None
 
 
 def without_sweeps(run: RunData) -> RunData:

@@ -1,1 +1,1 @@
-"""Calibrations by hand: solved, judged, predicted, and compared with what the board solved by itself."""
+"""Calibrations by hand: solved, judged, predicted, and compared with the board's own solution."""

@@ -1,4 +1,4 @@
-"""A gyroscope that a hand turned on a table: what its readings alone tell. Pure."""
+"""The calibration of a gyroscope from readings of a body that a hand turned on a table. Pure."""
 
 from rig.analysis.gyroscope.calibration import ALGORITHM_1, NEWTON, SensorResult
 from rig.analysis.gyroscope.correction import Correction, matrix_correction
@@ -15,19 +15,19 @@ from rig.observation.stuck_check import check_reads
 NO_SWEEPS = Fault("too_few_observations", "moves by hand are no sweeps", "Give sweeps in six directions")
 
 
-def solved_by_hand(item: Item, samples: Samples, told: Columns) -> SensorResult:
-    """The gyroscope of readings, by what somebody `told` of the session (`told_of`).
+def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> SensorResult:
+    """Solve the gyroscope of readings, with the stated conditions of the session (`read_conditions`).
 
-    Raises Fault and Refused as `rig.estimation.by_hand.solve_by_hand`, and `stuck_sensor`.
+    Raise Fault and Refused as `rig.estimation.by_hand.solve_by_hand`, and `stuck_sensor`.
     """
     check_reads(samples.readings[RATE], RATE)
     session = handled(samples.time_s, samples.readings[RATE], samples.readings.get(ACCELERATION))
-    solution = solve_by_hand(session, told_of(told))
-    return result_by_hand(item, solution, matrix_correction(solution.turned))
+    solution = solve_by_hand(session, read_conditions(columns))
+    return build_hand_result(item, solution, matrix_correction(solution.turned))
 
 
-def result_by_hand(sensor: RecordedSensor | Item, solution: HandSolution, corrected_by: Correction) -> SensorResult:
-    """The gyroscope as one that was swept is described."""
+def build_hand_result(sensor: RecordedSensor | Item, solution: HandSolution, corrected_by: Correction) -> SensorResult:
+    """Return the result in the form of a gyroscope with sweeps."""
     return SensorResult(
         sensor=sensor,
         solution=solution.turned,
@@ -45,8 +45,8 @@ def result_by_hand(sensor: RecordedSensor | Item, solution: HandSolution, correc
     )
 
 
-def told_of(columns: Columns) -> SessionConditions:
-    """What the one row of a table of "turns" says (`rig.data.recording.motion_file`)."""
+def read_conditions(columns: Columns) -> SessionConditions:
+    """Return the conditions in the one row of a table of "turns" (`rig.data.recording.motion_file`)."""
     first = columns.get("first_face")
     return SessionConditions(
         clock_ppm=float(columns["clock_ppm"][0]),

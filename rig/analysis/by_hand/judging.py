@@ -1,8 +1,8 @@
-"""What recordings of a session by hand amount to: every gyroscope solved from its rests and moves, and judged."""
+"""The outcome of a session by hand: every gyroscope solved from its rests and moves, and judged."""
 
 from collections.abc import Sequence
 
-from rig.analysis.by_hand.gyroscope import result_by_hand
+from rig.analysis.by_hand.gyroscope import build_hand_result
 from rig.analysis.gyroscope.correction import diagonal_correction, matrix_correction
 from rig.analysis.outcome import Outcome, origin_of
 from rig.analysis.verdict import judge
@@ -12,8 +12,8 @@ from rig.estimation.by_hand import solve_by_hand
 from rig.observation.by_hand.runs import session_of, told_of
 
 
-def calibrated_by_hand(runs: Sequence[RunData]) -> Outcome:
-    """The outcome, as `rig.analysis.analyses.calibrate_by_hand` says."""
+def calibrate_by_hand(runs: Sequence[RunData]) -> Outcome:
+    """Return the outcome, as `rig.analysis.analyses.calibrate_by_hand` describes it."""
     settings = runs[0].settings
     if any(run.sensors != runs[0].sensors for run in runs):
         raise Refused(
@@ -23,11 +23,11 @@ def calibrated_by_hand(runs: Sequence[RunData]) -> Outcome:
         )
     results = {}
     for name in settings.to_calibrate:
-        told = told_of(settings, runs[0].provenance, runs[0].sensors[name])
-        found = solve_by_hand(session_of(runs, name), told)
-        whole = name in settings.matrix_corrected
-        corrected_by = matrix_correction(found.turned) if whole else diagonal_correction(found.scale)
-        results[name] = result_by_hand(runs[0].sensors[name], found, corrected_by)
+        conditions = told_of(settings, runs[0].provenance, runs[0].sensors[name])
+        solution = solve_by_hand(session_of(runs, name), conditions)
+        uses_matrix = name in settings.matrix_corrected
+        corrected_by = matrix_correction(solution.turned) if uses_matrix else diagonal_correction(solution.scale)
+        results[name] = build_hand_result(runs[0].sensors[name], solution, corrected_by)
     return Outcome(
         settings=settings,
         provenance=origin_of(runs),

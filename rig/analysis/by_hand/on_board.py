@@ -1,8 +1,8 @@
-"""A calibration by hand that the board has made, held against double precision. Pure.
+"""The comparison of the board's calibration by hand with double precision. Pure.
 
-The host integrates the very same readings by the same equations (`rig.estimation.by_hand.on_board`); which rests and
-moves there are is the board's word. So what differs is the board's arithmetic alone. How good such a calibration is
-another matter: that is its stated uncertainty, and a verification.
+The host integrates the same readings by the same equations (`rig.estimation.by_hand.on_board`), with the rests and
+moves that the board reports. So only the arithmetic differs. The quality of such a calibration is another matter: that
+is its stated uncertainty, and a verification.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ BIAS_LIMIT_RAD_S = 1e-6
 class BoardReadings:
     """Readings (n, 3), rad/s, at times (n,) of the board's counter, with their numbers (n,).
 
-    `microsecond_s` is what the counter's microsecond lasts.
+    `microsecond_s`: the duration of the counter's microsecond.
     """
 
     times_us: NDArray[np.integer]
@@ -43,14 +43,14 @@ class HandAgreement:
     bias_difference_rad_s: float
 
 
-def hand_agreement(readings: BoardReadings, reports: Sequence[HandReport], solved: HandSolved) -> HandAgreement:
-    """The board's solution against the same readings.
+def compare_with_board(readings: BoardReadings, reports: Sequence[HandReport], solved: HandSolved) -> HandAgreement:
+    """Compare the board's solution with double precision on the same readings.
 
-    Raises Fault `board_unverified` where readings or reports are missing, `board_disagrees` beyond the limits.
+    Raise Fault `board_unverified` if readings or reports are missing, `board_disagrees` beyond the limits.
     """
     host = solve_like_board(tuple(_moves(readings, reports)))
-    if (taken := sum(each.outcome == "taken" for each in reports)) != solved.taken:
-        raise _unverified(f"it has taken {solved.taken} moves, of which {taken} were seen here")
+    if (used := sum(report.outcome == "taken" for report in reports)) != solved.taken:
+        raise _unverified_fault(f"it has taken {solved.taken} moves, of which {used} were seen here")
     matrix = float(np.max(np.abs(np.array(solved.matrix) - host.matrix)))
     bias = float(np.max(np.abs(np.array(solved.bias_rad_s) - host.bias_rad_s)))
     if not (matrix <= SCALE_LIMIT and bias <= BIAS_LIMIT_RAD_S):
@@ -64,12 +64,12 @@ def hand_agreement(readings: BoardReadings, reports: Sequence[HandReport], solve
 
 
 def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[BoardMove]:
-    counted = False  # whether the rest before is in the solution
+    counted = False  # the previous rest is in the solution
     for report in reports:
-        taken = report.outcome == "taken"
-        if taken:
+        used = report.outcome == "taken"
+        if used:
             yield _move(readings, report, follows=counted)
-        counted = taken
+        counted = used
 
 
 def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> BoardMove:
@@ -77,9 +77,9 @@ def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> Boar
     times_us, rates = readings.times_us, readings.rates
     marks = [report.rest_us, report.move_us, report.after_us, report.end_us]
     first, begin, end, last = np.searchsorted(times_us, marks).tolist()
-    there = first > 0 and last < len(times_us) and np.array_equal(times_us[[first, begin, end, last]], marks)
-    if not there or (np.diff(readings.sequence[first - 1 : last]) != 1).any():
-        raise _unverified(f"readings of its move from {report.before} to {report.after} did not arrive here")
+    complete = first > 0 and last < len(times_us) and np.array_equal(times_us[[first, begin, end, last]], marks)
+    if not complete or (np.diff(readings.sequence[first - 1 : last]) != 1).any():
+        raise _unverified_fault(f"readings of its move from {report.before} to {report.after} did not arrive here")
     return BoardMove(
         before=BoardRest(HAND_FACES.index(report.before), rates[first:begin].mean(axis=0), begin - first),
         after=BoardRest(HAND_FACES.index(report.after), rates[end:last].mean(axis=0), last - end),
@@ -92,7 +92,7 @@ def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> Boar
     )
 
 
-def _unverified(what: str) -> Fault:
+def _unverified_fault(what: str) -> Fault:
     return Fault(
         "board_unverified",
         f"the board's calibration by hand cannot be checked: {what}",

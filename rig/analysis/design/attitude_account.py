@@ -1,4 +1,4 @@
-"""What the attitudes of a plan will tell of the accelerometers in a configuration, before anything moves. Pure."""
+"""The information of a plan's attitudes on the accelerometers of a configuration. Pure."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ from rig.motion.geometry import flange_attitude
 from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan
 
-MAX_CONDITION = 100.0  # the worst of a thousand random tens has 19; beyond, noise decides more than the attitudes do
+MAX_CONDITION = 100.0  # the worst of a thousand random sets of ten has 19; beyond, noise dominates
 
 
 @dataclass(frozen=True, slots=True)
 class AttitudeAccount:
-    """What `count` attitudes tell of a model of that `order`, and what is expected_stds of each sensor by its name.
+    """The identifiability of a model of that `order` by `count` attitudes, and the expected uncertainty of each sensor.
 
-    `first` and `second` say how well they tell the two models; the efficiency is that of the one asked for.
+    `first` and `second` are the identifiability of the two models; the efficiency is that of the chosen one.
     """
 
     count: int
@@ -42,24 +42,25 @@ class AttitudeAccount:
     sensors: Mapping[str, ExpectedStds]
 
     @property
-    def told(self) -> Identifiability:
-        """What the attitudes tell of the model asked for."""
+    def chosen(self) -> Identifiability:
+        """The identifiability of the chosen model."""
         return self.first if self.order == 1 else self.second
 
 
 def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
-    """What a plan's attitudes tell, for the nominal arm and its parts' noise; None where nothing is asked of attitudes.
+    """Return the account of a plan's attitudes, for the nominal arm and its parts' noise; None without such a
+    procedure.
 
-    An attitude that is repeated has the same error of the arm every time, so only its noise is averaged.
-    Raises Refused `rank_deficient`, `ill_conditioned`.
+    A repeated attitude has the same error of the arm every time, so only its noise is averaged. Raise Refused
+    `rank_deficient`, `ill_conditioned`.
     """
     order = config.procedure.accelerometer_order
     if order == 0:
         return None
-    seconds = _time_in_each(plan.dwells)
+    seconds = _sum_durations(plan.dwells)
     attitudes, up = _attitudes(list(seconds)), np.array(config.site.up)
     first, second = assess_identifiability(attitudes, up, 1), assess_identifiability(attitudes, up, 2)
-    _refuse_undetermined(first if order == 1 else second, len(attitudes))
+    _check_identifiability(first if order == 1 else second, len(attitudes))
     attitude_std_rad = radians(config.uncertainty.axis_deg)
     reference, dwells_s = config.site.gravity_m_s2 * up, np.array(list(seconds.values()))
     sensors = {
@@ -77,15 +78,15 @@ def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
     return AttitudeAccount(len(attitudes), order, first, second, efficiency, attitude_std_rad, sensors)
 
 
-def refuse_untelling(config: RigConfig, plan: Plan) -> None:
-    """Raise Refused `rank_deficient`, `ill_conditioned` when the plan's attitudes do not tell what is asked of them."""
+def refuse_undetermined(config: RigConfig, plan: Plan) -> None:
+    """Raise Refused `rank_deficient` or `ill_conditioned` if the plan's attitudes do not determine the chosen model."""
     order = config.procedure.accelerometer_order
     if order != 0:
-        attitudes = _attitudes(list(_time_in_each(plan.dwells)))
-        _refuse_undetermined(assess_identifiability(attitudes, np.array(config.site.up), order), len(attitudes))
+        attitudes = _attitudes(list(_sum_durations(plan.dwells)))
+        _check_identifiability(assess_identifiability(attitudes, np.array(config.site.up), order), len(attitudes))
 
 
-def _time_in_each(dwells: Sequence[Dwell]) -> dict[Joints, float]:
+def _sum_durations(dwells: Sequence[Dwell]) -> dict[Joints, float]:
     seconds: dict[Joints, float] = {}
     for dwell in dwells:
         seconds[dwell.q_rad] = seconds.get(dwell.q_rad, 0.0) + dwell.duration_s
@@ -93,24 +94,26 @@ def _time_in_each(dwells: Sequence[Dwell]) -> dict[Joints, float]:
 
 
 def _attitudes(poses_rad: Sequence[Joints]) -> Array:
-    """(N, 3, 3) from the flange into the base."""
+    """Return the attitudes (N, 3, 3) from the flange into the base."""
     attitudes: Array = np.swapaxes(flange_attitude(np.array(poses_rad)), -1, -2)
     return attitudes
 
 
-def _refuse_undetermined(told: Identifiability, count: int) -> None:
+def _check_identifiability(identifiability: Identifiability, count: int) -> None:
     remedy = "Add attitudes to procedure.attitudes in which wrist 1 and wrist 3 are turned, or take eighteen"
-    if told.undetermined:
+    if identifiability.undetermined:
         raise Refused(
             "rank_deficient",
-            f"{count} attitudes determine {told.rank} of the {told.needed} numbers of an accelerometer's calibration; "
-            f"undetermined: {', '.join(told.undetermined)}",
+            f"{count} attitudes determine {identifiability.rank} of the {identifiability.needed} numbers of an "
+            "accelerometer's calibration; "
+            f"undetermined: {', '.join(identifiability.undetermined)}",
             remedy,
         )
-    if told.condition > MAX_CONDITION:
+    if identifiability.condition > MAX_CONDITION:
         raise Refused(
             "ill_conditioned",
-            f"{count} attitudes hardly determine an accelerometer's calibration (condition {told.condition:.3g}, "
+            f"{count} attitudes hardly determine an accelerometer's calibration "
+            f"(condition {identifiability.condition:.3g}, "
             f"{MAX_CONDITION:g} is the most)",
             remedy,
         )

@@ -1,4 +1,4 @@
-"""A plan as if it had been recorded: when the arm would be where, and how it would turn. Pure."""
+"""The motion of a plan as if it had been recorded. Pure."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ StepT_co = TypeVar("StepT_co", bound=Step, covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class PlannedRun:
-    """A recording that a plan will give, of a chain of joints made so (`arm`), and what is stated beforehand.
+    """A recording that a plan will give, of a chain of joints (`arm`), and the stated errors.
 
     Its clock begins `since_s` after that of the run's first recording.
     """
@@ -37,14 +37,14 @@ class PlannedRun:
     since_s: float = 0.0
 
 
-def planned_run(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> PlannedRun:
-    """A new run of the plan. Raises Refused as `settings_of`."""
+def plan_run(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> PlannedRun:
+    """Return a new run of the plan. Raise Refused as `settings_of`."""
     return PlannedRun(plan, arm, settings_of(config, plan), site_of(config.site), uncertainty_of(config))
 
 
 @dataclass(frozen=True, slots=True)
 class Timed(Generic[StepT_co]):
-    """A step, when it begins and ends, and the joint angles where it begins."""
+    """A step with its start and end, and the joint angles at its start."""
 
     step: StepT_co
     start_s: float
@@ -53,15 +53,15 @@ class Timed(Generic[StepT_co]):
 
     @property
     def window_s(self) -> tuple[float, float]:
-        """When what counts of it begins and ends: of a sweep its whole turn, or its arc, at constant speed."""
+        """The start and end of its measurement: of a sweep the revolution, or its arc, at constant speed."""
         if not isinstance(self.step, Sweep):
             return self.start_s, self.end_s
         middle, half = (self.start_s + self.end_s) / 2, self.step.angle_rad / 2 / self.step.speed_rad_s
         return middle - half, middle + half
 
 
-def timed(plan: Plan) -> Iterator[Timed[Step]]:
-    """Every step of it, one after the other; no sensor takes long to settle before a dwell."""
+def time_steps(plan: Plan) -> Iterator[Timed[Step]]:
+    """Yield every step in order with its times; no sensor needs long to settle before a dwell."""
     time_s, q_rad = STANDING_S, plan.start_q_rad
     for step in plan.steps:
         yield Timed(step, time_s, time_s + step.duration_s, q_rad)
@@ -69,41 +69,45 @@ def timed(plan: Plan) -> Iterator[Timed[Step]]:
         q_rad = step.target_q_rad if isinstance(step, (Sweep, Transfer)) else q_rad
 
 
-def timed_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
-    """The plan's steps of one kind, its sweeps alone or its dwells, with their times."""
+def time_steps_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
+    """Return the plan's steps of one kind, sweeps or dwells, with their times."""
     return [
-        Timed(each.step, each.start_s, each.end_s, each.q_rad) for each in timed(plan) if isinstance(each.step, kind)
+        Timed(time_step.step, time_step.start_s, time_step.end_s, time_step.q_rad)
+        for time_step in time_steps(plan)
+        if isinstance(time_step.step, kind)
     ]
 
 
-def measured(plan: Plan) -> Iterator[Timed[Step]]:
-    """What a plan measures: its sweeps, rests and dwells, with their times."""
-    return (each for each in timed(plan) if isinstance(each.step, (Sweep, Rest, Dwell)))
+def measuring_steps(plan: Plan) -> Iterator[Timed[Step]]:
+    """Return the plan's sweeps, rests and dwells with their times."""
+    return (time_step for time_step in time_steps(plan) if isinstance(time_step.step, (Sweep, Rest, Dwell)))
 
 
-def planned_turn(at: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
-    """The turn of a sweep, or its arc, as `ArmMotion.turn` will find it where the item is mounted so (3, 3)."""
-    sweep, began = at.step, at.step.began_q_rad
+def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
+    """Return the revolution of a sweep, or its arc, as `ArmMotion.turn` will find it, with a mount (3, 3)."""
+    sweep, start_q_rad = timed_step.step, timed_step.step.began_q_rad
     return Revolution(
-        *at.window_s,
+        *timed_step.window_s,
         duration_std_s=0.0,
-        axis_flange=sweep.growing * mount @ _axes(began, arm)[:, sweep.joint],
-        attitude=mount @ _attitude(began, arm),
-        axis_errors=sweep.growing * _axis_errors(began, sweep.joint, arm) @ mount.T,
-        arm_m=mount @ _arm(began, sweep.joint, arm),
-        station=(sweep.joint, *np.round(np.delete(began, sweep.joint), 2).tolist()),
+        axis_flange=sweep.growing * mount @ _axes(start_q_rad, arm)[:, sweep.joint],
+        attitude=mount @ _attitude(start_q_rad, arm),
+        axis_errors=sweep.growing * _axis_errors(start_q_rad, sweep.joint, arm) @ mount.T,
+        arm_m=mount @ _arm(start_q_rad, sweep.joint, arm),
+        station=(sweep.joint, *np.round(np.delete(start_q_rad, sweep.joint), 2).tolist()),
         angle_rad=sweep.angle_rad,
     )
 
 
-def planned_attitude(at: Timed[Step], arm: DenavitHartenberg, mount: Array) -> Array:
-    """The mean attitude (3, 3) over a sweep's turn, or of a rest or a dwell, as `ArmMotion.attitude` will find it."""
-    if not isinstance(at.step, Sweep):
-        return mount @ _attitude(at.q_rad, arm)
-    return mount @ _mean_attitude(at.step.began_q_rad, at.step.joint, at.step.growing * at.step.angle_rad, arm)
+def predict_attitude(timed_step: Timed[Step], arm: DenavitHartenberg, mount: Array) -> Array:
+    """Return the mean attitude (3, 3) of a revolution, a rest or a dwell, as `ArmMotion.attitude` will find it."""
+    if not isinstance(timed_step.step, Sweep):
+        return mount @ _attitude(timed_step.q_rad, arm)
+    return mount @ _mean_attitude(
+        timed_step.step.began_q_rad, timed_step.step.joint, timed_step.step.growing * timed_step.step.angle_rad, arm
+    )
 
 
-# Each pose comes again in every repeat, and in most of the plans that a search looks at.
+# Each pose recurs in every repeat, and in most plans of a search.
 _axes, _axis_errors = lru_cache(maxsize=512)(flange_axes), lru_cache(maxsize=512)(axis_errors)
 _attitude, _arm = lru_cache(maxsize=512)(flange_attitude), lru_cache(maxsize=512)(flange_arm)
 
@@ -116,20 +120,17 @@ def _mean_attitude(began_q_rad: Joints, joint: int, turned_rad: float, arm: Dena
     return mean
 
 
-def planned_motion(plan: Plan, arm: DenavitHartenberg) -> ArmMotion:
-    """The motion of an arm, or of another chain of joints, made so, without vibration.
-
-    Raises Fault `no_motion` where nothing moves.
-    """
+def predict_motion(plan: Plan, arm: DenavitHartenberg) -> ArmMotion:
+    """Return the motion of a chain of joints without vibration. Raise Fault `no_motion` if nothing moves."""
     time_s = np.arange(0.0, plan.duration_s + 2 * STANDING_S, 1 / STATE_RATE_HZ)
     states = np.zeros(len(time_s), state_dtype(arm.joints))
     states["time_s"] = time_s
     q_rad = np.tile(np.array(plan.start_q_rad), (len(time_s), 1))
-    for each in timed(plan):
-        step, since = each.step, time_s >= each.start_s
+    for time_step in time_steps(plan):
+        step, moving = time_step.step, time_s >= time_step.start_s
         if isinstance(step, (Sweep, Transfer)):
-            share = progress(step, time_s[since] - each.start_s)[:, None]
+            fraction = progress(step, time_s[moving] - time_step.start_s)[:, None]
             start, target = np.array(step.start_q_rad), np.array(step.target_q_rad)
-            q_rad[since] = start + share * (target - start)
+            q_rad[moving] = start + fraction * (target - start)
     states["q_rad"] = q_rad
     return ArmMotion(states, arm)

@@ -1,11 +1,11 @@
-"""What an accelerometer would read in a plan's dwells and sweeps, with nothing wrong with it. Pure."""
+"""The readings of an accelerometer in a plan's dwells and sweeps without faults. Pure."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
-from rig.analysis.design.planned_motion import PlannedRun, Timed, planned_attitude, planned_turn, timed_of
+from rig.analysis.design.planned_motion import PlannedRun, Timed, predict_attitude, predict_revolution, time_steps_of
 from rig.analysis.reference.acceleration import held_out, sweeps_of
 from rig.analysis.reference.accelerometer_errors import Piece, Sheet, errors_of, sheet_of
 from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns, arm_turns
@@ -26,7 +26,7 @@ from rig.observation.reference.swept_acceleration import SweptAcceleration, of_t
 
 @dataclass(frozen=True, slots=True)
 class PlannedAccelerometer:
-    """An accelerometer that goes through a run."""
+    """An accelerometer in a planned run."""
 
     run: PlannedRun
     name: str
@@ -35,84 +35,88 @@ class PlannedAccelerometer:
 
     @property
     def sheet(self) -> Sheet:
-        """What the data sheet lets the accelerometer do beside the model."""
+        """The errors beside the model that the data sheet allows."""
         return sheet_of(self.run.known, self.name, self.range_m_s2)
 
 
-def planned_accelerometers(config: RigConfig, run: PlannedRun) -> list[PlannedAccelerometer]:
-    """The accelerometers of the sensors to calibrate, in a run."""
+def list_accelerometers(config: RigConfig, run: PlannedRun) -> list[PlannedAccelerometer]:
+    """Return the accelerometers of the sensors to calibrate, in a run."""
     return [
-        PlannedAccelerometer(run, name, each, range_m_s2(each.acceleration))
-        for name, each in config.to_calibrate.items()
-        if each.acceleration is not None
+        PlannedAccelerometer(run, name, sensor, range_m_s2(sensor.acceleration))
+        for name, sensor in config.to_calibrate.items()
+        if sensor.acceleration is not None
     ]
 
 
-def planned_read(of: PlannedAccelerometer) -> ReferenceModel:
-    """What an accelerometer would read, with noise as its data sheet has it.
+def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
+    """Return an accelerometer's readings, with noise as its data sheet has it.
 
-    Of attitudes that are gone through several times the last is held out, as in a run.
+    Of attitudes that are repeated the last one is held out, as in a run.
     """
-    run, mounting, second_order = of.run, mounting_matrix(of.sensor.mounting), of.run.settings.second_order
-    noise_m_s2_sqrt_hz = PARTS[of.sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2
-    last = held_out(run.settings.planned_dwells)
-    dwells = [each for each in timed_of(run.plan, Dwell) if each.step.index not in last]
-    sweeps = timed_of(run.plan, Sweep)
-    swept = [_swept(each, run.arm, noise_m_s2_sqrt_hz) for each in sweeps]
+    run, mounting, second_order = (
+        accelerometer.run,
+        mounting_matrix(accelerometer.sensor.mounting),
+        accelerometer.run.settings.second_order,
+    )
+    noise_m_s2_sqrt_hz = PARTS[accelerometer.sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2
+    held_out_dwells = held_out(run.settings.planned_dwells)
+    dwells = [dwell for dwell in time_steps_of(run.plan, Dwell) if dwell.step.index not in held_out_dwells]
+    sweeps = time_steps_of(run.plan, Sweep)
+    swept = [_predict_sweep(sweep, run.arm, noise_m_s2_sqrt_hz) for sweep in sweeps]
     theta = np.zeros(PARAMETERS)
     theta[:9], theta[REFERENCE] = np.eye(3).ravel(), run.site.gravity_m_s2 * np.array(run.site.up)
     movement = Movement(
         Dwells(
             readings_m_s2=np.zeros((len(dwells), 3)),
-            variances_m2_s4=np.array([np.full(3, noise_m_s2_sqrt_hz**2 / each.step.duration_s) for each in dwells]),
-            attitudes=np.array([planned_attitude(each, run.arm, mounting).T for each in dwells]),
+            variances_m2_s4=np.array([np.full(3, noise_m_s2_sqrt_hz**2 / dwell.step.duration_s) for dwell in dwells]),
+            attitudes=np.array([predict_attitude(dwell, run.arm, mounting).T for dwell in dwells]),
         ),
         sweeps_of(swept, mounting),
         run.known.repeatability_std_rad,
     )
-    pieces = [*map(_piece, dwells), *map(_piece, sweeps)]
-    stood = [each.stood for each in pieces]
+    segments = [*map(_segment, dwells), *map(_segment, sweeps)]
+    poses = [segment.stood for segment in segments]
     movement = replace(
-        _reading(theta, movement),
-        own=errors_of(of.sheet, pieces, 0.0, second_order=second_order),
-        arm_turns=arm_turns(stood, run.arm, mounting),
+        _with_predicted_readings(theta, movement),
+        own=errors_of(accelerometer.sheet, segments, 0.0, second_order=second_order),
+        arm_turns=arm_turns(poses, run.arm, mounting),
     )
     lag = lag_pattern(movement, 1e-3 * run.known.acceleration_lag_ms) / np.sqrt(3)
-    off = arm_patterns(theta, movement, stood, Known(run.arm, run.known.axis_deg, mounting, 0.0))
-    middles_s = np.array([sum(each.window_s) / 2 for each in pieces])
-    return ReferenceModel(theta, movement, np.concatenate([lag, off]), middles_s, second_order=second_order)
+    arm_errors = arm_patterns(theta, movement, poses, Known(run.arm, run.known.axis_deg, mounting, 0.0))
+    middles_s = np.array([sum(segment.window_s) / 2 for segment in segments])
+    return ReferenceModel(theta, movement, np.concatenate([lag, arm_errors]), middles_s, second_order=second_order)
 
 
-def _piece(at: Timed[Dwell] | Timed[Sweep]) -> Piece:
-    """A dwell or a sweep at a temperature that stays."""
-    step = at.step
+def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> Piece:
+    """Return a dwell or a sweep at constant temperature."""
+    step = timed_step.step
     wrist = step.joint - WRIST_1 if isinstance(step, Sweep) else None
     q_rad = step.began_q_rad if isinstance(step, Sweep) else step.q_rad
-    return Piece(step.index, at.window_s, 1, 0.0, Stood(np.array(q_rad), wrist))
+    return Piece(step.index, timed_step.window_s, 1, 0.0, Stood(np.array(q_rad), wrist))
 
 
-def _swept(at: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_sqrt_hz: float) -> SweptAcceleration:
-    turn = planned_turn(at, arm, np.eye(3))
+def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_sqrt_hz: float) -> SweptAcceleration:
+    turn = predict_revolution(timed_step, arm, np.eye(3))
     waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # mean, cosine and sine of so many readings
     harmonic = FirstHarmonic(
         harmonic_m_s2=np.zeros((3, 3)),
         covariance_m2_s4=noise_m_s2_sqrt_hz**2 / turn.duration_s * waves,
-        speed_rad_s=at.step.growing * turn.speed_rad_s,
+        speed_rad_s=timed_step.step.growing * turn.speed_rad_s,
         noise_m_s2=np.zeros(3),
         freedom=0,
         residuals_m_s2=np.zeros((0, 3)),
         vibration_m_s2=np.zeros(3),
         turning_rad2_s2=evenly_turning(turn.speed_rad_s),
     )
-    return of_turn(at.step, turn, harmonic)
+    return of_turn(timed_step.step, turn, harmonic)
 
 
-def _reading(theta: Array, movement: Movement) -> Movement:
-    """The movement with the readings that the model predicts."""
-    read = predicted(theta, movement)
+def _with_predicted_readings(theta: Array, movement: Movement) -> Movement:
+    """Return the movement with the readings that the model predicts."""
+    readings = predicted(theta, movement)
     count = len(movement.dwells.readings_m_s2)
     return replace(
         movement,
-        dwells=replace(movement.dwells, readings_m_s2=read[:count]),
-        sweeps=replace(movement.sweeps, harmonics_m_s2=read[count:].reshape(-1, 3, 3)),
+        dwells=replace(movement.dwells, readings_m_s2=readings[:count]),
+        sweeps=replace(movement.sweeps, harmonics_m_s2=readings[count:].reshape(-1, 3, 3)),
     )

@@ -1,8 +1,8 @@
-"""Whether a run that goes on has reached what is wanted: its recordings so far, solved as at its end. Pure."""
+"""The uncertainty that a run has reached so far, solved as at its end. Pure."""
 
 from collections.abc import Sequence
 
-from rig.analysis.design.shortest import Reached
+from rig.analysis.design.shortest import ReachedUncertainty
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.solvable import solvable
 from rig.analysis.surroundings import surroundings_of
@@ -11,8 +11,8 @@ from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 
 
-def reached_so_far(runs: Sequence[RunData], estimator: str) -> Reached | None:
-    """The worst U of all sensors to calibrate by what is recorded yet; None where that tells no uncertainty."""
+def assess_reached(runs: Sequence[RunData], estimator: str) -> ReachedUncertainty | None:
+    """Return the worst U of all sensors to calibrate from the recordings so far; None without an uncertainty."""
     settings = runs[0].settings
     try:
         with solvable():
@@ -21,9 +21,11 @@ def reached_so_far(runs: Sequence[RunData], estimator: str) -> Reached | None:
                 return None
             surroundings = surroundings_of(recordings, settings)
             sensors = runs[0].measuring(RATE)
-            found = solve_observed(sensors, recordings, surroundings, estimator, settings.matrix_corrected)
+            results = solve_observed(sensors, recordings, surroundings, estimator, settings.matrix_corrected)
     except Fault:  # what is wrong with it, the end of the run will say
         return None
-    budgets = {name: found[name].uncertainty for name in settings.to_calibrate}
-    known = {name: each for name, each in budgets.items() if each is not None}
-    return Reached.by(known) if known and len(known) == len(budgets) else None
+    budgets = {name: results[name].uncertainty for name in settings.to_calibrate}
+    known_budgets = {name: budget for name, budget in budgets.items() if budget is not None}
+    return (
+        ReachedUncertainty.of_budgets(known_budgets) if known_budgets and len(known_budgets) == len(budgets) else None
+    )

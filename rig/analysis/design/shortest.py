@@ -1,4 +1,4 @@
-"""The shortest run that reaches a wanted uncertainty: a search among candidates by what is predicted of each. Pure."""
+"""The search for the shortest run that reaches a target uncertainty, by predictions of candidates. Pure."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,10 +14,9 @@ NONE: Mapping[str, Budget] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
-class Reached:
-    """U of scale and of bias (rad/s), each of the axis and the sensor that is known worst; 0 where there is none.
-
-    Those of accelerometers (m/s²) beside them.
+class ReachedUncertainty:
+    """U of scale and of bias (rad/s), of the worst axis of the worst sensor, 0 without one; and of accelerometers
+    (m/s²).
     """
 
     scale: float
@@ -26,9 +25,11 @@ class Reached:
     acceleration_bias_m_s2: float = 0.0
 
     @classmethod
-    def by(cls, rates: Mapping[str, Budget], accelerations: Mapping[str, Budget] = NONE) -> "Reached":
-        """The worst U in the budgets of all gyroscopes, and in those of all accelerometers."""
-        return cls(*_worst(rates), *_worst(accelerations))
+    def of_budgets(
+        cls, rates: Mapping[str, Budget], accelerations: Mapping[str, Budget] = NONE
+    ) -> "ReachedUncertainty":
+        """Return the worst U in the budgets of all gyroscopes, and of all accelerometers."""
+        return cls(*_worst_expanded(rates), *_worst_expanded(accelerations))
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,22 +40,22 @@ class Budgets:
     accelerations: Mapping[str, Budget] = field(default_factory=dict)
 
     @property
-    def reached(self) -> Reached:
+    def reached(self) -> ReachedUncertainty:
         """The worst U of them."""
-        return Reached.by(self.rates, self.accelerations)
+        return ReachedUncertainty.of_budgets(self.rates, self.accelerations)
 
     def without(self, names: Collection[str]) -> "Budgets":
-        """The budgets without contributors of these names."""
+        """Return the budgets without contributors of these names."""
         rates, accelerations = (
-            {sensor: each.without(names) for sensor, each in budgets.items()}
+            {sensor: budget.without(names) for sensor, budget in budgets.items()}
             for budgets in (self.rates, self.accelerations)
         )
         return Budgets(rates, accelerations)
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """The U that is wanted of what is `Reached`, infinite where nothing is, in a run of `at_most_s`."""
+class TargetUncertainty:
+    """The target of each U in `ReachedUncertainty`, infinite without one, in a run of `at_most_s`."""
 
     scale: float = inf
     bias_rad_s: float = inf
@@ -62,31 +63,31 @@ class Wanted:
     acceleration_scale: float = inf
     acceleration_bias_m_s2: float = inf
 
-    def met_by(self, reached: Reached) -> bool:
-        """Whether all of it is reached."""
-        return self.share(reached) <= 1.0
+    def is_met_by(self, reached: ReachedUncertainty) -> bool:
+        """Return whether all targets are reached."""
+        return self.ratio_to_target(reached) <= 1.0
 
-    def share(self, reached: Reached) -> float:
-        """What is reached by what is wanted, of the worst."""
-        shares: list[float] = [getattr(reached, each) / getattr(self, each) for each in SIZES]
-        return max(shares)
+    def ratio_to_target(self, reached: ReachedUncertainty) -> float:
+        """Return the largest ratio of reached to target uncertainty."""
+        ratios: list[float] = [getattr(reached, size) / getattr(self, size) for size in SIZES]
+        return max(ratios)
 
 
-def wanted_by(section: SixObservationSection) -> Wanted | None:
-    """The wish at which a run of several repeats ends; None where it makes all of them."""
+def target_of(section: SixObservationSection) -> TargetUncertainty | None:
+    """Return the target at which a run of several repeats ends; None if it makes all of them."""
     scale, bias_rad_s = section.target_scale_u, section.target_bias_u_rad_s
-    return None if scale is bias_rad_s is None else Wanted(scale or inf, bias_rad_s or inf)
+    return None if scale is bias_rad_s is None else TargetUncertainty(scale or inf, bias_rad_s or inf)
 
 
-SIZES = tuple(Reached.__dataclass_fields__)  # what may be wanted, as the fields of both are called
+SIZES = tuple(ReachedUncertainty.__dataclass_fields__)  # what may be wanted, as the fields of both are called
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A procedure that may be run, and how long it takes.
+    """A possible procedure, and its duration.
 
-    Those of one `family` differ in `sizes`, of which a larger one never tells less: turns, repeats, dwells; and
-    in `rests_s` after sweeps. Longer rests may tell less: meanwhile the bias wanders on.
+    Candidates of one `family` differ in `sizes` (turns, repeats, dwells), of which a larger one never gives a larger U,
+    and in `rests_s` after sweeps. Longer rests may give a larger U, as the bias drifts on.
     """
 
     procedure: ProcedureSection
@@ -95,99 +96,104 @@ class Candidate:
     duration_s: float
     rests_s: tuple[float, ...] = ()
 
-    def within(self, other: "Candidate") -> bool:
-        """Whether it tells no more than another."""
+    def is_contained_in(self, other: "Candidate") -> bool:
+        """Return whether it cannot have a smaller U than another."""
         return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
-            mine <= its for mine, its in zip(self.sizes, other.sizes, strict=True)
+            size <= other_size for size, other_size in zip(self.sizes, other.sizes, strict=True)
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Planned:
-    """A candidate and the budgets that are predicted of it."""
+    """A candidate and its predicted budgets."""
 
     candidate: Candidate
     budgets: Budgets
 
     @property
-    def reached(self) -> Reached:
-        """U that is predicted of it."""
+    def reached(self) -> ReachedUncertainty:
+        """The predicted U."""
         return self.budgets.reached
 
 
 @dataclass(frozen=True, slots=True)
 class Searched:
-    """What a search came to: the shortest that does, None of none; the one that comes nearest; what all had."""
+    """The result of a search: the shortest candidate that meets the target, the nearest one, and all budgets."""
 
     best: Planned | None = None
     nearest: Planned | None = None
-    looked: Sequence[Budgets] = ()
-    among: int = 0
+    evaluated: Sequence[Budgets] = ()
+    candidates_count: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Shortest:
-    """The shortest run for what is wanted.
+    """The shortest run for a target.
 
-    `before` is the file's own procedure, None where it tells nothing; `nearest` what comes nearest where none does, and
-    `endless` the budgets of the endless runs of each family, and of all plans that were looked at. `cannot_be_had`: no
-    run of this kind has what is wanted, however long. `directions` (N, 3) are those of the sweeps, None without.
+    - `before`: the file's own procedure, None if it determines nothing.
+    - `nearest`: the candidate with the smallest ratio to the target if none meets it.
+    - `endless`: the budgets of the endless runs of each family, and of all evaluated plans.
+    - `unreachable`: no run of this kind meets the target, however long.
+    - `directions` (N, 3): those of the sweeps, None without.
     """
 
-    wanted: Wanted
+    wanted: TargetUncertainty
     before: Planned | None
     best: Planned | None
     nearest: Planned | None
     endless: Sequence[Budgets]
-    cannot_be_had: bool
+    unreachable: bool
     tried: int
-    among: int
+    candidates_count: int
     directions: Array | None
 
     def least(self, size: str) -> Budgets:
-        """The budgets of the run that knows best what is called so in `Reached`."""
+        """Return the budgets of the run with the smallest U of this name in `ReachedUncertainty`."""
         return min(self.endless, key=lambda each: float(getattr(each.reached, size)))
 
     @property
-    def at_any_length(self) -> Reached:
-        """The least U of all runs, of each size for itself: these may be different runs."""
-        return Reached(*(getattr(self.least(each).reached, each) for each in SIZES))
+    def at_any_length(self) -> ReachedUncertainty:
+        """The smallest U of all runs, of each name: these may be different runs."""
+        return ReachedUncertainty(*(getattr(self.least(size).reached, size) for size in SIZES))
 
 
-def shortest(
-    candidates: Sequence[Candidate], predict: Callable[[Candidate], Budgets | None], wanted: Wanted
+def find_shortest(
+    candidates: Sequence[Candidate], predict: Callable[[Candidate], Budgets | None], target: TargetUncertainty
 ) -> Searched:
-    """The shortest of the candidates whose predicted U is what is wanted, without a look at every one.
+    """Return the shortest candidate whose predicted U meets the target, without evaluating all of them.
 
-    One that does leaves only those that are shorter; of one that does not, none `within` it does. `predict` is None
-    of a candidate that cannot be run, and says nothing of others.
+    One that does excludes all longer ones; one that does not excludes those contained in it. `predict` returns None for
+    a candidate that cannot be run, which excludes no other.
     """
-    left = sorted(
-        (each for each in candidates if each.duration_s <= wanted.at_most_s), key=lambda each: each.duration_s
+    remaining = sorted(
+        (candidate for candidate in candidates if candidate.duration_s <= target.at_most_s),
+        key=lambda candidate: candidate.duration_s,
     )
-    among, looked = len(left), list[Budgets]()
+    candidates_count, evaluated = len(remaining), list[Budgets]()
     best: Planned | None = None
     nearest: Planned | None = None
-    while left:
-        middle = len(left) // 2
-        candidate = left[middle]
+    while remaining:
+        middle = len(remaining) // 2
+        candidate = remaining[middle]
         budgets = predict(candidate)
         if budgets is None:
-            del left[middle]
+            del remaining[middle]
             continue
-        looked.append(budgets)
+        evaluated.append(budgets)
         planned = Planned(candidate, budgets)
-        if nearest is None or wanted.share(planned.reached) < wanted.share(nearest.reached):
+        if nearest is None or target.ratio_to_target(planned.reached) < target.ratio_to_target(nearest.reached):
             nearest = planned
-        if wanted.met_by(planned.reached):
-            best, left = planned, [each for each in left if each.duration_s < candidate.duration_s]
+        if target.is_met_by(planned.reached):
+            best, remaining = planned, [other for other in remaining if other.duration_s < candidate.duration_s]
         else:
-            left = [each for each in left if not each.within(candidate)]
-    return Searched(best, nearest, looked, among)
+            remaining = [other for other in remaining if not other.is_contained_in(candidate)]
+    return Searched(best, nearest, evaluated, candidates_count)
 
 
-def _worst(budgets: Mapping[str, Budget]) -> tuple[float, float]:
-    """U of the scale factor and of the bias that are known worst."""
-    expanded = [each.expanded for each in budgets.values()]
-    scale, bias = (max((float(each[of].max()) for each in expanded), default=0.0) for of in (slice(3), slice(3, 6)))
+def _worst_expanded(budgets: Mapping[str, Budget]) -> tuple[float, float]:
+    """Return the largest U of a scale factor and of a bias."""
+    expanded = [budget.expanded for budget in budgets.values()]
+    scale, bias = (
+        max((float(uncertainty[columns].max()) for uncertainty in expanded), default=0.0) for columns in (slice(3), slice(3, 6))
+    )
     return scale, bias

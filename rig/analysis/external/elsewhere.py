@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from rig.analysis.by_hand.gyroscope import solved_by_hand
+from rig.analysis.by_hand.gyroscope import solve_hand_samples
 from rig.analysis.check import Check, fitness, unsolved_checks
 from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.external.attitudes import InAttitudes, Result, known_method, solve_placed
@@ -120,7 +120,7 @@ def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:
 def _by_hand(read: ReadElsewhere, name: str | None) -> OfSensor:
     if name not in (None, "by_hand"):
         estimator_among(("by_hand",), str(name))
-    return OfSensor(read.item, solved_by_hand(read.item, _samples(read), read.motion), None, {}, {})
+    return OfSensor(read.item, solve_hand_samples(read.item, _samples(read), read.motion), None, {}, {})
 
 
 def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:

@@ -12,9 +12,9 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.analysis.design.shortest import Planned, Wanted
+    from rig.analysis.design.shortest import Planned, TargetUncertainty
 
-# What may be wanted, and how `rig.analysis.design.shortest.Wanted` calls it.
+# What may be wanted, and how `rig.analysis.design.shortest.TargetUncertainty` calls it.
 NAMES = {
     "scale": "scale",
     "bias": "bias_rad_s",
@@ -65,9 +65,9 @@ def print_shortest_run(options: Namespace) -> int:
     return 0
 
 
-def wanted_of(options: Sequence[str], at_most_s: float | None) -> "Wanted":
+def wanted_of(options: Sequence[str], at_most_s: float | None) -> "TargetUncertainty":
     """What the words `scale=U`, `bias=U` and the like say. Raises Refused `bad_option`."""
-    from rig.analysis.design.shortest import Wanted
+    from rig.analysis.design.shortest import TargetUncertainty
 
     sizes: dict[str, float] = {}
     for each in options:
@@ -83,7 +83,7 @@ def wanted_of(options: Sequence[str], at_most_s: float | None) -> "Wanted":
     if at_most_s is not None and not (isfinite(at_most_s) and at_most_s > 0):
         raise Refused("bad_option", f"--max-duration-s is {at_most_s:g}", "Give a time above 0, in seconds")
     wanted = {NAMES[name]: size for name, size in sizes.items()}
-    return Wanted(**wanted, at_most_s=inf if at_most_s is None else at_most_s)
+    return TargetUncertainty(**wanted, at_most_s=inf if at_most_s is None else at_most_s)
 
 
 def _write(options: Namespace, best: "Planned") -> None:

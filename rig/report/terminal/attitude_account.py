@@ -18,8 +18,8 @@ def account_document(account: AttitudeAccount) -> dict[str, Any]:
     return {
         "count": account.count,
         "order": account.order,
-        "rank": account.told.rank,
-        "needed": account.told.needed,
+        "rank": account.chosen.rank,
+        "needed": account.chosen.needed,
         "condition": account.first.condition,
         "condition_second_order": account.second.condition if math.isfinite(account.second.condition) else None,
         "g_efficiency": account.g_efficiency,
@@ -32,7 +32,7 @@ def print_account(console: Console, account: AttitudeAccount) -> None:
     """A line on the attitudes, a table of what is expected of each sensor."""
     second = f"{account.second.condition:.2f}" if math.isfinite(account.second.condition) else "not determined"
     console.print(
-        f"{account.count} attitudes: rank {account.told.rank} of {account.told.needed}, condition "
+        f"{account.count} attitudes: rank {account.chosen.rank} of {account.chosen.needed}, condition "
         f"{account.first.condition:.2f} (second order {second}), G-efficiency {account.g_efficiency:.3f}",
         soft_wrap=True,
     )

@@ -11,7 +11,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.design.shortest import wanted_by
+from rig.analysis.design.shortest import target_of
 from rig.config.models import RigConfig
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.motion.doubts import doubts
@@ -23,7 +23,7 @@ from rig.station.plain_text import LONG_S, duration_words, plain
 if TYPE_CHECKING:
     from rig.analysis.consistency.detection_limits import DetectionLimit
     from rig.analysis.design.attitude_account import AttitudeAccount
-    from rig.analysis.design.planned import Told
+    from rig.analysis.design.planned import DetectionLimits
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +46,13 @@ class DryRun:
         return attitude_account(self.config, self.plan)
 
     @cached_property
-    def told(self) -> "Told":
+    def told(self) -> "DetectionLimits":
         """From what sizes on the checks tell that something happened."""
-        from rig.analysis.design.planned import planned_told_from
+        from rig.analysis.design.planned import predict_limits
         from rig.turners.registry import kind_of
 
         turner = self.config.turner
-        return planned_told_from(self.config, self.plan, kind_of(turner).meant(turner).kinematics)
+        return predict_limits(self.config, self.plan, kind_of(turner).meant(turner).kinematics)
 
     @property
     def steps(self) -> Sequence[Step]:
@@ -131,7 +131,7 @@ def _print_steps(planned: DryRun, console: Console) -> None:
     console.print(table)
     long = f" ({duration_words(plan.duration_s)})" if plan.duration_s >= LONG_S else ""
     console.print(f"{_measured(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s{long}; all within limits")
-    if isinstance(section := planned.config.procedure, SixObservationSection) and (wanted := wanted_by(section)):
+    if isinstance(section := planned.config.procedure, SixObservationSection) and (wanted := target_of(section)):
         repeats = f"of {section.repeats} repeats, each of about {plan.duration_s / section.repeats:.1f} s"
         console.print(plain(f"It ends after the first {repeats}, with {wish_words(wanted)}"))
     if arcs := {turn_words(sweep.angle_rad) for sweep in plan.sweeps if not closes(sweep.angle_rad)}:

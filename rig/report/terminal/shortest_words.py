@@ -10,7 +10,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.design.shortest import SIZES, Budgets, Planned, Reached, Shortest, Wanted
+from rig.analysis.design.shortest import SIZES, Budgets, Planned, ReachedUncertainty, Shortest, TargetUncertainty
 from rig.config.models import ProcedureSection
 from rig.config.procedures.attitude_sets import SETS
 from rig.config.procedures.procedure_sections import AttitudesSection
@@ -65,7 +65,7 @@ def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bo
     console.print(plain(_floor(shortest)))
     if shortest.directions is not None:
         console.print(_optimality(shortest.directions))
-    console.print(plain(f"{shortest.tried} of {shortest.among} plans were looked at. {ASSUMED}"))
+    console.print(plain(f"{shortest.tried} of {shortest.candidates_count} plans were looked at. {ASSUMED}"))
 
 
 def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str, Any]:
@@ -78,13 +78,13 @@ def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str
             "max_duration_s": _finite(shortest.wanted.at_most_s),
         },
         "reached": shortest.best is not None,
-        "cannot_be_had": shortest.cannot_be_had,
+        "cannot_be_had": shortest.unreachable,
         "plan": None if shown is None else _plan_entry(shown, section),
         "before": None if shortest.before is None else _plan_entry(shortest.before, section),
         "at_any_length": _sizes_entry(shortest.at_any_length),
         "optimality": None if shortest.directions is None else _efficiencies(shortest.directions),
         "tried": shortest.tried,
-        "among": shortest.among,
+        "among": shortest.candidates_count,
     }
 
 
@@ -100,7 +100,7 @@ def _plan_entry(planned: Planned, section: ProcedureSection) -> dict[str, Any]:
     }
 
 
-def _sizes_entry(reached: Reached) -> dict[str, float | None]:
+def _sizes_entry(reached: ReachedUncertainty) -> dict[str, float | None]:
     """What is reached; null of a kind of sensor that is not calibrated."""
     return {size: getattr(reached, size) or None for size in SIZES}
 
@@ -110,12 +110,12 @@ def _verdict(shortest: Shortest) -> str:
     within = "" if shortest.wanted.at_most_s == inf else f" within {shortest.wanted.at_most_s:g} s"
     if shortest.best is not None:
         return f"The shortest run for {wish} takes {shortest.best.candidate.duration_s:.1f} s."
-    if shortest.cannot_be_had:
+    if shortest.unreachable:
         return f"No run of this kind reaches {wish}, however long it is."
     return f"No plan that was looked at reaches {wish}{within}; this one comes nearest."
 
 
-def wish_words(wanted: Wanted) -> str:
+def wish_words(wanted: TargetUncertainty) -> str:
     """What is wanted, as `U ≤ 0.0005 of the scale factors`."""
     sizes = {size: getattr(wanted, size) for size in SIZES}
     return " and ".join(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from firmware_host.client import Board
 from firmware_host.hand_answers import HandReport, HandSolved
-from rig.analysis.by_hand.on_board import BoardReadings, HandAgreement, hand_agreement
+from rig.analysis.by_hand.on_board import BoardReadings, HandAgreement, compare_with_board
 from rig.board.crystal import follows_crystal
 from rig.board.identify import changing, refusing
 from rig.config.models import RigConfig
@@ -139,7 +139,7 @@ def calibrated_by_board(
             source.board.stop()
             solved = source.board.hand_solution()
         samples = np.concatenate([samples for sensor, samples in drained(arrived) if sensor == name])
-        agreement = hand_agreement(_readings(described, samples), session.reports, solved)
+        agreement = compare_with_board(_readings(described, samples), session.reports, solved)
         yield source.board, CalibratedByBoard(index, solved, agreement)
 
 

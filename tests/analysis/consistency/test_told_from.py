@@ -7,7 +7,7 @@ import pytest
 
 from rig.analysis.consistency.contradictions import ConsistencyChecks, contradictions
 from rig.analysis.consistency.detection_limits import DetectionLimit
-from rig.analysis.design.planned import planned_told_from
+from rig.analysis.design.planned import predict_limits
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.surroundings import surroundings_of
 from rig.config.load import parse
@@ -99,7 +99,7 @@ def test_what_is_as_large_is_told_nearly_always_and_a_quarter_of_it_hardly_ever(
 def test_what_a_plan_says_will_be_told_is_what_its_recording_says() -> None:
     seen = drawn(3, KINDS["quiet LSM9DS1"])
     motion = Motion(Setup(), np.random.default_rng(0))
-    will = planned_told_from(parse(motion.config).config, motion.plan, NOMINAL).rates["gyro"]
+    will = predict_limits(parse(motion.config).config, motion.plan, NOMINAL).rates["gyro"]
     recorded = {each.what: each for each in held(seen.run).detection_limits["gyro"]}
     assert set(PLANTED) == set(recorded) == {each.what for each in will}
     for each in will:

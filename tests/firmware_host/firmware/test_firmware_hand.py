@@ -8,7 +8,7 @@ import pytest
 
 from firmware_host.emulator.chip.gpio import Port
 from firmware_host.hand_answers import HandReport, HandSolved
-from rig.analysis.by_hand.on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, hand_agreement
+from rig.analysis.by_hand.on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, compare_with_board
 from rig.errors import Fault
 from rig.world.hand.habits import Action, FlipAction, Mistake, MistakeKind, TurnAction
 from support.board.emulated_session import Session
@@ -156,14 +156,14 @@ def test_what_is_missing_in_the_readings_of_the_host_is_named(played: Played) ->
     kept = np.arange(len(played.times_us)) != np.searchsorted(played.times_us, played.reports[2].move_us + 500_000)
     gappy = BoardReadings(played.times_us[kept], np.flatnonzero(kept), played.rates[kept], 1e-6)
     with pytest.raises(Fault, match="did not arrive") as missing:
-        hand_agreement(gappy, played.reports, played.solved)
+        compare_with_board(gappy, played.reports, played.solved)
     assert missing.value.name == "board_unverified"
     with pytest.raises(Fault, match="taken 12 moves, of which 11 were seen"):
-        hand_agreement(played.readings, played.reports[1:], played.solved)
+        compare_with_board(played.readings, played.reports[1:], played.solved)
     (mxx, mxy, mxz), second, third = played.solved.matrix
     wrong = replace(played.solved, matrix=((mxx * 1.00003, mxy, mxz), second, third))
     with pytest.raises(Fault) as differs:
-        hand_agreement(played.readings, played.reports, wrong)
+        compare_with_board(played.readings, played.reports, wrong)
     assert differs.value.name == "board_disagrees"
 
 

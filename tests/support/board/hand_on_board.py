@@ -12,7 +12,7 @@ import numpy as np
 
 from firmware_host.frames import Frame
 from firmware_host.hand_answers import HandReport, HandSolved
-from rig.analysis.by_hand.on_board import BoardReadings, HandAgreement, hand_agreement
+from rig.analysis.by_hand.on_board import BoardReadings, HandAgreement, compare_with_board
 from rig.estimation.arrays import Array
 from support.board.host_board import HostBoard, configured
 from support.external.handled_body import Recorded
@@ -47,7 +47,7 @@ class Played:
 
     @property
     def agreement(self) -> HandAgreement:
-        return hand_agreement(self.readings, self.reports, self.solved)
+        return compare_with_board(self.readings, self.reports, self.solved)
 
     @property
     def readings(self) -> BoardReadings:
