@@ -60,7 +60,9 @@ def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
             stream = on_the_arms_clock(run.samples[name], sensor, motion)
             pieces += [(stream, inside) for inside in still_samples(run, stream, motion)]
         quantities = [RATE, ACCELERATION] if sensor.measures(ACCELERATION) else [RATE]
-        found[name] = SensorAtRest(sensor, attempt_each({each: partial(_of, pieces, each) for each in quantities}))
+        found[name] = SensorAtRest(
+            sensor, attempt_each({quantity: partial(_of, pieces, quantity) for quantity in quantities})
+        )
     return found
 
 
@@ -77,7 +79,7 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
         attempt_each(
             {
                 quantity: partial(
-                    _told, [samples.time_s[each] for each in pieces], [readings[each] for each in pieces], quantity
+                    _told, [samples.time_s[piece] for piece in pieces], [readings[piece] for piece in pieces], quantity
                 )
                 for quantity, readings in samples.readings.items()
             }
@@ -97,15 +99,15 @@ def _told(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantit
     """What stretches at rest tell of the noise, each of (nᵢ,) times and (nᵢ, 3) readings."""
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")
-    if any(not np.ptp(each, axis=0).all() for each in readings if len(each) > FEWEST_TO_JUDGE):
+    if any(not np.ptp(reading, axis=0).all() for reading in readings if len(reading) > FEWEST_TO_JUDGE):
         raise Fault(
             "stuck_sensor",
             f"an axis repeats one {quantity} through a whole rest",
             "Check the sensor's supply and its wiring; if the sensor's noise is below its resolution, it has "
             "no such curve",
         )
-    durations_s = [float(each[-1] - each[0]) for each in times_s]
-    interval_s = float(np.sum(durations_s) / np.sum([len(each) - 1 for each in readings]))
+    durations_s = [float(time_s[-1] - time_s[0]) for time_s in times_s]
+    interval_s = float(np.sum(durations_s) / np.sum([len(reading) - 1 for reading in readings]))
     curve = allan_curve(readings, interval_s)
     return AtRest(
         curve=curve,

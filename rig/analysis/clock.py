@@ -74,7 +74,10 @@ class ClockCheck:
     def differences(self) -> Iterator[ClockDifference]:
         """Every two clocks that are compared; of two half-widths the sum, for all values within are alike likely."""
         known = [("controller", 0.0, self.half_width, 0.0)]
-        known += [(SHORT[each.by], each.error, each.half_width, each.noise_std) for each in self.comparisons]
+        known += [
+            (SHORT[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)
+            for comparison in self.comparisons
+        ]
         for (one, error, width, noise), (other, its_error, its_width, its_noise) in combinations(known, 2):
             limit = width + its_width + CERTAIN * float(np.hypot(noise, its_noise))
             yield ClockDifference((one, other), abs(error - its_error), limit)
@@ -82,7 +85,10 @@ class ClockCheck:
     @property
     def freedom(self) -> float:
         """Degrees of freedom of `std`, infinite where nothing was found from readings."""
-        found = [(each.noise_std * (self.std / each.std) ** 2) ** 4 / each.freedom for each in self.comparisons]
+        found = [
+            (comparison.noise_std * (self.std / comparison.std) ** 2) ** 4 / comparison.freedom
+            for comparison in self.comparisons
+        ]
         return self.std**4 / sum(found) if any(found) else np.inf
 
 
@@ -102,7 +108,7 @@ def check_clock(recording: ObservedRun, known: Uncertainty) -> ClockCheck:
 def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
     """The difference of every two clocks that are compared, in the recording in which they agree least."""
     worst: dict[tuple[str, str], ClockDifference] = {}
-    for found in (each for check in clocks for each in check.differences()):
+    for found in (difference for check in clocks for difference in check.differences()):
         worst[found.clocks] = max(worst.get(found.clocks, found), found, key=lambda each: each.share)
     return list(worst.values())
 
@@ -115,7 +121,7 @@ def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison:
 
 def _by_crystal(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
     """The controller's clock by the board's counter; None where no board was, or by its word no crystal holds it."""
-    bases = [each.time_base for name, each in recording.sensors.items() if recording.run.sensors[name].on_board]
+    bases = [sensor.time_base for name, sensor in recording.sensors.items() if recording.run.sensors[name].on_board]
     if not bases or recording.run.provenance.board_follows_crystal is False:
         return None
     best = min(bases, key=lambda base: base.drift_std)

@@ -70,7 +70,7 @@ def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:
 
     Of the latter the fewest of any run's bias: a sum of independent parts never has fewer than its scarcest.
     """
-    budgets = [each.result.budget for each in reversal.runs]
+    budgets = [run.result.budget for run in reversal.runs]
     # (Σ u_i²)² / ν of each run is Σ u_i⁴ / ν_i: what the runs share is known, and adds nothing to it.
     scarce = np.sum([budget.std[:3] ** 4 / budget.freedom[:3] for budget in budgets], axis=0) / len(budgets) ** 4
     with np.errstate(divide="ignore"):
@@ -103,7 +103,7 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
 
     Raises KeyError where the budget has no such line.
     """
-    made = [np.clip(each, 0.0, whole) for each in parts.values()]
+    made = [np.clip(part, 0.0, whole) for part in parts.values()]
     rest = np.clip(whole - np.sum(made, axis=0), 0.0, None)
     freedom = [budget.line(name).freedom for name in parts]
     shape = (-1, *np.ones(np.ndim(whole), dtype=np.intp))

@@ -83,10 +83,10 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         onboard=swept.onboard,
         checks=(
             *swept.checks,
-            *(check for each in averages for check in each),
+            *(check for average in averages for check in average),
             *_acceleration_checks(accelerometers, settings),
             *among_dwells.checks,
-            *(check for each in of_kinds for check in each.checks),
+            *(check for kind in of_kinds for check in kind.checks),
             *_unsolved(magnetometers, of_kinds),
         ),
         of_kinds=of_kinds,
@@ -103,7 +103,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
 
 def _unsolved(magnetometers: Attempts[str, MagnetometerResult], of_kinds: Sequence[KindFound]) -> Iterator[Check]:
     """The checks of what was to be calibrated and is not."""
-    yield from unsolved_checks((name, FIELD.name, each) for name, each in magnetometers.faults.items())
+    yield from unsolved_checks((name, FIELD.name, fault) for name, fault in magnetometers.faults.items())
     yield from unsolved_checks((kind.name, kind.quantity.name, kind.fault) for kind in of_kinds if kind.fault)
 
 

@@ -66,26 +66,26 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
         for what, value in _what_must_be_alike(other).items():
             if value != first[what]:
                 raise Refused("runs_do_not_match", f"{runs[0].run} and {other.run} differ in {what}", ALIKE)
-    results = [each.result for each in runs]
+    results = [run.result for run in runs]
     found = separate(
-        np.array([each.solution.bias for each in results]),
-        np.array([each.budget.covariance[3:, 3:] for each in results]),
-        np.array([each.solution.matrix for each in results]),
-        np.array([each.sensor.mounting for each in results]),
+        np.array([result.solution.bias for result in results]),
+        np.array([result.budget.covariance[3:, 3:] for result in results]),
+        np.array([result.solution.matrix for result in results]),
+        np.array([result.sensor.mounting for result in results]),
     )
     return MagnetometerReversal(
         tuple(runs),
         found,
-        np.mean([each.triad.scale for each in results], axis=0),
+        np.mean([result.triad.scale for result in results], axis=0),
         _scale_std(results),
-        np.mean([each.triad.correction_matrix for each in results], axis=0),
+        np.mean([result.triad.correction_matrix for result in results], axis=0),
     )
 
 
 def _scale_std(results: Sequence[MagnetometerResult]) -> Array:
     """(3,) standard deviations of mean scale factors: runs have their own, and share how well the field is known."""
     shared = results[0].budget.of(SIZE_OF_FIELD)[:3]
-    own = [each.budget.std[:3] ** 2 - each.budget.of(SIZE_OF_FIELD)[:3] ** 2 for each in results]
+    own = [result.budget.std[:3] ** 2 - result.budget.of(SIZE_OF_FIELD)[:3] ** 2 for result in results]
     std: Array = np.sqrt(np.sum(own, axis=0) / len(results) ** 2 + shared**2)
     return std
 

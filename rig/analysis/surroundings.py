@@ -40,8 +40,8 @@ def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) ->
     """
     known = settings.stated_uncertainty
     longest = max(recordings, key=lambda each: float(each.motion.time_s[-1] - each.motion.time_s[0]))
-    clocks = tuple(check_clock(each, known) for each in recordings)
-    clock = next(check for each, check in zip(recordings, clocks, strict=True) if each is longest)
+    clocks = tuple(check_clock(recording, known) for recording in recordings)
+    clock = next(check for recording, check in zip(recordings, clocks, strict=True) if recording is longest)
     jitter = state_jitter(recordings)
     return Surroundings(
         settings.site,

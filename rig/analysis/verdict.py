@@ -130,9 +130,9 @@ def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
     """
     means = Meaning("fitness", what=CLOCKS)
     return tuple(
-        Check(f"{CLOCKS}.{one}_and_{other}", each.size / PPM, each.limit / PPM, "ppm", means)
-        for each in worst_differences(clocks)
-        for one, other in [each.clocks]
+        Check(f"{CLOCKS}.{one}_and_{other}", worst_difference.size / PPM, worst_difference.limit / PPM, "ppm", means)
+        for worst_difference in worst_differences(clocks)
+        for one, other in [worst_difference.clocks]
     )
 
 

@@ -194,6 +194,7 @@ def _worst_expanded(budgets: Mapping[str, Budget]) -> tuple[float, float]:
     """Return the largest U of a scale factor and of a bias."""
     expanded = [budget.expanded for budget in budgets.values()]
     scale, bias = (
-        max((float(uncertainty[columns].max()) for uncertainty in expanded), default=0.0) for columns in (slice(3), slice(3, 6))
+        max((float(uncertainty[columns].max()) for uncertainty in expanded), default=0.0)
+        for columns in (slice(3), slice(3, 6))
     )
     return scale, bias

@@ -44,7 +44,7 @@ def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: 
     """
     scale = scale_of(matrix)
     lines = []
-    for name, each in causes.items():
+    for name, cause in causes.items():
         kind, source = SOURCES[name]
         freedom = np.inf
         if name == placement.NOISE and noise_freedom is not None:
@@ -52,6 +52,8 @@ def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: 
         elif name == placement.NOISE:
             source = f"{source}, {IN_U}"
         lines.append(
-            Contributor(name, kind, "normal", None, "", source, freedom, scale_and_bias_covariance(matrix, scale, each))
+            Contributor(
+                name, kind, "normal", None, "", source, freedom, scale_and_bias_covariance(matrix, scale, cause)
+            )
         )
     return Budget(tuple(lines))

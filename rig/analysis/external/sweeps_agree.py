@@ -50,7 +50,7 @@ def check_agree(solution: VectorSolution, data: ExternalData) -> None:
 def _named(worst: int, data: ExternalData) -> str:
     """Which sweep contradicts which, by their rows."""
     axis = data.sweeps[worst].axis_flange
-    about = [each.sweep for each in data.sweeps if abs(each.axis_flange @ axis) > SAME_AXIS]
+    about = [sweep.sweep for sweep in data.sweeps if abs(sweep.axis_flange @ axis) > SAME_AXIS]
     if len(about) == 2:
         return f"of sweeps {about[0]} and {about[1]}, alone about their axis, one contradicts the other"
     return f"sweep {data.sweeps[worst].sweep} contradicts the others"
@@ -120,8 +120,8 @@ def rows_left(data: ExternalData) -> int:
 def noise_freedom(solution: VectorSolution, data: ExternalData) -> float:
     """Return the noise's fewest degrees of freedom, by how the vector model weighs the means."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
-    variances = np.array([each.variance_rad2_s2 for each in averages])
-    freedom = by_axis(each.freedom for each in averages)
+    variances = np.array([average.variance_rad2_s2 for average in averages])
+    freedom = by_axis(average.freedom for average in averages)
     return fewest_freedom(solution.response.reshape(6, -1), variances.ravel(), freedom.ravel())
 
 
@@ -178,7 +178,7 @@ def _equations(data: ExternalData) -> tuple[Array, Array, Array]:
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     rates = [sweep.speed_rad_s * sweep.axis_flange for sweep in data.sweeps]
     return (
-        np.array([each.mean_rad_s for each in averages]),
-        np.array([each.variance_rad2_s2 for each in averages]),
+        np.array([average.mean_rad_s for average in averages]),
+        np.array([average.variance_rad2_s2 for average in averages]),
         design_matrix(np.array([*rates, *np.zeros((len(data.rests), 3))]), None),
     )

@@ -58,7 +58,7 @@ def observe_as_mounted(
 
 def _found(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[FoundMount, ...]:
     """The mounts of all stages but the first, by the sensor to calibrate that tells them best; none where none does."""
-    stages = list(dict.fromkeys(each.run.settings.stage for each in recordings))
+    stages = list(dict.fromkeys(recording.run.settings.stage for recording in recordings))
     if len(stages) < 2:
         return ()
     surroundings, run = surroundings_of(recordings, settings), recordings[0].run

@@ -212,7 +212,8 @@ def unknown_of(
         clock_std=clock.std,
         clock_freedom=clock.freedom,
         clock_half_width=None if clock.comparisons else PPM * known.controller_clock_ppm,
-        clock_source="held against " + (" and ".join(each.by for each in clock.comparisons) or "no other clock"),
+        clock_source="held against "
+        + (" and ".join(comparison.by for comparison in clock.comparisons) or "no other clock"),
         state_jitter_s=surroundings.state_jitter_s,
         state_jitter_freedom=surroundings.state_jitter_freedom,
         axis_rad=float(np.radians(known.axis_deg)),

@@ -204,7 +204,10 @@ def _wanted(dwells: Sequence[DwellReading], settings: RunSettings) -> tuple[Plan
     if settings.reference_c is None:
         return settings.planned_dwells
     last = max((dwell.index for dwell in dwells), default=-1)
-    return tuple(each for each in settings.planned_dwells if each.index <= last) or settings.planned_dwells
+    return (
+        tuple(planned_dwell for planned_dwell in settings.planned_dwells if planned_dwell.index <= last)
+        or settings.planned_dwells
+    )
 
 
 def _apart(

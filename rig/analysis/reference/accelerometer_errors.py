@@ -92,11 +92,16 @@ def pieces_of(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[Dwe
     """The pieces that the sensor `name` is calibrated from: these dwells, then all sweeps."""
     used = {dwell.index for dwell in dwells}
     return [
-        *(_dwelt(each, dwell) for each in recordings for dwell in each.sensors[name].dwells if dwell.index in used),
         *(
-            _swept(each, turn.sweep, turn.average, turn.acceleration.joint)
-            for each in recordings
-            for turn in each.sensors[name].revolutions
+            _dwelt(recording, dwell)
+            for recording in recordings
+            for dwell in recording.sensors[name].dwells
+            if dwell.index in used
+        ),
+        *(
+            _swept(recording, turn.sweep, turn.average, turn.acceleration.joint)
+            for recording in recordings
+            for turn in recording.sensors[name].revolutions
             if turn.acceleration is not None
         ),
     ]
@@ -104,21 +109,21 @@ def pieces_of(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[Dwe
 
 def mean_temperature_c(pieces: Sequence[Piece]) -> float:
     """Mean temperature of the pieces' readings, which `rig.analysis.read_when` too says that scale and bias hold at."""
-    return float(np.average([each.temperature_c for each in pieces], weights=[each.samples for each in pieces]))
+    return float(np.average([piece.temperature_c for piece in pieces], weights=[piece.samples for piece in pieces]))
 
 
 def errors_of(
     sheet: Sheet, pieces: Sequence[Piece], temperature_step_k: float, *, second_order: bool
 ) -> AccelerometerErrors:
     """Errors of a sensor in these pieces, with a thermometer of such steps; no even part where that is looked for."""
-    windows_s, samples = np.array([each.window_s for each in pieces]), np.array([each.samples for each in pieces])
+    windows_s, samples = np.array([piece.window_s for piece in pieces]), np.array([piece.samples for piece in pieces])
     return AccelerometerErrors(
         even_s2_m=0.0 if second_order else sheet.even_s2_m / STANDARD,
         odd_s4_m2=sheet.odd_s4_m2 / STANDARD,
         norm_m_s2=STANDARD_GRAVITY_M_S2,
         bias_m_s2_k=MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k / STANDARD,
         scale_per_k=1e-6 * sheet.scale_ppm_k / STANDARD,
-        warmer_k=from_their_mean(np.array([each.temperature_c for each in pieces]), samples),
+        warmer_k=from_their_mean(np.array([piece.temperature_c for piece in pieces]), samples),
         unseen_k=unseen_k(temperature_step_k, windows_s, samples),
         windows_s=windows_s,
         instability_m_s2=MICRO_G_M_S2 * sheet.bias_instability_ug,
@@ -136,7 +141,7 @@ def with_errors(
 ) -> Movement:
     """The movement with what is known of the sensor's errors and of the arm's in these pieces of it."""
     own = errors_of(sheet, pieces, sensor.unseen_change_k, second_order=settings.second_order)
-    turns = arm_turns([each.stood for each in pieces], arm, np.array(sensor.mounting))
+    turns = arm_turns([piece.stood for piece in pieces], arm, np.array(sensor.mounting))
     return replace(movement, own=own, arm_turns=turns)
 
 
@@ -163,7 +168,7 @@ def of_its_own(spread: Spread, theta: Array, movement: Movement, sheet: Sheet) -
             for name, (half_width, unit, source, patterns) in by_sheet.items()
         ),
     ]
-    own = np.sum([each.covariance for each in lines], axis=0)
+    own = np.sum([line.covariance for line in lines], axis=0)
     return replace(spread, covariance=spread.covariance - own), lines
 
 

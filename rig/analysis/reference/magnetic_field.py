@@ -87,7 +87,9 @@ def _calibrated(
             "Use the procedure static_attitudes or imu, which hold attitudes",
         )
     known = known_field(site, "site.magnetic_field_ut")
-    dwells = tuple(each for run in recordings for each in field_readings(run, name, settings.observation))
+    dwells = tuple(
+        field_reading for run in recordings for field_reading in field_readings(run, name, settings.observation)
+    )
     drift = _drift(name, recordings, settings)
     seen = seen_in(dwells, np.array(sensor.mounting))
     read = seen.readings_m_s2, seen.attitudes, seen.variances_m2_s4
@@ -111,7 +113,7 @@ def _calibrated(
             (alike, drift),
             site,
             field_t=known.norm,
-            noise_freedom=by_axis(each.reading.freedom for each in dwells).ravel(),
+            noise_freedom=by_axis(dwell.reading.freedom for dwell in dwells).ravel(),
         ),
         beside=attempt_each({method: partial(solve, method=method) for method in BESIDE}),
         dwells=dwells,

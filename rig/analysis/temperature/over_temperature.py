@@ -71,8 +71,8 @@ def taken_to_reference(recordings: Sequence[ObservedRun], settings: RunSettings,
 
 def files_to_reference(data: ExternalData, reference_c: float) -> tuple[ExternalData, OverTemperature]:
     """Sweeps and rests of files at the reference temperature. Raises Fault as `taken_to_reference` does."""
-    averages = [*(each.average for each in data.sweeps), *data.rests]
-    turned = [each.speed_rad_s * each.axis_flange for each in data.sweeps]
+    averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
+    turned = [sweep.speed_rad_s * sweep.axis_flange for sweep in data.sweeps]
     felt = np.array([*turned, *np.zeros((len(data.rests), 3))])
     seen = RepeatedMeans(
         means=np.array([each.mean_rad_s for each in averages]),
@@ -87,7 +87,7 @@ def files_to_reference(data: ExternalData, reference_c: float) -> tuple[External
     found = fit_over_temperature(seen, reference_c, ASSUMED_GRADIENT_K)
     means = found.correct_to_reference(seen.means, seen.temperature_c)
     moved = [_average(each, mean, reference_c) for each, mean in zip(averages, means, strict=True)]
-    sweeps = tuple(replace(each, average=average) for each, average in zip(data.sweeps, moved, strict=False))
+    sweeps = tuple(replace(sweep, average=average) for sweep, average in zip(data.sweeps, moved, strict=False))
     return ExternalData(sweeps, tuple(moved[len(sweeps) :]), at_reference=True), found
 
 
@@ -116,9 +116,14 @@ def _together(
     values = sign @ parameters
     lines = tuple(
         TemperatureLine(
-            each.name, each.kind, each.distribution, each.source, each.freedom, sign @ each.covariance @ sign
+            contributor.name,
+            contributor.kind,
+            contributor.distribution,
+            contributor.source,
+            contributor.freedom,
+            sign @ contributor.covariance @ sign,
         )
-        for each in budget.contributors
+        for contributor in budget.contributors
     )
     at = powers_at(0.0)
     moved = sign @ at @ combine_with_reference(polynomials, values, ()).covariance @ at.T @ sign
@@ -133,10 +138,10 @@ def _rates(
     recordings: Sequence[ObservedRun], name: str, surroundings: Surroundings, reference_c: float
 ) -> tuple[list[ObservedRun], OverTemperature]:
     known = see(recordings, name, surroundings)
-    parts = [each.sensors[name] for each in recordings]
+    parts = [recording.sensors[name] for recording in recordings]
     averages = [turn.average for part in parts for turn in part.revolutions]
     averages += [rest for part in parts for rest in part.rests]
-    temperature_c = np.array([each.temperature_c for each in averages])
+    temperature_c = np.array([average.temperature_c for average in averages])
     seen = RepeatedMeans(
         means=known.means_rad_s,
         variances=known.variances_rad2_s2,
@@ -158,8 +163,8 @@ def _rates(
 def _accelerations(
     recordings: Sequence[ObservedRun], name: str, surroundings: Surroundings, reference_c: float
 ) -> tuple[list[ObservedRun], OverTemperature]:
-    parts = [each.sensors[name] for each in recordings]
-    placed = [(dwell, each.clock_offset_s) for each in recordings for dwell in each.sensors[name].dwells]
+    parts = [recording.sensors[name] for recording in recordings]
+    placed = [(dwell, recording.clock_offset_s) for recording in recordings for dwell in recording.sensors[name].dwells]
     dwells = [dwell for dwell, _ in placed]
     attitudes = np.array([dwell.attitude for dwell in dwells])
     felt = -(attitudes @ surroundings.site.down_m_s2)

@@ -235,7 +235,7 @@ def _found(settled: _Settled, aside_s: Array) -> KnownIncrements:
         wanted[12:, COMMON + 12 * each :][:, BIAS] = np.eye(3) / stretches
     residual_freedom = solved.residuals.size - BIAS.stop - 1  # less F, b and the clock
     freedom = np.minimum(settled.model.freedom(sizes, wanted), residual_freedom)
-    causes = {name: widened(wanted @ each @ wanted.T, freedom) for name, each in _causes(settled).items()}
+    causes = {name: widened(wanted @ cause @ wanted.T, freedom) for name, cause in _causes(settled).items()}
     return KnownIncrements(
         matrix=state.matrix,
         bias=state.bias + wanted[12:, COMMON:] @ solved.theta[COMMON:],

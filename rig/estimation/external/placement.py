@@ -73,8 +73,8 @@ class _Linear:
         chi_square = np.sum(left * np.linalg.solve(covariance, left), axis=(1, 2, 3))
         sizes = np.linalg.slogdet(covariance)[1].sum(axis=1) + np.linalg.slogdet(information)[1]
         causes = {
-            name: inverse @ across @ (each @ weighted).reshape(len(zetas), -1, columns) @ inverse
-            for name, each in errors.items()
+            name: inverse @ across @ (error @ weighted).reshape(len(zetas), -1, columns) @ inverse
+            for name, error in errors.items()
         }
         return _Fits(steps, causes, -0.5 * (chi_square + sizes))
 
@@ -101,15 +101,15 @@ def laid_down(theta: Array, placed: Placed, elsewhere: Array, elsewhere_variance
     )
     size = float(np.linalg.norm(theta[REFERENCE]))
     sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, GRID)
-    looked = np.array([(delta, size * each) for delta in sizes for each in sizes])
+    looked = np.array([(delta, size * ratio) for delta in sizes for ratio in sizes])
     fits = [linear.fits(delta, size * sizes) for delta in sizes.tolist()]
-    likelihood = np.concatenate([each.likelihood for each in fits]) + _before(looked, size)
+    likelihood = np.concatenate([fit.likelihood for fit in fits]) + _before(looked, size)
     weights = np.exp(likelihood - likelihood.max())
     weights /= weights.sum()
-    steps = np.concatenate([each.steps for each in fits])
+    steps = np.concatenate([fit.steps for fit in fits])
     step = weights @ steps
     causes = {
-        name: free @ np.tensordot(weights, np.concatenate([each.causes[name] for each in fits]), 1) @ free.T
+        name: free @ np.tensordot(weights, np.concatenate([fit.causes[name] for fit in fits]), 1) @ free.T
         for name in (NOISE, ATTITUDES, PLACEMENTS)
     }
     causes[PLACEMENTS] = causes[PLACEMENTS] + free @ ((steps - step).T * weights @ (steps - step)) @ free.T

@@ -62,7 +62,7 @@ class Budget:
     @property
     def covariance(self) -> Array:
         """(6, 6) covariance of scale and bias, all contributors together."""
-        combined: Array = np.sum([each.covariance for each in self.contributors], axis=0)
+        combined: Array = np.sum([contributor.covariance for contributor in self.contributors], axis=0)
         return combined
 
     @property
@@ -73,7 +73,7 @@ class Budget:
 
     def line(self, name: str) -> Contributor:
         """One contributor. Raises KeyError where there is none of that name."""
-        return {each.name: each for each in self.contributors}[name]
+        return {contributor.name: contributor for contributor in self.contributors}[name]
 
     def of(self, name: str) -> Array:
         """(6,) standard uncertainties by one contributor. Raises KeyError as `line` does."""
@@ -81,7 +81,9 @@ class Budget:
 
     def without(self, names: Collection[str]) -> "Budget":
         """The budget without contributors of these names."""
-        return replace(self, contributors=tuple(each for each in self.contributors if each.name not in names))
+        return replace(
+            self, contributors=tuple(contributor for contributor in self.contributors if contributor.name not in names)
+        )
 
     @property
     def coverage_factors(self) -> Array:
@@ -97,13 +99,13 @@ class Budget:
     @property
     def freedom(self) -> Array:
         """(6,) effective degrees of freedom (Welch–Satterthwaite, JCGM 100, G.4); infinite where all is known."""
-        variances = np.array([each.std**2 for each in self.contributors])
-        return effective_freedom(variances, np.array([[each.freedom] for each in self.contributors]))
+        variances = np.array([contributor.std**2 for contributor in self.contributors])
+        return effective_freedom(variances, np.array([[contributor.freedom] for contributor in self.contributors]))
 
     @property
     def shares(self) -> Array:
         """(contributors, 6) shares of the variance."""
-        shares: Array = np.array([each.std**2 for each in self.contributors]) / self.std**2
+        shares: Array = np.array([contributor.std**2 for contributor in self.contributors]) / self.std**2
         return shares
 
 
@@ -184,8 +186,8 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     elif unknown.earth_rate:
         along = EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T  # for each axis of the base
         yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", along)
-    for each in seen.own_errors(matrix):
-        yield assumed(each.name, each.half_width, each.unit, each.source, each.patterns)
+    for own_error in seen.own_errors(matrix):
+        yield assumed(own_error.name, own_error.half_width, own_error.unit, own_error.source, own_error.patterns)
     per_m_s2 = unknown.g_sensitivity_rad_s_per_g / STANDARD_GRAVITY_M_S2
     any_sensitivity = [per_m_s2 * np.outer(row, column) for row in np.eye(3) for column in np.eye(3)]
     sensitivity = solution.g_sensitivity

@@ -111,13 +111,13 @@ class _Equations:
 
     @property
     def covariance(self) -> Array:
-        total: Array = np.sum([each @ each.T for each in self.causes.values()], axis=0)
+        total: Array = np.sum([cause @ cause.T for cause in self.causes.values()], axis=0)
         return total
 
     def widened(self, by: float) -> "_Equations":
         """The equations with the errors of a turn so much larger."""
         return replace(
-            self, causes={name: by * each if name in (ENDS, AXES) else each for name, each in self.causes.items()}
+            self, causes={name: by * cause if name in (ENDS, AXES) else cause for name, cause in self.causes.items()}
         )
 
 
@@ -151,7 +151,7 @@ def solve_turned(
     equations = _equations(gyroscope, turns, means, state)
     widened, freedom = _widened(equations[len(means) :], covariance)
     _check_closed(turns, equations[len(means) :], widened)
-    equations = [each.widened(widened) for each in equations]
+    equations = [equation.widened(widened) for equation in equations]
     step, covariance = _solve(equations)
     state = state.moved(step)
     refusals.check_unit(scale_of(state.matrix))
@@ -168,7 +168,7 @@ def solve_turned(
         non_orthogonality_rad=axes.non_orthogonality_rad,
         mounting=axes.mounting,
         angles_covariance_rad2=axes.angles_covariance_rad2(covariance[:9, :9]),
-        residuals_rad_s=np.array([(each.observed - each.design @ step)[:3] for each in equations]),
+        residuals_rad_s=np.array([(equation.observed - equation.design @ step)[:3] for equation in equations]),
         widened=widened,
         widened_freedom=freedom,
         budget=_budget(equations, to_parameters @ covariance),
@@ -239,17 +239,17 @@ def _across(axis: Array) -> Array:
 def _solve(equations: Sequence[_Equations]) -> tuple[Array, Array]:
     """δθ (12,) and its covariance."""
     information, told = np.zeros((12, 12)), np.zeros(12)
-    for each in equations:
-        weighted = each.design.T @ np.linalg.inv(each.covariance)
-        information += weighted @ each.design
-        told += weighted @ each.observed
+    for equation in equations:
+        weighted = equation.design.T @ np.linalg.inv(equation.covariance)
+        information += weighted @ equation.design
+        told += weighted @ equation.observed
     covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
     return covariance @ told, covariance
 
 
 def _conditioning(equations: Sequence[_Equations]) -> refusals.Conditioning:
     """Conditioning of the design, rates and offsets of one size. Raises Fault `rank_deficient`, `ill_conditioned`."""
-    design = np.vstack([each.design for each in equations])
+    design = np.vstack([equation.design for equation in equations])
     sizes = [np.linalg.norm(design[:, each]) for each in (slice(0, 9), slice(9, 12))]
     told = refusals.condition_of(design / np.repeat(sizes, [9, 3]), 12)
     refusals.check_conditioning(told, 12, MAX_CONDITION, "axis or bias", REMEDY)
@@ -262,10 +262,10 @@ def _widened(turns: Sequence[_Equations], covariance: Array) -> tuple[float, flo
     And with how many degrees of freedom that is known: no end of them where what was said holds.
     """
     chi_square, freedom = 0.0, 0.0
-    for each in turns:
-        weight = np.linalg.inv(each.covariance)
-        chi_square += float(each.observed @ weight @ each.observed)
-        freedom += len(each.observed) - float(np.trace(weight @ each.design @ covariance @ each.design.T))
+    for turn in turns:
+        weight = np.linalg.inv(turn.covariance)
+        chi_square += float(turn.observed @ weight @ turn.observed)
+        freedom += len(turn.observed) - float(np.trace(weight @ turn.design @ covariance @ turn.design.T))
     if freedom <= 1 or chi_square <= freedom:
         return 1.0, np.inf
     return float(np.sqrt(chi_square / freedom)), freedom
@@ -277,8 +277,8 @@ def _check_closed(turns: Sequence[Turn], equations: Sequence[_Equations], widene
     if off <= FARTHEST_RAD:
         return
     missed = [
-        float(np.linalg.norm(each.observed[:3])) * (turn.end_s - turn.start_s)
-        for turn, each in zip(turns, equations, strict=True)
+        float(np.linalg.norm(equation.observed[:3])) * (turn.end_s - turn.start_s)
+        for turn, equation in zip(turns, equations, strict=True)
     ]
     worst = int(np.argmax(missed))
     raise Fault(
@@ -298,9 +298,9 @@ def _budget(equations: Sequence[_Equations], gain: Array) -> Budget:
         AXES: "axis_std_rad, wider where the turns contradict each other",
     }
     spread = {name: np.zeros((6, 6)) for name in sources}
-    for each in equations:
-        told = gain @ each.design.T @ np.linalg.inv(each.covariance)
-        for name, patterns in each.causes.items():
+    for equation in equations:
+        told = gain @ equation.design.T @ np.linalg.inv(equation.covariance)
+        for name, patterns in equation.causes.items():
             effect = told @ patterns
             spread[name] += effect @ effect.T
     kinds: dict[str, Literal["A", "B"]] = {NOISE: "A", BIAS: "A", ENDS: "B", AXES: "B"}

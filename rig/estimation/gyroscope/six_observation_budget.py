@@ -43,7 +43,9 @@ def six_observation_budget(explained: Explained, own: Solution, unknown: Unknown
     )
     half_width, source = float(np.degrees(axes_rad)), "what is known of the part"
     square = Contributor(NOT_SQUARE, "B", "rectangular", half_width, "°", source, np.inf, effects.T @ effects)
-    known = [each for each in of_readings.contributors if each.name not in (AXES, REPEATABILITY, MOUNTS)]
+    known = [
+        contributor for contributor in of_readings.contributors if contributor.name not in (AXES, REPEATABILITY, MOUNTS)
+    ]
     return replace(of_readings, contributors=(*known, square))
 
 

@@ -109,7 +109,7 @@ class Seen:
         """(P, N, 3) what all kinds of errors of the arm's angles add, and those of mounts last."""
         none = np.zeros((0, *self.means_rad_s.shape))
         kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s, self.mount_errors_rad_s)
-        return np.concatenate([none, *(each for each in kinds if each is not None)])
+        return np.concatenate([none, *(kind for kind in kinds if kind is not None)])
 
     def own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
         """What a sensor of that F (3, 3) may do beside the model."""
@@ -122,7 +122,7 @@ class Seen:
     def own_patterns(self, matrix: Array) -> Array:
         """(P, N, 3) what one standard deviation of each of the sensor's own errors adds."""
         none = np.zeros((0, *self.means_rad_s.shape))
-        return np.concatenate([none, *(each.patterns / np.sqrt(3) for each in self.own_errors(matrix))])
+        return np.concatenate([none, *(own_error.patterns / np.sqrt(3) for own_error in self.own_errors(matrix))])
 
     def centripetal_m_s2(self, way_m: Array) -> Array:
         """(N, 3) acceleration at `way_m` (3,) or (N, 3) from the axis that turns, in the flange's frame."""
