@@ -1,4 +1,4 @@
-"""Frames to bytes and back, as `protocol.py` describes them."""
+"""Encoding and decoding of frames, as `protocol.py` describes them."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -22,21 +22,21 @@ from firmware_host.protocol import (
 from firmware_host.stuffing import stuff, unstuff
 
 _BLOCK_MAX = PAYLOAD_MAX + OVERHEAD + 1
-_REMEMBERED = 200  # frames: more than a buffer on the way hands on twice, and fewer than their sequence counts
-# Of fields: values from here on mean nothing. Where an unknown one has a name (`unknown`), any will do.
-_MEANINGLESS_FROM = {
+_REMEMBERED = 200  # frames: more than a buffer in between repeats, and fewer than the range of their sequence
+# The first meaningless value by field. Fields with a name for unknown values (`unknown`) accept all.
+_INVALID_FROM = {
     "mode": len(MODES),
     "method": len(METHODS),
     "status": len(SOLUTION_STATUSES),
     "quantity": len(QUANTITIES),
     "written_unix_s": 253_402_300_800,  # the year 10 000
 }
-_CHECKED = {
-    message.name: tuple((each.name, _MEANINGLESS_FROM[each.name]) for each in fields if each.name in _MEANINGLESS_FROM)
+_LIMITS = {
+    message.name: tuple((field.name, _INVALID_FROM[field.name]) for field in fields if field.name in _INVALID_FROM)
     for message in MESSAGE_BY_NAME.values()
     for fields in [(*message.fields, *message.items)]
 }
-_CRC_OF_INTACT = 0x2144DF1C  # of any bytes followed by their own CRC
+_CRC_OF_INTACT = 0x2144DF1C  # CRC of any bytes followed by their own CRC
 
 
 class Frame(NamedTuple):
@@ -49,13 +49,13 @@ class Frame(NamedTuple):
 
     @property
     def items(self) -> np.ndarray[Any, Any]:
-        """The items as a structured array of the table's layout; of a message without any, an empty one."""
+        """The items as a structured array of the table's layout; an empty one for a message without items."""
         dtype = MESSAGE_BY_NAME[self.name].item_dtype
         return np.frombuffer(self.content, dtype) if dtype.itemsize else np.empty(0)
 
 
 def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items: np.ndarray | None = None) -> bytes:
-    """The bytes of one frame, delimiter included. Raises ValueError when the payload exceeds `PAYLOAD_MAX`."""
+    """Return the bytes of one frame, delimiter included. Raise ValueError if the payload exceeds `PAYLOAD_MAX`."""
     message = MESSAGE_BY_NAME[name]
     values = values or {}
     flat: list[Any] = []
@@ -75,78 +75,80 @@ def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items
 
 
 class _Layout(NamedTuple):
-    """What decoding needs of a message, looked up once."""
+    """The data of a message for decoding, looked up once."""
 
     name: str
     head: Callable[[bytes, int], tuple[Any, ...]]
-    named: Callable[[tuple[Any, ...]], dict[str, Any]]
-    items_at: int
+    name_values: Callable[[tuple[Any, ...]], dict[str, Any]]
+    items_offset: int
     item_size: int
-    least: int  # bytes of a body without items
-    checked: tuple[tuple[str, int], ...]
+    min_size: int  # bytes of a body without items
+    limits: tuple[tuple[str, int], ...]
 
     @classmethod
-    def of(cls, message: Message) -> "_Layout":
-        at, size = 2 + message.head.size, message.item_dtype.itemsize
-        least = OVERHEAD + message.head.size
-        return cls(message.name, message.head.unpack_from, message.named, at, size, least, _CHECKED[message.name])
+    def make(cls, message: Message) -> "_Layout":
+        offset, size = 2 + message.head.size, message.item_dtype.itemsize
+        min_size = OVERHEAD + message.head.size
+        return cls(
+            message.name, message.head.unpack_from, message.name_values, offset, size, min_size, _LIMITS[message.name]
+        )
 
 
-_LAYOUTS = {code: _Layout.of(message) for code, message in MESSAGE_BY_CODE.items()}
+_LAYOUTS = {code: _Layout.make(message) for code, message in MESSAGE_BY_CODE.items()}
 
 
 def decode(block: bytes) -> Frame | None:
-    """One COBS block (without its delimiter) → frame; None when damaged or not in the table, or of no meaning there.
+    """Decode one COBS block (without its delimiter); return None if it is damaged, unknown or of invalid values.
 
-    An identity of another protocol version comes back with only the two fields every version has.
+    An identity of another protocol version is returned with only the two fields of every version.
     """
     body = unstuff(block) if len(block) <= _BLOCK_MAX else None
     if body is None or len(body) < OVERHEAD or crc32(body) != _CRC_OF_INTACT or body[0] not in _LAYOUTS:
         return None
-    name, head, named, items_at, item_size, least, checked = _LAYOUTS[body[0]]
+    name, head, name_values, items_offset, item_size, min_size, limits = _LAYOUTS[body[0]]
     if name == "identity" and len(body) >= OVERHEAD + 2 and body[3] != PROTOCOL_VERSION:
         return Frame("identity", body[1], {"reply_to": body[2], "protocol": body[3]}, b"")
-    length = len(body) - least
+    length = len(body) - min_size
     if length < 0 or length % item_size if item_size else length != 0:
         return None
-    values = named(head(body, 2))
+    values = name_values(head(body, 2))
     if item_size and values.get("count", length // item_size) != length // item_size:
         return None
-    frame = Frame(name, body[1], values, body[items_at:-4])
-    for field, limit in checked:
+    frame = Frame(name, body[1], values, body[items_offset:-4])
+    for field, limit in limits:
         if values[field] >= limit if field in values else np.any(frame.items[field] >= limit):
             return None
     return frame
 
 
 class FrameReader:
-    """Cuts a byte stream into frames, whatever the chunks it arrives in, and counts what is missing or came twice.
+    """The parser of a byte stream in chunks of any size, with counts of lost and repeated frames.
 
-    `lost` is exact as long as fewer than 256 frames are lost in a row; the samples' own sequence tells any number. A
-    frame that equals one of the latest, sequence, CRC and all, is that one again: the line has delivered it twice.
+    `lost` is exact as long as fewer than 256 frames are lost in a row; the samples' own sequence counts any number. A
+    frame equal to one of the latest, sequence and CRC included, is a repetition by the line.
     """
 
     def __init__(self) -> None:
         self._rest = b""
         self._expected: int | None = None  # sequence of the next frame
-        self._recent: OrderedDict[bytes, None] = OrderedDict()  # the latest frames' blocks, but for identities
-        self._identity = b""  # the latest identity's block
-        self.damaged = 0  # blocks that did not decode
-        self.lost = 0  # frames missing between the first and the latest, by their sequence
-        self.repeated = 0  # frames that had come before
-        self.bytes_seen = 0
+        self._recent: OrderedDict[bytes, None] = OrderedDict()  # blocks of the latest frames, except identities
+        self._identity = b""  # block of the latest identity
+        self.damaged = 0  # number of blocks that did not decode
+        self.lost = 0  # number of missing frames, by their sequence
+        self.repeated = 0  # number of repeated frames
+        self.byte_count = 0
 
     def expect_restart(self) -> None:
-        """The sender is about to start afresh: its next frame continues no sequence."""
+        """Accept that the sender restarts: its next frame continues no sequence."""
         self._expected = None
         self._recent.clear()
         self._identity = b""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames that `data` completes, each once."""
-        self.bytes_seen += len(data)
+        """Return the frames that `data` completes, without repetitions."""
+        self.byte_count += len(data)
         *blocks, rest = (self._rest + data).split(b"\0")
-        self._rest = rest[: _BLOCK_MAX + 1]  # of noise, or of another baud rate, no more than tells that it is no frame
+        self._rest = rest[: _BLOCK_MAX + 1]  # at most one byte beyond the longest frame, which suffices to reject noise
         frames = []
         for block in blocks:
             if not block:
@@ -154,7 +156,7 @@ class FrameReader:
             frame = decode(block)
             if frame is None:
                 self.damaged += 1
-            elif self._came_before(block, frame):
+            elif self._is_repeated(block, frame):
                 self.repeated += 1
             else:
                 if self._expected is not None:
@@ -163,16 +165,16 @@ class FrameReader:
                 frames.append(frame)
         return frames
 
-    def _came_before(self, block: bytes, frame: Frame) -> bool:
-        """Whether the line delivers a frame again.
+    def _is_repeated(self, block: bytes, frame: Frame) -> bool:
+        """Return whether the line repeats a frame.
 
-        An idle board says the same again every 256 frames, and after a reset; so an identity is held against the
-        latest one alone, and is new when its sequence has come round.
+        An idle board sends the same identity every 256 frames, and after a reset; so an identity is compared with the
+        latest one alone, and is new if it has the expected sequence.
         """
         if frame.name == "identity":
-            again = block == self._identity and frame.sequence != self._expected
+            is_repeated = block == self._identity and frame.sequence != self._expected
             self._identity = block
-            return again
+            return is_repeated
         if block in self._recent:
             return True
         self._recent[block] = None

@@ -65,7 +65,7 @@ class BoardLink:
     @property
     def byte_count(self) -> int:
         """The number of bytes received, readable or not."""
-        return self._frames.bytes_seen
+        return self._frames.byte_count
 
     @property
     def silent_s(self) -> float:

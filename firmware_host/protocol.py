@@ -1,13 +1,13 @@
-"""The wire between host and board: one table of messages, for Python here and, through `c_header.py`, for C.
+"""The protocol between host and board: one table of messages, for Python here and, through `c_header.py`, for C.
 
 A frame is `COBS(type u8, sequence u8, payload, CRC u32) 0x00`, everything little-endian. The CRC is that of zlib and
 Ethernet, over type, sequence and payload. A frame is shorter than 254 bytes, so COBS never needs a second block.
 
-Why 32 bits: one flipped bit can move a COBS zero, and the damage it decodes to is then no short burst but as good as
-random, of which a 16-bit CRC lets one in 65536 through.
+The CRC has 32 bits because one flipped bit can move a COBS zero: the decoded damage is then no short burst but nearly
+random, of which a 16-bit CRC accepts one in 65536.
 
-The sequence of a host's frame is chosen by the host, 1 … 255; the board's answer carries it in `reply_to`. A board's
-own frames count up modulo 256, so a missing number is a lost frame. `reply_to` 0 means nobody asked.
+The host chooses the sequence of its frames, 1 … 255; the board's answer repeats it in `reply_to`. A board's own frames
+count modulo 256, so a missing number is a lost frame. `reply_to` 0 marks unrequested frames.
 """
 
 import struct
@@ -25,33 +25,33 @@ PROTOCOL_VERSION = 6
 FIRMWARE_VERSION = "0.9.0"  # of the shipped image
 PAYLOAD_MAX = 240
 OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
-COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter
-BAUD_RATE = 921600  # what the shipped image uses
-HEATER_WORD_US = 2_000_000  # the heater goes off when the host has said nothing of it for so long
-HEATER_LIMIT_C = 70.0  # and when any thermometer of a part reads this
-HEATER_POWERS = 255  # of its pin, all of the time
-BATCH_AGE_US = 80_000  # a sample waits no longer than this for company; a full frame goes at once
-FULL_SCALE_COUNTS = 32767  # of raw readings: every part the firmware drives reports 16 bits, two's complement
-CALIBRATED_RAD_S = 1e-6  # a count of calibrated readings: they come in microradians per second
-# No sensor's scale factor is that far off, either way. Observations that are all alike leave only noise to compare,
-# which looks like readings of a sensor that is: the board calls that degenerate.
+COBS_BYTES = 2  # added by COBS: the code byte and the delimiter
+BAUD_RATE = 921600  # of the shipped image
+HEATER_WORD_US = 2_000_000  # the heater switches off without a request of the host in this time
+HEATER_LIMIT_C = 70.0  # and at this reading of any part's thermometer
+HEATER_POWERS = 255  # its full duty
+BATCH_AGE_US = 80_000  # the longest time a sample waits in an incomplete batch; a full frame is sent at once
+FULL_SCALE_COUNTS = 32767  # of raw readings: all parts report 16 bits, two's complement
+CALIBRATED_RAD_S = 1e-6  # a count of calibrated readings, which are in microradians per second
+# Bound on a sensor's scale factor and its inverse. From equal observations only noise remains,
+# which simulates a scale factor beyond it: the board reports that as degenerate.
 MAX_SCALE = 4.0
 
 MODES = ("raw", "calibrated")
 QUANTITIES = (
     "rate",
     "field",
-)  # what a sensor measures: a gyroscope, beside which there may be accelerations, a magnetometer
+)  # quantity of a sensor: a gyroscope (with or without accelerations), a magnetometer
 RESET_CAUSES = ("unknown", "power", "pin", "software", "watchdog", "fault")
-# Of a calibration: g = K (m + b) with K diagonal, SIX Eq. (3), and the same with a whole matrix in the place of K.
+# Calibration models: g = K (m + b) with K diagonal, SIX Eq. (3), and the same with a full matrix for K.
 MODELS = ("none", "k_times_m_plus_b", "matrix_times_m_plus_b")
 METHODS = ("closed_form", "algorithm_1")
 SOLUTION_STATUSES = ("solved", "too_few_observations", "degenerate", "not_converged")
-# Of a session by hand, and what became of the last move.
+# States of a session by hand, and outcomes of its last move.
 HAND_STATES = ("idle", "starting", "moving", "resting", "done", "failed")
 HAND_OUTCOMES = ("nothing", "taken", "clipped", "lost", "no_face", "contradicts")
 HAND_FACES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the sensor's axis that points upwards
-HEATER_CAUSES = ("on", "not_wanted", "no_word", "too_hot", "no_thermometer")  # why it is off
+HEATER_CAUSES = ("on", "not_wanted", "no_word", "too_hot", "no_thermometer")  # reasons for being off
 ENUMERATIONS = {  # name → prefix of its values in C, the values counted from 0
     "reset_cause": ("RESET", RESET_CAUSES),
     "sample_mode": ("MODE", MODES),
@@ -93,7 +93,7 @@ class Field:
 
     @property
     def rows(self) -> int:
-        """Number of rows of three numbers each: 1 of a vector, 3 of a matrix, 0 of anything else."""
+        """The number of rows of three numbers: 1 for a vector, 3 for a matrix, 0 otherwise."""
         return {"vector": 1, "matrix": 3}.get(self.kind.partition("_")[0], 0)
 
 
@@ -110,78 +110,79 @@ class Message:
 
     @cached_property
     def head(self) -> struct.Struct:
-        """Layout of the fixed fields."""
+        """The layout of the fixed fields."""
         return struct.Struct("<" + "".join(KINDS[field.kind][0] for field in self.fields))
 
     @cached_property
     def item_dtype(self) -> np.dtype[np.void]:
-        """Layout of one item; without items, an empty one."""
+        """The layout of one item; an empty one without items."""
         codes = {"bytes12": "V12", "text12": "S12", "text24": "S24"}
         vectors = {"vector_i16": "(3,)<i2", "vector_i32": "(3,)<i4", "vector_f32": "(3,)<f4", "matrix_f32": "(3,3)<f4"}
         return np.dtype([(f.name, (codes | vectors).get(f.kind, "<" + KINDS[f.kind][0])) for f in self.items])
 
     @cached_property
     def _names(self) -> tuple[str, ...] | None:
-        """Names of what `head` unpacks, one for one; None when some of it is vectors or matrices."""
+        """The names of the values that `head` unpacks; None if some are vectors or matrices."""
         return None if any(field.rows for field in self.fields) else tuple(field.name for field in self.fields)
 
-    def named(self, values: tuple[Any, ...]) -> dict[str, Any]:
-        """What `head` unpacks, by field name; a vector is a tuple of three, a matrix of its three rows."""
-        if self._names is not None:  # the frequent frames, made short
+    def name_values(self, values: tuple[Any, ...]) -> dict[str, Any]:
+        """Return the values that `head` unpacks, by field name; a vector is a tuple of three, a matrix of its three
+        rows.
+        """
+        if self._names is not None:  # a short path for frequent frames
             return dict(zip(self._names, values))  # noqa: B905 - as many as `head` unpacks
         rest = iter(values)
         return {field.name: _next(field.rows, rest) for field in self.fields}
 
 
 def _next(rows: int, values: Iterator[Any]) -> Any:
-    """The next value, vector or matrix of those that `head` unpacks."""
+    """Return the next value, vector or matrix of those that `head` unpacks."""
     if rows == 0:
         return next(values)
-    found = tuple(tuple(islice(values, 3)) for _ in range(rows))
-    return found if rows > 1 else found[0]
+    rows_of_three = tuple(tuple(islice(values, 3)) for _ in range(rows))
+    return rows_of_three if rows > 1 else rows_of_three[0]
 
 
-REPLY_TO = Field("reply_to", "u8", "sequence of the frame this answers, 0 = nobody asked")
+REPLY_TO = Field("reply_to", "u8", "sequence of the answered frame, 0 = unrequested")
 SENSOR = Field("sensor", "u8", "index in the identity's list")
-SENSORS = Field("sensors", "u8", "which sensors: bit i is the sensor of index i in the identity's list")
-BATCH = (  # what samples, imu_samples, field_samples and rates begin with
+SENSORS = Field("sensors", "u8", "mask of sensors: bit i is the sensor of index i in the identity's list")
+BATCH = (  # the first fields of samples, imu_samples, field_samples and rates
     SENSOR,
     Field("mode", "u8", "enum sample_mode"),
     Field("sequence", "u32", "of the first sample; counts every conversion of the part since start"),
-    Field("dropped", "u32", "conversions since start that never became a sample in a frame"),
+    Field("dropped", "u32", "conversions since start that were not sent in a frame"),
     Field("base_time_us", "u64", "board time of the first sample, read before the bus transfer"),
     Field("count", "u8", "number of samples"),
 )
 DELTA = Field("delta_us", "u32", "board time after base_time_us")
-COUNTS = Field("counts", "vector_i16", "turn rate: x, y, z as the part reports them, in right-handed axes")
+COUNTS = Field("counts", "vector_i16", "angular rate: x, y, z as the part reports them, in right-handed axes")
 TEMPERATURE = Field("temperature_counts", "i16", "as the part reports it")
-CALIBRATION = (  # what the host knows of a calibration; the board adds which part it was measured on
+CALIBRATION = (  # the host's part of a calibration; the board adds the part that it was measured on
     Field("model", "u8", "enum calibration_model"),
     Field("serial_number", "text24", "of the sensor, as the configuration names it"),
     Field("written_unix_s", "u64", "when it was written, seconds since 1970 UTC"),
-    Field("temperature_c", "f32", "at which matrix and bias hold, by the sensor's own thermometer, degrees Celsius"),
-    Field("matrix", "matrix_f32", "what m + b is multiplied by, row by row; of k_times_m_plus_b it is diagonal"),
+    Field("temperature_c", "f32", "of matrix and bias, by the sensor's own thermometer, degrees Celsius"),
+    Field("matrix", "matrix_f32", "factor of m + b, row by row; diagonal for k_times_m_plus_b"),
     Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
-    Field("lowest_c", "f32", "from which on the polynomials hold; below it is corrected as there"),
-    Field("highest_c", "f32", "up to which they hold; without polynomials both are temperature_c"),
-    Field("scale_change", "matrix_f32", "k(T)/k − 1 per K, K², K³ from temperature_c, a row each; 0 = none known"),
+    Field("lowest_c", "f32", "lower end of the polynomials' range; constant below it"),
+    Field("highest_c", "f32", "upper end of that range; without polynomials both are temperature_c"),
+    Field("scale_change", "matrix_f32", "k(T)/k − 1 per K, K², K³ from temperature_c, a row each; 0 = none"),
     Field("bias_change_rad_s", "matrix_f32", "b(T) − b likewise"),
 )
 
 MESSAGES = (
-    Message(0x01, "hello", "host", "who is there? answered by identity"),
+    Message(0x01, "hello", "host", "request for identity"),
     Message(
         0x02,
         "identity",
         "board",
-        "answers hello; also sent twice a second while idle, so that a wrong baud rate can be distinguished "
-        "from silence",
+        "answers hello; also sent twice a second while idle, to distinguish a wrong baud rate from silence",
         (
             REPLY_TO,  # these first two fields stay in every version of the protocol
             Field("protocol", "u8", "PROTOCOL_VERSION of the image"),
             Field("firmware", "text12", "version of the image"),
             Field("unique_id", "bytes12", "of the microcontroller"),
-            Field("reset_cause", "u8", "why the board last started: enum reset_cause"),
+            Field("reset_cause", "u8", "cause of the last start: enum reset_cause"),
         ),
         (
             Field("part", "text12", "part the firmware has a driver for"),
@@ -197,17 +198,19 @@ MESSAGES = (
         "set a sensor up; answered by setup",
         (
             SENSOR,
-            Field("rate_hz", "f32", "wanted data rate, Hz; the nearest is taken"),
-            Field("range_deg_s", "f32", "wanted range, degrees per second; the next one up; 0 of a magnetometer"),
-            Field("range_g", "f32", "wanted range of accelerations, g; the next one up; 0 = none wanted"),
-            Field("range_gauss", "f32", "wanted range of a magnetometer, gauss; the next one up; 0 of any other"),
+            Field("rate_hz", "f32", "requested data rate, Hz; the nearest is set"),
+            Field("range_deg_s", "f32", "requested range, degrees per second; the next one up; 0 for a magnetometer"),
+            Field("range_g", "f32", "requested range of accelerations, g; the next one up; 0 = none"),
+            Field(
+                "range_gauss", "f32", "requested range of a magnetometer, gauss; the next one up; 0 for other sensors"
+            ),
         ),
     ),
     Message(
         0x04,
         "setup",
         "board",
-        "what the part really does",
+        "actual settings of the part",
         (
             REPLY_TO,
             SENSOR,
@@ -226,11 +229,11 @@ MESSAGES = (
         0x05,
         "start",
         "host",
-        "stream every configured sensor, sequences from 0: those named calibrated, the others raw; answered by ack",
+        "stream every configured sensor, sequences from 0: selected ones calibrated, the others raw; answered by ack",
         (SENSORS,),
     ),
     Message(0x06, "stop", "host", "stop streaming; the ack follows the last samples"),
-    Message(0x07, "ack", "board", "done as asked", (REPLY_TO,)),
+    Message(0x07, "ack", "board", "request executed", (REPLY_TO,)),
     Message(
         0x08,
         "samples",
@@ -239,7 +242,7 @@ MESSAGES = (
         BATCH,
         (DELTA, COUNTS, TEMPERATURE),
     ),
-    Message(0x09, "status", "host", "how is it going? answered by report"),
+    Message(0x09, "status", "host", "request for report"),
     Message(
         0x0A,
         "report",
@@ -249,28 +252,28 @@ MESSAGES = (
             REPLY_TO,
             Field("uptime_us", "u64", "board time"),
             Field("rx_errors", "u32", "frames from the host that were damaged or too long"),
-            Field("tx_overruns", "u32", "frames there was no room to send"),
+            Field("tx_overruns", "u32", "frames not sent for lack of room"),
             Field("bus_errors", "u32", "sensor reads that did not carry new data"),
             Field("stack_high_water", "u32", "most stack ever used, bytes"),
-            Field("fault_pc", "u32", "where the last processor fault struck, 0 = none"),
+            Field("fault_pc", "u32", "address of the last processor fault, 0 = none"),
             Field("reset_cause", "u8", "enum reset_cause"),
             Field("clock_locked", "u8", "1 = the clock follows the 32768 Hz crystal"),
             Field("streaming", "u8", "1 = between start and stop"),
         ),
         (
             Field("conversions", "u32", "conversions seen since start"),
-            Field("samples", "u32", "of them sent in a frame"),
-            Field("dropped", "u32", "of them lost on the board"),
+            Field("samples", "u32", "conversions sent in a frame"),
+            Field("dropped", "u32", "conversions lost on the board"),
         ),
     ),
     Message(
         0x0B,
         "error",
         "board",
-        "a request refused, or something wrong on the board",
+        "refusal of a request, or a fault of the board",
         (REPLY_TO, Field("code", "u8", "enum error_code"), SENSOR),
     ),
-    Message(0x0C, "reboot", "host", "start afresh; the ack comes before"),
+    Message(0x0C, "reboot", "host", "restart; the ack comes before"),
     Message(
         0x0D,
         "rates",
@@ -283,34 +286,35 @@ MESSAGES = (
         0x0E,
         "keep",
         "host",
-        "keep the readings from now on, so that observe finds them; readings kept before are discarded; "
-        "answered by ack",
-        (SENSORS, Field("duration_s", "f32", "for how long, at least")),
+        "store the readings from now on for observe; earlier ones are discarded; answered by ack",
+        (SENSORS, Field("duration_s", "f32", "least duration, s")),
     ),
     Message(
         0x0F,
         "observe",
         "host",
-        "average what was kept of a sensor between two board times and add it as an observation; answered by observed",
+        "average stored readings of a sensor between two board times and add an observation; answered by observed",
         (
             SENSOR,
-            Field("index", "u16", "0 begins anew; else the number of observations before; the last may be repeated"),
+            Field(
+                "index", "u16", "0 starts a new set; else the number of earlier observations; the last may be repeated"
+            ),
             Field("start_us", "u64", "board time"),
             Field("end_us", "u64", "board time"),
-            Field("speed_rad_s", "f32", "magnitude of the turn rate in between, rad/s"),
+            Field("speed_rad_s", "f32", "magnitude of the angular rate meanwhile, rad/s"),
         ),
     ),
     Message(
         0x10,
         "observed",
         "board",
-        "what was averaged: the samples from start_us up to, not including, end_us",
+        "average of the samples from start_us up to, not including, end_us",
         (
             REPLY_TO,
             SENSOR,
             Field("index", "u16", "of the observation"),
-            Field("start_us", "u64", "board time of the first sample used; within the span asked for"),
-            Field("end_us", "u64", "board time of the first sample after those used; within the span asked for"),
+            Field("start_us", "u64", "board time of the first sample used; within the requested span"),
+            Field("end_us", "u64", "board time of the first sample after those used; within the requested span"),
             Field("samples", "u32", "number of samples used"),
             Field("mean_rad_s", "vector_f32", "their mean, uncalibrated, rad/s"),
         ),
@@ -338,7 +342,7 @@ MESSAGES = (
             Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
         ),
     ),
-    Message(0x13, "read_calibration", "host", "what is stored for a sensor? answered by calibration", (SENSOR,)),
+    Message(0x13, "read_calibration", "host", "request for a sensor's calibration", (SENSOR,)),
     Message(
         0x14,
         "calibration",
@@ -358,27 +362,27 @@ MESSAGES = (
         0x15,
         "write_calibration",
         "host",
-        "store a calibration for a configured sensor; the old one stays until the new one is whole; answered by ack",
+        "store a calibration of a configured sensor; the old one stays until the new one is complete; answered by ack",
         (SENSOR, *CALIBRATION),
     ),
-    Message(0x16, "erase_calibration", "host", "forget the calibration of a sensor; answered by ack", (SENSOR,)),
+    Message(0x16, "erase_calibration", "host", "erase the calibration of a sensor; answered by ack", (SENSOR,)),
     Message(
         0x17,
         "recall",
         "host",
-        "add an observation that this board made before it was reset; answered by observed, of no samples",
+        "add an observation of this board from before a reset; answered by observed, of no samples",
         (
             SENSOR,
             Field("index", "u16", "as in observe"),
             Field("mean_rad_s", "vector_f32", "as observed then, rad/s"),
-            Field("speed_rad_s", "f32", "magnitude of the turn rate then, rad/s"),
+            Field("speed_rad_s", "f32", "magnitude of the angular rate then, rad/s"),
         ),
     ),
     Message(
         0x18,
         "imu_samples",
         "board",
-        "in the place of samples where accelerations are wanted: both triads of one conversion",
+        "replaces samples if accelerations are requested: both triads of one conversion",
         BATCH,
         (
             DELTA,
@@ -395,7 +399,7 @@ MESSAGES = (
         0x19,
         "field_samples",
         "board",
-        "in the place of samples where a magnetometer is read",
+        "replaces samples for a magnetometer",
         BATCH,
         (DELTA, Field("field", "vector_i16", "magnetic flux density: x, y, z as the part reports them, right-handed")),
     ),
@@ -403,71 +407,73 @@ MESSAGES = (
         0x1A,
         "heat",
         "host",
-        "switch the heater on, or off; to be said again within two seconds, or it goes off; answered by heating",
-        (Field("power", "u8", "of 255: which part of the time the heater's pin is up; 0 = off"),),
+        "switch the heater on or off; without a repetition within two seconds it switches off; answered by heating",
+        (Field("power", "u8", "duty of the heater's pin, of 255; 0 = off"),),
     ),
     Message(
         0x1B,
         "heating",
         "board",
-        "what the heater does now",
+        "present state of the heater",
         (
             REPLY_TO,
             Field("power", "u8", "of 255, 0 = off"),
-            Field("cause", "u8", "enum heater_cause: why it is off; too_hot holds until the host says off itself"),
-            Field("temperature_c", "f32", "of the hottest part when the board last looked, degrees Celsius"),
+            Field(
+                "cause", "u8", "enum heater_cause: reason for being off; too_hot remains until the host switches it off"
+            ),
+            Field("temperature_c", "f32", "of the hottest part at the board's last look, degrees Celsius"),
         ),
     ),
     Message(
         0x30,
         "by_hand",
         "host",
-        "begin to calibrate a sensor by hand, which is set up with accelerations; answered by ack",
+        "begin to calibrate by hand a sensor that is set up with accelerations; answered by ack",
         (
             SENSOR,
-            Field("moves", "u8", "it is done when so many moves are taken, at least"),
-            Field("scale_std", "f32", "and the scale's standard uncertainty is no larger"),
+            Field("moves", "u8", "least number of accepted moves"),
+            Field("scale_std", "f32", "largest standard uncertainty of the scale at the end"),
         ),
     ),
-    Message(0x31, "hand_status", "host", "how does the calibration by hand go? answered by hand_report"),
+    Message(0x31, "hand_status", "host", "request for hand_report"),
     Message(
         0x32,
         "hand_report",
         "board",
-        "how a calibration by hand goes, and the move judged last",
+        "progress of a calibration by hand, and its last judged move",
         (
             REPLY_TO,
             SENSOR,
             Field("state", "u8", "enum hand_state"),
-            Field("outcome", "u8", "enum hand_outcome, of the move judged last"),
+            Field("outcome", "u8", "enum hand_outcome, of the last judged move"),
             Field("before", "u8", "face it began on: 0 to 5 are +x -x +y -y +z -z upwards, 255 none"),
             Field("after", "u8", "face it ended on; before any move, the one it lay on at first"),
-            Field("whole", "u8", "1 = whole turns on a face, which count as closed"),
-            Field("settled", "u8", "1 = what was known after it is what the equations are linear about from then on"),
+            Field("whole", "u8", "1 = whole revolutions on a face, which count as closed"),
+            Field("settled", "u8", "1 = the equations are linearized about the solution after it from then on"),
             Field("judged", "u16", "moves judged so far"),
-            Field("taken", "u8", "of them taken"),
-            Field("angle_rad", "f32", "how far that move turned, there and back"),
-            Field("noise_rad_s", "f32", "standard deviation of a reading at rest, as it was weighed with"),
+            Field("taken", "u8", "accepted moves"),
+            Field("angle_rad", "f32", "rotation of that move, there and back"),
+            Field("noise_rad_s", "f32", "standard deviation of a reading at rest, used as its weight"),
             Field("scale_std", "f32", "largest standard uncertainty of a scale factor"),
-            Field("rest_us", "u64", "board time of the first sample of the rest before"),
+            Field("rest_us", "u64", "board time of the first sample used of the rest before"),
             Field("move_us", "u64", "of the first of the move, which is the first after that rest"),
             Field("after_us", "u64", "of the first of the rest after, which is the first after the move"),
-            Field("end_us", "u64", "of the first after what was used of that rest"),
+            Field("end_us", "u64", "of the first after the part used of that rest"),
         ),
     ),
-    Message(0x33, "hand_solve", "host", "what has the calibration by hand found? answered by hand_solution"),
+    Message(0x33, "hand_solve", "host", "request for hand_solution"),
     Message(
         0x34,
         "hand_solution",
         "board",
-        "a calibration g = C (m + b) by hand in single precision, m counted from the g-sensitivity's part",
+        "a calibration g = C (m + b) by hand in single precision, with the g-sensitivity's part removed from m",
         (
             REPLY_TO,
             SENSOR,
             Field("state", "u8", "enum hand_state"),
-            Field("taken", "u8", "moves it is made of"),
+            Field("taken", "u8", "number of accepted moves"),
             Field("scale_std", "f32", "largest standard uncertainty of a scale factor"),
-            Field("range_deg_s", "f32", "that the sensor was set up to, degrees a second"),
+            Field("range_deg_s", "f32", "range of the sensor, degrees per second"),
             Field("temperature_c", "f32", "of the sensor when it was last laid down, degrees Celsius"),
             Field("matrix", "matrix_f32", "C, row by row"),
             Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
@@ -506,7 +512,7 @@ ERRORS = {  # code → what the board reports; `what` follows "the board says th
     20: Problem("not_a_gyroscope", "only a gyroscope can do this", "Leave the magnetometer out of the request"),
 }
 
-# A request is answered by `error` or by: these, every other one by `ack`.
+# Answers to requests other than `error`; those not listed are answered by `ack`.
 ANSWERS = {
     "hello": "identity",
     "heat": "heating",
@@ -525,5 +531,5 @@ MESSAGE_BY_NAME = {message.name: message for message in MESSAGES}
 
 
 def text(value: bytes) -> str:
-    """A fixed-width text field as str."""
+    """Return a fixed-width text field as str."""
     return value.rstrip(b"\0").decode("ascii", "replace")

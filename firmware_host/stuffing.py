@@ -1,6 +1,7 @@
-"""COBS for blocks shorter than 255 bytes, as fast as this machine can.
+"""COBS for blocks shorter than 255 bytes, by the fastest available implementation.
 
-Package `cobs` does it in C where that could be compiled; its Python part takes six times as long as the loop here.
+Package `cobs` has an implementation in C if that could be compiled; its Python part takes six times as long as the loop
+here.
 """
 
 from types import BuiltinFunctionType
@@ -9,29 +10,29 @@ from cobs import cobs
 
 
 def stuff(body: bytes) -> bytes:
-    """`body` without zeros, without a delimiter."""
+    """Return `body` without zeros, without a delimiter."""
     return bytes(cobs.encode(body))
 
 
 def unstuff_in_python(block: bytes) -> bytes | None:
-    """What was stuffed into `block`, which is shorter than 255 bytes; None when it is damaged.
+    """Return the content of `block`, which is shorter than 255 bytes; None if it is damaged.
 
-    Each code byte is the distance to the next one and stands for a zero; the first stands for nothing.
+    Each code byte is the distance to the next one and represents a zero, except the first.
     """
     if 0 in block:
         return None
     body = bytearray(block)
-    place, end = 0, len(block)
-    while place < end:
-        distance = body[place]
-        body[place] = 0
-        place += distance
+    position, end = 0, len(block)
+    while position < end:
+        distance = body[position]
+        body[position] = 0
+        position += distance
     del body[:1]
-    return bytes(body) if place == end else None
+    return bytes(body) if position == end else None
 
 
 def unstuff_by_package(block: bytes) -> bytes | None:
-    """What was stuffed into `block`, of any length, by the package `cobs`; None when it is damaged."""
+    """Return the content of `block`, of any length, by the package `cobs`; None if it is damaged."""
     try:
         body: bytes = cobs.decode(block)
     except cobs.DecodeError:

@@ -61,11 +61,11 @@ def _frame() -> list[str]:
         f"- A payload has at most {protocol.PAYLOAD_MAX} bytes, a frame on the wire at most {LARGEST_BLOCK}: COBS",
         "  needs no second block.",
         "- The CRC is CRC-32 as in zlib and Ethernet, over type, sequence and payload.",
-        "- The host numbers its frames 1 … 255 as it likes; the board's answer repeats the number as `reply_to`. What",
-        "  nobody asked for has `reply_to` 0.",
+        "- The host chooses the numbers of its frames, 1 … 255; the board's answer repeats the number as `reply_to`,",
+        "  which is 0 in unrequested frames.",
         "- The board numbers its own frames 0 … 255 and again from 0: a missing number is a lost frame.",
-        "- A receiver throws away what does not decode, up to the next 0x00, and counts it. The host repeats a request",
-        "  that stays unanswered, so every request may arrive twice; the board repeats nothing.",
+        "- A receiver discards and counts blocks that do not decode, up to the next 0x00. The host repeats a request",
+        "  without an answer, so every request may arrive twice; the board repeats nothing.",
         f"- Example: `hello` with sequence 1 is `{encode('hello', 1).hex(' ')}` on the wire.",
     ]
 

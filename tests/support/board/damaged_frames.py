@@ -68,7 +68,7 @@ def write_sound(path: Path, sender: str, seed: int) -> Path:
 
 def _sound(random: np.random.Generator, message: protocol.Message) -> bytes:
     each = message.item_dtype.itemsize
-    values: dict[str, Any] = message.named(message.head.unpack(random.bytes(message.head.size)))
+    values: dict[str, Any] = message.name_values(message.head.unpack(random.bytes(message.head.size)))
     items = None
     if each:
         number = int(random.integers((protocol.PAYLOAD_MAX - message.head.size) // each + 1))

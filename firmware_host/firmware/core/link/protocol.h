@@ -10,11 +10,11 @@
 #define FRAME_OVERHEAD 6u /* type, sequence, CRC */
 #define COBS_BYTES 2u /* code byte and delimiter */
 #define BAUD_RATE 921600u
-#define HEATER_WORD_US 2000000u /* without a word for so long the heater goes off */
-#define HEATER_LIMIT_C 70.0f /* and when a part is that hot */
-#define BATCH_AGE_US 80000u /* a sample waits no longer than this for company */
+#define HEATER_WORD_US 2000000u /* heater off after this time without a request */
+#define HEATER_LIMIT_C 70.0f /* and the temperature of a part that switches it off */
+#define BATCH_AGE_US 80000u /* longest wait of a sample in an incomplete batch */
 #define CALIBRATED_PER_RAD_S 1000000.0f /* counts of calibrated readings */
-#define MAX_SCALE 4.0f /* no sensor's scale factor is that far off, either way */
+#define MAX_SCALE 4.0f /* bound on a scale factor and its inverse */
 
 enum message_type {
     MESSAGE_HELLO = 1,
@@ -137,14 +137,14 @@ enum heater_cause {
     HEATER_NO_THERMOMETER = 4,
 };
 
-/* hello, from the host: who is there? answered by identity */
-/* identity, from the board: answers hello; also sent twice a second while idle, so that a wrong baud rate can be distinguished from silence */
+/* hello, from the host: request for identity */
+/* identity, from the board: answers hello; also sent twice a second while idle, to distinguish a wrong baud rate from silence */
 struct identity_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t protocol; /* PROTOCOL_VERSION of the image */
     char firmware[12]; /* version of the image */
     uint8_t unique_id[12]; /* of the microcontroller */
-    uint8_t reset_cause; /* why the board last started: enum reset_cause */
+    uint8_t reset_cause; /* cause of the last start: enum reset_cause */
 } __attribute__((packed));
 _Static_assert(sizeof(struct identity_payload) == 27, "identity_payload");
 
@@ -159,16 +159,16 @@ _Static_assert(sizeof(struct identity_item) == 16, "identity_item");
 /* configure, from the host: set a sensor up; answered by setup */
 struct configure_payload {
     uint8_t sensor; /* index in the identity's list */
-    float rate_hz; /* wanted data rate, Hz; the nearest is taken */
-    float range_deg_s; /* wanted range, degrees per second; the next one up; 0 of a magnetometer */
-    float range_g; /* wanted range of accelerations, g; the next one up; 0 = none wanted */
-    float range_gauss; /* wanted range of a magnetometer, gauss; the next one up; 0 of any other */
+    float rate_hz; /* requested data rate, Hz; the nearest is set */
+    float range_deg_s; /* requested range, degrees per second; the next one up; 0 for a magnetometer */
+    float range_g; /* requested range of accelerations, g; the next one up; 0 = none */
+    float range_gauss; /* requested range of a magnetometer, gauss; the next one up; 0 for other sensors */
 } __attribute__((packed));
 _Static_assert(sizeof(struct configure_payload) == 17, "configure_payload");
 
-/* setup, from the board: what the part really does */
+/* setup, from the board: actual settings of the part */
 struct setup_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t sensor; /* index in the identity's list */
     double rate_hz; /* nominal data rate, Hz */
     double range_deg_s; /* range, degrees per second; 0 = no rates are sent */
@@ -182,16 +182,16 @@ struct setup_payload {
 } __attribute__((packed));
 _Static_assert(sizeof(struct setup_payload) == 74, "setup_payload");
 
-/* start, from the host: stream every configured sensor, sequences from 0: those named calibrated, the others raw; answered by ack */
+/* start, from the host: stream every configured sensor, sequences from 0: selected ones calibrated, the others raw; answered by ack */
 struct start_payload {
-    uint8_t sensors; /* which sensors: bit i is the sensor of index i in the identity's list */
+    uint8_t sensors; /* mask of sensors: bit i is the sensor of index i in the identity's list */
 } __attribute__((packed));
 _Static_assert(sizeof(struct start_payload) == 1, "start_payload");
 
 /* stop, from the host: stop streaming; the ack follows the last samples */
-/* ack, from the board: done as asked */
+/* ack, from the board: request executed */
 struct ack_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
 } __attribute__((packed));
 _Static_assert(sizeof(struct ack_payload) == 1, "ack_payload");
 
@@ -200,7 +200,7 @@ struct samples_payload {
     uint8_t sensor; /* index in the identity's list */
     uint8_t mode; /* enum sample_mode */
     uint32_t sequence; /* of the first sample; counts every conversion of the part since start */
-    uint32_t dropped; /* conversions since start that never became a sample in a frame */
+    uint32_t dropped; /* conversions since start that were not sent in a frame */
     uint64_t base_time_us; /* board time of the first sample, read before the bus transfer */
     uint8_t count; /* number of samples */
 } __attribute__((packed));
@@ -208,21 +208,21 @@ _Static_assert(sizeof(struct samples_payload) == 19, "samples_payload");
 
 struct samples_item {
     uint32_t delta_us; /* board time after base_time_us */
-    int16_t counts[3]; /* turn rate: x, y, z as the part reports them, in right-handed axes */
+    int16_t counts[3]; /* angular rate: x, y, z as the part reports them, in right-handed axes */
     int16_t temperature_counts; /* as the part reports it */
 } __attribute__((packed));
 _Static_assert(sizeof(struct samples_item) == 12, "samples_item");
 
-/* status, from the host: how is it going? answered by report */
+/* status, from the host: request for report */
 /* report, from the board: the board's health */
 struct report_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint64_t uptime_us; /* board time */
     uint32_t rx_errors; /* frames from the host that were damaged or too long */
-    uint32_t tx_overruns; /* frames there was no room to send */
+    uint32_t tx_overruns; /* frames not sent for lack of room */
     uint32_t bus_errors; /* sensor reads that did not carry new data */
     uint32_t stack_high_water; /* most stack ever used, bytes */
-    uint32_t fault_pc; /* where the last processor fault struck, 0 = none */
+    uint32_t fault_pc; /* address of the last processor fault, 0 = none */
     uint8_t reset_cause; /* enum reset_cause */
     uint8_t clock_locked; /* 1 = the clock follows the 32768 Hz crystal */
     uint8_t streaming; /* 1 = between start and stop */
@@ -231,26 +231,26 @@ _Static_assert(sizeof(struct report_payload) == 32, "report_payload");
 
 struct report_item {
     uint32_t conversions; /* conversions seen since start */
-    uint32_t samples; /* of them sent in a frame */
-    uint32_t dropped; /* of them lost on the board */
+    uint32_t samples; /* conversions sent in a frame */
+    uint32_t dropped; /* conversions lost on the board */
 } __attribute__((packed));
 _Static_assert(sizeof(struct report_item) == 12, "report_item");
 
-/* error, from the board: a request refused, or something wrong on the board */
+/* error, from the board: refusal of a request, or a fault of the board */
 struct error_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t code; /* enum error_code */
     uint8_t sensor; /* index in the identity's list */
 } __attribute__((packed));
 _Static_assert(sizeof(struct error_payload) == 3, "error_payload");
 
-/* reboot, from the host: start afresh; the ack comes before */
+/* reboot, from the host: restart; the ack comes before */
 /* rates, from the board: a run of calibrated samples with consecutive sequence numbers */
 struct rates_payload {
     uint8_t sensor; /* index in the identity's list */
     uint8_t mode; /* enum sample_mode */
     uint32_t sequence; /* of the first sample; counts every conversion of the part since start */
-    uint32_t dropped; /* conversions since start that never became a sample in a frame */
+    uint32_t dropped; /* conversions since start that were not sent in a frame */
     uint64_t base_time_us; /* board time of the first sample, read before the bus transfer */
     uint8_t count; /* number of samples */
 } __attribute__((packed));
@@ -263,30 +263,30 @@ struct rates_item {
 } __attribute__((packed));
 _Static_assert(sizeof(struct rates_item) == 18, "rates_item");
 
-/* keep, from the host: keep the readings from now on, so that observe finds them; readings kept before are discarded; answered by ack */
+/* keep, from the host: store the readings from now on for observe; earlier ones are discarded; answered by ack */
 struct keep_payload {
-    uint8_t sensors; /* which sensors: bit i is the sensor of index i in the identity's list */
-    float duration_s; /* for how long, at least */
+    uint8_t sensors; /* mask of sensors: bit i is the sensor of index i in the identity's list */
+    float duration_s; /* least duration, s */
 } __attribute__((packed));
 _Static_assert(sizeof(struct keep_payload) == 5, "keep_payload");
 
-/* observe, from the host: average what was kept of a sensor between two board times and add it as an observation; answered by observed */
+/* observe, from the host: average stored readings of a sensor between two board times and add an observation; answered by observed */
 struct observe_payload {
     uint8_t sensor; /* index in the identity's list */
-    uint16_t index; /* 0 begins anew; else the number of observations before; the last may be repeated */
+    uint16_t index; /* 0 starts a new set; else the number of earlier observations; the last may be repeated */
     uint64_t start_us; /* board time */
     uint64_t end_us; /* board time */
-    float speed_rad_s; /* magnitude of the turn rate in between, rad/s */
+    float speed_rad_s; /* magnitude of the angular rate meanwhile, rad/s */
 } __attribute__((packed));
 _Static_assert(sizeof(struct observe_payload) == 23, "observe_payload");
 
-/* observed, from the board: what was averaged: the samples from start_us up to, not including, end_us */
+/* observed, from the board: average of the samples from start_us up to, not including, end_us */
 struct observed_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t sensor; /* index in the identity's list */
     uint16_t index; /* of the observation */
-    uint64_t start_us; /* board time of the first sample used; within the span asked for */
-    uint64_t end_us; /* board time of the first sample after those used; within the span asked for */
+    uint64_t start_us; /* board time of the first sample used; within the requested span */
+    uint64_t end_us; /* board time of the first sample after those used; within the requested span */
     uint32_t samples; /* number of samples used */
     float mean_rad_s[3]; /* their mean, uncalibrated, rad/s */
 } __attribute__((packed));
@@ -301,7 +301,7 @@ _Static_assert(sizeof(struct solve_payload) == 2, "solve_payload");
 
 /* solution, from the board: a calibration g = K (m + b) in single precision */
 struct solution_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t sensor; /* index in the identity's list */
     uint8_t method; /* enum solve_method */
     uint8_t status; /* enum solution_status; unless solved, scale and bias are 0 */
@@ -312,7 +312,7 @@ struct solution_payload {
 } __attribute__((packed));
 _Static_assert(sizeof(struct solution_payload) == 31, "solution_payload");
 
-/* read_calibration, from the host: what is stored for a sensor? answered by calibration */
+/* read_calibration, from the host: request for a sensor's calibration */
 struct read_calibration_payload {
     uint8_t sensor; /* index in the identity's list */
 } __attribute__((packed));
@@ -320,7 +320,7 @@ _Static_assert(sizeof(struct read_calibration_payload) == 1, "read_calibration_p
 
 /* calibration, from the board: the stored calibration of a sensor */
 struct calibration_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t sensor; /* index in the identity's list */
     uint32_t sequence; /* counts the calibrations ever stored for this sensor, from 1 */
     char part[12]; /* part it was stored for */
@@ -329,53 +329,53 @@ struct calibration_payload {
     uint8_t model; /* enum calibration_model */
     char serial_number[24]; /* of the sensor, as the configuration names it */
     uint64_t written_unix_s; /* when it was written, seconds since 1970 UTC */
-    float temperature_c; /* at which matrix and bias hold, by the sensor's own thermometer, degrees Celsius */
-    float matrix[3][3]; /* what m + b is multiplied by, row by row; of k_times_m_plus_b it is diagonal */
+    float temperature_c; /* of matrix and bias, by the sensor's own thermometer, degrees Celsius */
+    float matrix[3][3]; /* factor of m + b, row by row; diagonal for k_times_m_plus_b */
     float bias_rad_s[3]; /* b, in the units of the reading */
-    float lowest_c; /* from which on the polynomials hold; below it is corrected as there */
-    float highest_c; /* up to which they hold; without polynomials both are temperature_c */
-    float scale_change[3][3]; /* k(T)/k − 1 per K, K², K³ from temperature_c, a row each; 0 = none known */
+    float lowest_c; /* lower end of the polynomials' range; constant below it */
+    float highest_c; /* upper end of that range; without polynomials both are temperature_c */
+    float scale_change[3][3]; /* k(T)/k − 1 per K, K², K³ from temperature_c, a row each; 0 = none */
     float bias_change_rad_s[3][3]; /* b(T) − b likewise */
 } __attribute__((packed));
 _Static_assert(sizeof(struct calibration_payload) == 189, "calibration_payload");
 
-/* write_calibration, from the host: store a calibration for a configured sensor; the old one stays until the new one is whole; answered by ack */
+/* write_calibration, from the host: store a calibration of a configured sensor; the old one stays until the new one is complete; answered by ack */
 struct write_calibration_payload {
     uint8_t sensor; /* index in the identity's list */
     uint8_t model; /* enum calibration_model */
     char serial_number[24]; /* of the sensor, as the configuration names it */
     uint64_t written_unix_s; /* when it was written, seconds since 1970 UTC */
-    float temperature_c; /* at which matrix and bias hold, by the sensor's own thermometer, degrees Celsius */
-    float matrix[3][3]; /* what m + b is multiplied by, row by row; of k_times_m_plus_b it is diagonal */
+    float temperature_c; /* of matrix and bias, by the sensor's own thermometer, degrees Celsius */
+    float matrix[3][3]; /* factor of m + b, row by row; diagonal for k_times_m_plus_b */
     float bias_rad_s[3]; /* b, in the units of the reading */
-    float lowest_c; /* from which on the polynomials hold; below it is corrected as there */
-    float highest_c; /* up to which they hold; without polynomials both are temperature_c */
-    float scale_change[3][3]; /* k(T)/k − 1 per K, K², K³ from temperature_c, a row each; 0 = none known */
+    float lowest_c; /* lower end of the polynomials' range; constant below it */
+    float highest_c; /* upper end of that range; without polynomials both are temperature_c */
+    float scale_change[3][3]; /* k(T)/k − 1 per K, K², K³ from temperature_c, a row each; 0 = none */
     float bias_change_rad_s[3][3]; /* b(T) − b likewise */
 } __attribute__((packed));
 _Static_assert(sizeof(struct write_calibration_payload) == 166, "write_calibration_payload");
 
-/* erase_calibration, from the host: forget the calibration of a sensor; answered by ack */
+/* erase_calibration, from the host: erase the calibration of a sensor; answered by ack */
 struct erase_calibration_payload {
     uint8_t sensor; /* index in the identity's list */
 } __attribute__((packed));
 _Static_assert(sizeof(struct erase_calibration_payload) == 1, "erase_calibration_payload");
 
-/* recall, from the host: add an observation that this board made before it was reset; answered by observed, of no samples */
+/* recall, from the host: add an observation of this board from before a reset; answered by observed, of no samples */
 struct recall_payload {
     uint8_t sensor; /* index in the identity's list */
     uint16_t index; /* as in observe */
     float mean_rad_s[3]; /* as observed then, rad/s */
-    float speed_rad_s; /* magnitude of the turn rate then, rad/s */
+    float speed_rad_s; /* magnitude of the angular rate then, rad/s */
 } __attribute__((packed));
 _Static_assert(sizeof(struct recall_payload) == 19, "recall_payload");
 
-/* imu_samples, from the board: in the place of samples where accelerations are wanted: both triads of one conversion */
+/* imu_samples, from the board: replaces samples if accelerations are requested: both triads of one conversion */
 struct imu_samples_payload {
     uint8_t sensor; /* index in the identity's list */
     uint8_t mode; /* enum sample_mode */
     uint32_t sequence; /* of the first sample; counts every conversion of the part since start */
-    uint32_t dropped; /* conversions since start that never became a sample in a frame */
+    uint32_t dropped; /* conversions since start that were not sent in a frame */
     uint64_t base_time_us; /* board time of the first sample, read before the bus transfer */
     uint8_t count; /* number of samples */
 } __attribute__((packed));
@@ -383,18 +383,18 @@ _Static_assert(sizeof(struct imu_samples_payload) == 19, "imu_samples_payload");
 
 struct imu_samples_item {
     uint32_t delta_us; /* board time after base_time_us */
-    int16_t counts[3]; /* turn rate: x, y, z as the part reports them, in right-handed axes */
+    int16_t counts[3]; /* angular rate: x, y, z as the part reports them, in right-handed axes */
     int16_t acceleration[3]; /* specific force: x, y, z in the same axes; at rest the axis up is positive */
     int16_t temperature_counts; /* as the part reports it */
 } __attribute__((packed));
 _Static_assert(sizeof(struct imu_samples_item) == 18, "imu_samples_item");
 
-/* field_samples, from the board: in the place of samples where a magnetometer is read */
+/* field_samples, from the board: replaces samples for a magnetometer */
 struct field_samples_payload {
     uint8_t sensor; /* index in the identity's list */
     uint8_t mode; /* enum sample_mode */
     uint32_t sequence; /* of the first sample; counts every conversion of the part since start */
-    uint32_t dropped; /* conversions since start that never became a sample in a frame */
+    uint32_t dropped; /* conversions since start that were not sent in a frame */
     uint64_t base_time_us; /* board time of the first sample, read before the bus transfer */
     uint8_t count; /* number of samples */
 } __attribute__((packed));
@@ -406,61 +406,61 @@ struct field_samples_item {
 } __attribute__((packed));
 _Static_assert(sizeof(struct field_samples_item) == 10, "field_samples_item");
 
-/* heat, from the host: switch the heater on, or off; to be said again within two seconds, or it goes off; answered by heating */
+/* heat, from the host: switch the heater on or off; without a repetition within two seconds it switches off; answered by heating */
 struct heat_payload {
-    uint8_t power; /* of 255: which part of the time the heater's pin is up; 0 = off */
+    uint8_t power; /* duty of the heater's pin, of 255; 0 = off */
 } __attribute__((packed));
 _Static_assert(sizeof(struct heat_payload) == 1, "heat_payload");
 
-/* heating, from the board: what the heater does now */
+/* heating, from the board: present state of the heater */
 struct heating_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t power; /* of 255, 0 = off */
-    uint8_t cause; /* enum heater_cause: why it is off; too_hot holds until the host says off itself */
-    float temperature_c; /* of the hottest part when the board last looked, degrees Celsius */
+    uint8_t cause; /* enum heater_cause: reason for being off; too_hot remains until the host switches it off */
+    float temperature_c; /* of the hottest part at the board's last look, degrees Celsius */
 } __attribute__((packed));
 _Static_assert(sizeof(struct heating_payload) == 7, "heating_payload");
 
-/* by_hand, from the host: begin to calibrate a sensor by hand, which is set up with accelerations; answered by ack */
+/* by_hand, from the host: begin to calibrate by hand a sensor that is set up with accelerations; answered by ack */
 struct by_hand_payload {
     uint8_t sensor; /* index in the identity's list */
-    uint8_t moves; /* it is done when so many moves are taken, at least */
-    float scale_std; /* and the scale's standard uncertainty is no larger */
+    uint8_t moves; /* least number of accepted moves */
+    float scale_std; /* largest standard uncertainty of the scale at the end */
 } __attribute__((packed));
 _Static_assert(sizeof(struct by_hand_payload) == 6, "by_hand_payload");
 
-/* hand_status, from the host: how does the calibration by hand go? answered by hand_report */
-/* hand_report, from the board: how a calibration by hand goes, and the move judged last */
+/* hand_status, from the host: request for hand_report */
+/* hand_report, from the board: progress of a calibration by hand, and its last judged move */
 struct hand_report_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t sensor; /* index in the identity's list */
     uint8_t state; /* enum hand_state */
-    uint8_t outcome; /* enum hand_outcome, of the move judged last */
+    uint8_t outcome; /* enum hand_outcome, of the last judged move */
     uint8_t before; /* face it began on: 0 to 5 are +x -x +y -y +z -z upwards, 255 none */
     uint8_t after; /* face it ended on; before any move, the one it lay on at first */
-    uint8_t whole; /* 1 = whole turns on a face, which count as closed */
-    uint8_t settled; /* 1 = what was known after it is what the equations are linear about from then on */
+    uint8_t whole; /* 1 = whole revolutions on a face, which count as closed */
+    uint8_t settled; /* 1 = the equations are linearized about the solution after it from then on */
     uint16_t judged; /* moves judged so far */
-    uint8_t taken; /* of them taken */
-    float angle_rad; /* how far that move turned, there and back */
-    float noise_rad_s; /* standard deviation of a reading at rest, as it was weighed with */
+    uint8_t taken; /* accepted moves */
+    float angle_rad; /* rotation of that move, there and back */
+    float noise_rad_s; /* standard deviation of a reading at rest, used as its weight */
     float scale_std; /* largest standard uncertainty of a scale factor */
-    uint64_t rest_us; /* board time of the first sample of the rest before */
+    uint64_t rest_us; /* board time of the first sample used of the rest before */
     uint64_t move_us; /* of the first of the move, which is the first after that rest */
     uint64_t after_us; /* of the first of the rest after, which is the first after the move */
-    uint64_t end_us; /* of the first after what was used of that rest */
+    uint64_t end_us; /* of the first after the part used of that rest */
 } __attribute__((packed));
 _Static_assert(sizeof(struct hand_report_payload) == 55, "hand_report_payload");
 
-/* hand_solve, from the host: what has the calibration by hand found? answered by hand_solution */
-/* hand_solution, from the board: a calibration g = C (m + b) by hand in single precision, m counted from the g-sensitivity's part */
+/* hand_solve, from the host: request for hand_solution */
+/* hand_solution, from the board: a calibration g = C (m + b) by hand in single precision, with the g-sensitivity's part removed from m */
 struct hand_solution_payload {
-    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t reply_to; /* sequence of the answered frame, 0 = unrequested */
     uint8_t sensor; /* index in the identity's list */
     uint8_t state; /* enum hand_state */
-    uint8_t taken; /* moves it is made of */
+    uint8_t taken; /* number of accepted moves */
     float scale_std; /* largest standard uncertainty of a scale factor */
-    float range_deg_s; /* that the sensor was set up to, degrees a second */
+    float range_deg_s; /* range of the sensor, degrees per second */
     float temperature_c; /* of the sensor when it was last laid down, degrees Celsius */
     float matrix[3][3]; /* C, row by row */
     float bias_rad_s[3]; /* b, in the units of the reading */
