@@ -7,6 +7,7 @@ own (`rig.observation.formats.sample_files`) and keeps no more of the bag than a
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ NOT_PROVIDED = -1.0  # sensor_msgs/Imu: first element of a covariance of what a 
 SUFFIXES = (".mcap", ".db3")
 METADATA = "metadata.yaml"
 METADATA_BYTES = 4_000_000  # of two thousand topics, with all that is said of how each was sent
+METADATA_VALUES = 50_000  # of a thousand topics; rosbags takes 50 µs for each, whatever becomes of it
 DEFINITION_CHARACTERS = 100_000  # ten times what ROS 2 writes of a message, with all comments
 NANO = 10**9
 
@@ -111,10 +113,22 @@ def _opened(path: Path) -> Iterator[Any]:
         from rosbags.rosbag2 import Reader
     except ImportError as error:
         raise missing_extra(error, "ros2") from error
-    if path.is_dir() and (size := (path / METADATA).stat().st_size) > METADATA_BYTES:
-        raise ValueError(f"its {METADATA} is {size} bytes long, {METADATA_BYTES} at most")
+    if path.is_dir():
+        _check_metadata(path / METADATA)
     with Reader(path) as reader:
         yield reader
+
+
+def _check_metadata(path: Path) -> None:
+    """Raise ValueError for metadata that is longer than that of any bag, by bytes or by the values that it holds."""
+    import yaml
+
+    if (size := path.stat().st_size) > METADATA_BYTES:
+        raise ValueError(f"its {METADATA} is {size} bytes long, {METADATA_BYTES} at most")
+    with path.open("rb") as file:
+        values = (event for event in yaml.parse(file, yaml.CSafeLoader) if isinstance(event, yaml.ScalarEvent))
+        if next(islice(values, METADATA_VALUES, None), None) is not None:
+            raise ValueError(f"its {METADATA} holds more than {METADATA_VALUES} values")
 
 
 def _chosen(reader: Any, types: Sequence[str], topic: str | None, what: str) -> Any:
