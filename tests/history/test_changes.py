@@ -1,13 +1,13 @@
-"""What has changed since another calibration: chance raises the alarm in 5 of 100 comparisons at most."""
+"""What has changed since another calibration: chance raises the alarm in 2 of 100 comparisons at most."""
 
 import numpy as np
 import pytest
 
-from rig.estimation.statistics.coverage import PROBABILITY, coverage_factors
-from rig.history.series import changes_in
+from rig.estimation.statistics.coverage import coverage_factors
+from rig.history.series import UNCHANGED, changes_in
 from rig.report.findings.followed import Parameter
 
-ALARMS = 1 - PROBABILITY
+ALARMS = 1 - UNCHANGED
 PAIRS = 1500
 # How many values a sensor has, and their degrees of freedom.
 SENSORS = {
@@ -42,14 +42,14 @@ def alarms(pairs: list[tuple[dict[str, Parameter], dict[str, Parameter]]]) -> fl
 @pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 @pytest.mark.parametrize("sensor", SENSORS)
-def test_an_undamaged_part_has_changed_in_one_of_twenty_comparisons_at_most(sensor: str, correlation: float) -> None:
+def test_an_undamaged_part_has_changed_in_one_of_fifty_comparisons_at_most(sensor: str, correlation: float) -> None:
     random, freedom = np.random.default_rng(1), np.array(SENSORS[sensor])
     pairs = [(drawn(random, freedom, correlation), drawn(random, freedom, correlation)) for _ in range(PAIRS)]
     allowed = ALARMS + 3 * np.sqrt(ALARMS * (1 - ALARMS) / PAIRS)  # by chance of the draw
     share = alarms(pairs)
     print(f"{sensor}, correlation {correlation}: {share:.1%}")
     assert share <= allowed
-    assert correlation or share > 0.015, "and the limit is no wider than it must be"
+    assert correlation or share > 0.006, "and the limit is no wider than it must be"
 
 
 @pytest.mark.slow
@@ -62,12 +62,12 @@ def test_all_values_of_a_run_are_one_comparison() -> None:
 
 @pytest.mark.slow
 def test_a_change_of_2_u_in_one_value_of_nineteen_is_told() -> None:
-    """2 U of the change: noise hides it in a sixth of the comparisons, and in none if it is what both results say."""
+    """2 U of the change: noise hides it in a quarter of the comparisons, and in none if it is what both results say."""
     random, freedom = np.random.default_rng(3), np.full(19, np.inf)
     shift = 2 * 2 * np.sqrt(2)
     told = alarms([(drawn(random, freedom, 0.0), drawn(random, freedom, 0.0, shift)) for _ in range(400)])
-    assert 0.78 < told < 0.92
+    assert 0.70 < told < 0.85
     before = {str(i): Parameter(str(i), 0.0, 1.0, None, "1") for i in range(19)}
     (changes,) = changes_in([(before, before | {"7": Parameter("7", shift, 1.0, None, "1")})])
     assert [change.name for change in changes if change.has_changed] == ["7"]
-    assert changes[7].normalised_error == pytest.approx(2.0) and changes[7].limit == pytest.approx(1.52, abs=0.01)
+    assert changes[7].normalised_error == pytest.approx(2.0) and changes[7].limit == pytest.approx(1.64, abs=0.01)

@@ -54,12 +54,12 @@ def false_alarm_of_each(of_all: float, tests: int) -> float:
     return of_all / tests
 
 
-def joint_factors(values: int, freedom: ArrayLike) -> Array:
-    """Return the k by which so many `values` ± k u hold all true values at once, with 95.45 % at least.
+def joint_factors(values: int, freedom: ArrayLike, probability: float) -> Array:
+    """Return the k by which so many `values` ± k u hold all true values at once, with that `probability` at least.
 
-    `freedom` are degrees of freedom of any shape; for one value it is `coverage_factors`.
+    `freedom` are degrees of freedom of any shape; for one value and `PROBABILITY` it is `coverage_factors`.
     """
-    whole, tail = _whole(freedom), false_alarm_of_each(1 - PROBABILITY, values) / 2
+    whole, tail = _whole(freedom), false_alarm_of_each(1 - probability, values) / 2
     factors = np.full(np.shape(freedom), -NormalDist().inv_cdf(tail))
     if np.isfinite(whole).any():
         from scipy.special import stdtrit

@@ -28,7 +28,7 @@ def comparison_in_words(changes: Sequence[Change]) -> str:
     limit = " to ".join(dict.fromkeys(f"{size:.2f}" for size in (min(limits), max(limits))))
     return (
         f"{share}. As {compared} are compared{others}, one has changed if its E_n is above {limit}: "
-        "chance alone takes one of them that far in fewer than 5 of 100 comparisons"
+        "chance alone takes one of them that far in 2 of 100 comparisons at most"
     )
 
 
