@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
+from itertools import accumulate
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -32,48 +33,61 @@ class SampleBatch(NamedTuple):
     dropped: int
     samples: np.ndarray
 
-    @classmethod
-    def of(cls, frames: Sequence[Frame], host_time_s: float) -> Self:
-        """Frames of one kind that came at `host_time_s`, each of which goes on where the one before ended.
-
-        They are put together as bytes and taken apart once: most of what a frame costs alone is the same for many.
-        """
-        first, heads = frames[0], [frame.values for frame in frames]
-        items = first._replace(content=b"".join([frame.content for frame in frames])).items
-        samples = np.empty(len(items), _DTYPES.get(first.name, SAMPLE_DTYPE))
-        sequence = heads[0]["sequence"]
-        samples["sequence"] = np.arange(sequence, sequence + len(items))
-        base_times_us = np.array([head["base_time_us"] for head in heads], np.uint64)
-        samples["board_time_us"] = base_times_us.repeat([head["count"] for head in heads]) + items["delta_us"]
-        samples["host_time_s"] = host_time_s
-        if first.name == "field_samples":
-            samples["field_counts"] = items["field"]
-        else:
-            samples["counts"] = items["rate_urad_s" if first.name == "rates" else "counts"]
-            samples["temperature_counts"] = items["temperature_counts"]
-        if first.name == "imu_samples":
-            samples["acceleration_counts"] = items["acceleration"]
-        last = heads[-1]
-        return cls(last["sensor"], protocol.MODES[last["mode"]], last["dropped"], samples)
-
 
 def sample_batches(frames: Iterable[Frame], host_time_s: float) -> Iterator[SampleBatch]:
     """The batches of frames of a stream that came together at `host_time_s`, as few as there can be.
 
     Those of a sensor come in their order; a batch ends where samples are missing, or their kind changes.
     """
-    runs: dict[int, list[Frame]] = {}
+    runs = _runs(frames)
+    samples = {name: _samples(name, runs, host_time_s) for name in {run[0].name for run in runs}}
+    taken = dict.fromkeys(samples, 0)
+    for run in runs:
+        name, first, last = run[0].name, run[0].values, run[-1].values
+        begin = taken[name]
+        taken[name] += last["sequence"] + last["count"] - first["sequence"]
+        mode = protocol.MODES[last["mode"]]
+        yield SampleBatch(last["sensor"], mode, last["dropped"], samples[name][begin : taken[name]])
+
+
+def _runs(frames: Iterable[Frame]) -> list[list[Frame]]:
+    """Return the frames of each sensor that go on where the one before ended; those of a sensor in their order."""
+    runs, latest = list[list[Frame]](), dict[int, list[Frame]]()
     for frame in frames:
         sensor = frame.values["sensor"]
-        run = runs.get(sensor)
+        run = latest.get(sensor)
         if run is not None and _goes_on(run[-1], frame):
             run.append(frame)
-            continue
-        if run is not None:
-            yield SampleBatch.of(run, host_time_s)
-        runs[sensor] = [frame]
-    for run in runs.values():
-        yield SampleBatch.of(run, host_time_s)
+        else:
+            latest[sensor] = run = [frame]
+            runs.append(run)
+    return runs
+
+
+def _samples(name: str, runs: Sequence[Sequence[Frame]], host_time_s: float) -> np.ndarray:
+    """Return the samples (n,) of all frames of that name, run after run.
+
+    They are put together as bytes and taken apart once: most of what a frame costs alone is the same for many.
+    """
+    frames = [frame for run in runs if run[0].name == name for frame in run]
+    items = np.frombuffer(b"".join([frame.content for frame in frames]), protocol.MESSAGE_BY_NAME[name].item_dtype)
+    heads = [frame.values for frame in frames]
+    counts = [head["count"] for head in heads]
+    base_times_us = np.array([head["base_time_us"] for head in heads], np.uint64)
+    before = accumulate(counts, initial=0)  # items of the frames before
+    less = np.array([head["sequence"] - items_before for head, items_before in zip(heads, before, strict=False)])
+    samples = np.empty(len(items), _DTYPES.get(name, SAMPLE_DTYPE))
+    samples["sequence"] = less.repeat(counts) + np.arange(len(items))
+    samples["board_time_us"] = base_times_us.repeat(counts) + items["delta_us"]
+    samples["host_time_s"] = host_time_s
+    if name == "field_samples":
+        samples["field_counts"] = items["field"]
+    else:
+        samples["counts"] = items["rate_urad_s" if name == "rates" else "counts"]
+        samples["temperature_counts"] = items["temperature_counts"]
+    if name == "imu_samples":
+        samples["acceleration_counts"] = items["acceleration"]
+    return samples
 
 
 def _goes_on(before: Frame, frame: Frame) -> bool:

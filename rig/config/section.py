@@ -38,7 +38,7 @@ def _kinds(annotation: Any) -> set[Any]:
 class Section(BaseModel):
     """A part of the file: unknown keys are refused, values are frozen."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
 

@@ -144,7 +144,7 @@ class ProvenanceEntry(Entry):
     `readings_file` and `motion_file` of readings recorded elsewhere; no arm and no board are named then.
     """
 
-    model_config = ConfigDict(frozen=True, extra="allow")
+    model_config = ConfigDict(frozen=True, extra="allow", defer_build=True)
     __pydantic_extra__: dict[str, JsonValue] = Field(init=False)
 
     started_utc: Utc

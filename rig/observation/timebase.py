@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.cubic_spline import CubicSpline
 from rig.observation.motion.known_motion import KnownMotion, check_span, not_finite
 from rig.observation.statistics.coloured_noise import correlation_inflation
 
@@ -204,8 +205,6 @@ def _coarse_offset(
     Cross-correlates each axis with each (not magnitudes, in which a bias can hide the turning) and judges its peaks by
     the vector fit. A step holds at least one sample.
     """
-    from scipy.fft import next_fast_len
-
     step_s = max(COARSE_STEP_S, 1.1 * float(np.median(np.diff(time_s))))
     bins = ((time_s - time_s[0]) / step_s).astype(np.intp)
     counts = np.bincount(bins)
@@ -215,7 +214,7 @@ def _coarse_offset(
     start_s, moving = arm_rate(step_s)
 
     count = len(filled) + moving.shape[1]
-    size = next_fast_len(count, real=True)
+    size = _fast_length(count)
     spectra = np.conj(np.fft.rfft(turning, size)), np.fft.rfft(moving, size)
     squares = sum(np.fft.irfft(one * other, size) ** 2 for one in spectra[0] for other in spectra[1])
     correlation = np.roll(squares, len(filled))[:count]
@@ -226,6 +225,14 @@ def _coarse_offset(
     fraction, lag = max(zip(explained.tolist(), best.tolist(), strict=True), default=(0.0, 0))
     # Bin j of the board, whose middle lies half a step after its start, corresponds to point j + lag of the arm's grid.
     return fraction, float(start_s + lag * step_s - time_s[0] - step_s / 2)
+
+
+def _fast_length(least: int) -> int:
+    """Return the next number without prime factors beyond 5: of such lengths a Fourier transform is fast."""
+    threes = (3**power for power in range(least.bit_length()))
+    odd = (three * 5**power for three in threes for power in range(least.bit_length()) if three * 5**power < 2 * least)
+    found: int = min(number << (-(-least // number) - 1).bit_length() for number in odd)
+    return found
 
 
 def _explained_fractions(turning: Array, filled: NDArray[np.bool_], moving: Array, lags: NDArray[np.intp]) -> Array:
@@ -252,8 +259,6 @@ class _SlowMotion:
     """A `KnownMotion` between two times, with its rate averaged over `over_s`."""
 
     def __init__(self, motion: KnownMotion, over_s: float, start_s: float, end_s: float) -> None:
-        from scipy.interpolate import CubicSpline
-
         self.time_s, self.covered = motion.time_s, motion.covered
         step_s = over_s / AVERAGED
         times_s = np.arange(max(start_s, self.time_s[0]), min(end_s, self.time_s[-1]), step_s)

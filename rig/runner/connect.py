@@ -79,9 +79,6 @@ class Connector:
         was recorded earlier, or has no calibration to correct by.
         """
         whole_plan = self.phase.plan()
-        # The board's own calibration needs it of the host after each sweep: to import it takes longer than to use it.
-        import scipy.interpolate  # noqa: F401
-
         if self.resumed.earlier and not self.phase.agreed:  # a stage that follows resumes nothing
             self.station.event(RunResumed(len(self.resumed.done), len(whole_plan.sweeps) + len(whole_plan.dwells)))
         acquisition = Acquisition()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rig.analysis.gyroscope.alignment import mean_rates
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.cubic_spline import CubicSpline
 from rig.observation.arm_rests import MIN_SAMPLES_AT_REST
 from rig.observation.average import Stream
 from rig.observation.consistency.movement_masks import mask_movement
@@ -188,10 +189,8 @@ def _surrounded(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
 
 def _interpolated(known: Stream, reference: Reference, time_s: Array) -> Array:
     """(n, 3) the reference's corrected rate at other times: a cubic spline, for a chord cuts the vibration's crests."""
-    from scipy.interpolate import CubicSpline
-
     rate = reference.scale * (known.readings_rad_s + reference.bias_rad_s)
-    return np.asarray(CubicSpline(known.time_s, rate)(time_s), dtype=np.float64)
+    return CubicSpline(known.time_s, rate)(time_s)
 
 
 def _deviation(errors: Sequence[Array]) -> Deviation:

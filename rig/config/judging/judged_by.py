@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from rig.config.section import RATIO, Positive, no_number_is_true
 
-JUDGES = ConfigDict(frozen=True, allow_inf_nan=False)
+JUDGES = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 NonNegative = Annotated[float, Field(ge=0)]
 DecisionRule = Literal["simple", "guard_band"]
 OfSensor = Literal[

@@ -38,7 +38,7 @@ class Limits(BaseModel):
     """The verdict's limits; None where what needs one was not asked for."""
 
     # What a later version limits too is ignored when a recording is read.
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 
     scale_deviation: Annotated[Positive, Limit("rate", "scale_deviation", "1", "conformity", "scale")] = Field(
         description="largest difference of a scale factor from 1, |k − 1|", json_schema_extra=RATIO

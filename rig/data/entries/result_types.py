@@ -41,7 +41,7 @@ class Entry(BaseModel):
     """A part of the document."""
 
     # What a later version has added is ignored when it is read.
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class ConditionsEntry(Entry):

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.cubic_spline import CubicSpline
 from rig.observation.motion.known_motion import MIN_RATE_RAD_S, closely_followed
 
 MAX_STEP_S = 0.05  # between rows that still show how the table turned
@@ -20,8 +21,6 @@ class TableMotion:
     """
 
     def __init__(self, middles_s: Array, attitudes: Array, rates_rad_s: Array | None) -> None:
-        from scipy.interpolate import CubicSpline
-
         order = np.argsort(middles_s)
         self.time_s = middles_s[order]
         close = np.diff(self.time_s) <= MAX_STEP_S

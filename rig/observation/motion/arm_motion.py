@@ -11,6 +11,7 @@ from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.estimation.cubic_spline import CubicSpline
 from rig.motion.geometry import (
     NOMINAL,
     DenavitHartenberg,
@@ -55,8 +56,6 @@ class ArmMotion:
         mount: Array | None = None,
         reading_std_rad: float = 0.0,
     ) -> None:
-        from scipy.interpolate import CubicSpline
-
         self.kinematics, self._names, self._scatters = kinematics, names, reading_std_rad > 0
         self.mount: Array = np.eye(3) if mount is None else mount
         states = well_timed(states) if self._scatters else states
