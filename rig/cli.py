@@ -1,6 +1,7 @@
 """The command line: which commands there are. Each is imported when it is meant, so that help comes at once."""
 
 import argparse
+import gc
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 if "numpy" not in sys.modules:
     for _library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+# What is imported lives as long as the process: to look through it for garbage takes a tenth of a short command.
+_COLLECTED_AFTER = 50_000  # objects that hold others
 
 # Of each its module, in which `add` says what it takes and `run` does it, and its help line.
 _COMMANDS = {
@@ -103,6 +107,7 @@ FAULT, INTERRUPTED = Fault.exit_status, 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `rig`; returns the exit status docs/architecture.md promises (0 to 5, or 130)."""
+    gc.set_threshold(_COLLECTED_AFTER)
     keep_streams_usable()  # help too is read by `head`, and by terminals that know no °
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["history"]:

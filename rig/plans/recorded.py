@@ -1,11 +1,13 @@
 """A run as it was recorded, and judged again by the procedure that judged it when it ended."""
 
 import os
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from rig.analysis.outcome import Outcome
+from rig.data.processes.reading_process import Reading
 from rig.data.recording.run_file import RunData, read_run
 from rig.data.run_folder import SCRIPT, recordings
 from rig.errors import Refused
@@ -44,16 +46,23 @@ class RecordedRun:
         return replace(self, raw=raw, corrected=corrected)
 
 
-def open_run(path: Path, script: Path | None = None, *, only: Container[str] | None = None) -> RecordedRun:
+def open_run(
+    path: Path,
+    script: Path | None = None,
+    *,
+    only: Container[str] | None = None,
+    begun: Mapping[Path, Reading] = MappingProxyType({}),
+) -> RecordedRun:
     """The recordings in a run folder, or a run file; `script` is executed, if it is named.
 
-    Of a folder `only` those of these names, where some are given: what was recorded there later is left out.
+    Of a folder `only` those of these names, where some are given: what was recorded there later is left out. Those
+    that are `begun` are being read already.
 
     Raises Refused `no_run`, and as `read_run` and `load_script`.
     """
     named = None if script is None else load_script(script)
     if not path.is_dir():
-        run = read_run(path)
+        run = read_run(path, begun=begun.get(path))
         corrected = _is_corrected(run)
         return RecordedRun(path, () if corrected else (run,), (run,) if corrected else (), alone=True, script=named)
     # Corrected readings are compared as one whole movement: what was interrupted before it does not count.
@@ -61,7 +70,9 @@ def open_run(path: Path, script: Path | None = None, *, only: Container[str] | N
         [file for file in recordings(path, readings) if only is None or file.name in only]
         for readings in ("raw", "calibrated")
     )
-    raw, repeated = (tuple(map(read_run, files)) for files in (raw_files, repeated_files[-1:]))
+    raw, repeated = (
+        tuple(read_run(file, begun=begun.get(file)) for file in files) for files in (raw_files, repeated_files[-1:])
+    )
     if not raw and not repeated:
         why = "holds no run.h5" if os.access(path, os.R_OK | os.X_OK) else "cannot be read: Permission denied"
         raise Refused("no_run", f"{path} {why}", "Give a run folder or a run file")

@@ -64,11 +64,14 @@ def _recording(options: Namespace) -> int:
     `--set` changes what it is judged by, see `RunSettings.with_overrides`. `--script` is the one it was recorded by,
     where that is another's.
     """
-    from rig.plans.recorded import judged, left_out, open_run
-    from rig.report.document import document_of
-    from rig.report.terminal.table import print_outcome
+    from rig.data.recording.run_reading import reading_ahead
 
-    run = open_run(options.run, options.script).judged_by(options.overrides)
+    with reading_ahead(options.run) as begun:
+        from rig.plans.recorded import judged, left_out, open_run
+        from rig.report.document import document_of
+        from rig.report.terminal.table import print_outcome
+
+        run = open_run(options.run, options.script, begun=begun).judged_by(options.overrides)
     say_on_terminal("solving")
     outcome = judged(run, options.estimator)
     if (said := left_out(run)) is not None:

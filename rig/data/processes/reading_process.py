@@ -18,17 +18,18 @@ from dataclasses import asdict, dataclass
 from enum import IntEnum
 from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO
-
-import numpy as np
-from numpy.typing import NDArray
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, BinaryIO, Self, TypeAlias
 
 from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
 from rig.data.processes.silence import Silence
 from rig.errors import Refused
 from rig.errors.quoting import printable
 
-Part = dict[str, Any] | NDArray[Any]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Part: TypeAlias = "dict[str, Any] | NDArray[Any]"
 Reader = Callable[..., Iterator[Part]]
 
 MOST_FILES = 10_000  # in a folder: a bag is split into one for every minute or gigabyte
@@ -133,37 +134,65 @@ def size_without_holes(file: BinaryIO) -> int:
     return stored
 
 
-def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> list[Part]:
-    """Return the parts that a `reader` ("module:function") yields of a file, called with its path and `arguments`.
+class Reading:
+    """A file that another process reads by a `reader` ("module:function"), called with its path and `arguments`.
 
-    The arguments are such as JSON has. Raise `UnreadableFile` for what cannot be read, `CostlyFile` for what goes
-    beyond the limits; Refused `temporary_folder_full`, and as the reader does.
+    The arguments are such as JSON has. The process has begun: what its parts need may be imported meanwhile. On the way
+    out it is ended. Raises Refused `temporary_folder_full`.
     """
-    request = {"reader": reader, "path": str(path), "arguments": arguments, "limits": asdict(limits)}
-    # Not from the working folder, where any file could pass for a module, but by what this process finds modules by.
-    command = [sys.executable, "-P", "-m", "rig.data.processes.reading_child"]
-    with ExitStack() as stack:
+
+    def __init__(self, reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> None:
+        request = {"reader": reader, "path": str(path), "arguments": arguments, "limits": asdict(limits)}
+        # Not from the working folder, where any file could pass for a module, but by what this one finds modules by.
+        command = [sys.executable, "-P", "-m", "rig.data.processes.reading_child"]
+        self._path, self._limits = path, limits
+        with ExitStack() as stack:
+            try:
+                told, self._out = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
+                room = stack.enter_context(tempfile.TemporaryDirectory(prefix="rig-reads-", ignore_cleanup_errors=True))
+                told.write(json.dumps(request).encode())
+                told.seek(0)
+            except OSError as error:
+                raise _no_room(path, str(error)) from error
+            environment = {**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+            environment |= dict.fromkeys(("TMPDIR", "SQLITE_TMPDIR"), room)
+            self._process = subprocess.Popen(
+                command, stdin=told, stdout=self._out, stderr=subprocess.PIPE, env=environment
+            )
+            stack.callback(_end, self._process)
+            self._ending = stack.pop_all()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ending.close()
+
+    def parts(self) -> list[Part]:
+        """Return the parts that the reader yields, once it has ended.
+
+        Raise `UnreadableFile` for what cannot be read, `CostlyFile` for what goes beyond the limits; Refused
+        `temporary_folder_full`, and as the reader does.
+        """
         try:
-            told, out = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
-            room = stack.enter_context(tempfile.TemporaryDirectory(prefix="rig-reads-", ignore_cleanup_errors=True))
-            told.write(json.dumps(request).encode())
-            told.seek(0)
-        except OSError as error:
-            raise _no_room(path, str(error)) from error
-        environment = {**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        environment |= dict.fromkeys(("TMPDIR", "SQLITE_TMPDIR"), room)
-        reading = subprocess.Popen(command, stdin=told, stdout=out, stderr=subprocess.PIPE, env=environment)
-        try:
-            complaint = _awaited(reading, limits.idle_s)
+            complaint = _awaited(self._process, self._limits.idle_s)
         except TimeoutError:
-            raise CostlyFile(f"no end of it was found in {limits.idle_s:.0f} s") from None
+            raise CostlyFile(f"no end of it was found in {self._limits.idle_s:.0f} s") from None
         finally:
-            _end(reading)
-        if reading.returncode == Status.NO_ROOM:
-            raise _no_room(path, complaint.decode(errors="replace").strip())
-        _raise_failure(reading.returncode, complaint, limits)
-        out.seek(0)
-        return list(_parts(out))
+            _end(self._process)
+        if self._process.returncode == Status.NO_ROOM:
+            raise _no_room(self._path, complaint.decode(errors="replace").strip())
+        _raise_failure(self._process.returncode, complaint, self._limits)
+        self._out.seek(0)
+        return list(_parts(self._out))
+
+
+def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> list[Part]:
+    """Return the parts that a `reader` yields of a file: see `Reading`. Raise as `Reading` and `Reading.parts`."""
+    with Reading(reader, path, arguments, limits) as reading:
+        return reading.parts()
 
 
 def _awaited(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
@@ -217,6 +246,8 @@ def _no_room(path: Path, why: str) -> Refused:
 
 def _parts(out: Any) -> Iterator[Part]:
     """Yield what the process wrote: a line of JSON, or an array in NumPy's format, one after the other."""
+    import numpy as np
+
     while start := out.read(1):
         out.seek(-1, os.SEEK_CUR)
         yield json.loads(out.readline()) if start == b"{" else np.load(out)

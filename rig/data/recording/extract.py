@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.processes.reading_process import MAX_UNPACKED, ReadingLimits, size_without_holes
+from rig.data.processes.reading_process import MAX_UNPACKED, size_without_holes
+from rig.data.recording.run_reading import MAX_UNWRITTEN_BYTES
 from rig.data.recording.schema import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
@@ -22,14 +23,6 @@ MAX_SENSORS = 64
 MAX_COLUMNS = 40  # of states: times, joints, and 32 fields
 LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000  # characters: configurations have 65,536 at most; numbers
 MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
-MAX_UNWRITTEN_BYTES = 50_000_000  # of all of them
-LIBRARIES_BYTES = 1 << 29  # of memory, and more than the libraries and the structures of any file take
-
-
-def limits_of_run(stored_bytes: int, time_s: float) -> ReadingLimits:
-    """Return what may be taken to read a run file: a packed piece need not be as long as it says."""
-    rows_bytes = MAX_UNPACKED * stored_bytes + MAX_UNWRITTEN_BYTES
-    return ReadingLimits(LIBRARIES_BYTES + 3 * rows_bytes, time_s, time_s, 2 * rows_bytes)  # rows, and their copies
 
 
 def contents(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:

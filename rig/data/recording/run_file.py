@@ -18,18 +18,18 @@ from typing import Any, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
 from rig.config.section import SensorName
 from rig.data.checked import LARGEST_NUMBER, checked, parsed
-from rig.data.processes.reading_process import UnreadableFile, read_apart, size_without_holes
+from rig.data.processes.reading_process import Reading, UnreadableFile
 from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
 from rig.data.recording.events import Event, Recorded, from_lines, to_line
-from rig.data.recording.extract import limits_of_run, reason
+from rig.data.recording.extract import reason
 from rig.data.recording.layout import Contents, append, check_rows, empty, lay_out, table_of
 from rig.data.recording.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner, check_joints
+from rig.data.recording.run_reading import begin_reading
 from rig.data.recording.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES
 from rig.data.recording.settings import RunSettings, settings_from_json
 from rig.errors import Fault, Refused
@@ -37,7 +37,6 @@ from rig.errors.quoting import quote
 from rig.motion.state import State
 
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
-READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
 LARGEST_STATE = 1e12  # of a turner's states, in SI units; times are among them
 
 
@@ -191,14 +190,15 @@ class RunRecorder:
         )
 
 
-def read_run(path: Path, timeout_s: float | None = None) -> RunData:
+def read_run(path: Path, timeout_s: float | None = None, *, begun: Reading | None = None) -> RunData:
     """Read a run file: finished, still being written, or left behind by a killed process.
 
+    `begun` is its `begin_reading`, if that has been called already.
     Rows that the kill left unwritten or torn at the end are dropped. Raises Refused: `no_run_file` when there is none,
     `not_a_run_file` when it is something else, damaged, of another schema, or cannot be read within `timeout_s` (None:
     by its size), not counting the time in which the machine is too busy to read; `temporary_folder_full`.
     """
-    contents = _contents(path, timeout_s)
+    contents = _contents(path, timeout_s, begun)
     try:
         checked(_Named, {"sensors": [*contents.described]}, "samples")
         elsewhere = _elsewhere(contents) if contents.tables else None
@@ -253,13 +253,11 @@ def make_plain(path: Path) -> None:
     lay_out(path, replace(contents, samples=samples, states=_whole_rows(contents.states)), swmr=False)
 
 
-def _contents(path: Path, timeout_s: float | None) -> Contents:
+def _contents(path: Path, timeout_s: float | None, begun: Reading | None = None) -> Contents:
     """What the file holds, read by a process that can be ended: see `rig.data.recording.extract`."""
-    stored = _stored_bytes(path)
-    if timeout_s is None:
-        timeout_s = READ_TIMEOUT_S + stored / READ_BYTES_PER_S
     try:
-        header, *arrays = read_apart("rig.data.recording.extract:contents", path, {}, limits_of_run(stored, timeout_s))
+        with begun or begin_reading(path, timeout_s) as reading:
+            header, *arrays = reading.parts()
     except UnreadableFile as error:
         raise _not_a_run_file(path, str(error)) from error
     told, rows = cast("dict[str, Any]", header), iter(cast("list[NDArray[Any]]", arrays))
@@ -275,19 +273,6 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
     except (ValueError, RecursionError) as error:
         raise _not_a_run_file(path, str(error)) from None
     return contents
-
-
-def _stored_bytes(path: Path) -> int:
-    try:
-        with open_regular_file(path, RECORDING_MAX_BYTES) as file:
-            return size_without_holes(file)
-    except FileNotFoundError:
-        why = f"there is no file {path}"
-    except UnfitFile as error:
-        why = f"{path} cannot be read: {error}"
-    except OSError as error:
-        why = f"{path} cannot be read: {error.strerror}"
-    raise Refused("no_run_file", why, "Give the path of a run.h5 that you may read")
 
 
 def _not_a_run_file(path: Path, why: str) -> Refused:

@@ -1,0 +1,58 @@
+"""Begins to read a run file in another process, before what its contents need is imported here: both take as long."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
+from rig.data.processes.reading_process import MAX_UNPACKED, Reading, ReadingLimits, size_without_holes
+from rig.errors import Refused
+
+FIRST_RECORDING = "run.h5"
+READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
+MAX_UNWRITTEN_BYTES = 50_000_000  # of all rows that are announced and not there
+LIBRARIES_BYTES = 1 << 29  # of memory, and more than the libraries and the structures of any file take
+
+
+def begin_reading(path: Path, timeout_s: float | None = None) -> Reading:
+    """Begin to read a run file (`rig.data.recording.extract`), to be done within `timeout_s` (None: by its size).
+
+    Raises Refused `no_run_file`, and as `Reading`.
+    """
+    stored = _stored_bytes(path)
+    if timeout_s is None:
+        timeout_s = READ_TIMEOUT_S + stored / READ_BYTES_PER_S
+    return Reading("rig.data.recording.extract:contents", path, {}, _limits(stored, timeout_s))
+
+
+def _limits(stored_bytes: int, time_s: float) -> ReadingLimits:
+    """Return what may be taken to read a run file: a packed piece need not be as long as it says."""
+    rows_bytes = MAX_UNPACKED * stored_bytes + MAX_UNWRITTEN_BYTES
+    return ReadingLimits(LIBRARIES_BYTES + 3 * rows_bytes, time_s, time_s, 2 * rows_bytes)  # rows, and their copies
+
+
+def _stored_bytes(path: Path) -> int:
+    try:
+        with open_regular_file(path, RECORDING_MAX_BYTES) as file:
+            return size_without_holes(file)
+    except FileNotFoundError:
+        why = f"there is no file {path}"
+    except UnfitFile as error:
+        why = f"{path} cannot be read: {error}"
+    except OSError as error:
+        why = f"{path} cannot be read: {error.strerror}"
+    raise Refused("no_run_file", why, "Give the path of a run.h5 that you may read")
+
+
+@contextmanager
+def reading_ahead(run: Path) -> Iterator[dict[Path, Reading]]:
+    """Read the first recording of a run folder, or a run file, for the length of the block; yield it by its path.
+
+    Nothing of a folder in which there is none. Raises as `begin_reading`.
+    """
+    first = run / FIRST_RECORDING if run.is_dir() else run
+    if first != run and not first.exists():
+        yield {}
+        return
+    with begin_reading(first) as reading:
+        yield {first: reading}
