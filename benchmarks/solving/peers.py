@@ -70,11 +70,17 @@ def by_vector_model(samples: Session, *, with_gravity: bool = False) -> Array:
     sections = [samples[f"gyr_{name}"] for name in (*HOLDS, "x_rot", "y_rot", "z_rot")]
     by_axis = [section.T.copy() for section in sections]  # a sum along what lies side by side is four times as fast
     means = np.array([readings.mean(axis=1) for readings in by_axis])
-    variances = np.array([readings.var(axis=1) / readings.shape[1] for readings in by_axis])
+    variances = np.array([_mean_squares(section, mean) for section, mean in zip(by_axis, means, strict=True)])
     rates = np.concatenate([np.zeros((6, 3)), -SPEED_RAD_S * np.eye(3)])
     up = np.concatenate([list(UP.values()), np.eye(3)])
     solved = solve_vector_model(means, rates, variances, gravity_m_s2=GRAVITY_M_S2 * up if with_gravity else None)
     return np.concatenate([solved.scale, solved.bias_rad_s])
+
+
+def _mean_squares(readings: Array, mean: Array) -> Array:
+    """(3,) variances of the means of readings (3, n)."""
+    away = readings - mean[:, None]
+    return np.einsum("in,in->i", away, away) / readings.shape[1] ** 2
 
 
 def main() -> None:

@@ -178,10 +178,16 @@ def check_axes(axes: Array, nominal: Array | None) -> None:
             raise Fault(
                 "wrong_mounting", f"the sensor's {'xyz'[worst]} axis lies {angle:.0f}° off its mounting", remedy
             )
-    if np.linalg.det(axes) < 0:
+    if _is_left_handed(axes):
         raise Fault(
             "mirrored_axis", "the sensor's axes form a left-handed frame: one is mirrored or two swapped", remedy
         )
+
+
+def _is_left_handed(matrix: Array) -> bool:
+    """Return whether the determinant of a matrix (3, 3) is negative: of so few numbers plain Python is the quickest."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    return bool(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0)
 
 
 def check_rotations(attitudes: Array) -> None:
@@ -207,7 +213,7 @@ def check_side(reference: Array, side: Array) -> None:
 
 def check_handedness(matrix: Array) -> None:
     """Raise Fault `mirrored_axis` if F (3, 3) is that of a left-handed sensor."""
-    if np.linalg.det(matrix) < 0:
+    if _is_left_handed(matrix):
         raise Fault(
             "mirrored_axis",
             "the sensor's axes form a left-handed frame: one is mirrored or two are swapped",

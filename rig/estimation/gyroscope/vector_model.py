@@ -133,7 +133,7 @@ def solve_vector_model(
         speed_noise = of_the_speed(rates, speed_std, coefficients[:3].T)
         coefficients, inverse = regress(design, means, variances + speed_noise**2, shared)
         speed_noise = of_the_speed(rates, speed_std, coefficients[:3].T)
-    raw = _raw_covariance(inverse, variances, speed_noise, shared)
+    raw = _raw_covariance(inverse, variances, speed_noise if speed_std.any() else None, shared)
 
     matrix = coefficients[:3].T
     check_reads(matrix)
@@ -204,8 +204,9 @@ def design_matrix(rates: Array, gravity: Array | None) -> Array:
 def _unit(design: Array) -> Array:
     """(p,) the size of each block of columns, so that rate, one and gravity compare while a missing axis shows."""
     unit = np.ones(design.shape[1])
+    squares = np.einsum("np,np->p", design, design)
     for block in (slice(0, 3), slice(4, None)):
-        unit[block] = float(np.linalg.norm(design[:, block])) / len(design) ** 0.5 or 1.0
+        unit[block] = (float(squares[block].sum()) / len(design)) ** 0.5 or 1.0
     return unit
 
 
@@ -231,11 +232,13 @@ def of_the_speed(rates: Array, speed_std: Array, matrix: Array) -> Array:
     return noise
 
 
-def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array, shared: Array | None) -> Array:
+def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None, shared: Array | None) -> Array:
     """(3 p, 3 p) covariance of the coefficients, axis by axis; a wrong speed moves all three axes at once."""
     columns, count = inverse.shape[1:]
-    of_speed = (inverse * speed_noise.T[:, None]).reshape(3 * columns, count)
-    covariance = (of_speed @ of_speed.T).reshape(3, columns, 3, columns)
+    covariance = np.zeros((3, columns, 3, columns))
+    if speed_noise is not None:
+        of_speed = (inverse * speed_noise.T[:, None]).reshape(3 * columns, count)
+        covariance += (of_speed @ of_speed.T).reshape(covariance.shape)
     noise = inverse * variances.T[:, None]
     if shared is not None:
         noise = noise + inverse @ shared
@@ -261,6 +264,6 @@ def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -
 
 def _response(to_parameters: Array, inverse: Array) -> Array:
     """(6, N, 3) derivative of k and b with respect to each mean reading, from (6, 12) and the linear map (3, p, N)."""
-    of_matrix = np.einsum("qij,ijn->qni", to_parameters[:, :9].reshape(6, 3, 3), inverse[:, :3])
-    response: Array = of_matrix + np.einsum("qi,in->qni", to_parameters[:, 9:], inverse[:, 3])
+    by_axis = np.concatenate([to_parameters[:, :9].reshape(6, 3, 3), to_parameters[:, 9:, None]], axis=2)
+    response: Array = np.matmul(np.swapaxes(by_axis, 0, 1), inverse[:, :4]).transpose(1, 2, 0)
     return response
