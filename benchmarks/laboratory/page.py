@@ -28,6 +28,9 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
 from support.page.told_runs import ABOUT, before_it_moves, moving, planned
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from goals import record
+
 BROWSERS, STALLED = 5, 5
 PERIOD_S = 0.02  # between two looks at the arm, as in a run
 EVENTS = 3  # in each
@@ -110,6 +113,8 @@ def main() -> None:
         (f"{BROWSERS} browsers and {STALLED} stalled", BROWSERS, STALLED),
     ):
         share, longest_s, read = with_page(seconds, reading, stalled)
+        if reading and not stalled:
+            record("operator's page, five browsers", share - alone, "% of a core")
         page = f"the page {share - alone:5.2f} %, {read:4.1f} frames/s read"
         print(f"{what:30} {share:5.2f} % of a core, {page}, longest wait {1e3 * longest_s:.2f} ms")
     print(f"largest memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")

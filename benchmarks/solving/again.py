@@ -11,6 +11,7 @@ the ratio would be: solving is divided among the workers, while handing out is d
 
 import argparse
 import shutil
+import sys
 import tempfile
 import time
 from dataclasses import dataclass
@@ -20,6 +21,9 @@ from rig.commands.history.again_work import Task, solved_again
 from rig.commands.history.spread import Cluster, one_by_one, spread
 from rig.history.again.answer import Answer
 from rig.history.entered.finished import recording_of
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from goals import record
 
 FROZEN = Path(__file__).parents[2] / "tests" / "fixtures" / "recordings"
 KINDS = ("six_observation", "resumed", "speeds")
@@ -73,6 +77,7 @@ def main() -> None:
         began_s, here_s = time.perf_counter(), time.process_time()
         alone = {task.key: answer for task, answer in one_by_one(todo, solved_again)}
         alone_took = f"{time.perf_counter() - began_s:.1f} s, {time.process_time() - here_s:.1f} s of a processor"
+        record("solve of a recording, again", len(todo) / (time.process_time() - here_s), "recordings/s")
         print(f"{len(todo)} recordings, one by one in this process: {alone_took}", flush=True)
         least_s: dict[int, float] = {}
         for _ in range(options.rounds):

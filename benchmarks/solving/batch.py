@@ -5,7 +5,9 @@ python benchmarks/solving/batch.py
 The loop goes through every thirtieth run and its time is scaled; both see the same readings.
 """
 
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -13,6 +15,9 @@ from scipy.optimize import least_squares
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.batch import algorithm_1_batch, newton_batch
 from rig.study import simulation as sim
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from goals import record
 
 EVERY = 30  # of the runs go through the loop
 
@@ -62,6 +67,9 @@ def main() -> None:
         looped = by_loop(means[::EVERY], speed)
         passed = (time.perf_counter() - start) * EVERY
         apart = np.abs(looped - exact[::EVERY])
+        if speed == sim.ARM_RAD_S:
+            batch_us, loop_us = (1e6 * seconds / len(means) for seconds in (batch_s, passed))
+            record("batch, a run", batch_us, "µs", peer="least_squares, looped", peer_value=loop_us)
         _line(f'least_squares("lm"), scaled loop, {name}', passed, len(means), batch_s, float(apart.max()))
 
 

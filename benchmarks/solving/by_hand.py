@@ -23,6 +23,9 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
 from support.external.handled_body import TWELVE, handle
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from goals import record
+
 SESSION: tuple[Action, ...] = (
     TurnAction(-1),
     TWELVE[0],
@@ -88,6 +91,7 @@ def main(sessions: int) -> None:
     for name, (scale, beside) in rms.items():
         print(f"{name:30} scale {scale:.2e}, off-diagonals {beside:.2e}")
     theirs, ours = rms.values()
+    record("by hand, RMS error of scale", ours[0], "1", peer="imucal", peer_value=theirs[0])
     print(f"better by {theirs[0] / ours[0]:.1f} in scale, {theirs[1] / ours[1]:.1f} in the off-diagonals")
 
 

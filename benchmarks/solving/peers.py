@@ -7,9 +7,11 @@ The session is imucal's: six still holds with ±x, ±y, ±z upwards, and one tur
 reading = K_g R_g ω + b_g + K_ga a is the vector model with g-sensitivity; its 1/K_g is our scale, −b_g our bias.
 """
 
+import sys
 import timeit
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from imucal import FerrarisCalibration, FerrarisSignalRegions
@@ -17,6 +19,9 @@ from imucal import FerrarisCalibration, FerrarisSignalRegions
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import solve_vector_model
 from rig.study import simulation as sim
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from goals import GOALS, record
 
 Session = dict[str, Array]
 
@@ -80,7 +85,8 @@ def by_vector_model(samples: Session, *, with_gravity: bool = False) -> Array:
 def _mean_squares(readings: Array, mean: Array) -> Array:
     """(3,) variances of the means of readings (3, n)."""
     away = readings - mean[:, None]
-    return np.einsum("in,in->i", away, away) / readings.shape[1] ** 2
+    squares: Array = np.einsum("in,in->i", away, away) / readings.shape[1] ** 2
+    return squares
 
 
 def main() -> None:
@@ -103,6 +109,8 @@ def main() -> None:
     for (name, (solve, given)), seconds in zip(solvers.items(), medians_s, strict=True):
         errors = np.array([solve(samples) for samples in given]) - truth
         scale, bias = np.sqrt(np.mean(errors[:, :3] ** 2)), np.sqrt(np.mean(errors[:, 3:] ** 2))
+        if name in GOALS:
+            record(name, seconds * 1e6, "µs", peer="imucal", peer_value=float(medians_s[0]) * 1e6)
         stated = "no" if name.startswith("imucal") else "yes"
         print(f"{name:34}{seconds * 1e6:12.0f}{seconds / medians_s[0]:8.2f}{scale:18.2e}{bias:23.2e}{stated:>12}")
 

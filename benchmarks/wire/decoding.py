@@ -25,6 +25,9 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
 from support.board.emulated_session import Session
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from goals import record
+
 STREAMS = {
     "three sensors": {"lsm9ds1": 238.0, "mpu9250": 200.0, "adis16465": 200.0},
     "one at 952 Hz": {"lsm9ds1": 952.0},
@@ -135,7 +138,7 @@ def main(megabytes: float) -> int:
     for name, rates_hz in STREAMS.items():
         once = recorded(rates_hz)
         samples = frames(once)
-        told = mavlink_of(samples)
+        told, speeds_mb_s = mavlink_of(samples), dict[str, float]()
         print(f"{name}: {' + '.join(f'{rate_hz:g}' for rate_hz in rates_hz.values())} Hz, {samples} samples at a time")
         for decode, stream, share in (
             (frames, once, 1.0),
@@ -148,6 +151,9 @@ def main(megabytes: float) -> int:
             print(f"  {decode.__name__:26}{mb_s:7.1f} MB/s {mb_s * samples / len(stream):6.2f} million samples/s")
             if share == 1.0 and mb_s < LIMIT_MB_S:
                 slow.append(f"{decode.__name__} of {name}")
+            speeds_mb_s[decode.__name__] = mb_s
+        what, loop_mb_s = f"decode to batches, {name}", speeds_mb_s["byte_loop"]
+        record(what, speeds_mb_s["batches"], "MB/s", peer="byte loop", peer_value=loop_mb_s)
     if slow:
         print(f"under {LIMIT_MB_S:g} MB/s: {', '.join(slow)}")
     return 1 if slow else 0

@@ -5,11 +5,15 @@ In reads of 64 KB, as a recording would be, and of 4 KB. Fails under 20 MB/s; 41
 
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
 from rig.sensors.kvh1775.counting import MessageCounter
 from rig.sensors.kvh1775.messages import MESSAGE_BYTES, Format, MessageReader, encode
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from goals import record
 
 LIMIT_MB_S = 20.0
 READS = (65536, 4096)
@@ -43,14 +47,16 @@ def measure(name: Format, stream: bytes, size: int) -> float:
 
 
 def main(megabytes: float) -> int:
-    slow = []
+    slow, slowest_mb_s = [], float("inf")
     for name in FORMATS:
         stream = sent(name, megabytes)
         for size in READS:
             mb_s = measure(name, stream, size)
             print(f"format {name}, {size:6} bytes a read: {mb_s:6.1f} MB/s")
+            slowest_mb_s = min(slowest_mb_s, mb_s)
             if mb_s < LIMIT_MB_S:
                 slow.append(f"format {name} in reads of {size}")
+    record("decode a KVH 1775", slowest_mb_s, "MB/s")
     if slow:
         print(f"under {LIMIT_MB_S:g} MB/s: {', '.join(slow)}")
     return 1 if slow else 0

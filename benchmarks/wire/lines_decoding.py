@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 import tty
+from pathlib import Path
 
 import numpy as np
 import serial
@@ -17,6 +18,9 @@ import serial
 from rig.config.sensors.lines_section import LinesSection
 from rig.sensors.lines.decoding import LineReader
 from rig.sensors.lines.stamping import Stamper
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from goals import record
 
 LIMIT_MB_S, LIMIT_RATIO = 5.0, 5.0
 READS = (65536, 4096)
@@ -86,6 +90,7 @@ def main(megabytes: float) -> int:
     print(f"readline().split() at a port:       {at_a_port:6.2f} MB/s")
     print(f"readline().split() from memory:     {split(io.BytesIO(stream), len(stream)):6.1f} MB/s")
     slowest = min(fast.values())
+    record("decode lines", slowest, "MB/s", peer="readline() at a port", peer_value=at_a_port)
     if slowest < LIMIT_MB_S or slowest < LIMIT_RATIO * at_a_port:
         print(f"under {LIMIT_MB_S:g} MB/s, or under {LIMIT_RATIO:g} times the loop at a port")
         return 1

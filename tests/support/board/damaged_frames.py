@@ -18,9 +18,9 @@ from firmware_host.answers import (
     BoardObservation,
     BoardSolution,
     BoardStatus,
-    SampleBatch,
     SensorSetup,
     StoredCalibration,
+    sample_batches,
 )
 from firmware_host.frames import Frame, FrameReader, encode
 from support.paths import FIRMWARE
@@ -109,7 +109,7 @@ class Heard:
 
 # What the host makes of a frame, as firmware_host/client.py does.
 _READ: dict[str, Callable[[Frame], object]] = {
-    **{name: lambda frame: SampleBatch.of([frame], 0.0) for name in protocol.SAMPLES},
+    **{name: lambda frame: list(sample_batches([frame], 0.0)) for name in protocol.SAMPLES},
     "setup": SensorSetup.decode,
     "report": lambda frame: BoardStatus.decode(frame, 0, 0),
     "observed": BoardObservation.decode,

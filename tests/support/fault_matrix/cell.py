@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware_host.answers import SampleBatch
+from firmware_host.answers import sample_batches
 from firmware_host.frames import FrameReader
 from firmware_host.protocol import SAMPLES
 from rig.data.recording.run_file import read_run
@@ -187,7 +187,7 @@ def _delivered(here: Bench, from_s: float, to_s: float) -> set[int]:
     for wall_s, data in here.wire["board"].delivered or []:
         for frame in reader.feed(data):
             if frame.name in SAMPLES and from_s + BEHIND_S < wall_s < to_s:
-                stamps.update(SampleBatch.of([frame], wall_s).samples["board_time_us"].tolist())
+                stamps.update(*(batch.samples["board_time_us"].tolist() for batch in sample_batches([frame], wall_s)))
     return stamps
 
 
