@@ -23,7 +23,8 @@ def _source() -> tuple[bool, str]:
 
     try:
         installed = distribution(NAME)
-        if Path(str(installed.locate_file(""))).resolve() == SOURCE:  # metadata left by a build
+        is_in_sources = Path(str(installed.locate_file(""))).resolve() == SOURCE  # metadata left by a build
+        if is_in_sources and (SOURCE / "pyproject.toml").exists():
             return True, str(SOURCE)
         origin = json.loads(installed.read_text("direct_url.json") or "{}")
     except PackageNotFoundError:  # run from a folder of sources that is not installed

@@ -3,8 +3,6 @@
 import os
 import time
 
-import serial
-
 READ_TIMEOUT_S = 0.005  # the delay of every read: bytes come a few at a time, and each would wake the reader
 _READ_SIZE = 65536
 
@@ -27,6 +25,8 @@ class SerialPort:
     """An open port; constructor, `read` and `write` raise OSError."""
 
     def __init__(self, port: str, baud: int) -> None:
+        import serial  # which a computer without serial ports may lack: to read recordings it is not needed
+
         try:
             self._serial = serial.serial_for_url(port, baudrate=baud, timeout=0, exclusive=True)
         except ValueError as error:  # an invalid name, or an unsupported baud rate

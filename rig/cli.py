@@ -29,6 +29,7 @@ _COLLECTED_AFTER = 50_000  # objects that hold others
 
 # Of each its module, in which `add` says what it takes and `run` does it, and its help line.
 _COMMANDS = {
+    "demo": ("rig.commands.measure.demo", "a calibration in a simulated laboratory, without any hardware"),
     "run": ("rig.commands.measure.run", "run the procedure the file names"),
     "plan": ("rig.commands.measure.plan", "dry run: every motion, its time and limits; connects to nothing"),
     "check": ("rig.commands.measure.check", "connect and look; nothing moves, no program is stopped"),
@@ -78,6 +79,7 @@ _COMMANDS = {
     "world": ("rig.commands.laboratory.world", "only the simulated laboratory, in the foreground, for any client"),
 }
 _AT_ONCE = {  # what a command that begins by loading libraries for a second says before
+    "demo": "reading the configuration",
     "run": "reading the configuration",
     "plan": "reading the configuration",
     "check": "reading the configuration",

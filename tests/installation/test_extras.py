@@ -3,6 +3,7 @@
 import json
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -17,14 +18,14 @@ from support.processes.waiting import PATIENCE_S
 SHOWN = "from firmware_host.installation import install_command; print(install_command('study'))"
 
 
-def printed(folder: Path, said: dict[str, Any] | None) -> list[str]:
+def printed(folder: Path, said: dict[str, Any] | None, program: Path = ROOT) -> list[str]:
     """The words of the command, of a program whose installer has `said` from where it came."""
     info = folder / "calibration_rig-9.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: calibration-rig\nVersion: 9\n", encoding="utf-8")
     if said is not None:
         (info / "direct_url.json").write_text(json.dumps(said), encoding="utf-8")
-    path = os.pathsep.join([str(folder), str(ROOT)])
+    path = os.pathsep.join([str(folder), str(program)])
     command = [sys.executable, "-c", SHOWN]
     done = subprocess.run(
         command,
@@ -68,3 +69,11 @@ def test_an_export_without_its_extra_names_the_command_and_leaves_no_folder(
     told = capsys.readouterr().err
     assert "missing_extra" in told and f"{sys.executable} -m pip install" in told and f"[{name}]" in told
     assert not list(tmp_path.iterdir())
+
+
+def test_a_wheel_in_site_packages_is_no_folder_of_sources(tmp_path: Path) -> None:
+    wheel = tmp_path / "calibration_rig-9-py3-none-any.whl"
+    wheel.touch()
+    packages = tmp_path / "site-packages"
+    shutil.copytree(ROOT / "firmware_host", packages / "firmware_host", ignore=shutil.ignore_patterns("firmware"))
+    assert printed(packages, {"url": wheel.as_uri(), "archive_info": {}}, packages)[3:] == ["install", f"{wheel}[study]"]

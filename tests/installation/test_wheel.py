@@ -54,8 +54,11 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_demonstration_runs_from_the_wheel_and_finds_the_truth(installed: Path, tmp_path: Path) -> None:
     where = [str(installed / "bin" / "python"), "-P", "-c", "import rig; print(rig.__file__)"]
     assert subprocess.run(where, capture_output=True, text=True, check=True).stdout.startswith(str(installed))
-    config = installed / "share" / "calibration-rig" / "configs" / "demo.yaml"
-    errors = normalised_errors([installed / "bin" / "rig"], config, 1, tmp_path / "run")
+    rig = installed / "bin" / "rig"
+    subprocess.run([rig, "demo", "--files", tmp_path], check=True, timeout=PATIENCE_S, capture_output=True)
+    assert (tmp_path / "examples" / "solve_and_apply.py").exists()
+    config = tmp_path / "configs" / "demo.yaml"
+    errors = normalised_errors([rig], config, 1, tmp_path / "run")
     print(f"errors of {np.round(errors, 2)} σ")
     assert np.abs(errors).max() < 4
     assert {file.name for file in (tmp_path / "run").iterdir()} >= {"certificate.html", "calibration.h", "result.json"}

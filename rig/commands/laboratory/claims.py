@@ -18,6 +18,7 @@ from hashlib import sha256
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from rig.commands.laboratory.only_on_linux import refuse_unless_linux
 from rig.config.models import RigConfig
 from rig.errors import Refused
 from rig.errors.quoting import shorten
@@ -27,7 +28,7 @@ CREDENTIALS = struct.Struct("3i")  # of the far end: process, user, group (unix(
 
 @contextmanager
 def claimed(config: RigConfig) -> Iterator[None]:
-    """All that a run works with. Raises Refused `arm_claimed`, `board_claimed`, `sensor_claimed`."""
+    """All that a run works with. Raises Refused as `claimed_arm`, `claimed_board` and `claimed_sensor` do."""
     with ExitStack() as stack:
         if config.turner.address:
             stack.enter_context(claimed_arm(config.turner.address))
@@ -40,7 +41,11 @@ def claimed(config: RigConfig) -> Iterator[None]:
 
 
 def claimed_arm(host: str) -> AbstractContextManager[None]:
-    """The arm, or what turns at a serial port, by whatever name it is called. Raises Refused `arm_claimed`."""
+    """The arm, or what turns at a serial port, by whatever name it is called.
+
+    Raises Refused `arm_claimed`, `only_on_linux`.
+    """
+    refuse_unless_linux("what moves an arm or a servomotor")
     if "/" in host:
         return _claimed("arm_claimed", f"port {_place(host)}", f"the turner at {host}")
     return _claimed("arm_claimed", f"arm {_address(host)}", f"the arm at {host}")

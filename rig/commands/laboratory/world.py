@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 
 from rig.commands.config_arguments import add_config
 from rig.commands.laboratory.laboratory import written
+from rig.commands.laboratory.only_on_linux import refuse_unless_linux
 
 
 def add(parser: ArgumentParser) -> None:
@@ -14,7 +15,11 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Run only the world of a configuration, until Ctrl-C; returns its exit status. Raises Refused as `load`."""
+    """Run only the world of a configuration, until Ctrl-C; returns its exit status.
+
+    Raises Refused `only_on_linux`, and as `load`.
+    """
+    refuse_unless_linux("the simulated laboratory")
     from rig.config.load import load
 
     with written(load(options.config, options.overrides, sections=None).text) as config_path:

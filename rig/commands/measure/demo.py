@@ -1,0 +1,76 @@
+"""`rig demo`: a calibration in a simulated laboratory, and the files to go on with."""
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from rig.commands.config_arguments import add_json
+from rig.commands.page_arguments import add_page
+from rig.config.files.supplied import NAMES, supplied
+from rig.errors import Refused
+from rig.station.plain_text import say
+
+DEMO = "configs/demo.yaml"
+
+
+def add(parser: ArgumentParser) -> None:
+    """Add the arguments of `rig demo`."""
+    parser.add_argument(
+        "--files",
+        type=Path,
+        metavar="DIR",
+        help="run nothing; copy the configurations and examples that come with the program into this folder",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: a new one in runs)")
+    add_json(parser)
+    add_page(parser)
+    parser.set_defaults(overrides=[], script=None, yes=False, other_board=[])
+
+
+def run(options: Namespace) -> int:
+    """Run the demonstration and return as `rig run` does; with `--files` copy and return 0.
+
+    Raise Refused `files_not_copied`, and as `rig run`.
+    """
+    if options.files is not None:
+        return _copy(options.files)
+    from rig.commands.measure.run import run as run_configuration
+
+    say("the demonstration: a simulated arm turns a simulated LSM9DS1 gyroscope; about ten seconds", sys.stderr)
+    options.config = supplied(DEMO)
+    return run_configuration(options)
+
+
+def _copy(folder: Path) -> int:
+    """Copy each supplied file that the folder does not have yet under its path; no file is replaced."""
+    import shutil
+
+    copied = kept = 0
+    try:
+        for source, target in _pairs(folder):
+            if target.exists() or target.is_symlink():
+                kept += 1
+                continue
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, target)
+            copied += 1
+    except OSError as error:
+        what = f"{folder} cannot be written: {error.strerror or error}"
+        raise Refused("files_not_copied", what, "Name another folder with --files") from error
+    say(f"{copied} files copied into {folder}, {kept} were there already and stay as they are")
+    say(f"next: rig plan {folder / DEMO}")
+    return 0
+
+
+def _pairs(folder: Path) -> list[tuple[Path, Path]]:
+    """Return every supplied file with its place in the folder."""
+    pairs = []
+    for name in NAMES:
+        source = supplied(name)
+        files = sorted(source.rglob("*")) if source.is_dir() else [source]
+        pairs += [
+            (file, folder / name / file.relative_to(source) if source.is_dir() else folder / name)
+            for file in files
+            if file.is_file() and "__pycache__" not in file.parts
+        ]
+    return pairs

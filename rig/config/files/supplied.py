@@ -1,0 +1,12 @@
+"""Finds the configurations and examples that come with the program: in its wheel, or in the checkout it runs from."""
+
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parents[2]
+NAMES = ("configs", "examples", "docs/examples", "docs/config.schema.json")  # as in setup.py
+
+
+def supplied(name: str) -> Path:
+    """Return where a supplied file or folder is, by its path in the checkout: `configs/demo.yaml`."""
+    in_wheel = PACKAGE / "supplied" / name
+    return in_wheel if in_wheel.exists() else PACKAGE.parent / name
