@@ -3,10 +3,11 @@
 import argparse
 import gc
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 from rig.commands.endings import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable, output_lost
@@ -27,81 +28,161 @@ if "numpy" not in sys.modules:
 # What is imported lives as long as the process: to look through it for garbage takes a tenth of a short command.
 _COLLECTED_AFTER = 50_000  # objects that hold others
 
-# Of each its module, in which `add` says what it takes and `run` does it, and its help line.
-_COMMANDS = {
-    "demo": ("rig.commands.measure.demo", "a calibration in a simulated laboratory, without any hardware"),
-    "run": ("rig.commands.measure.run", "run the procedure the file names"),
-    "plan": ("rig.commands.measure.plan", "dry run: every motion, its time and limits; connects to nothing"),
-    "check": ("rig.commands.measure.check", "connect and look; nothing moves, no program is stopped"),
-    "record": (
+
+class Command(NamedTuple):
+    """A command: its module, in which `add` says what it takes and `run` does it, its help line, and its page in docs.
+
+    `waits_for` is what it says at once if it begins by loading libraries for a second.
+    """
+
+    module: str
+    text: str
+    page: str
+    waits_for: str = ""
+
+
+COMMANDS = {
+    "demo": Command(
+        "rig.commands.measure.demo",
+        "a calibration in a simulated laboratory, without any hardware",
+        "how-to/start/ten-minutes.md",
+        "reading the configuration",
+    ),
+    "run": Command(
+        "rig.commands.measure.run",
+        "run the procedure the file names",
+        "how-to/start/first-calibration.md",
+        "reading the configuration",
+    ),
+    "plan": Command(
+        "rig.commands.measure.plan",
+        "dry run: every motion, its time and limits; connects to nothing",
+        "how-to/at-the-rig/no-longer-than-needed.md",
+        "reading the configuration",
+    ),
+    "check": Command(
+        "rig.commands.measure.check",
+        "connect and look; nothing moves, no program is stopped",
+        "how-to/start/first-calibration.md",
+        "reading the configuration",
+    ),
+    "record": Command(
         "rig.commands.measure.record",
         "record the sensors alone, while something else turns them; nothing moves",
+        "how-to/without-an-arm/known-attitudes.md",
     ),
-    "resume": ("rig.commands.measure.resume", "go on with an interrupted run"),
-    "station": ("rig.commands.station.station", "one part after the other: number, checks, run, verdict, label"),
-    "floor": ("rig.commands.station.floor", "what several rigs that share a history do now, in a browser"),
-    "watch": ("rig.commands.station.watch", "a recorded run in a browser, as it was"),
-    "solve": ("rig.commands.offline.solve", "recompute the calibration from a recording"),
-    "allan": (
+    "resume": Command(
+        "rig.commands.measure.resume",
+        "go on with an interrupted run",
+        "how-to/at-the-rig/resume-and-repeat.md",
+        "reading the run",
+    ),
+    "station": Command(
+        "rig.commands.station.station",
+        "one part after the other: number, checks, run, verdict, label",
+        "how-to/at-the-rig/station.md",
+        "reading the configuration",
+    ),
+    "floor": Command(
+        "rig.commands.station.floor",
+        "what several rigs that share a history do now, in a browser",
+        "how-to/at-the-rig/station.md",
+    ),
+    "watch": Command(
+        "rig.commands.station.watch",
+        "a recorded run in a browser, as it was",
+        "how-to/at-the-rig/operators-page.md",
+    ),
+    "solve": Command(
+        "rig.commands.offline.solve",
+        "recompute the calibration from a recording, or from samples recorded elsewhere",
+        "how-to/without-an-arm/data-recorded-elsewhere.md",
+        "reading the recording",
+    ),
+    "allan": Command(
         "rig.commands.offline.allan",
         "random walk and bias instability, by the Allan deviation of what was recorded at rest",
+        "how-to/at-the-rig/bias-drift.md",
+        "reading the recording",
     ),
-    "reversal": (
+    "reversal": Command(
         "rig.commands.offline.reversal",
         "a magnetometer's own bias, from runs between which it was turned over",
+        "how-to/at-the-rig/magnetometers.md",
     ),
-    "show": ("rig.commands.documents.show", "what a finished run amounts to: values, budgets, checks"),
-    "explain": ("rig.commands.documents.explain", "what a check, an error, a limit or a word means, and what to do"),
-    "report": ("rig.commands.documents.report", "the certificate of a finished run: HTML, PDF, digital certificate"),
-    "verify": (
+    "show": Command(
+        "rig.commands.documents.show",
+        "what a finished run amounts to: values, budgets, checks",
+        "how-to/finished-runs/read-a-certificate.md",
+        "reading the result",
+    ),
+    "explain": Command(
+        "rig.commands.documents.explain",
+        "what a check, an error, a limit or a word means, and what to do",
+        "how-to/start/failed.md",
+    ),
+    "report": Command(
+        "rig.commands.documents.report",
+        "the certificate of a finished run: HTML, PDF, digital certificate",
+        "how-to/finished-runs/read-a-certificate.md",
+        "reading the result",
+    ),
+    "verify": Command(
         "rig.commands.documents.verify",
         "who signed a certificate, when, whether it is unchanged, and whether a history knows it",
+        "how-to/finished-runs/signed-certificates.md",
+        "looking at the signatures",
     ),
-    "export": ("rig.commands.documents.export", "what was calibrated and recorded, in the files of other programs"),
-    "history": ("rig.commands.history.command", "what the laboratory remembers: calibrations, trends, check standards"),
-    "study": (
+    "export": Command(
+        "rig.commands.documents.export",
+        "what was calibrated and recorded, in the files of other programs",
+        "how-to/finished-runs/export.md",
+        "reading the run",
+    ),
+    "history": Command(
+        "rig.commands.history.command",
+        "what the laboratory remembers: calibrations, trends, check standards",
+        "how-to/finished-runs/check-standards.md",
+        "opening the history",
+    ),
+    "study": Command(
         "rig.commands.offline.study",
         "Monte-Carlo studies of the papers' figures and tables; without a name, list them",
+        "how-to/with-code/studies.md",
+        "loading the studies",
     ),
-    "board": (
+    "board": Command(
         "rig.commands.devices.board",
         "look at the board, read and change its stored calibrations, flash its firmware",
+        "board.md",
     ),
-    "kvh": ("rig.commands.devices.kvh", "look at a KVH 1775"),
-    "autopilot": (
+    "kvh": Command("rig.commands.devices.kvh", "look at a KVH 1775", "how-to/at-the-rig/kvh1775.md"),
+    "autopilot": Command(
         "rig.commands.devices.autopilot",
         "write a calibration into an autopilot's parameters, and bring the old ones back",
+        "how-to/at-the-rig/autopilot.md",
     ),
-    "lines": (
+    "lines": Command(
         "rig.commands.devices.lines",
         "look at a device that prints lines, and write its section of a configuration",
+        "how-to/at-the-rig/lines.md",
     ),
-    "world": ("rig.commands.laboratory.world", "only the simulated laboratory, in the foreground, for any client"),
-}
-_AT_ONCE = {  # what a command that begins by loading libraries for a second says before
-    "demo": "reading the configuration",
-    "run": "reading the configuration",
-    "plan": "reading the configuration",
-    "check": "reading the configuration",
-    "resume": "reading the run",
-    "station": "reading the configuration",
-    "solve": "reading the recording",
-    "allan": "reading the recording",
-    "report": "reading the result",
-    "show": "reading the result",
-    "verify": "looking at the signatures",
-    "export": "reading the run",
-    "history": "opening the history",
-    "study": "loading the studies",
+    "world": Command(
+        "rig.commands.laboratory.world",
+        "only the simulated laboratory, in the foreground, for any client",
+        "how-to/with-code/laboratory-ci.md",
+    ),
 }
 FIRST_STEPS = """\
-Calibrates inertial sensors on a robot arm. What one does first:
+Calibrates inertial sensors on a robot arm, a servomotor or by hand. What one does first:
 
-  rig plan configs/demo.yaml    what the arm will do, and how long; connects to nothing
-  rig run configs/demo.yaml     a calibration; this one in a simulated laboratory
-  rig check CONFIG              what is there and what is missing, before a run on hardware; nothing moves
-  rig report RUN                the certificate of a finished run
-  rig history                   every calibration so far
+  rig demo                a calibration in a simulated laboratory; ten seconds
+  rig plan CONFIG         what the arm will do, and how long; connects to nothing
+  rig check CONFIG        what is there and what is missing, before a run on hardware; nothing moves
+  rig run CONFIG          the calibration
+  rig show latest         what the latest run found
+  rig report latest       its certificate
+  rig history             every calibration so far
 
 rig --help names all commands, rig COMMAND --help what each takes. Step by step: docs/README.md."""
 FAULT, INTERRUPTED = Fault.exit_status, 130
@@ -116,15 +197,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from rig.commands.history.command import with_usual_command
 
         words = with_usual_command(words)
-    meant = next((word for word in words if not word.startswith("-")), None)
-    if not words:
+    if not words and "_ARGCOMPLETE" not in os.environ:
         return guarded(_first_steps)
+    meant = _first_word(os.environ["COMP_LINE"].split()[1:] if "_ARGCOMPLETE" in os.environ else words)
     parser = _parser(meant)
+    if "_ARGCOMPLETE" in os.environ:
+        import argcomplete
+
+        argcomplete.autocomplete(parser)
     options, not_understood = parser.parse_known_args(words)
     if not_understood:
         hint = "--set takes one word without blanks, as in --set procedure.speed_deg_s=30; " if "--set" in words else ""
         parser.error(f"{hint}unrecognized arguments: {' '.join(not_understood)}")
     return guarded(lambda: _begun(meant, options.command, options))
+
+
+def _first_word(words: Sequence[str]) -> str | None:
+    """Return the first word that is no option: the name of the command."""
+    return next((word for word in words if not word.startswith("-")), None)
 
 
 def _first_steps() -> int:
@@ -134,8 +224,8 @@ def _first_steps() -> int:
 
 def _begun(name: str | None, command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
     """Carry out a command; there is a sign of life before what it needs is loaded."""
-    if name in _AT_ONCE:
-        say_on_terminal(_AT_ONCE[name])
+    if name is not None and COMMANDS[name].waits_for:
+        say_on_terminal(COMMANDS[name].waits_for)
     return command(options)
 
 
@@ -171,17 +261,40 @@ def _ended(text: str, status: int) -> int:
     return status
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaint is one line that stands before the usage, with what may have been meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print what is wrong, how the command is used, and where help is; end with status 2."""
+        usage = self.format_usage()
+        self.exit(2, f"{self.prog}: error: {_with_what_was_meant(message)}\n{usage}more: {self.prog} --help\n")
+
+
+def _with_what_was_meant(message: str) -> str:
+    """Return a message of argparse about a wrong choice as a sentence, with the nearest of the choices."""
+    wrong = re.fullmatch(r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)", message)
+    if wrong is None:
+        return message
+    from difflib import get_close_matches
+
+    name, given, choices = wrong.groups()
+    known = [choice.strip(" '") for choice in choices.split(",")]
+    what = f"there is no command {given}" if name == "COMMAND" else f"{name} cannot be {given}"
+    nearest = get_close_matches(given, known, n=2)
+    return f"{what}; " + (f"did you mean {' or '.join(nearest)}?" if nearest else f"there are {', '.join(known)}")
+
+
 def _parser(meant: str | None) -> argparse.ArgumentParser:
-    """Every command by its name, and the arguments of the one that is meant."""
-    parser = argparse.ArgumentParser(prog="rig", description="Calibrate inertial sensors on a robot arm.")
+    """Return a parser of every command by its name, and of the arguments of the one that is meant."""
+    parser = _Parser(prog="rig", description="Calibrate inertial sensors on a robot arm, a servomotor or by hand.")
     parser.add_argument("--version", action="version", version=f"rig {VERSION}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for name, (module_name, text) in _COMMANDS.items():
-        command = commands.add_parser(name, help=text, description=text)
+    for name, command in COMMANDS.items():
+        added = commands.add_parser(name, help=command.text, description=command.text)
         if name == meant:
-            module = import_module(module_name)
-            module.add(command)
-            command.set_defaults(command=module.run)
+            module = import_module(command.module)
+            module.add(added)
+            added.set_defaults(command=module.run)
     return parser
 
 

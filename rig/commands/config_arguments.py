@@ -1,7 +1,11 @@
 """Arguments of several commands: the configuration, changes to it, a script in place of the procedure it names."""
 
-from argparse import ArgumentParser, _ActionsContainer
+from argparse import ArgumentParser, ArgumentTypeError, _ActionsContainer
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+from rig.errors import Refused
 
 
 def add_config(parser: ArgumentParser) -> None:
@@ -18,6 +22,33 @@ def add_set(parser: ArgumentParser, text: str, metavar: str = "PATH=VALUE") -> N
 def add_script(parser: ArgumentParser) -> None:
     """Add the argument `--script`."""
     parser.add_argument("--script", type=Path, metavar="FILE", help="a procedure of your own, in place of the file's")
+
+
+def add_run(
+    parser: _ActionsContainer, name: str, text: str, *, metavar: str = "RUN", nargs: str | None = None, **more: Any
+) -> None:
+    """Add an argument that is a run; `latest` is the one that this user ran last."""
+    text += "; latest: the one that you ran last"
+    action = parser.add_argument(name, type=_run, metavar=metavar, nargs=nargs, help=text, **more)
+    action.completer = _completed_runs  # type: ignore[attr-defined]  # as argcomplete asks for it
+
+
+def _run(text: str) -> Path:
+    from rig.data.latest_run import meant_run
+
+    try:
+        return meant_run(text)
+    except Refused as error:
+        raise ArgumentTypeError(f"{text}: {error.what}. {error.remedy}") from None
+
+
+def _completed_runs(prefix: str, **_: Any) -> Iterator[str]:
+    from argcomplete.completers import FilesCompleter
+
+    from rig.data.latest_run import LATEST
+
+    yield LATEST
+    yield from FilesCompleter()(prefix)
 
 
 def add_json(parser: _ActionsContainer) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.data.checked import checked
+from rig.data.latest_run import note_run
 from rig.errors import Refused
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: Script
     with _written(out or parent):
         folder = out or folder_of_its_own(parent, loaded.config.procedure.name)
         empty_folder(folder, or_else=f", or go on with: {resuming(folder)}")
+        note_run(folder)
         _write_all(folder, {SCRIPT: script, SCRIPT_IDENTITY: json.dumps(asdict(identity)) + "\n", CONFIG: loaded.text})
     return folder
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rig.cli import COMMANDS
 from support.paths import DOCS, ROOT
 from support.processes.waiting import PATIENCE_S
 
@@ -51,8 +52,8 @@ def test_help_without_a_reader_or_a_known_degree_sign_is_no_traceback(command: s
 @pytest.mark.slow
 def test_the_help_of_every_command_is_shown_on_a_terminal_of_plain_ascii() -> None:
     code = (
-        "from rig.cli import _COMMANDS, main\n"
-        "for name in _COMMANDS:\n"
+        "from rig.cli import COMMANDS, main\n"
+        "for name in COMMANDS:\n"
         "    try: main([name, '--help'])\n"
         "    except SystemExit as ended: assert ended.code == 0\n"
     )
@@ -87,7 +88,7 @@ def test_a_terminal_without_special_characters_gets_the_plan_too() -> None:
 def test_the_bare_command_shows_what_one_does_first_and_where_help_is() -> None:
     done = shell(f"{sys.executable} -m rig")
     assert done.returncode == 0 and done.stderr == ""
-    for command in ("rig plan", "rig run", "rig check", "rig report", "rig history", "rig --help"):
+    for command in ("rig demo", "rig plan", "rig run", "rig check", "rig report", "rig history", "rig --help"):
         assert command in done.stdout
 
 
@@ -161,7 +162,7 @@ print(*sys.modules, file=sys.stderr)
 def test_help_comes_at_once_whatever_the_command() -> None:
     listed = re.findall(r"^ {4}(\w+)", shell(f"{sys.executable} -m rig --help").stdout, re.MULTILINE)
     asked = subprocess.run([sys.executable, "-c", ASKED, *listed], capture_output=True, text=True, check=True)
-    assert all(f"usage: rig {command} " in asked.stdout for command in listed) and len(listed) == 23
+    assert all(f"usage: rig {command} " in asked.stdout for command in listed) and len(listed) == len(COMMANDS)
     assert not HEAVY & {*asked.stderr.split()}
 
 

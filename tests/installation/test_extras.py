@@ -76,4 +76,7 @@ def test_a_wheel_in_site_packages_is_no_folder_of_sources(tmp_path: Path) -> Non
     wheel.touch()
     packages = tmp_path / "site-packages"
     shutil.copytree(ROOT / "firmware_host", packages / "firmware_host", ignore=shutil.ignore_patterns("firmware"))
-    assert printed(packages, {"url": wheel.as_uri(), "archive_info": {}}, packages)[3:] == ["install", f"{wheel}[study]"]
+    assert printed(packages, {"url": wheel.as_uri(), "archive_info": {}}, packages)[3:] == [
+        "install",
+        f"{wheel}[study]",
+    ]

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.config_arguments import add_config
+from rig.commands.config_arguments import add_config, add_run
 from rig.errors import Refused
 from rig.station.plain_text import say
 
@@ -30,7 +30,7 @@ def add(autopilot: ArgumentParser) -> None:
     text = "write the calibration of a run that passed into the autopilot's parameters; the old ones are kept in a file"
     store = commands.add_parser("store", help=text, description=text)
     add_config(store)
-    store.add_argument("result", type=Path, metavar="RESULT", help="a run folder or its result.json")
+    add_run(store, "result", "a run folder or its result.json", metavar="RESULT")
     store.add_argument("--old", type=Path, metavar="FILE", help="file for the old values (default: beside the result)")
     text = "bring the autopilot back to the parameters in a file that `store` kept"
     restore = commands.add_parser("restore", help=text, description=text)

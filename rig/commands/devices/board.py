@@ -1,10 +1,9 @@
 """`rig board …`: look at the board, read and change its stored calibrations, flash its firmware; what these take."""
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 from typing import Any
 
-from rig.commands.config_arguments import add_config, add_json
+from rig.commands.config_arguments import add_config, add_json, add_run
 
 
 def add(board: ArgumentParser) -> None:
@@ -48,7 +47,7 @@ def add(board: ArgumentParser) -> None:
     for command in (read, write, erase):
         add_config(command)
     add_json(read)
-    write.add_argument("result", type=Path, metavar="RESULT", help="a run folder or its result.json")
+    add_run(write, "result", "a run folder or its result.json", metavar="RESULT")
     for command in (read, write, erase):
         command.add_argument("--sensor", metavar="NAME", help="only this one of the configuration's sensors")
     flash = added(commands, "flash", "put the firmware that comes with this program on it")

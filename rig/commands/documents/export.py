@@ -4,6 +4,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.commands.config_arguments import add_run
 from rig.config.files.written_file import replace_together, write_new
 from rig.errors import Refused
 from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibrations, writer_of_readings
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig export`."""
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    add_run(parser, "run", "a run folder")
     parser.add_argument(
         "--format",
         choices=FORMATS,

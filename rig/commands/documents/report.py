@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.config_arguments import add_set
+from rig.commands.config_arguments import add_run, add_set
 from rig.commands.history.named_history import add_history, named_history
 from rig.config.files.written_file import replace_together, write_new
 from rig.errors import Refused
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig report`."""
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder or its result.json")
+    add_run(parser, "run", "a run folder or its result.json")
     parser.add_argument(
         "--pdf",
         action="store_true",

@@ -4,6 +4,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.commands.config_arguments import add_run
 from rig.errors import Refused
 
 if TYPE_CHECKING:
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig show`."""
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder or its result.json")
+    add_run(parser, "run", "a run folder or its result.json (default: latest)", nargs="?", default="latest")
     part = parser.add_mutually_exclusive_group()
     part.add_argument("--budget", action="store_true", help="values, uncertainty budgets, and what stands beside")
     part.add_argument("--checks", action="store_true", help="every check, sensor by sensor, those that failed first")

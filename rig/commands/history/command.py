@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from datetime import date
 from pathlib import Path
 
-from rig.commands.config_arguments import add_json, add_set
+from rig.commands.config_arguments import add_json, add_run, add_set
 from rig.commands.history.named_history import add_history
 from rig.commands.history.waiting import answer_of
 
@@ -42,14 +42,14 @@ def add(history: argparse.ArgumentParser) -> None:
     show.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")
     show.add_argument("--json", action="store_true", help="the result.json of its run, as it was entered")
     plot = added("plot", "draw a sensor's calibrations over time, drift and charts (extra `study`)")
-    plot.add_argument("serial_number", metavar="SERIAL")
+    plot.add_argument("serial_number", metavar="SERIAL", help="of this sensor")
     _add_selection(plot)
     plot.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
     rigs = added("rigs", "what check standards and shared sensors say of the rigs themselves")
     _add_selection(rigs, rig=False)
     add_json(rigs)
     imported = added("import", "enter runs that are in no history yet; what is there already stays as it is")
-    imported.add_argument("folders", nargs="+", type=Path, metavar="DIR", help="run folders, or folders that hold some")
+    add_run(imported, "folders", "run folders, or folders that hold some", metavar="DIR", nargs="+")
     imported.add_argument(
         "--solve", action="store_true", help="enter what the recordings give, whatever a result.json says"
     )
@@ -59,11 +59,11 @@ def add(history: argparse.ArgumentParser) -> None:
     _add_selection(again)
     _add_again(again)
     compare = added("compare", "two calibrations of one sensor, with E_n")
-    compare.add_argument("first", type=int, metavar="A")
-    compare.add_argument("second", type=int, metavar="B")
+    compare.add_argument("first", type=int, metavar="A", help="number of the earlier one, as `rig history` has it")
+    compare.add_argument("second", type=int, metavar="B", help="number of the later one")
     add_json(compare)
     void = added("void", "say that a calibration does not count, and why; nothing is taken away")
-    void.add_argument("number", type=int, metavar="NUMBER")
+    void.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")
     void.add_argument("--reason", required=True, metavar="TEXT", help="why, in a few words")
 
 

@@ -23,7 +23,8 @@ def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator
     Should steps of it come late, it writes to the file `late` what held them; to stderr where it is None.
 
     The world ends when its standard input closes, so it cannot outlive this process, however this process ends.
-    Raises Refused: `only_on_linux`, what the world refused, or `world_not_ready` when it ends without a word of its own.
+    Raises Refused: `only_on_linux`, what the world refused, or `world_not_ready` when it ends without a word of its
+    own.
     """
     refuse_unless_linux("the simulated laboratory")
     command = [sys.executable, "-P", "-m", "rig.world", "--until-eof", *([] if late is None else ["--late", str(late)])]

@@ -3,7 +3,7 @@
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from rig.commands.config_arguments import add_set
+from rig.commands.config_arguments import add_run, add_set
 from rig.commands.measure.run import add_outcome
 from rig.commands.page_arguments import wish
 from rig.errors import Refused
@@ -11,7 +11,7 @@ from rig.errors import Refused
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig resume`."""
-    parser.add_argument("run_folder", type=Path, metavar="RUN_DIR")
+    add_run(parser, "run_folder", "an interrupted run", metavar="RUN_DIR")
     parser.add_argument("--script", type=Path, metavar="FILE", help="the script it was begun with, of another's folder")
     parser.add_argument(
         "--connect",
@@ -38,6 +38,7 @@ def run(options: Namespace) -> int:
     from rig.commands.measure.consent import refuse_foreign_addresses
     from rig.commands.measure.moved_addresses import refuse_other_changes
     from rig.config.load import load
+    from rig.data.latest_run import note_run
     from rig.data.result_file import read_result
     from rig.data.run_folder import CONFIG, RESULT, SCRIPT, refuse_links, script_identity
     from rig.plans.script_file import kept_script, load_script
@@ -61,5 +62,6 @@ def run(options: Namespace) -> int:
     refuse_foreign_addresses(folder, now, [*options.connect, *named_now])
     named = None if options.script is None else load_script(options.script)
     script, moved = kept_script(folder, script_identity(folder), named), frozenset(options.other_board)
+    note_run(folder)
     with configured_here(folder / CONFIG, options.overrides, script=script) as found:
         return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.config_arguments import add_json
+from rig.commands.config_arguments import add_json, add_run
 from rig.errors import Refused, raised_as
 from rig.station.plain_text import say
 
@@ -18,12 +18,8 @@ CSV = (".csv", ".csv.gz")
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig allan`."""
-    parser.add_argument(
-        "run",
-        type=Path,
-        metavar="RECORDING",
-        help="a run folder, its run.h5, a log of a sensor at rest as CSV, or what `rig record` wrote",
-    )
+    what = "a run folder, its run.h5, a log of a sensor at rest as CSV, or what `rig record` wrote"
+    add_run(parser, "run", what, metavar="RECORDING")
     parser.add_argument("--plot", type=Path, metavar="DIR", help="draw the curves into this folder")
     add_json(parser)
 

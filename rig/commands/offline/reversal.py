@@ -3,13 +3,13 @@
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from rig.commands.config_arguments import add_json
+from rig.commands.config_arguments import add_json, add_run
 from rig.errors import Refused
 
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig reversal`."""
-    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="run folders, or their run.h5: two or three")
+    add_run(parser, "runs", "run folders, or their run.h5: two or three", nargs="+")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the JSON to this file too")
     add_json(parser)
 

@@ -4,7 +4,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from rig.commands.config_arguments import add_json, add_set
+from rig.commands.config_arguments import add_json, add_run, add_set
 from rig.commands.offline import solve_elsewhere
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
@@ -12,12 +12,7 @@ from rig.station.plain_text import say, say_on_terminal
 
 def add(solve: ArgumentParser) -> None:
     """The arguments of `rig solve`."""
-    solve.add_argument(
-        "run",
-        type=Path,
-        metavar="RUN",
-        help="a run folder or its run.h5; with --sweeps, --attitudes or --turns, samples as CSV",
-    )
+    add_run(solve, "run", "a run folder or its run.h5; with --sweeps, --attitudes or --turns, samples as CSV")
     elsewhere = solve.add_mutually_exclusive_group()
     elsewhere.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples recorded elsewhere")
     elsewhere.add_argument("--attitudes", type=Path, metavar="CSV", help="the attitudes, for samples recorded in them")

@@ -252,6 +252,7 @@ def _told_of_turns(options: Namespace) -> "Columns":
 def _kept(options: Namespace, recording: "RunData", outcome: "Outcome") -> "tuple[Beside, ...]":
     """Write the run folder and enter it in the history; its calibrations beside the ones before."""
     from rig.commands.history.remember import remember_own
+    from rig.data.latest_run import note_run
     from rig.data.recording.run_file import write_elsewhere
     from rig.data.run_folder import empty_folder, next_recording
     from rig.report.writers import write_outcome
@@ -259,6 +260,7 @@ def _kept(options: Namespace, recording: "RunData", outcome: "Outcome") -> "tupl
     from rig.station.view import PlainView
 
     folder, tell = empty_folder(options.out), PlainView().event
+    note_run(folder)
     try:
         write_elsewhere(next_recording(folder, "raw"), recording)
         for event in write_outcome(folder, outcome):

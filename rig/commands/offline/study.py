@@ -21,7 +21,7 @@ WORTH_TELLING_S = 5.0
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig study`."""
-    parser.add_argument("name", nargs="?", metavar="NAME")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="one of those that `rig study` lists")
     parser.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="default: 1")
     parser.add_argument("--runs", type=int, metavar="N", help="per parameter set (default: as many as the paper)")

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.commands.config_arguments import add_run
 from rig.commands.page_arguments import PageWish, add_place, token_said, wait_for_interrupt
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused, raised_as
@@ -27,7 +28,7 @@ LARGEST_LOG = 50_000_000  # bytes
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig watch`, which has a page in any case."""
-    parser.add_argument("run_folder", type=Path, metavar="RUN_DIR")
+    add_run(parser, "run_folder", "a run folder", metavar="RUN_DIR")
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="N", help="times as fast as it was (default: 1)")
     add_place(parser)
 

@@ -1,0 +1,52 @@
+"""The run folders that this user ran last, newest at the end: what `latest` means in place of a run folder."""
+
+from contextlib import suppress
+from pathlib import Path
+
+from rig.config.files.own_folder import own_folder
+from rig.config.files.regular_file import UnfitFile, read_regular_file
+from rig.config.files.written_file import write_new
+from rig.errors import Refused
+
+LATEST = "latest"
+KEPT = 20  # folders, as the newest may be removed
+_LIST_MAX_BYTES = 1_000_000
+
+
+def note_run(folder: Path) -> None:
+    """Note that this user runs something in a folder. A run that cannot be noted goes on all the same."""
+    with suppress(OSError, Refused):
+        path = _list()
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        new = str(folder.resolve())
+        earlier = [noted for noted in _noted() if noted != new]
+        write_new(path, "".join(f"{noted}\n" for noted in [*earlier, new][-KEPT:]))
+
+
+def latest_run() -> Path:
+    """Return the newest noted run folder that is still there, relative to the working folder if it lies in it.
+
+    Raise Refused `no_latest_run`.
+    """
+    for noted in reversed(_noted()):
+        if (folder := Path(noted)).is_dir():
+            return folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder
+    raise Refused("no_latest_run", "no run folder of yours is known to be there", "Name the run folder")
+
+
+def meant_run(path: str | Path) -> Path:
+    """Return the run that a user names: `latest`, unless something here is called so, or a path.
+
+    Raise Refused as `latest_run`.
+    """
+    return latest_run() if str(path) == LATEST and not Path(LATEST).exists() else Path(path)
+
+
+def _noted() -> list[str]:
+    with suppress(OSError, UnfitFile, UnicodeDecodeError, Refused):
+        return read_regular_file(_list(), _LIST_MAX_BYTES).decode().splitlines()
+    return []
+
+
+def _list() -> Path:
+    return own_folder() / "latest_runs"
