@@ -32,7 +32,7 @@ autodoc_member_order = "bysource"
 default_role = "code"
 
 html_theme = "furo"
-html_extra_path = ["site"]  # its index.html leads to the first page
+html_extra_path = ["site", "config.schema.json"]  # site/index.html leads to the first page; editors fetch the schema
 html_show_sourcelink = False
 
 SECTION = re.compile(r"^## (.+)$", re.MULTILINE)

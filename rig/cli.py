@@ -48,6 +48,11 @@ COMMANDS = {
         "how-to/start/ten-minutes.md",
         "reading the configuration",
     ),
+    "new": Command(
+        "rig.commands.devices.new",
+        "a configuration from a few questions, with comments, checked",
+        "how-to/start/own-imu.md",
+    ),
     "run": Command(
         "rig.commands.measure.run",
         "run the procedure the file names",
@@ -164,7 +169,7 @@ COMMANDS = {
     ),
     "lines": Command(
         "rig.commands.devices.lines",
-        "look at a device that prints lines, and write its section of a configuration",
+        "look at a device that prints lines, and write its section, or a whole file that runs by hand",
         "how-to/at-the-rig/lines.md",
     ),
     "world": Command(
@@ -177,6 +182,7 @@ FIRST_STEPS = """\
 Calibrates inertial sensors on a robot arm, a servomotor or by hand. What one does first:
 
   rig demo                a calibration in a simulated laboratory; ten seconds
+  rig new my.yaml         a configuration from a few questions
   rig plan CONFIG         what the arm will do, and how long; connects to nothing
   rig check CONFIG        what is there and what is missing, before a run on hardware; nothing moves
   rig run CONFIG          the calibration

@@ -252,24 +252,26 @@ def set_of_that_name(value: Any) -> Any:
     return SETS[value]
 
 
+Attitudes = tuple[tuple[JointAngle, JointAngle, JointAngle], ...]
+AsWritten = Literal["eighteen", "faces", "magnetic"] | Attitudes  # the names are those of SETS
+
+
 class AttitudesSection(ProcedureSection):
     """Attitudes in which the arm stands still: which, how long, how often."""
 
-    attitudes: Annotated[tuple[tuple[JointAngle, JointAngle, JointAngle], ...], BeforeValidator(set_of_that_name)] = (
-        Field(
-            default=SETS["eighteen"],
-            min_length=1,
-            max_length=100,
-            description="`eighteen`: the best for an arm whose attitudes are good to 1 mrad; `faces`: twelve that "
-            "are the best for exact attitudes; `magnetic`: the eighteen, and eight more for "
-            "magnetometers; or a list of your own, with the angles of wrists 1, 2 and 3 for each "
-            "attitude; base, shoulder and elbow stay as in `arm.home_deg`",
-            json_schema_extra={
-                "unit": "°",
-                "allowed": f"{', '.join(f'`{name}`' for name in SETS)} or a list of 3 numbers each",
-                "usual": "`eighteen`",
-            },
-        )
+    attitudes: Annotated[Attitudes, BeforeValidator(set_of_that_name, json_schema_input_type=AsWritten)] = Field(
+        default=SETS["eighteen"],
+        min_length=1,
+        max_length=100,
+        description="`eighteen`: the best for an arm whose attitudes are good to 1 mrad; `faces`: twelve that "
+        "are the best for exact attitudes; `magnetic`: the eighteen, and eight more for "
+        "magnetometers; or a list of your own, with the angles of wrists 1, 2 and 3 for each "
+        "attitude; base, shoulder and elbow stay as in `arm.home_deg`",
+        json_schema_extra={
+            "unit": "°",
+            "allowed": f"{', '.join(f'`{name}`' for name in SETS)} or a list of 3 numbers each",
+            "usual": "`eighteen`",
+        },
     )
     dwell_s: float = Field(
         default=DEFAULT_REST_S, ge=0.1, le=3600, description="time of standing still in each attitude"

@@ -1,6 +1,7 @@
 """The section of a sensor as `rig lines` writes it: the guess, and a gap for each unknown. Pure."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from rig.config.sensors.lines_section import GAP
 from rig.sensors.lines.guessing import Guess
@@ -10,8 +11,19 @@ NICE = 0.02  # relative tolerance of a round rate
 ROUND = (1, 2, 2.5, 4, 5, 8, 10)
 
 
-def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu") -> str:
-    """Return the YAML of `sensors`; `?` marks values to look up, which `rig check` refuses by their key."""
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """What no line shows and the user states, None if that is open; `by_hand` asks for what a session by hand finds."""
+
+    serial_number: str | None = None
+    range_deg_s: str | None = None
+    range_g: str | None = None
+    by_hand: bool = False
+
+
+def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, known: Stated | None = None) -> str:
+    """Return the YAML of `sensors`; `?` stands for what is to be looked up, and `rig check` refuses it by the key."""
+    known = known or Stated()
     lines: dict[str, object] = {"columns": _format_list(guess.columns)}
     if shape.keys:
         lines["keys"] = _format_list([_quote(key) for key in shape.keys])
@@ -30,17 +42,19 @@ def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu")
     for kind, key in (("g", "rate"), ("a", "acceleration"), ("m", "field")):
         if kind in guess.units:
             lines[key] = _format_mapping(guess.units[kind])
-    gap = f'"{GAP}"'
     rows = [
         "sensors:",
         f"  {name}:",
         "    part: lines",
-        f"    serial_number: {gap}  # of this specimen",
+        f"    serial_number: {_stated(known.serial_number)}  # of this specimen",
         f"    rate_hz: {_round_rate(guess.rate_hz):g}",
-        f"    range_deg_s: {gap}  # full scale to which the device's program sets the gyroscope",
+        f"    range_deg_s: {_stated(known.range_deg_s)}  # full scale to which the device's program sets the gyroscope",
     ]
     if "a" in guess.units:
-        rows.append(f"    acceleration: {{range_g: {gap}}}  # … and the accelerometer; without this it is not read")
+        range_g = _stated(known.range_g)
+        rows.append(f"    acceleration: {{range_g: {range_g}}}  # … and the accelerometer; without this it is not read")
+    if known.by_hand:
+        rows.append("    correction: matrix  # the right angles of the axes are found too")
     rows += ["    serial:", f"      port: {port}", f"      baud: {baud}", "    lines:"]
     rows += [f"      {key}: {value}" for key, value in lines.items()]
     if "temperature" not in guess.columns:
@@ -60,7 +74,11 @@ def _format_value(value: object) -> str:
     return f'"{GAP}"' if value == GAP else str(value)
 
 
-def _quote(text: str) -> str:
+def _stated(value: str | None) -> str:
+    return f'"{GAP}"' if value is None else value
+
+
+def _quoted(text: str) -> str:
     return "'" + text.replace("'", "''") + "'"
 
 
