@@ -34,6 +34,7 @@ UNITS = {
 }
 
 REPEAT = """\
+# yaml-language-server: $schema=../docs/config.schema.json
 # The next LSM9DS1 on the same rig: a repeat calibration says only what differs.
 base: ur10e_lsm9ds1.yaml
 sensors: {gyro: {serial_number: LSM9DS1-002}}

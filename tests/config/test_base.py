@@ -48,7 +48,8 @@ def test_null_leaves_out_what_the_base_says_and_nothing_else() -> None:
 
 def test_a_repeat_calibration_takes_five_lines(folder: Path) -> None:
     path = CONFIGS / "repeat_lsm9ds1.yaml"
-    assert len(path.read_text(encoding="utf-8").splitlines()) == 5
+    schema, *lines = path.read_text(encoding="utf-8").splitlines()
+    assert schema.startswith("# yaml-language-server") and len(lines) == 5
     repeat, demo = load(path), load(DEMO)
     assert not repeat.simulated
     assert repeat.config.sensors["gyro"].serial_number == "LSM9DS1-002"
@@ -88,10 +89,10 @@ def test_errors_name_the_file_and_the_line_they_came_from(folder: Path) -> None:
     written(folder, text, "broken.yaml")
     path = written(folder, "base: broken.yaml\nboard:\n  baud: 9600\nlimits: {condition: -1}\n")
     found = problems_of(path)
-    assert found[0] == "arm.payload_kg (broken.yaml, line 4): 99: input should be less than or equal to 30"
+    assert found[0] == "arm.payload_kg (broken.yaml, line 5): 99: input should be less than or equal to 30"
     assert found[1].startswith("board.baud (line 3): 9600 is not allowed, did you mean 921600?")
     assert found[2] == "limits.condition (line 4): -1: input should be greater than 0"
-    assert found[3].startswith("procedure.rest (broken.yaml, line 25): unknown key, did you mean rest_s?")
+    assert found[3].startswith("procedure.rest (broken.yaml, line 26): unknown key, did you mean rest_s?")
     assert len(found) == 4
 
 

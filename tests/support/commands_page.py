@@ -42,7 +42,7 @@ def page_text() -> str:
     ]
     for name, parser in parsers():
         page = COMMANDS[name].page
-        lines += ["", f"## rig {name}", "", f"{_sentence(COMMANDS[name].text)} More: [{page}]({page})."]
+        lines += ["", f"## rig {name}", "", _sentence(COMMANDS[name].text), f"More: [{page}]({page})."]
         lines += _section(parser)
     return "\n".join(lines) + "\n"
 
@@ -65,7 +65,7 @@ def _section(parser: argparse.ArgumentParser) -> Iterator[str]:
     for action in below:
         meanings = {choice.dest: choice.help or "" for choice in action._choices_actions}
         for name, command in action.choices.items():
-            yield from ("", f"**`{command.prog}`**: {_cell(meanings.get(name, ''))}.")
+            yield from ("", f"**`{command.prog}`**", "", _sentence(_cell(meanings.get(name, ""))))
             yield from _section(command)
 
 

@@ -70,11 +70,11 @@ def run(options: Namespace) -> int:
 def stated(options: Namespace, *, by_hand: bool) -> "Stated":
     """Ask what no line shows and no option says; without a terminal it stays open. Raise Refused `bad_option`."""
     from rig.commands.devices.questions import answered
-    from rig.config.sensors.sensor_sections import checked_serial_number
+    from rig.config.sensors.sensor_sections import check_serial_number
     from rig.sensors.lines.written import Stated
 
     asked = {
-        "serial_number": ("serial number of this specimen", "--serial-number", checked_serial_number),
+        "serial_number": ("serial number of this specimen", "--serial-number", check_serial_number),
         "range_deg_s": ("full scale of the gyroscope in its program, °/s", "--range-deg-s", positive_number),
         "range_g": ("full scale of the accelerometer in its program, g", "--range-g", positive_number),
     }

@@ -60,7 +60,7 @@ def run(options: Namespace) -> int:
 def _answers(options: Namespace) -> "Answers":
     from rig.config.first_configuration import Answers
     from rig.config.sensors.sensor_catalogue import PARTS
-    from rig.config.sensors.sensor_sections import checked_serial_number
+    from rig.config.sensors.sensor_sections import check_serial_number
 
     turner = chosen("What turns the sensors?", "--turner", TURNERS, options.turner)
     sources = {key: words for key, words in SOURCES.items() if key != "kvh1775" or turner == "arm"}
@@ -72,7 +72,7 @@ def _answers(options: Namespace) -> "Answers":
     parts = {name: name for name, part in PARTS.items() if not part.own_port and name != "mavlink"}
     part = {"part": chosen("Which sensor is it?", "--part", parts, options.part)} if source == "board" else {}
     serial_number = answered(
-        "serial number of this specimen", "--serial-number", checked_serial_number, given=options.serial_number
+        "serial number of this specimen", "--serial-number", check_serial_number, given=options.serial_number
     )
     return Answers(turner, source, port, serial_number, **part, **arm)  # type: ignore[arg-type]
 
@@ -80,7 +80,7 @@ def _answers(options: Namespace) -> "Answers":
 def _turner_answers(turner: str, options: Namespace) -> dict[str, object]:
     from rig.config.models import ArmSection
     from rig.config.procedures.servo_section import ServoSection
-    from rig.config.section import checked_host
+    from rig.config.section import check_host
 
     if turner == "arm":
         usual = ArmSection.model_fields["model"]
@@ -89,7 +89,7 @@ def _turner_answers(turner: str, options: Namespace) -> dict[str, object]:
         )
         return {
             "arm_host": answered(
-                "address of the arm (pendant: Settings, System, Network)", "--host", checked_host, given=options.host
+                "address of the arm (pendant: Settings, System, Network)", "--host", check_host, given=options.host
             ),
             "arm_model": chosen("Which arm is it?", "--model", _literals(usual.annotation), options.model),
             "payload_kg": float(payload),
@@ -124,7 +124,7 @@ def _literals(annotation: object) -> Mapping[str, str]:
 
 def _port(question: str, option: str, given: str | None) -> str:
     """Return a port: one of those that this computer has, or another that is typed."""
-    from rig.config.section import checked_port
+    from rig.config.section import check_port
 
     if given is None:
         from serial.tools.list_ports import comports
@@ -136,4 +136,4 @@ def _port(question: str, option: str, given: str | None) -> str:
         if given != ANOTHER:
             return given
         given = None
-    return answered("port, such as /dev/ttyUSB0, COM3 or socket://host:port", option, checked_port, given=given)
+    return answered("port, such as /dev/ttyUSB0, COM3 or socket://host:port", option, check_port, given=given)

@@ -78,7 +78,7 @@ def _stated(value: str | None) -> str:
     return f'"{GAP}"' if value is None else value
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return "'" + text.replace("'", "''") + "'"
 
 
