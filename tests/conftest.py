@@ -23,8 +23,10 @@ __all__ = ["world"]
 # What is made until the tests are collected stays: to look it through for garbage takes a second of each worker.
 gc.disable()
 
-settings.register_profile("rig", deadline=None)  # a shared machine stalls now and then, which is no failure
-settings.load_profile("rig")
+# Without a deadline: a shared machine stalls now and then, which is no failure.
+settings.register_profile("test", deadline=None, max_examples=30)
+settings.register_profile("proof", deadline=None, max_examples=300)
+settings.load_profile("test")
 
 # Nothing that a test runs enters the history of whoever runs the tests, or is known as a run of theirs.
 os.environ["RIG_HISTORY"] = "off"
@@ -42,7 +44,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     nursery.closed = bool(config.getoption("--proof"))
-    if not nursery.closed:
+    if nursery.closed:
+        settings.load_profile("proof")
+    else:
         readers_forked()
 
 

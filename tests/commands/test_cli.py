@@ -195,6 +195,7 @@ LATER = {
 LATER |= {"rig.report.certificate.page", "rig.report.kinds.registry"}
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [f"plan {CONFIG}", f"run {CONFIG} --out RUN", "history"])
 def test_what_solves_and_reports_is_loaded_after_the_first_line(command: str, tmp_path: Path) -> None:
@@ -206,6 +207,7 @@ def test_what_solves_and_reports_is_loaded_after_the_first_line(command: str, tm
     assert command != "history" or "rig.config.load" not in loaded
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_plan_says_what_its_checks_will_tell() -> None:
     document = json.loads(shell(f"{PLAN} --json").stdout)

@@ -63,17 +63,20 @@ def test_what_the_history_knows_is_told_without_them(words: tuple[str, ...], pla
     assert loaded("history", *words) == ([], [])
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_comparison_loads_no_more_than_its_limit_needs(place: Path) -> None:
     assert {library for libraries in loaded("history", "compare", "1", "3") for library in libraries} <= {"scipy"}
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_report_is_written_without_them(place: Path) -> None:
     run = shutil.copytree(RECORDINGS / "six_observation", place / "run")
     assert {library for libraries in loaded("report", run) for library in libraries} <= {"scipy"}  # for Student's t
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_steps_of_a_plan_are_told_before_what_takes_longer_to_find() -> None:
     first, last = loaded("plan", DEMO)

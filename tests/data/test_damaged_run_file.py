@@ -130,6 +130,7 @@ def test_a_signal_ends_the_reading(recording: Path) -> None:
     interrupted_while_it_reads(recording, "solve", recording)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who has opened what")
 def test_a_signal_ends_the_reading_of_a_log_of_millions_of_lines(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"

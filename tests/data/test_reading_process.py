@@ -31,6 +31,7 @@ read_apart("support.external.greedy:patience", Path(sys.argv[1]), {}, limits_for
 """
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.usefixtures("read_by_system")
 @pytest.mark.parametrize(

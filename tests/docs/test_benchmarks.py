@@ -59,6 +59,7 @@ def test_every_benchmark_has_a_short_form_or_takes_hours() -> None:
     assert {path.stem for path in (ROOT / "benchmarks").glob("*/*.py")} == {*HOURS, *SHORT, *LONGER}
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.parametrize(

@@ -36,6 +36,7 @@ def test_a_recorded_run_is_enough(name: str, shows: str, tmp_path: Path) -> None
     assert done.returncode == 0 and shows in done.stdout, done.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("name", "arguments", "shows"),

@@ -457,6 +457,7 @@ def doubling(share: float, seed: int) -> tuple[Callable[[bytes], bytes], list[in
     return twice, doubled
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.05, 1.0])
 def test_frames_that_come_twice_are_taken_once_and_counted(wire: tuple[BoardOnAWire, str], share: float) -> None:
@@ -546,6 +547,7 @@ def streaming(wire: tuple[BoardOnAWire, str]) -> Board:
     return board
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 def test_a_board_that_falls_silent_while_streaming_is_noticed_after_two_seconds(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:

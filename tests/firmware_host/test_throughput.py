@@ -8,6 +8,7 @@ from support.board.full_rate import CASES, stream
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("case", "simulated_s"),

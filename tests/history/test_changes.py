@@ -38,6 +38,7 @@ def alarms(pairs: list[tuple[dict[str, Parameter], dict[str, Parameter]]]) -> fl
     return float(np.mean([any(change.has_changed for change in changes_in([pair])[0]) for pair in pairs]))
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
@@ -52,6 +53,7 @@ def test_an_undamaged_part_has_changed_in_one_of_fifty_comparisons_at_most(senso
     assert correlation or share > 0.006, "and the limit is no wider than it must be"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_all_values_of_a_run_are_one_comparison() -> None:
     random, freedom = np.random.default_rng(2), np.full(12, np.inf)

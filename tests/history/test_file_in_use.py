@@ -60,6 +60,7 @@ def read_a_link_to_it(file: Path) -> None:
         read_regular_file(link, 1 << 30)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "beside",

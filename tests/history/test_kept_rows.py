@@ -281,6 +281,7 @@ def test_a_run_that_was_taken_away_leaves_its_numbers_though_the_journal_was_wri
         assert wrong(history) == [("missing", f"{table} 2 to 3") for table in GAPS]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["run-2.h5", "run-17.h5", "verify-2.h5", "certificate.pdf", "script.py"])
 def test_a_file_of_a_run_that_no_run_was_entered_with_is_named(name: str, tmp_path: Path) -> None:

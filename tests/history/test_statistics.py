@@ -107,6 +107,7 @@ def runs_to_alarm(found: Chart, begin: int) -> Array:
     return counted
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize("equal", [True, False], ids=["equal uncertainties", "differing uncertainties"])
@@ -121,6 +122,7 @@ def test_false_alarms_are_300_runs_apart(thorough: bool, equal: bool) -> None:
     assert apart >= (300 if thorough else 240)  # of 170 alarms an eighth, 2σ, is chance
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize(("change", "most"), [("drift", 15), ("shift", 10)])

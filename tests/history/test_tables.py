@@ -133,6 +133,7 @@ def test_readings_from_files_are_of_no_rig_that_is_called_none(history: History)
     assert rig_states(pasts) == []
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_one_alarm_is_one(history: History) -> None:
     for day in range(40):

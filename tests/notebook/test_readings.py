@@ -71,6 +71,7 @@ def test_a_table_without_pandas_says_which_extra_it_needs(imu: rig.Readings, mon
         imu.to_frame()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_nothing_loads_pandas_before_a_table_is_asked_for() -> None:
     program = (

@@ -184,6 +184,7 @@ def test_a_clock_that_runs_far_off_is_refused() -> None:
         look(synthetic_run(Setup(drift=0.06)))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_coloured_noise_widens_the_uncertainty() -> None:
     rng = np.random.default_rng(8)
@@ -232,6 +233,7 @@ def drifting(run: RunData, change_rad_s: float) -> RunData:
     return counts(run, change)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize(("noise_rad_s", "change_rad_s"), [(0.035, 0.03), (0.003, 0.01)])
 def test_a_bias_that_drifts_makes_the_result_uncertain(noise_rad_s: float, change_rad_s: float) -> None:

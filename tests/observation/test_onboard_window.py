@@ -36,6 +36,7 @@ def told(run: RunData, setup: Setup, sweep: int) -> tuple[float, float]:
     return middle_s - (start_s + end_s) / 2, float(np.degrees(speed_rad_s))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "setup",

@@ -83,6 +83,7 @@ def test_a_slow_ripple_beside_faster_ones_is_in_both_means_alike(
         assert weights.sum() == pytest.approx(1.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 def test_errors_are_as_large_as_is_stated_by_whatever_the_arm_ripples(thorough: bool) -> None:

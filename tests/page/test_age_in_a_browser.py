@@ -70,6 +70,7 @@ def of_now(driver: Chrome) -> bool:
     return bool(found) and not any(found)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("what", TURNERS)
 def test_readings_that_arrive_are_of_now_and_those_told_again_are_not(
     driver: Chrome, tmp_path: Path, what: str

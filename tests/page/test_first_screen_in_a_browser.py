@@ -62,6 +62,7 @@ def six(driver: Chrome, tmp_path: Path) -> Iterator[Telling]:
         driver.get("about:blank")  # so that it asks no longer
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("size", SIZES)
 def test_six_sensors_are_measured_and_judged_without_scrolling(
     driver: Chrome, tmp_path: Path, six: Telling, size: tuple[int, int]

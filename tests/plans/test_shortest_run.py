@@ -158,6 +158,7 @@ def predicted_of(of: Run) -> ReachedUncertainty:
     return budgets.reached
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3000)
@@ -271,6 +272,7 @@ def budgets_of(tells: Tells) -> Callable[[Candidate], Budgets]:
     return predict
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_several_speeds_are_tried_and_keep_what_the_file_says_of_them() -> None:
     speeds = {each.procedure.speeds_deg_s for each in tried(demo()).candidates()}  # type: ignore[attr-defined]

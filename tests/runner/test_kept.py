@@ -21,6 +21,7 @@ def taken(acquisition: Acquisition, from_s: float, to_s: float, sensor: Recorded
         acquisition.on_samples("gyro", sample)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_hours_of_waiting_before_a_sweep_are_not_looked_through_for_its_clock() -> None:
     acquisition = Acquisition()

@@ -43,6 +43,7 @@ def test_sweeps_that_agree_count() -> None:
     assert resumption([run], run.settings, SCRIPT).done == set(range(6))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
     """And the one about the same axis the other way, for which of the two was disturbed nobody can tell."""

@@ -65,6 +65,7 @@ def refused(port: str, **changes: object) -> SensorError:
     return caught.value
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("message", ["A", "B", "C"])
 @pytest.mark.parametrize("rotation", ["delta", "rate"])

@@ -4,7 +4,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.sensors.errors import SensorError
@@ -82,7 +82,6 @@ garbage = st.one_of(st.binary(max_size=40), st.integers(4, 35).map(lambda length
 
 @pytest.mark.slow
 @given(st.lists(st.one_of(st.sampled_from(FORMATS), st.just("test"), garbage), max_size=20))
-@settings(deadline=None, max_examples=100)
 def test_whatever_stands_between_them_costs_no_whole_message(parts: list[Format | str | bytes]) -> None:
     sent, wanted = b"", []
     for number, part in enumerate(parts):

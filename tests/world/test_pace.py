@@ -250,6 +250,7 @@ def turn(arm: Arm) -> Transfer:
     return Transfer("test move", start, (*start[:5], start[5] + 4.0), 1.0, 2.0, trapezoid_duration(4.0, 1.0, 2.0))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @linux
 def test_a_stalled_wire_does_not_end_a_move(world: World) -> None:

@@ -82,6 +82,7 @@ def test_a_protective_stop_unlocks_after_five_seconds_and_the_script_can_be_sent
             arm.says("True")
 
 
+@pytest.mark.thorough
 def test_no_program_starts_while_the_robot_is_stopped(world: World) -> None:
     running = world()
     running.control({"do": "protective_stop"})

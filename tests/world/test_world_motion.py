@@ -77,6 +77,7 @@ def test_no_joint_exceeds_its_limit_and_all_arrive_together() -> None:
         assert gone == pytest.approx(way * gone[0] / way[0], abs=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.tuples(*[angles] * 6), st.floats(0.5, 3.1), st.floats(0.5, 20.0), st.sampled_from([0.0, 0.05, 0.2]))

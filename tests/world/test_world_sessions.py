@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.config.load import load
@@ -69,14 +69,12 @@ def play(session: ClientSession, data: bytes) -> None:
     assert all(abs(q) < 100 for q in robot.motion.q_rad)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.sampled_from([RtdeSession, DashboardSession, PrimarySession]), st.binary(max_size=200))
 def test_noise(new_session: Callable[[Robot], ClientSession], data: bytes) -> None:
     play(new_session(LABORATORY.robot), data + b"\n")
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
 @given(st.lists(statements, max_size=6))
 def test_programs_that_cannot_be_right(lines: list[str]) -> None:
     text = "\n".join(["def odd():", *(f"  {line}" for line in lines), "end", ""])
@@ -84,7 +82,6 @@ def test_programs_that_cannot_be_right(lines: list[str]) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
 @given(
     st.lists(st.sampled_from(sorted(OUTPUTS)), max_size=8),
     st.lists(st.sampled_from(sorted(INPUTS)), max_size=4),

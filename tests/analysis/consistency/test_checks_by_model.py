@@ -50,6 +50,7 @@ DAMAGES: dict[str, tuple[float, float, Callable[[Drawn, float], Array]]] = {
 GOOD = {"ADIS16465": 0, "quiet LSM9DS1": 1}
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.proof

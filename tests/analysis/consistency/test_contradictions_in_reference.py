@@ -140,6 +140,7 @@ def test_a_recording_as_it_was_made_contradicts_nothing(folder: str) -> None:
     assert told_of(recorded(folder)).failed == set()
 
 
+@pytest.mark.thorough
 def test_a_sensor_that_is_no_more_bent_than_its_data_sheet_says_is_within_its_uncertainty() -> None:
     """The simulated KVH 1775 has 0.09 % of v²/g on one axis, and the run did not look for it."""
     run = recorded(KVH)
@@ -174,6 +175,7 @@ def test_a_bias_that_drifts_contradicts_nothing_where_it_is_watched() -> None:
     assert "gyro.acceleration_bias_changed" not in names and "gyro.acceleration_scale_changed" in names
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("folder", "sensor", "axis", "at_m_s2"),

@@ -86,6 +86,7 @@ def test_what_is_large_is_told(part: str, name: str, size: float) -> None:
     assert passes(DAMAGES[name][0](drawn(part, 1), size)) is None
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("part", PARTS)
 def test_a_sensor_as_its_data_sheet_lets_it_be_is_told_nothing_of_and_within_its_uncertainty(part: str) -> None:
     by = passes(drawn(part, 2))

@@ -62,6 +62,7 @@ def held_to_be_uniform(found: Seen, of: str) -> None:
     assert all(each <= most for each in often.values()), (of, often)
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(5)
 @pytest.mark.slow
 @pytest.mark.proof
@@ -95,6 +96,7 @@ def test_of_a_thousand_undamaged_recordings_two_fail_at_most() -> None:
     assert found.recordings >= 1000 and len(found.alarms) <= 2
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2179, 2599, 2859])  # one fast vibration, one so slow; two of nearly one frequency
 def test_what_shakes_a_quiet_gyroscope_beside_its_encoders_contradicts_nothing(seed: int) -> None:

@@ -69,6 +69,7 @@ def read_of(movement: Movement, axes: int, axis_rad: float) -> ReferenceModel:
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.proof

@@ -77,6 +77,7 @@ def test_real_cameras_tell_the_same_scale_whatever_the_window(window_s: float | 
     assert isinstance(found.solution.earth, Fault), "nobody sees the Earth's rate by a hand-held phone's gyroscope"
 
 
+@pytest.mark.thorough
 @pytest.mark.proof
 @pytest.mark.parametrize(
     "world",

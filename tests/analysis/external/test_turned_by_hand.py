@@ -54,6 +54,7 @@ def test_a_hands_turns_tell_the_scale_to_a_thousandth(tmp_path: Path) -> None:
     assert (std[:3] < 1.5e-3).all() and (std[3:] < 3e-4).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.one_in(2)
 @pytest.mark.proof

@@ -30,6 +30,7 @@ def errors(seen: Drawn) -> tuple[Array, Budget, tuple[Observation, ...]]:
     return np.concatenate([found.scale, found.bias_rad_s]) - true, found.uncertainty, found.observations
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.proof

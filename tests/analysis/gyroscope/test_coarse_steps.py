@@ -15,6 +15,7 @@ FIRST_SEED, SEEDS = 900, 5
 WITHIN, BEYOND = 0.93, 1.5  # at least such a share of the errors within U, and none so many U away
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3600)

@@ -37,6 +37,7 @@ def solved(setup: Setup, seed: int, off_deg: Array) -> tuple[Array, Budget, tupl
     return result.scale - scale, result.uncertainty, mounts
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 def test_three_mountings_tell_the_scale_as_well_as_their_budget_says(thorough: bool) -> None:

@@ -33,6 +33,7 @@ def errors(kind: str, arc_deg: float | None, seed: int) -> tuple[np.ndarray, np.
     return off / found.uncertainty.std, np.abs(off) / found.uncertainty.expanded
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize(("kind", "arc_deg"), [("quiet LSM9DS1", None), ("ADIS16465", None), ("quiet LSM9DS1", 180.0)])

@@ -42,6 +42,7 @@ def turning(outcome: Outcome) -> float:
     return float(np.sqrt(np.mean(np.square(shares)) / 2))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_run_errs_by_what_it_says_and_the_turning_adds_next_to_nothing() -> None:
     found = ran(3, "turner.state_rate_hz=100")

@@ -362,6 +362,7 @@ def test_the_result_names_its_statistics_and_a_person_can_read_them() -> None:
     assert "–" in console.export_text()
 
 
+@pytest.mark.thorough
 def test_plots_of_before_and_after_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written = Plotted(("verification_gyro_before", "verification_gyro_after"))
     assert draw_verifications([verified()], tmp_path) == (written,)

@@ -18,6 +18,7 @@ def drift_of(run: RecordedRun) -> FieldDrift:
     return drift
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_what_is_stated_of_the_arms_returns_is_a_half_width_and_no_standard_deviation() -> None:
     recorded = open_run(RECORDINGS / "magnetometer")

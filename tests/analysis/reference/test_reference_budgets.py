@@ -121,6 +121,7 @@ BY_SHEET = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.proof
 @pytest.mark.parametrize(("session", "without"), [(accelerometer, 1.25), (magnetometer, 2.0)])
 def test_the_stated_uncertainty_covers_the_truth(
@@ -130,6 +131,7 @@ def test_the_stated_uncertainty_covers_the_truth(
     check([session(seed) for seed in range(seeds)], within, without)
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(3)
 @pytest.mark.proof
 @pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465"])
@@ -148,6 +150,7 @@ def test_the_stated_uncertainty_covers_what_a_data_sheet_lets_a_sensor_do(part: 
     assert all(each > (0.92 if thorough else 0.8) for each in share)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("new_rad", "least", "most"), [(0.0, 0.0, 0.01), (1e-4, 0.01, 0.2), (5e-4, 0.1, 0.5)])
 def test_the_readings_tell_how_much_of_what_an_arm_is_off_by_is_new_in_each_dwell(
     new_rad: float, least: float, most: float

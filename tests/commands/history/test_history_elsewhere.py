@@ -96,6 +96,7 @@ def test_a_spreadsheet_is_given_no_formulas(tmp_path: Path) -> None:
     assert {float(row["value"]) for row in rows if row["parameter"] == "by"} == {-0.02}
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_run_waits_four_seconds_for_a_server_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("RIG_HISTORY")

@@ -36,6 +36,7 @@ def test_a_defect_at_one_recording_costs_no_other_here() -> None:
     assert all(isinstance(each, Given) for each in answers.values()) and len(answers) == len(NAMES) - 1
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_workers_of_a_cluster_work_in_processes_of_their_own_and_one_that_dies_costs_no_other(tmp_path: Path) -> None:
     with local_cluster(n_workers=2, processes=True) as cluster, client_of(cluster.scheduler_address) as client:

@@ -345,6 +345,7 @@ def test_poses_ahead_of_the_readings_end_by_name(
         assert found["unsolved"]["imu"]["acceleration"]["error"].startswith(("rank_deficient", "too_few"))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("packed", [True, False])
 def test_the_allan_deviation_of_rounded_stamps_is_that_of_even_ones(

@@ -188,6 +188,7 @@ def test_an_unmodelled_register_fails_by_name(tmp_path: Path) -> None:
     assert "in function usart_init" in error.what
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "statement", "what"),

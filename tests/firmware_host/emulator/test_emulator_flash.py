@@ -122,6 +122,7 @@ def test_the_core_stands_still_while_the_flash_works(tmp_path: Path) -> None:
     assert program_us == pytest.approx(82, abs=3)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "status"),
@@ -143,6 +144,7 @@ def test_mistakes_show_in_the_status(body: str, status: int, tmp_path: Path) -> 
     assert words(chip(f"{body} put_word(SR);", tmp_path).run(0.05)) == [status]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "body"),
     [

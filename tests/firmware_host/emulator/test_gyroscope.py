@@ -62,6 +62,7 @@ def test_scale_and_bias_follow_the_temperature_and_hold_where_they_were_found() 
         assert gyroscope.read(time_s) == pytest.approx(1 / scale - bias)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_flicker_makes_a_floor_of_the_allan_deviation() -> None:
     """Two hours, a floor around 10 s: level within a fifth from 1 s to 30 s, and it does not begin with a jump."""
@@ -71,6 +72,7 @@ def test_flicker_makes_a_floor_of_the_allan_deviation() -> None:
         assert allan_deviation(rates, 0.1, time_s) == pytest.approx(1e-5, rel=0.2)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_random_walk_grows_with_the_root_of_time() -> None:
     """Allan deviation of a rate random walk q: q √(τ / 3)."""

@@ -68,6 +68,7 @@ def test_its_identity_is_the_datasheets_unless_it_is_another_part(part: DataShee
     assert driver.identity() == part.other_identity
 
 
+@pytest.mark.one_in(3)
 @every_rate
 def test_conversions_come_at_the_data_rate(part: DataSheet, rate_hz: float) -> None:
     asked: list[float] = []

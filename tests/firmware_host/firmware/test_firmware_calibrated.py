@@ -332,6 +332,7 @@ def test_polynomials_that_cannot_be_right_are_refused(wrong: dict[str, Any]) -> 
     assert error_of(board.ask("write_calibration", sensor=0, **OVER_TEMPERATURE | wrong)) == "bad_calibration"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_than_before() -> None:
     """Polynomials of sweeps from 20 to 60 °C and back, in the board's flash, correct a part that stands still there."""

@@ -157,6 +157,7 @@ def test_what_was_kept_of_another_setting_and_while_the_part_settles_is_not_used
     assert sweeps.observe(0, start_us, end_us - PERIOD_US)["samples"] == 49
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("duration_s", [0.5, 3.0, 30.0])
 def test_three_sensors_share_the_room_and_each_has_its_duration(duration_s: float) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -171,7 +171,6 @@ def test_a_few_passes_are_enough_for_a_common_sensor_and_one_step_for_the_closed
 axis = st.floats(-1, 1, allow_nan=False, width=32)
 
 
-@settings(max_examples=400)
 @given(
     more=st.lists(st.sampled_from(range(6)), max_size=14),
     order=st.permutations(range(6)),
@@ -205,7 +204,6 @@ def test_any_observations_the_rig_accepts_are_solved_alike(
     assert scale_difference < SCALE_AGREEMENT and bias_difference < BIAS_AGREEMENT_RAD_S
 
 
-@settings(max_examples=300)
 @given(
     st.lists(st.sampled_from(range(6)), min_size=6, max_size=20),
     st.sampled_from(range(6)),

@@ -152,6 +152,7 @@ def test_the_newest_record_is_found_across_the_wrap_of_its_sequence(flash: HostF
         assert Store().read_numbered() == ((sequence + k) % 2**32, content)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("before", range(3))
 def test_a_cut_at_any_operation_of_a_write_leaves_the_old_record_or_the_new_one(flash: HostFlash, before: int) -> None:
@@ -197,6 +198,7 @@ def test_two_cuts_in_a_row_leave_what_was_there_or_the_newest(flash: HostFlash) 
                 assert after_first is not None
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("before", range(1, 4))
 def test_a_cut_in_an_erase_leaves_the_newest_record_or_none_but_no_older_one(flash: HostFlash, before: int) -> None:

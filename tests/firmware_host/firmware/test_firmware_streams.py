@@ -1,7 +1,7 @@
 """From data-ready edges to batches: time stamps, sequence numbers, losses."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_host.frames import encode
@@ -230,7 +230,6 @@ def test_answers_there_is_no_room_for_are_counted_and_the_question_can_be_asked_
 
 
 @pytest.mark.slow
-@settings(max_examples=100)
 @given(
     st.lists(st.tuples(st.integers(1, 90), st.integers(1, 3), st.booleans(), st.booleans()), min_size=1, max_size=20)
 )

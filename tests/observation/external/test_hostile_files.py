@@ -48,6 +48,7 @@ def test_a_file_that_was_made_to_harm_is_refused_by_name(tmp_path: Path, name: s
     assert said.isprintable() and len(said) < 1500 + len(str(path)), said
 
 
+@pytest.mark.thorough
 @pytest.mark.one_in(4)
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what a process took at most")
 @pytest.mark.parametrize("name", DEAREST)

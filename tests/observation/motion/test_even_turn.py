@@ -20,6 +20,7 @@ def drawn() -> Drawn:
     return drawn_servo(7)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_time_of_a_turn_is_known_to_a_few_hundred_thousandths(drawn: Drawn) -> None:
     for run in drawn.runs:

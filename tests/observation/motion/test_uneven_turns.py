@@ -28,6 +28,7 @@ def turns(seed: int) -> list[tuple[Observation, Shaft]]:
     ]
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_beside_a_servos_lines_the_noise_is_that_of_the_gyroscope_alone() -> None:
     """Three times a turn, 18 and 22 times: what is as large as the noise, and would be taken for coloured noise."""

@@ -36,6 +36,7 @@ def shown(variances: list[float]) -> float:
     return 2 * float(np.mean(variances)) ** 2 / float(np.var(variances))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize(("made", "within"), [(white, 1.3), (remembering, 2.0), (shaken, 1.7)])
 def test_the_freedom_of_a_variance_is_what_its_scatter_shows(

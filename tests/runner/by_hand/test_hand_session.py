@@ -20,6 +20,7 @@ def held(table: Table) -> None:
     assert np.all(off < 1.5), (off, table.again)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
     table = Table(seed=3)

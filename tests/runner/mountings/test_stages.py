@@ -57,6 +57,7 @@ def test_an_instruction_that_was_not_followed_ends_the_run_before_a_sweep(tmp_pa
     assert not [each for each in read_run(out / "run-2.h5").events if "Sweep" in type(each.event).__name__]
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_an_accelerometer_refuses_it_before_anything_has_moved(tmp_path: Path) -> None:
     stages: list[dict[str, Any]] = [{"instruction": "as it is"}, {"instruction": "tip the board", "mount": TIPPED}]

@@ -75,6 +75,7 @@ def test_a_stop_that_the_servo_refuses_is_told_with_its_error() -> None:
         assert "the servo refused the stop (error 1 at " in f"{fault.value} {notes}", (fault.value, notes)
 
 
+@pytest.mark.thorough
 def test_a_few_lost_replies_are_borne() -> None:
     with servo_on_a_wire() as wire, held(wire) as servo:
         servo.move(turn(servo.latest.q_rad[0], 60.0), at_speed(wire, lambda: wire.do("of_bus", "lose", 3)))

@@ -166,6 +166,7 @@ def test_one_program_at_a_time_has_the_port() -> None:
         assert refused.value.name == "servo_port_in_use"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["servo_out_of_range", "servo_too_fast", "servo_move_too_long"])
 def test_a_move_that_the_servo_cannot_make_is_not_begun(name: str) -> None:

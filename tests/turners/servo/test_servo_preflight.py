@@ -48,7 +48,7 @@ REFUSED: dict[str, tuple[str, tuple[ServoTruth, ...], LineTruth]] = {
 }
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 @pytest.mark.slow
 @pytest.mark.parametrize("what", REFUSED)
 def test_a_servo_is_refused_by_name_and_stays_as_it_is(what: str) -> None:

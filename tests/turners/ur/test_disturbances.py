@@ -106,6 +106,7 @@ def test_local_control_ends_the_run_at_once_by_the_client_and_says_who_refused(
     assert laboratory.state()["q_rad"][WRIST_3] < 5.0, "the arm went on to the end of its way"
 
 
+@pytest.mark.thorough
 @on("CB3")
 def test_a_controller_without_local_control_has_nothing_to_switch(laboratory: WorldHandle) -> None:
     with connected(laboratory) as arm:
@@ -149,6 +150,7 @@ def test_another_payload_ends_the_run_at_once(laboratory: WorldHandle, moment: s
     assert "1.5 kg at (0, 0, 25) mm instead of 0.35 kg" in fault.what and "gripper" in fault.remedy
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("seconds", "moment"),
     [(1.0, "rest"), (-0.5, "move"), *(pytest.param(*each, marks=LATER) for each in [(1.0, "move"), (-0.5, "rest")])],
@@ -164,6 +166,7 @@ def test_a_clock_that_is_set_ends_the_run_at_once_and_its_states_are_not_passed_
     assert all(0.0 < b.time_s - a.time_s < 0.1 for a, b in pairwise(states))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("moment", ["move"])
 @on_all
 def test_a_safety_limit_that_slows_the_arm_is_no_slider(laboratory: WorldHandle, moment: str) -> None:
@@ -218,6 +221,7 @@ def test_a_run_goes_on_without_one_port_and_ends_without_all(laboratory: WorldHa
 # -- the preparation: from the start of the program until the payload shows ------------------------------------------
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("name", "then", "after_s"),
     [

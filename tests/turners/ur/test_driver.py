@@ -432,6 +432,7 @@ def test_a_program_that_comes_late_to_the_states_does_not_take_its_driver_for_hu
         assert arm.missed_states == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_crowd")
 def test_a_program_that_takes_no_more_states_is_noticed(world: World) -> None:
     laboratory = world({"world": {"time_scale": SLOW}})
@@ -569,6 +570,7 @@ def test_a_dashboard_that_is_gone_leaves_the_primary_interface_to_stop_the_arm(w
         assert stands(laboratory) and on_its_way(laboratory)
 
 
+@pytest.mark.thorough
 def test_a_speed_the_client_refuses_is_named(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
         arm.take_control(PAYLOAD)
@@ -631,6 +633,7 @@ def test_a_polyscope_x_that_cannot_be_stopped_is_not_moved(world: World, order: 
     assert not laboratory.state()["program_running"] and laboratory.state()["still_since_s"] == 0
 
 
+@pytest.mark.thorough
 def test_a_payload_the_controller_does_not_take_is_refused(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm, pytest.raises(Refused) as refused:
         arm.take_control(replace(PAYLOAD, payload_kg=20.0))

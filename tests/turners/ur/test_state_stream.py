@@ -298,6 +298,7 @@ def test_a_controller_that_sends_no_states_is_an_error_that_says_why(
         StateStream(controllers(**answers).host, 125.0, 0.5)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("changed", "unknown"),

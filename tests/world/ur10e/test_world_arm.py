@@ -296,6 +296,7 @@ def test_version_1_of_the_protocol(world: World) -> None:
         client.sendall(struct.pack(">HBH", 5, ord("V"), 9))  # an unknown version is declined, not fatal
 
 
+@pytest.mark.thorough
 def test_the_speed_slider_slows_a_move_and_shows(home: Arm) -> None:
     control, receive = home.control, home.receive
     with outputs_of(home.world) as io:
