@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli import main
+from rig.data.latest_run import note_run
 from rig.errors.catalogue import catalogue
 from support.paths import DOCS, ROOT
 
@@ -125,8 +126,12 @@ def test_no_line_but_a_tables_is_too_wide() -> None:
         assert not wide, page_name(page)
 
 
-def test_every_command_a_page_shows_is_one(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_command_a_page_shows_is_one(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Nothing is run: each command line gets an argument that no command has, which must be all it is refused for."""
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    note_run(tmp_path)  # there is a latest run
     shown = {
         (tuple(arguments), inline): f"{page_name(page)}: {written!r}"
         for page in PAGES

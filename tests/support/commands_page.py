@@ -65,7 +65,7 @@ def _section(parser: argparse.ArgumentParser) -> Iterator[str]:
     for action in below:
         meanings = {choice.dest: choice.help or "" for choice in action._choices_actions}
         for name, command in action.choices.items():
-            yield from ("", f"**`{command.prog}`**", "", _sentence(_cell(meanings.get(name, ""))))
+            yield from ("", f"**`{command.prog}`**:", f"{_cell(meanings.get(name, ''))}.")
             yield from _section(command)
 
 
