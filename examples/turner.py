@@ -13,7 +13,7 @@ from dataclasses import replace
 from pydantic import Field
 
 from rig.config.procedures.hand_sections import HandSection
-from rig.motion.state import Made
+from rig.motion.state import TurnerIdentity
 from rig.turners.hand.kind import GEOMETRY, HAND
 
 
@@ -23,10 +23,10 @@ class TurntableSection(HandSection):
     bearing: str = Field(min_length=1, max_length=40, description="which bearing it is, for the records")
 
 
-def describe(section: HandSection) -> Made:
+def describe(section: HandSection) -> TurnerIdentity:
     """Return what recordings and documents say of the turntable."""
     assert isinstance(section, TurntableSection)
-    return Made("turntable on a bearing", section.bearing, GEOMETRY)
+    return TurnerIdentity("turntable on a bearing", section.bearing, GEOMETRY)
 
 
 TURNTABLE_BY_HAND = replace(

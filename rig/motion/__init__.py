@@ -1,1 +1,1 @@
-"""What is turned and how, whoever turns it: joints, geometry, steps, limits, and what keeps clear of what."""
+"""The motion of a turner, of whatever kind: joints, geometry, steps, limits, clearances."""

@@ -1,6 +1,6 @@
-"""What a hand is asked to do with an item on a table: which side comes up, or a whole turn as it lies. Pure.
+"""Instructions for a hand with an item on a table: which side comes up, or whole turns on one side. Pure.
 
-A face is named by the axis of the item that points upwards when that side is up: "+x", "-x", "+y", "-y", "+z", "-z".
+A face is named by the item's axis that points upwards when that side is up: "+x", "-x", "+y", "-y", "+z", "-z".
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ Say = Literal["lay", "turn"]
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
-    """One thing to do, as the line of text, the drawing and the simulated operator have it.
+    """One action, for the line of text, the drawing and the simulated operator.
 
-    "lay": the side `face` comes up, the item is let go. "turn": it turns as it lies, the side `face` up, by whole
-    `turns` about the vertical, counterclockwise seen from above where they are positive, and is let go where it was.
+    "lay": the side `face` comes up, and the item is released. "turn": the item turns with the side `face` up by whole
+    `turns` about the vertical, counterclockwise seen from above if positive, and is released where it was.
     """
 
     say: Say
@@ -29,13 +29,13 @@ class Instruction:
         if self.say == "lay":
             return f"Lay it down with the side {self.face} up, and let go"
         count = "one whole turn" if abs(self.turns) == 1 else f"{abs(self.turns)} whole turns"
-        way = "counterclockwise" if self.turns > 0 else "clockwise"
-        return f"Leave the side {self.face} up and turn it {count} {way} on the table, back against the rule; let go"
+        sense = "counterclockwise" if self.turns > 0 else "clockwise"
+        return f"Leave the side {self.face} up and turn it {count} {sense} on the table, back against the rule; let go"
 
 
 @dataclass(frozen=True, slots=True)
 class HandMove:
-    """A move that was made, as it was read: a flip from one face to another, or so many whole turns on one."""
+    """A recorded move: a flip from one face to another, or whole turns on one."""
 
     kind: Literal["flip", "turn"]
     from_face: Face

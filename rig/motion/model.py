@@ -1,4 +1,4 @@
-"""What turns the flange, as data: each model of arm has a file in `models/`, with the sources of its figures."""
+"""The properties of a turner, as data: each model of arm has a file in `models/`, with the sources of its figures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,24 +15,24 @@ if TYPE_CHECKING:
     from rig.config.models import ArmSection
 
 Series = Literal["e-Series", "CB3"]
-CLIENT_SPEED_RAD_S = 3.14  # `ur_rtde` accepts no more, which is a little below 180°/s
+CLIENT_SPEED_RAD_S = 3.14  # the greatest speed that `ur_rtde` accepts, a little below 180°/s
 
 
 @dataclass(frozen=True, slots=True)
 class Tube:
-    """A link, as thick as `radius_m`, whose middle lies beside its line in the drawing, on the side of wrist 1."""
+    """A link of `radius_m`, whose middle is offset from its line in the drawing, on the side of wrist 1."""
 
-    beside_m: float
+    offset_m: float
     radius_m: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)  # each is loaded once, and is only equal to itself
+@dataclass(frozen=True, slots=True, eq=False)  # each model is loaded once
 class TurnerModel:
-    """A model of arm: how it is made, what its joints may do, what it carries, how thick it is. SI units.
+    """A model of arm: geometry, joint limits, payload, thickness. SI units.
 
-    `robot_type` is what its controller tells of itself; models that are made alike share one. `sweep_room_m` and
-    `dwell_room_m` must be left between a link's surface and the middle of what the flange carries. `home_rad` is the
-    pose around which everything turns unless the configuration says another. `sources` says where figures are from.
+    - `robot_type`: the number that the controller reports; identical models share one.
+    - `sweep_room_m`, `dwell_room_m`: clearances between a link's surface and the middle of the load.
+    - `home_rad`: the default home pose; `sources`: the origin of the figures.
     """
 
     key: str
@@ -55,8 +55,8 @@ class TurnerModel:
 
 @lru_cache
 def turner_model(key: ModelName) -> TurnerModel:
-    """The model that a configuration calls so. Raises FileNotFoundError when there is none."""
-    import yaml  # here, as the process that the arm's client lives in shall start soon, and asks for no model
+    """Return the model that a configuration names `key`. Raise FileNotFoundError if there is none."""
+    import yaml  # here, because the process of the arm's client must start fast and needs no model
 
     text = files("rig.motion").joinpath("models", f"{key}.yaml").read_text(encoding="utf-8")
     row: dict[str, Any] = yaml.safe_load(text)
@@ -93,10 +93,10 @@ def turner_model(key: ModelName) -> TurnerModel:
 
 
 def model_of(arm: "ArmSection") -> TurnerModel:
-    """The model that an arm is, by its configuration."""
+    """Return the model of an arm by its configuration."""
     return turner_model(arm.model)
 
 
 def home_of(arm: "ArmSection") -> Joints:
-    """(6,) rad of the pose around which everything turns: what the configuration says, or else the model's own."""
+    """Return the home pose (n,), rad: the configured one, or else the model's."""
     return model_of(arm).home_rad if arm.home_deg is None else tuple(radians(angle) for angle in arm.home_deg)

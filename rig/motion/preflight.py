@@ -1,4 +1,4 @@
-"""Pre-flight of a plan: what is wrong with it by itself, whoever is to drive it. Pure: a plan in, problems out."""
+"""Pre-flight of a plan: its problems for any turner. Pure: a plan in, problems out."""
 
 import math
 
@@ -8,7 +8,7 @@ from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, travel
 
 
 def step_problems(plan: Plan) -> list[Problem]:
-    """Steps that cannot be made: every one must take time, and every motion must lead somewhere, at some speed."""
+    """Return the problems of steps: every step must take time, and every motion must move something at some speed."""
     problems = [
         Problem(
             "no_duration",
@@ -38,11 +38,11 @@ def step_problems(plan: Plan) -> list[Problem]:
 
 
 def way_to_home(plan: Plan, q_rad: Joints) -> Joints:
-    """(6,) rad: how far each joint will turn in the first motion, from where the arm stands to the plan's home pose."""
+    """Return each joint's travel (n,), rad, in the first motion, from the arm's pose to the plan's home."""
     return travel(q_rad, plan.home_q_rad)
 
 
 def travels(motion: Motion) -> bool:
-    """Whether a motion leads somewhere."""
-    way = travel(motion.start_q_rad, motion.target_q_rad)
-    return all(map(math.isfinite, way)) and max(map(abs, way)) > SAME_PLACE_RAD
+    """Return whether a motion moves a joint."""
+    travel_rad = travel(motion.start_q_rad, motion.target_q_rad)
+    return all(map(math.isfinite, travel_rad)) and max(map(abs, travel_rad)) > SAME_PLACE_RAD

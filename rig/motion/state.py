@@ -1,6 +1,6 @@
-"""What a turner says about itself: its states, of any number of joints, and the report a look at it gives.
+"""The state of a turner with any number of joints, and the report on a turner.
 
-A robot arm's states say more than joints: those of Universal Robots stand here too, for the page shows their modes.
+The states of Universal Robots' arms are defined here too, because the page shows their modes.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,20 +22,20 @@ Scalar = Literal["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"]  # 
 
 @dataclass(frozen=True, slots=True)
 class StateField:
-    """What the states of a turner tell beyond times and joints: a number's name, which carries the unit, its type."""
+    """A field of a turner's states besides times and joints: name, which carries the unit, and type."""
 
     name: str
     type: Scalar
 
 
 def state_dtype(joints: int, more: Sequence[StateField] = ()) -> np.dtype[Any]:
-    """The type of the rows in which states of so many joints are recorded, with what more they tell.
+    """Return the type of the rows in which states of a number of joints, with `more` fields, are recorded.
 
-    Without joints there are no columns of them: HDF5 has no arrays of no length.
+    Without joints there are no columns of them: HDF5 has no arrays of length 0.
     """
     angles = [(name, "<f8", (joints,)) for name in ("q_rad", "qd_rad_s")] if joints else []
-    beside = [(each.name, f"<{each.type}" if each.type[1] != "1" else each.type) for each in more]
-    return np.dtype([("time_s", "<f8"), ("host_time_s", "<f8"), *angles, *beside])
+    others = [(field.name, f"<{field.type}" if field.type[1] != "1" else field.type) for field in more]
+    return np.dtype([("time_s", "<f8"), ("host_time_s", "<f8"), *angles, *others])
 
 
 ARM_FIELDS = (
@@ -49,14 +49,14 @@ ARM_FIELDS = (
 )
 ARM_STATE_DTYPE = state_dtype(len(JOINT_NAMES), ARM_FIELDS)
 
-# A joint slower than this stands still: above the noise of the velocity signal, 0.3° a second.
+# A slower joint is at rest: 0.3°/s, above the noise of the velocity signal.
 REST_SPEED_RAD_S = 5e-3
 
 
 class State(Protocol):
-    """How a turner stood at one moment.
+    """The state of a turner at one moment.
 
-    `time_s` is its own time (the reference clock of a recording), `host_time_s` `time.monotonic()` when that was read;
+    `time_s` is its own time (the reference clock of a recording), `host_time_s` `time.monotonic()` at its reading;
     `q_rad` (n,) and `qd_rad_s` (n,) are the measured angles (rad) and speeds (rad/s) of its joints.
     """
 
@@ -69,13 +69,13 @@ class State(Protocol):
     @property
     def qd_rad_s(self) -> Joints: ...
     def to_record(self) -> Row:
-        """The values in the order of `state_dtype`: called for every state, hundreds of times a second."""
+        """Return the values in the order of `state_dtype`. Called for every state, hundreds of times a second."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class JointState:
-    """A `State` that tells nothing beyond times and joints."""
+    """A `State` with only times and joints."""
 
     time_s: float
     host_time_s: float
@@ -83,7 +83,7 @@ class JointState:
     qd_rad_s: Joints
 
     def to_record(self) -> Row:
-        """The values in the order of `state_dtype`, of at least one joint."""
+        """Return the values in the order of `state_dtype`, for at least one joint."""
         return self.time_s, self.host_time_s, self.q_rad, self.qd_rad_s
 
 
@@ -117,7 +117,7 @@ class SafetyMode(IntEnum):
 
 
 class RuntimeState(IntEnum):
-    """`runtime_state` of the controller: what its program does (RTDE guide)."""
+    """The state of the controller's program, `runtime_state` (RTDE guide)."""
 
     STOPPING = 0
     STOPPED = 1
@@ -129,13 +129,12 @@ class RuntimeState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ArmState:
-    """One packet of the controller: a `State`.
+    """One packet of the controller: a `State` with six joints, base to wrist 3.
 
-    `time_s` is the controller's time stamp (the reference clock), `host_time_s` is `time.monotonic()` when the
-    packet was read. `q_rad` and `qd_rad_s` are the six measured joint angles (rad) and speeds (rad/s), base to
-    wrist 3. `target_speed_fraction` is the speed slider (1 = 100 %), `speed_scaling` what the controller makes of it.
-    Modes are the controller's numbers: see `RobotMode`, `SafetyMode`, `RuntimeState`. The field names are those of
-    `ARM_STATE_DTYPE`.
+    - `target_speed_fraction`: the speed slider (1 = 100 %); `speed_scaling`: the actual scaling.
+    - modes: the controller's numbers; see `RobotMode`, `SafetyMode`, `RuntimeState`.
+
+    The field names are those of `ARM_STATE_DTYPE`.
     """
 
     time_s: float
@@ -151,8 +150,8 @@ class ArmState:
     safety_status_bits: int
 
     def to_record(self) -> Row:
-        """The values in the order of `ARM_STATE_DTYPE`: one row for `np.array([...], ARM_STATE_DTYPE)`."""
-        return _IN_ORDER(self)  # `astuple` copies every value: a tenth of a run's computing
+        """Return the values in the order of `ARM_STATE_DTYPE`: one row for `np.array([...], ARM_STATE_DTYPE)`."""
+        return _IN_ORDER(self)  # `astuple` would copy every value: 10 % of a run's computing
 
     @property
     def at_rest(self) -> bool:
@@ -160,14 +159,14 @@ class ArmState:
         return max(map(abs, self.qd_rad_s)) < REST_SPEED_RAD_S
 
 
-_IN_ORDER: Callable[[ArmState], Row] = attrgetter(*(each.name for each in fields(ArmState)))
+_IN_ORDER: Callable[[ArmState], Row] = attrgetter(*(field.name for field in fields(ArmState)))
 
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """What the controller lets the joints do, base to wrist 3 (6,): angles from least to greatest, speed, acceleration.
+    """The controller's joint limits, base to wrist 3 (6,): least and greatest angle, speed, acceleration.
 
-    A joint that turns without end has none of the first two: they may be infinite.
+    The angles of a joint that turns endlessly may be infinite.
     """
 
     least_rad: Joints
@@ -177,12 +176,11 @@ class JointLimits:
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
-    """Who made what turns, which model it is (None where it does not tell), and the geometry reckoned with.
+class TurnerIdentity:
+    """The maker and model (None if unknown) of a turner, and the geometry that results are computed with.
 
-    `tcp_offset` is where an arm's tool centre point stands in the flange's frame, which nothing is reckoned with.
-    `reading_std_rad` is how much one reading of a joint's angle scatters, where that is too much for an angle at one
-    moment: then a turn is known by the same reading one turn later.
+    `tcp_offset`: an arm's tool centre point in the flange's frame, for information. `reading_std_rad`: the noise of one
+    reading of an angle, if that is too large for single readings; a revolution then ends at the same reading.
     """
 
     maker: str
@@ -193,11 +191,10 @@ class Made:
 
 
 class Report(Protocol):
-    """What a look at a turner shows.
+    """The report on a turner.
 
-    `host` says where it answers, by an address or a port; `software` is the version of what drives it there, `model`
-    None where it does not tell, `kinematics` its geometry where it tells that itself, `joints` the names of its joints,
-    the one on the ground first; `words` name it in a line of text.
+    `host`: its address or port; `software`: the version of its controller; `model`: None if unknown; `kinematics`: its
+    geometry if it reports one; `joints`: their names, the one on the ground first; `words`: its name in a line of text.
     """
 
     @property

@@ -1,5 +1,4 @@
-"""What an arm can be told to do, step by step: motions with their joints, speed and duration, rests and
-dwells. Pure."""
+"""The steps of a plan: motions with their joints, speed and duration, rests and dwells. Pure."""
 
 import math
 from dataclasses import dataclass
@@ -11,14 +10,14 @@ from numpy.typing import NDArray
 from rig.config.section import Direction, Vector3
 from rig.motion.state import Joints
 
-# Joint angles closer than this are the same place: well above the encoder's step, well below anything that matters.
+# Joint angles closer than this are equal: well above the encoder's step, well below anything that matters.
 SAME_PLACE_RAD = 1e-4
 TURN_RAD = 2 * math.pi
-CLOSED_RAD = 1e-6  # what rounding may take from a whole turn, or add to it
+CLOSED_RAD = 1e-6  # tolerance of a whole turn, for rounding
 
 
 class Motion(Protocol):
-    """One joint-space movement: the joint that travels farthest has this speed and acceleration; others keep pace."""
+    """A joint-space motion. The joint with the longest travel has this speed and acceleration; the others keep pace."""
 
     @property
     def name(self) -> str: ...
@@ -38,10 +37,10 @@ class Motion(Protocol):
 class Sweep:
     """One wrist through one revolution, or an arc, at constant speed, with ramps and margins outside of it.
 
-    `index` counts the procedure's sweeps and dwells from 0. `joint` is 0 (base) to 5 (wrist 3). `direction` is "ccw"
-    for a growing joint angle, "cw" for a falling one. `axis_flange` is the unit vector of the flange's angular velocity
-    in the flange frame, sign included, as of the nominal arm. `revolution_rad` is the (low, high) joint angle of the
-    revolution or the arc, centred on the home pose.
+    - `index`: the number among the procedure's sweeps and dwells, from 0.
+    - `joint`: 0 (base) to 5 (wrist 3); `direction`: "ccw" for a growing joint angle, "cw" for a falling one.
+    - `axis_flange`: unit vector of the nominal arm's angular velocity in the flange frame, sign included.
+    - `revolution_rad`: (low, high) joint angle of the revolution or arc, centred on the home pose.
     """
 
     index: int
@@ -66,29 +65,29 @@ class Sweep:
 
     @property
     def growing(self) -> float:
-        """1 where the joint's angle grows, −1 where it falls."""
+        """The sign of the joint's speed, 1 or −1."""
         return 1.0 if self.direction == "ccw" else -1.0
 
     @property
     def began_q_rad(self) -> Joints:
-        """The joint angles where the revolution or the arc begins."""
+        """The joint angles at the start of the revolution or arc."""
         low, high = self.revolution_rad
         angle_rad = low if self.direction == "ccw" else high
         return (*self.start_q_rad[: self.joint], angle_rad, *self.start_q_rad[self.joint + 1 :])
 
     @property
     def angle_rad(self) -> float:
-        """How far it turns while it is averaged: exactly 2π n where that is n whole turns."""
+        """The averaged angle: exactly 2π n if it is n whole turns."""
         low, high = self.revolution_rad
         return TURN_RAD * round((high - low) / TURN_RAD) if closes(high - low) else high - low
 
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """A movement between sweeps or attitudes; nothing is measured during it.
+    """A motion between sweeps or attitudes, without measurement.
 
-    One that `tries` the mounting is a small turn of one joint that the sensors must feel about the axis and with the
-    sign that the stage's mounting says, or the run ends.
+    One that `tries` the mounting is a small turn of one joint. The sensors must sense it about the axis and with the
+    sign of the stage's mounting, or the run ends.
     """
 
     name: str
@@ -102,9 +101,9 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """The arm stands still, in the controller's time.
+    """A rest of the arm, in the controller's time.
 
-    One `for_temperature` lasts until the sensors are as warm as is wanted next; its duration is a guess.
+    One `for_temperature` lasts until the sensors have the next temperature; its duration is an estimate.
     """
 
     name: str
@@ -114,10 +113,10 @@ class Rest:
 
 @dataclass(frozen=True, slots=True)
 class Dwell:
-    """The arm stands still in the attitude `q_rad`, and that is measured, for `duration_s` in the controller's time.
+    """A measured rest in the attitude `q_rad` for `duration_s` in the controller's time.
 
-    It begins when the sensors have settled after the way there, `settle_s` after the arm has arrived at the latest;
-    `duration_s` does not hold that wait. `index` counts the procedure's sweeps and dwells from 0.
+    It begins when the sensors have settled, at the latest `settle_s` after the arm's arrival; `duration_s` does not
+    include that wait. `index` is the number among the procedure's sweeps and dwells, from 0.
     """
 
     index: int
@@ -136,10 +135,11 @@ Step = Sweep | Transfer | Rest | Dwell
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """A part of a plan before which the operator mounts the item as the `instruction` says; it has its own recording.
+    """A part of a plan with its own recording, before which the operator mounts the item by the `instruction`.
 
-    `mount` (3 rows of 3) is the nominal rotation from the flange's frame to the item's, in which the sensors'
-    mountings stand. `indices` are those of its sweeps in the whole procedure; `begins` counts the plan's steps before.
+    `mount` (3 rows of 3) is the nominal rotation from the flange's frame to the item's, in which the sensors' mountings
+    are given. `indices` are those of its sweeps in the whole procedure; `begins`: the number of the plan's steps before
+    it.
     """
 
     mount: tuple[Vector3, Vector3, Vector3]
@@ -150,9 +150,9 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Every step in order. `home_q_rad` is where the plan ends, `start_q_rad` where it expects the arm to begin.
+    """Every step in order. `home_q_rad`: the pose at the plan's end; `start_q_rad`: the expected pose at its start.
 
-    The item stays mounted as it is where there are no `stages`; else it is mounted for each, with the arm at home.
+    Without `stages` the item's mounting does not change; else it is mounted for each stage, with the arm at home.
     """
 
     steps: tuple[Step, ...]
@@ -167,7 +167,7 @@ class Plan:
 
     @property
     def settling_s(self) -> float:
-        """How long the waits for sensors to settle may take in all."""
+        """The greatest total wait for sensors to settle, s."""
         return sum(dwell.settle_s for dwell in self.dwells)
 
     @property
@@ -180,7 +180,7 @@ class Plan:
 
     @property
     def waits(self) -> tuple[Rest, ...]:
-        """The rests until a temperature is there."""
+        """The rests until a temperature is reached."""
         return tuple(step for step in self.steps if isinstance(step, Rest) and step.for_temperature)
 
     @property
@@ -189,36 +189,38 @@ class Plan:
 
 
 def closes(angle_rad: float) -> bool:
-    """Whether an angle is one or several whole turns: then it is known by the closure of the circle."""
+    """Return whether an angle is one or several whole turns, which the closure of the circle makes exact."""
     turns = round(angle_rad / TURN_RAD)
     return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSED_RAD
 
 
 def turn_words(angle_rad: float) -> str:
-    """An angle in words: a whole turn, so many of them, or degrees."""
+    """Return an angle in words: whole turns, or degrees."""
     turns = round(angle_rad / TURN_RAD)
     whole = "a whole turn" if turns == 1 else f"{turns} whole turns"
     return whole if closes(angle_rad) else f"{math.degrees(angle_rad):g}°"
 
 
 def trapezoid_duration(distance_rad: float, speed_rad_s: float, acceleration_rad_s2: float) -> float:
-    """Seconds for a distance with equal ramps up and down; a short distance never reaches the speed."""
+    """Return the duration, s, of a distance with equal ramps; a short distance never reaches the speed."""
     if distance_rad < speed_rad_s**2 / acceleration_rad_s2:
         return 2 * math.sqrt(distance_rad / acceleration_rad_s2)
     return distance_rad / speed_rad_s + speed_rad_s / acceleration_rad_s2
 
 
-def progress(motion: Motion, since_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) share of the way, from 0 to 1, that a motion has come at times (n,) since it began."""
-    way = max(map(abs, travel(motion.start_q_rad, motion.target_q_rad)))
+def progress(motion: Motion, elapsed_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the fraction of the path (n,), 0 to 1, that a motion has covered at times (n,) after its start."""
+    distance = max(map(abs, travel(motion.start_q_rad, motion.target_q_rad)))
     ramp_s = min(motion.speed_rad_s / motion.acceleration_rad_s2, motion.duration_s / 2)
-    since_s = since_s.clip(0.0, motion.duration_s)
-    left_s = np.minimum(since_s, motion.duration_s - since_s)
-    gone = motion.acceleration_rad_s2 * (np.minimum(left_s, ramp_s) ** 2 / 2 + ramp_s * (left_s - ramp_s).clip(min=0.0))
-    share: NDArray[np.float64] = np.where(since_s < motion.duration_s / 2, gone, way - gone) / way
-    return share
+    elapsed_s = elapsed_s.clip(0.0, motion.duration_s)
+    inner_s = np.minimum(elapsed_s, motion.duration_s - elapsed_s)
+    covered = motion.acceleration_rad_s2 * (
+        np.minimum(inner_s, ramp_s) ** 2 / 2 + ramp_s * (inner_s - ramp_s).clip(min=0.0)
+    )
+    fraction: NDArray[np.float64] = np.where(elapsed_s < motion.duration_s / 2, covered, distance - covered) / distance
+    return fraction
 
 
 def travel(start_q_rad: Joints, target_q_rad: Joints) -> Joints:
-    """The six signed joint travels from start to target, rad."""
+    """Return the signed joint travels (n,) from start to target, rad."""
     return tuple(target - start for start, target in zip(start_q_rad, target_q_rad, strict=True))

@@ -21,7 +21,7 @@ from rig.data.recording.settings import RunSettings
 from rig.data.recording.thermal_events import SetMeasured
 from rig.data.run_folder import ARM_LOG, refuse_links
 from rig.errors import Refused
-from rig.motion.state import Made, Report
+from rig.motion.state import Report, TurnerIdentity
 from rig.motion.steps import Plan
 from rig.observation.by_hand.runs import told_of
 from rig.plans.motions.temperature_course import Course
@@ -157,7 +157,7 @@ class Connector:
 
     def _connect_turner(
         self, kind: AnyTurner, stack: ExitStack, acquisition: Acquisition
-    ) -> tuple[Turner, Report, Made]:
+    ) -> tuple[Turner, Report, TurnerIdentity]:
         section = self.loaded.config.turner
         log = self.path.with_name(ARM_LOG)
         refuse_links(log)
@@ -173,7 +173,9 @@ class Connector:
         """Tell how the turner was left: whoever looks on has last seen it move."""
         self.station.event(ArmSeen(turner.latest, turner.missed_states))
 
-    def _provenance(self, kind: AnyTurner, board: BoardSource | None, report: Report, made: Made) -> Provenance:
+    def _provenance(
+        self, kind: AnyTurner, board: BoardSource | None, report: Report, made: TurnerIdentity
+    ) -> Provenance:
         with refusing():
             crystal = None if board is None else follows_crystal(board.board)
         return provenance_of(

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 from rig.config.models import TurnerSection
 from rig.errors import Problem
 from rig.motion.carried import Carried
-from rig.motion.state import Made, Report, State, StateField
+from rig.motion.state import Report, State, StateField, TurnerIdentity
 from rig.motion.steps import Plan
 from rig.turners.turner import Turner
 
@@ -71,8 +71,8 @@ class TurnerKind(Generic[SectionT, ReportT]):
     look: Callable[[SectionT], ReportT]
     stance: Callable[[ReportT], str]
     problems: Callable[[Sequence[Plan], SectionT, ReportT | None], list[Problem]]
-    meant: Callable[[SectionT], Made]
-    made: Callable[[SectionT, ReportT], Made]
+    meant: Callable[[SectionT], TurnerIdentity]
+    made: Callable[[SectionT, ReportT], TurnerIdentity]
     carried: Callable[[SectionT], Carried]
     words: Words
     fields: tuple[StateField, ...] = ()

@@ -57,9 +57,7 @@ class WorldClock:
         return self._stop_at
 
     def pace(self, time_scale: float) -> None:
-        """Limit virtual time to `time_scale` times wall time from now on. Raise ValueError if that is not positive and
-        finite.
-        """
+        """Limit virtual time to `time_scale` times wall time. Raise ValueError if that is not positive and finite."""
         if not 0.0 < time_scale < float("inf"):
             raise ValueError(f"{time_scale} is no time scale")
         self.time_scale = time_scale

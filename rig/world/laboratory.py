@@ -27,7 +27,7 @@ from rig.world.on_arm import OnArm
 from rig.world.operator import Operator
 from rig.world.servo.bench import ServoBench
 from rig.world.turning import MotionSource
-from rig.world.ur10e.motion.flange_motion import InertialMotion
+from rig.world.ur10e.motion.flange_motion import BodyMotion
 from rig.world.ur10e.robot import Robot
 
 
@@ -119,8 +119,7 @@ class Laboratory:
         return not forgotten
 
     def set_sensor_fault(self, name: str, fault: str | None) -> None:
-        """Set or, with None, clear the fault of the sensor called `name` in the configuration. It outlasts a loss of
-        power.
+        """Set the fault of the sensor `name`, or clear it with None. It outlasts a loss of power.
 
         `fault` is a value of `Fault` or of `ElementFault`. Raise ValueError if there is no such sensor or fault.
         """
@@ -136,9 +135,7 @@ class Laboratory:
             self._elements[name].set_fault(inside)
 
     def mount(self, stage: int) -> None:
-        """Mount the item as the simulated operator does for the stage, counted from 0; keep it if no mount is
-        configured.
-        """
+        """Mount the item for the stage, counted from 0, as the simulated operator does, if that is configured."""
         if stage < len(self._world.mounts):
             self._mount = mount_matrix(self._world.mounts[stage])
             for sensor in self._sensors_on_item:
@@ -187,7 +184,7 @@ class Laboratory:
         self._mount_on_item(sensor)
         if self.motion_source.ideal and not sensor.senses_force:
             return lambda time_s: sensor.rotate_rate(self.motion_source.rate_at(time_s))
-        last: InertialMotion | None = None
+        last: BodyMotion | None = None
         rows = sensor.rows
         motion: Sequence[float] = ()
 
@@ -201,9 +198,7 @@ class Laboratory:
         return motion_at
 
     def _build_field(self, sensor: MountedMagnetometer) -> MotionAt:
-        """Return the flux density at a magnetometer on the flange, T, as a function of virtual time inside the last
-        tick.
-        """
+        """Return the flux density at a magnetometer on the flange, T, as a function of virtual time."""
         self._mount_on_item(sensor)
         return lambda time_s: sensor.sense(self._field, self.motion_source.frames_at(time_s), time_s)
 

@@ -47,9 +47,7 @@ class Dipole:
     moment_a_m2: Vector
 
     def flux_density_at(self, position_m: Vector, frames: Frames) -> Vector:
-        """Return the iron's flux density, T, at a position in the base frame, m. Nearer than 1 mm it is that
-        at 1 mm.
-        """
+        """Return the iron's flux density, T, at a position in the base frame, m; inside 1 mm, that at 1 mm."""
         rotation, origin = frames[self.carried_by]
         source, moment = rotate(rotation, self.position_m), rotate(rotation, self.moment_a_m2)
         x, y, z = (target - base - offset for target, base, offset in zip(position_m, origin, source, strict=True))
@@ -81,18 +79,14 @@ class MagneticField:
 
 
 def build_magnetic_field(section: SiteSection, iron: Sequence[IronSection] = ()) -> MagneticField:
-    """Build the field from the Earth's magnitude, dip and declination, the room's gradient and drift, and the arm's
-    iron.
-    """
+    """Build the field of the Earth (magnitude, dip, declination), of the room and of the arm's iron."""
     size_t = MICROTESLA_T * section.magnetic_field_ut
     dip, declination = radians(section.magnetic_dip_deg), radians(section.magnetic_declination_deg)
-    level_t = size_t * cos(dip)
+    north_t, west_t = size_t * cos(dip) * cos(declination), -(size_t * cos(dip)) * sin(declination)
     xx, xy, xz, yy, yz = (MICROTESLA_T * gradient for gradient in section.magnetic_gradient_ut_m)
     a, b, c = (MICROTESLA_T * drift / 60.0 for drift in section.magnetic_drift_ut_min)
     room = Room(
-        rotate_into_base(
-            section, north=level_t * cos(declination), west=-level_t * sin(declination), up=-size_t * sin(dip)
-        ),
+        rotate_into_base(section, north=north_t, west=west_t, up=-size_t * sin(dip)),
         ((xx, xy, xz), (xy, yy, yz), (xz, yz, -xx - yy)),
         (a, b, c),
     )

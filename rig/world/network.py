@@ -39,15 +39,13 @@ class ClientSession(Protocol):
 class ClientConnection:
     """The connection of one accepted client."""
 
-    def __init__(
-        self, network: "Network", peer: socket.socket, session: ClientSession, listener: "PortListener"
-    ) -> None:
-        self._network, self._peer, self.session, self.listener = network, peer, session, listener
+    def __init__(self, network: "Network", peer: socket.socket, session: ClientSession, port: "PortListener") -> None:
+        self._network, self._peer, self.session, self.listener = network, peer, session, port
         self._unsent = bytearray()
         self.due = b""  # bytes of past ticks that the client's wire cannot take yet
         self._delivered_s = 0.0  # wall time
         self._ticks = 0
-        self._wire = Wire(network.sockets.count_unread(peer), listener.lag_s, time.monotonic)
+        self._wire = Wire(network.sockets.count_unread(peer), port.lag_s, time.monotonic)
         self._last_read_s = time.monotonic()
         peer.setblocking(False)
         with suppress(OSError):
@@ -290,8 +288,7 @@ class Network:
             connection.tick()
 
     def deliver(self, idle: bool = True, patient: bool = True) -> float:
-        """Send the bytes of past ticks to every client whose wire is free. Return the wall time to wait for the others,
-        s.
+        """Send the bytes of past ticks to every client whose wire is free; return the wait for the others, s.
 
         A tick is over when this returns 0. `idle`: the next tick is not due yet, so nothing needs to be gathered.
         `patient`: wait for clients that lag, as no real controller and no real board does.

@@ -8,7 +8,7 @@ from rig.config.models import RigConfig
 from rig.config.world.laboratory import SimulatedArmSection, WorldSection
 from rig.world.magnetic_field import Frames
 from rig.world.site import build_site
-from rig.world.ur10e.motion.flange_motion import Components, InertialMotion
+from rig.world.ur10e.motion.flange_motion import BodyMotion, Components
 from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.models import select_model
 from rig.world.ur10e.motion.ripple import draw_ripple
@@ -47,13 +47,13 @@ class OnArm:
             arm.speed_slider,
             build_calibrated_links(arm.calibration, drawing=model.drawing),
             model=model,
-            tool_turn_rad=(radians(about_x), radians(about_y), radians(about_z)),
+            tool_rotation_rad=(radians(about_x), radians(about_y), radians(about_z)),
         )
 
     @property
     def time_s(self) -> float:
         """The world's time at the end of the last tick, s."""
-        return self.arm.true_s(self.robot.time_s)
+        return self.arm.true_time_s(self.robot.time_s)
 
     @property
     def tick_s(self) -> float:
@@ -79,8 +79,8 @@ class OnArm:
         """Return the flange's angular rate in its own frame, rad/s, if `ideal`."""
         return self.arm.rate_at(time_s)
 
-    def motion_at(self, time_s: float) -> InertialMotion:
-        """Return the inertial motion of the flange."""
+    def motion_at(self, time_s: float) -> BodyMotion:
+        """Return the motion of the flange."""
         return self.arm.motion_at(time_s)
 
     def frames_at(self, time_s: float) -> Frames:

@@ -14,7 +14,7 @@ from rig.world.hand.habits import FACES, Action, Face, FlipAction, Habits, Mista
 from rig.world.hand.hand import SimulatedHand
 from rig.world.magnetic_field import Frames
 from rig.world.site import build_site
-from rig.world.ur10e.motion.flange_motion import Components, InertialMotion
+from rig.world.ur10e.motion.flange_motion import BodyMotion, Components
 from rig.world.ur10e.motion.forward_kinematics import Vector
 
 DIFFERENCE_S = 5e-4  # half the interval of the central difference of the rate
@@ -52,7 +52,7 @@ class Operator:
         self._pending: tuple[Action, float] | None = None  # the next action and its start, s
         self._acts = 0
         self._mistakes: list[str] = []
-        self._resting: tuple[float, InertialMotion] | None = None  # start of a rest, s, and the motion in it
+        self._resting: tuple[float, BodyMotion] | None = None  # start of a rest, s, and the motion in it
 
     @property
     def time_s(self) -> float:
@@ -105,8 +105,8 @@ class Operator:
         """Return the item's angular rate, rad/s."""
         return self.motion_at(time_s).rate_rad_s
 
-    def motion_at(self, time_s: float) -> InertialMotion:
-        """Return the inertial motion of the item, including bias jumps of its sensors after a fall."""
+    def motion_at(self, time_s: float) -> BodyMotion:
+        """Return the motion of the item, including bias jumps of its sensors after a fall."""
         lies_from_s = self._hand.lies_from_s + DIFFERENCE_S
         if self._resting is not None and self._resting[0] == lies_from_s and time_s >= lies_from_s:
             return self._resting[1]
@@ -114,7 +114,7 @@ class Operator:
         change = (hand.rate_rad_s[2] - hand.rate_rad_s[0]) / (2 * DIFFERENCE_S)
         rate = hand.rate_rad_s[1] + hand.gyro_bias_rad_s[1]
         force = hand.specific_force_m_s2[1] + hand.accelerometer_bias_m_s2[1]
-        now = InertialMotion(tuple(rate.tolist()), tuple(change.tolist()), tuple(force.tolist()))
+        now = BodyMotion(tuple(rate.tolist()), tuple(change.tolist()), tuple(force.tolist()))
         if time_s >= lies_from_s:
             self._resting = lies_from_s, now
         return now

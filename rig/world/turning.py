@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from rig.world.magnetic_field import Frames
-from rig.world.ur10e.motion.flange_motion import Components, InertialMotion
+from rig.world.ur10e.motion.flange_motion import BodyMotion, Components
 
 
 class MotionSource(Protocol):
@@ -40,8 +40,8 @@ class MotionSource(Protocol):
         """Return the angular rate of the body with the sensors, in its own frame, rad/s, if `ideal`."""
         ...
 
-    def motion_at(self, time_s: float) -> InertialMotion:
-        """Return the inertial motion of the body with the sensors, in its own frame."""
+    def motion_at(self, time_s: float) -> BodyMotion:
+        """Return the motion of the body with the sensors, in its own frame."""
         ...
 
     def frames_at(self, time_s: float) -> Frames:

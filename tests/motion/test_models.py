@@ -11,7 +11,7 @@ from rig.config.models import HOMES, ArmSection
 from rig.config.procedures.attitude_sets import EIGHTEEN, SETS
 from rig.config.procedures.procedure_sections import SixObservationSection, StaticAttitudesSection
 from rig.config.ranges import ModelName
-from rig.motion.carried import carried_by
+from rig.motion.carried import read_load
 from rig.motion.geometry import NOMINAL, flange_axes, lengths_m
 from rig.motion.keep_out import clearance_problems
 from rig.motion.model import CLIENT_SPEED_RAD_S, home_of, model_of, turner_model
@@ -32,7 +32,7 @@ def arm(model: ModelName, **changes: Any) -> ArmSection:
 
 
 def problems(section: ArmSection, plan: Plan) -> list[str]:
-    return [str(each) for each in plan_problems(plan, carried_by(section), model_of(section))]
+    return [str(each) for each in plan_problems(plan, read_load(section), model_of(section))]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -59,7 +59,7 @@ def test_every_row_says_where_its_figures_are_from(name: ModelName) -> None:
     height, upper_arm, forearm, *_ = lengths_m(row.drawing)
     assert 0.1 < height < 0.3 and 0.2 < forearm < upper_arm < 0.9
     assert 0.03 <= row.forearm.radius_m <= row.upper_arm.radius_m <= 0.1
-    assert 0 <= row.forearm.beside_m < row.upper_arm.beside_m and 0.045 <= row.sweep_room_m <= row.dwell_room_m
+    assert 0 <= row.forearm.offset_m < row.upper_arm.offset_m and 0.045 <= row.sweep_room_m <= row.dwell_room_m
 
 
 def test_a_configuration_ranges_as_far_as_any_of_them() -> None:
@@ -156,4 +156,4 @@ def test_a_ur5es_plan_is_no_ur10es() -> None:
     towards = StaticAttitudesSection.model_validate({"attitudes": [(45, -98, 0)]})
     for section, clear in ((arm("ur10e"), True), (arm("ur5e"), False)):
         made = plan_static_attitudes(section, towards)
-        assert (clearance_problems(made, carried_by(section), model_of(section)) == []) == clear
+        assert (clearance_problems(made, read_load(section), model_of(section)) == []) == clear

@@ -18,8 +18,8 @@ from rig.world.clock import TICK_S, TICKS_PER_SECOND, WorldClock
 from rig.world.section import read_world_section
 from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.interfaces.primary import PrimarySession
-from rig.world.ur10e.interfaces.rtde import Output
-from rig.world.ur10e.motion.flange_motion import InertialMotion
+from rig.world.ur10e.interfaces.rtde import OutputRecipe
+from rig.world.ur10e.motion.flange_motion import BodyMotion
 from rig.world.ur10e.motion.forward_kinematics import flange_rate
 from support.laboratories.ideal import ideal_document
 from support.laboratories.laboratory_host import Host, host
@@ -97,7 +97,7 @@ def chain(q_rad: Sequence[float], extra: Mapping[str, Sequence[float]] | None = 
 
 def states(one: Host, ticks: int, *names: str) -> np.ndarray:
     """(n, values) of RTDE's data packages at every tick, the names in alphabetical order."""
-    output = Output(sorted(names), 500.0, 1)
+    output = OutputRecipe(sorted(names), 500.0, 1)
     values = []
     for _ in range(ticks):
         one.ticks(1)
@@ -210,7 +210,7 @@ def test_a_bias_walks_as_its_truth_alone_says() -> None:
     one = laboratory({**walk, "bias_rad_s": [0.01, 0.0, 0.0]}, seed=5)
     simulated = SimulatedSensorSection.model_validate({**walk, "bias_rad_s": [0.01, 0, 0], "noise_rad_s": 0})
     sensor = SensorSection.model_validate({"part": "lsm9ds1", "serial_number": "A"})
-    still = InertialMotion((0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
+    still = BodyMotion((0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
     seen = rates(one, 1000)
     times_s = 0.137 + items(one, "time_us") * 1e-6 / (CRYSTAL * 1.000012)  # boot_time_s, crystal_ppm of demo.yaml
     alone = SensorTruth(sensor, simulated).readings(times_s, still, np.random.SeedSequence([5, 0]))
@@ -384,7 +384,7 @@ def test_a_vibration_that_encoders_see_is_felt_when_they_see_it() -> None:
         for _ in range(50):
             one.ticks(1)
             q_rad, qd_rad_s, _ = robot.motion.actual
-            rate, _, _ = arm.motion_at(arm.true_s(robot.time_s))
+            rate, _, _ = arm.motion_at(arm.true_time_s(robot.time_s))
             assert rate == pytest.approx(flange_rate(q_rad, qd_rad_s), abs=1e-9)
             assert robot.motion.actual_q_rad == q_rad
 

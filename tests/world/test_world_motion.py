@@ -113,9 +113,9 @@ def test_the_rate_is_the_derivative_of_the_angle_at_any_instant_of_a_tick() -> N
             player.tick()
             end = player.ticks * TICK_S
             for inside in (0.0002, 0.001, 0.0018):
-                before = player.motion.at(end - inside - 1e-6)[0][4]
-                after = player.motion.at(end - inside + 1e-6)[0][4]
-                assert (after - before) / 2e-6 == pytest.approx(player.motion.at(end - inside)[1][4], abs=1e-5)
+                before = player.motion.joints_at(end - inside - 1e-6)[0][4]
+                after = player.motion.joints_at(end - inside + 1e-6)[0][4]
+                assert (after - before) / 2e-6 == pytest.approx(player.motion.joints_at(end - inside)[1][4], abs=1e-5)
 
 
 def test_the_measured_turn_takes_the_time_of_the_smooth_speed() -> None:

@@ -35,7 +35,7 @@ from rig.estimation.gyroscope.budget import Budget, budget
 from rig.estimation.gyroscope.six_observation_budget import six_observation_budget
 from rig.estimation.gyroscope.vector_fit import Seen, explain
 from rig.estimation.statistics.bias_process import BiasProcess
-from rig.motion.state import Made
+from rig.motion.state import TurnerIdentity
 from rig.motion.steps import TURN_RAD, Plan, Step, Sweep
 from rig.observation.arm_rests import MIN_SAMPLES_AT_REST, REST_SETTLING_S
 from rig.observation.average import Average
@@ -52,7 +52,7 @@ ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking 
 STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
 
 
-def predict_budgets(config: RigConfig, plan: Plan, turner: Made) -> dict[str, Budget]:
+def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
     """Return the budget that a run of the plan will have, for each sensor to calibrate.
 
     It is that of the solution by which the turner's runs are judged: of the speeds alone if single readings of its
@@ -62,7 +62,7 @@ def predict_budgets(config: RigConfig, plan: Plan, turner: Made) -> dict[str, Bu
     return {name: _budget(config, run, turner, name, sensor) for name, sensor in config.to_calibrate.items()}
 
 
-def _budget(config: RigConfig, run: PlannedRun, turner: Made, name: str, sensor: SensorSection) -> Budget:
+def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: str, sensor: SensorSection) -> Budget:
     uncertainty, mounting = run.known, mounting_matrix(sensor.mounting)
     scatters = turner.reading_std_rad > 0
     jitter_s = 0.0 if scatters else STATE_JITTER_S  # what scatters tells no jitter beside
@@ -124,7 +124,7 @@ def _stages(run: PlannedRun) -> Iterator[PlannedRun]:
         clock_offset_s += stage_plan.duration_s + 2 * STANDING_S + REMOUNTING_S
 
 
-def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, turner: Made) -> Part:
+def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, turner: TurnerIdentity) -> Part:
     """Return the turns and rests of a recording."""
     turns = [
         _turn(sweep, run, sensor, _scatter(config, sweep.step, turner)) for sweep in time_steps_of(run.plan, Sweep)
@@ -181,7 +181,7 @@ def _turn(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std
     )
 
 
-def _scatter(config: RigConfig, sweep: Sweep, turner: Made) -> float:
+def _scatter(config: RigConfig, sweep: Sweep, turner: TurnerIdentity) -> float:
     """Return the relative standard deviation of the mean speed of a shaft whose single readings scatter.
 
     Angles that repeat one revolution later are pairs of readings; see `rig.observation.motion.turn_speed`.

@@ -20,7 +20,7 @@ from rig.data.result_file import FileEntry, StoredCalibrationEntry
 from rig.data.run_folder import ScriptIdentity
 from rig.data.version import VERSION
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import Made, Report
+from rig.motion.state import Report, TurnerIdentity
 
 OF_FILES = ("readings_file", "motion_file")
 OPTIONAL = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "turner_kind", "board_follows_crystal")
@@ -113,7 +113,7 @@ def provenance_of(
     loaded: Loaded,
     board: BoardIdentity | None,
     turner: Report,
-    made: Made,
+    made: TurnerIdentity,
     *,
     stored: Mapping[str, StoredCalibration],
     script: ScriptIdentity,

@@ -13,7 +13,7 @@ from rig.data.checked import checked, parsed
 from rig.data.recording.events import DwellFinished, DwellStarted, Recorded, SweepFinished, SweepStarted
 from rig.data.recording.settings import RunSettings
 from rig.motion.geometry import MAX_JOINTS, DenavitHartenberg
-from rig.motion.state import Joints, Made, StateField, state_dtype
+from rig.motion.state import Joints, StateField, TurnerIdentity, state_dtype
 
 MAX_FIELDS = 32
 ALWAYS = ("time_s", "host_time_s", "q_rad", "qd_rad_s")
@@ -28,7 +28,7 @@ class RecordedTurner:
 
     `joints` are the names of its n joints, 0 to `MAX_JOINTS`, the one on the ground first; `geometry` is what their
     angles are to be read with; `fields` are what its states tell beyond times and joints; `reading_std_rad` as of
-    `Made`.
+    `TurnerIdentity`.
     """
 
     kind: Kind
@@ -40,7 +40,9 @@ class RecordedTurner:
     reading_std_rad: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
 
     @classmethod
-    def of(cls, kind: str, made: Made, joints: Sequence[str], fields: Sequence[StateField]) -> "RecordedTurner":
+    def of(
+        cls, kind: str, made: TurnerIdentity, joints: Sequence[str], fields: Sequence[StateField]
+    ) -> "RecordedTurner":
         """A turner of that kind, made so, whose states tell these fields. Raises ValueError as `described`."""
         turned = tuple(joints), made.kinematics, tuple(fields), made.reading_std_rad
         return described(asdict(cls(kind, made.maker, made.model, *turned)))

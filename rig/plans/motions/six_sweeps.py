@@ -15,7 +15,7 @@ from rig.config.procedures.stage_section import Wrist, mount_matrix
 from rig.config.section import Direction, Vector3
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.motion.carried import carried_by
+from rig.motion.carried import read_load
 from rig.motion.geometry import flange_axes
 from rig.motion.keep_out import keeps_clear
 from rig.motion.model import home_of, model_of
@@ -180,7 +180,7 @@ def _connected(sweeps: Sequence[Sweep], arm: ArmSection, procedure: SixSweepsSec
     These lead through home where the straight way takes the flange or its payload to the forearm, as wrists 1 and 2
     may when they turn together.
     """
-    carried, model = carried_by(arm), model_of(arm)
+    carried, model = read_load(arm), model_of(arm)
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)
     return connected(
         sweeps, home_of(arm), pace, procedure.rest_s, lambda here, there: _clear(here, there, carried, model)

@@ -13,7 +13,7 @@ from rig.config.procedures.hand_sections import HandSection
 from rig.errors import Fault, Problem
 from rig.motion.carried import Carried
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import Joints, Made, Row
+from rig.motion.state import Joints, Row, TurnerIdentity
 from rig.motion.steps import Motion, Plan
 from rig.turners.kind import OnState, TurnerKind, Words
 from rig.turners.turner import Turner
@@ -126,7 +126,7 @@ def _problems(plans: Sequence[Plan], section: HandSection, report: HandReport | 
     ]
 
 
-MADE = Made("none", None, GEOMETRY)
+MADE = TurnerIdentity("none", None, GEOMETRY)
 HAND = TurnerKind(
     name="hand",
     section=HandSection,

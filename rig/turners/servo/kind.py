@@ -10,7 +10,7 @@ from rig.errors import Problem
 from rig.motion.carried import Carried
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.preflight import step_problems
-from rig.motion.state import Made
+from rig.motion.state import TurnerIdentity
 from rig.motion.steps import Plan
 from rig.turners.kind import OnState, TurnerKind, Words
 from rig.turners.servo.models import MAKER, find_model
@@ -86,12 +86,12 @@ def _wind_up_problems(plans: Sequence[Plan], report: ServoReport) -> list[Proble
     ]
 
 
-def _make_nominal(section: ServoSection) -> Made:
-    return Made(MAKER, find_model(section.model).title, SHAFT, reading_std_rad=READING_STD_RAD)
+def _make_nominal(section: ServoSection) -> TurnerIdentity:
+    return TurnerIdentity(MAKER, find_model(section.model).title, SHAFT, reading_std_rad=READING_STD_RAD)
 
 
-def _make_recorded(section: ServoSection, report: ServoReport) -> Made:
-    return Made(MAKER, report.model, SHAFT, reading_std_rad=READING_STD_RAD)
+def _make_recorded(section: ServoSection, report: ServoReport) -> TurnerIdentity:
+    return TurnerIdentity(MAKER, report.model, SHAFT, reading_std_rad=READING_STD_RAD)
 
 
 def _read_payload(section: ServoSection) -> Carried:

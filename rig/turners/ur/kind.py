@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rig.config.models import ArmSection
 from rig.errors import Problem, refuse
-from rig.motion.carried import carried_by
+from rig.motion.carried import read_load
 from rig.motion.model import model_of
-from rig.motion.state import ARM_FIELDS, Made
+from rig.motion.state import ARM_FIELDS, TurnerIdentity
 from rig.motion.steps import Plan
 from rig.turners.kind import OnState, TurnerKind, Words
 from rig.turners.turner import Turner
@@ -35,16 +35,16 @@ def _stance(report: ArmReport) -> str:
 
 def _problems(plans: Sequence[Plan], section: ArmSection, report: ArmReport | None) -> list[Problem]:
     if report is None:
-        return [problem for plan in plans for problem in plan_problems(plan, carried_by(section), model_of(section))]
+        return [problem for plan in plans for problem in plan_problems(plan, read_load(section), model_of(section))]
     return preflight.preflight_problems(plans, section, report)
 
 
-def _make_nominal(section: ArmSection) -> Made:
+def _make_nominal(section: ArmSection) -> TurnerIdentity:
     model = model_of(section)
-    return Made(model.maker, model.name, model.drawing)
+    return TurnerIdentity(model.maker, model.name, model.drawing)
 
 
-def _make_recorded(section: ArmSection, report: ArmReport) -> Made:
+def _make_recorded(section: ArmSection, report: ArmReport) -> TurnerIdentity:
     refuse(identity_problems(section, report))
     return preflight.make_recorded(section, report)
 
@@ -58,7 +58,7 @@ UR = TurnerKind(
     problems=_problems,
     meant=_make_nominal,
     made=_make_recorded,
-    carried=carried_by,
+    carried=read_load,
     words=Words(
         name="robot arm",
         short="arm",

@@ -9,11 +9,11 @@ import numpy as np
 
 from rig.config.models import ArmSection
 from rig.errors import Problem, refuse
-from rig.motion.carried import carried_by
+from rig.motion.carried import read_load
 from rig.motion.geometry import DenavitHartenberg, flange_axes
 from rig.motion.model import home_of, model_of
 from rig.motion.preflight import way_to_home
-from rig.motion.state import JOINT_NAMES, Made
+from rig.motion.state import JOINT_NAMES, TurnerIdentity
 from rig.motion.steps import Plan
 from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, readiness
 from rig.turners.ur.controller.registers import registers_in_use
@@ -42,7 +42,7 @@ def preflight_problems(plans: Sequence[Plan], arm: ArmSection, report: ArmReport
 def _plan_problems_on(plan: Plan, arm: ArmSection, report: ArmReport) -> list[Problem]:
     return plan_problems(
         plan,
-        carried_by(arm),
+        read_load(arm),
         model_of(arm),
         arm=_geometry(arm, report),
         controller=None if report.setup is None else report.setup.limits,
@@ -135,13 +135,13 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     ]
 
 
-def make_recorded(arm: ArmSection, report: ArmReport) -> Made:
+def make_recorded(arm: ArmSection, report: ArmReport) -> TurnerIdentity:
     """Return the arm for the recording, with the geometry that the configuration selects.
 
     Raise Refused `no_kinematics`, `kinematics_disagree`.
     """
     refuse(kinematics_problems(arm, report))
-    return Made(MAKER, identify_model(report), _geometry(arm, report), report.tcp_offset)
+    return TurnerIdentity(MAKER, identify_model(report), _geometry(arm, report), report.tcp_offset)
 
 
 def _geometry(arm: ArmSection, report: ArmReport) -> DenavitHartenberg:

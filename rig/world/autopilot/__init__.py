@@ -1,1 +1,1 @@
-"""The simulated autopilot: parameters, corrections, filters and messages of ArduPilot or PX4, on a line of its own."""
+"""The simulated autopilot: parameters, corrections, filters and messages of ArduPilot or PX4, on its own line."""

@@ -22,29 +22,29 @@ QUADROTOR, ACTIVE, STANDBY = 2, 4, 3
 AUTOPILOTS = {"ardupilot": 3, "px4": 12}
 VERSIONS = {"ardupilot": 0x04050700, "px4": 0x010E03FF}
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
-SCALED = {26: 0, 116: 1, 129: 2}  # SCALED_IMU, SCALED_IMU2, SCALED_IMU3: which IMU
+SCALED = {26: 0, 116: 1, 129: 2}  # index of the IMU in SCALED_IMU, SCALED_IMU2, SCALED_IMU3
 RAW_IMU, HIGHRES_IMU, AUTOPILOT_VERSION = 27, 105, 148
-IMUS_FIRST = {**SCALED, RAW_IMU: 0, HIGHRES_IMU: 0}
+IMU_INDEX = {**SCALED, RAW_IMU: 0, HIGHRES_IMU: 0}
 FASTEST_S = 1.0 / RATE_HZ
 HEAD_BYTES = 6  # of a message in MAVLink 1
-BAROMETER_S = 0.05  # between two readings of PX4's
+BAROMETER_S = 0.05  # interval of PX4's barometer readings
 # HIGHRES_IMU_UPDATED_FLAGS: x y z of the accelerometer and of the gyroscope; temperature.
 UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
 
 
 @dataclass(slots=True)
 class AutopilotFaults:
-    """What a test can make wrong: fractions of messages `lost` and `doubled`, and of the asked that are sent."""
+    """Faults that a test can set: fractions of messages `lost` and `doubled`; `slowest`: actual per requested rate."""
 
     lost: float = 0.0
     doubled: float = 0.0
     slowest: float = 1.0
     deaf: bool = False
-    camera: bool = False  # it says that it is none of the two autopilots
+    camera: bool = False  # it reports that it is neither of the two autopilots
 
 
 class SimulatedAutopilot:
-    """The autopilot, switched on at the virtual time `time_s`, by when it has counted `uptime_s` seconds."""
+    """The autopilot, switched on at the virtual time `time_s`, when its clock reads `uptime_s`."""
 
     def __init__(
         self,
@@ -81,35 +81,35 @@ class SimulatedAutopilot:
         self._random = Random(f"autopilot {seed}")
         self._sent = bytearray()
         self._steps = 0
-        self._due_s = {"heartbeat": 0.0, "attitude": 0.0}  # by its own clock since it was switched on
+        self._due_s = {"heartbeat": 0.0, "attitude": 0.0}  # by its own clock since power-up
         self._intervals_s: dict[int, float] = {}
         self._next_s: dict[int, float] = {}
 
     @property
     def baud_rate(self) -> float:
-        """The speed of its port."""
+        """The baud rate of its port."""
         return self._baud
 
     def misbehave(self, *, armed: bool | None = None, **faults: float) -> None:
-        """Set the faults that are given, and whether it is `armed`. Raises AttributeError for what it cannot do."""
+        """Set the given faults, and whether it is `armed`. Raise AttributeError for a fault that it does not have."""
         self.armed = self.armed if armed is None else bool(armed)
         for name, value in faults.items():
             setattr(self.faults, name, value)
 
     def transmitted(self) -> bytes:
-        """What it has sent since it was asked last."""
+        """Return the bytes sent since the last call."""
         data = bytes(self._sent)
         self._sent.clear()
         return data
 
     def receive(self, data: bytes) -> None:
-        """Messages to it, in pieces of any size."""
+        """Take messages to it, in fragments of any size."""
         for message in self._in.parse_buffer(data) or []:
             if not self.faults.deaf and message.get_type() != "BAD_DATA":
                 self._obey(message)
 
     def advance(self, time_s: float) -> None:
-        """Live until this virtual time, which lies in the laboratory's last tick."""
+        """Simulate until the virtual time `time_s`, which lies in the laboratory's last tick."""
         while (at_s := self._began_s + (self._steps + 1) / RATE_HZ / self._speed) <= time_s:
             self._steps += 1
             own_s = self._steps / RATE_HZ
@@ -118,7 +118,7 @@ class SimulatedAutopilot:
                 imu.step(at_s, now_us)
             self._send_due(own_s, now_us)
 
-    # -- what it sends -----------------------------------------------------------------------------------------------
+    # -- sending -----------------------------------------------------------------------------------------------------
     def _send_due(self, own_s: float, now_us: int) -> None:
         if own_s >= self._due_s["heartbeat"]:
             self._due_s["heartbeat"] += HEARTBEAT_S
@@ -135,18 +135,18 @@ class SimulatedAutopilot:
                 self._send_imu(number, now_us)
 
     def _send_imu(self, number: int, now_us: int) -> None:
-        imu = self._imus[IMUS_FIRST[number]]
+        imu = self._imus[IMU_INDEX[number]]
         rate = imu.rate_to_send()
         px4 = self._firmware == "px4"
         time_us = imu.time_us if px4 else now_us
         if number == HIGHRES_IMU:
-            celsius, flags = self._of_the_barometer(imu.temperature_c + 3.0)
+            celsius, flags = self._read_barometer(imu.temperature_c + 3.0)
             values = (*imu.force.tolist(), *rate, 0, 0, 0, 1013.0, 0, 0, celsius, flags, 0)
             self._send(self._mavlink.MAVLink_highres_imu_message(time_us, *values))
             return
-        # A float handed to an integer is cut toward zero.
-        forces = [_int16(1000 * each / STANDARD_GRAVITY_M_S2) for each in imu.force]
-        rates = [_int16(1000 * each) for each in rate]
+        # A float converted to an integer is truncated toward zero.
+        forces = [_int16(1000 * component / STANDARD_GRAVITY_M_S2) for component in imu.force]
+        rates = [_int16(1000 * component) for component in rate]
         centi = (_int16(100 * imu.temperature_c) or 1) if self._provides_temperature else 0
         if number == RAW_IMU:
             message = self._mavlink.MAVLink_raw_imu_message(time_us, *forces, *rates, 0, 0, 0, 0, centi)
@@ -155,8 +155,8 @@ class SimulatedAutopilot:
             message = kind(time_us // 1000 % 2**32, *forces, *rates, 0, 0, 0, centi)
         self._send(message)
 
-    def _of_the_barometer(self, celsius: float) -> tuple[float, int]:
-        """Temperature, and the flags of the fields that are new: ArduPilot's is always, PX4's where it was read."""
+    def _read_barometer(self, celsius: float) -> tuple[float, int]:
+        """Return temperature, °C, and the flags of new fields. ArduPilot's is always new, PX4's after a reading."""
         if not self._provides_temperature:
             return 0.0, UPDATED
         own_s = self._steps / RATE_HZ
@@ -166,7 +166,7 @@ class SimulatedAutopilot:
         return celsius, UPDATED | TEMPERATURE_UPDATED * new
 
     def _send(self, message: Any) -> None:
-        data = self._as_first_version(message) if self._first_version else message.pack(self._out)
+        data = self._pack_first_version(message) if self._first_version else message.pack(self._out)
         self._out.seq = (self._out.seq + 1) % 256
         if self.faults.lost and self._random.random() < self.faults.lost:
             return
@@ -174,8 +174,8 @@ class SimulatedAutopilot:
         if self.faults.doubled and self._random.random() < self.faults.doubled:
             self._sent += data
 
-    def _as_first_version(self, message: Any) -> bytes:
-        """The bytes of a message in MAVLink 1, whose payload ends before the fields that version 2 has added."""
+    def _pack_first_version(self, message: Any) -> bytes:
+        """Return a message in MAVLink 1, whose payload ends before the fields that version 2 added."""
         size = self._sizes[message.get_msgId()].unpacker.size
         begin, length, *rest = message.pack(self._out, force_mavlink1=True)[: HEAD_BYTES + size]
         checked = bytes([min(length, size), *rest])
@@ -183,30 +183,30 @@ class SimulatedAutopilot:
         crc.accumulate(bytes([message.crc_extra]))
         return bytes([begin]) + checked + int(crc.crc).to_bytes(2, "little")
 
-    # -- what it is told ---------------------------------------------------------------------------------------------
+    # -- receiving ---------------------------------------------------------------------------------------------------
     def _obey(self, message: Any) -> None:
         match message.get_type():
             case "PARAM_REQUEST_READ" if message.param_index < 0:
-                self._tell(message.param_id)
+                self._send_parameter(message.param_id)
             case "PARAM_REQUEST_LIST":
                 for name in self.parameters.names:
-                    self._tell(name)
+                    self._send_parameter(name)
             case "PARAM_SET" if message.param_id in self.parameters:
-                field = _field_of(message)
+                field = _read_field(message)
                 self.parameters.set_field(message.param_id, field)
-                self._tell(message.param_id)
+                self._send_parameter(message.param_id)
             case "COMMAND_LONG":
                 result = self._command(message)
                 self._send(self._mavlink.MAVLink_command_ack_message(message.command, result))
 
-    def _tell(self, name: str) -> None:
-        """A parameter that it does not have it says nothing of, as both do."""
+    def _send_parameter(self, name: str) -> None:
+        """Send a parameter. Both firmwares ignore requests for one that they do not have."""
         if name not in self.parameters:
             return
         names = self.parameters.names
         number = np.frombuffer(self.parameters.field(name), "<f4")[0]
-        kind, place = self.parameters.types[name], names.index(name)
-        message = self._mavlink.MAVLink_param_value_message(name.encode(), float(number), kind, len(names), place)
+        kind, index = self.parameters.types[name], names.index(name)
+        message = self._mavlink.MAVLink_param_value_message(name.encode(), float(number), kind, len(names), index)
         self._send(message)
 
     def _command(self, message: Any) -> int:
@@ -221,13 +221,13 @@ class SimulatedAutopilot:
         if message.command not in (511, 512):
             return UNSUPPORTED
         number, interval_us = int(message.param1), message.param2
-        if number not in IMUS_FIRST or IMUS_FIRST[number] >= len(self._imus) or isnan(interval_us):
+        if number not in IMU_INDEX or IMU_INDEX[number] >= len(self._imus) or isnan(interval_us):
             return DENIED
         if number == RAW_IMU and self._firmware == "px4":
             return DENIED
         if message.command == 512:
             self._send_imu(number, round((self._on_for_s + self._steps / RATE_HZ) * 1e6))
-        elif interval_us <= 0:  # never, or as often as it would by itself, which is never
+        elif interval_us <= 0:  # disabled, or the default, which is disabled too
             self._intervals_s.pop(number, None)
         else:
             self._intervals_s[number] = max(1e-6 * interval_us, FASTEST_S)
@@ -239,8 +239,8 @@ def _int16(value: float) -> int:
     return int(np.clip(value, -32768, 32767))
 
 
-def _field_of(message: Any) -> bytes:
-    """The four bytes of the value of a PARAM_SET."""
+def _read_field(message: Any) -> bytes:
+    """Return the four bytes of the value in a PARAM_SET."""
     frame = bytes(message.get_msgbuf())
     begin = 10 if frame[0] == 0xFD else 6
     return frame[begin : begin + 4]

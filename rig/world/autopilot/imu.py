@@ -1,4 +1,4 @@
-"""One IMU of a simulated autopilot: what its part reads, what the firmware makes of it before it is sent."""
+"""One IMU of a simulated autopilot: the readings of its part, and the firmware's processing before they are sent."""
 
 from collections.abc import Callable, Sequence
 from math import cos, pi, tan
@@ -14,22 +14,22 @@ from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 
-RATE_HZ = 400.0  # at which it is read: a quick main loop's
+RATE_HZ = 400.0  # sampling rate, that of a fast main loop
 AVERAGED = 2  # readings in a mean of PX4's VehicleIMU: IMU_INTEG_RATE is 200 Hz
-TURNS = {0: (), 2: ((2, 90),), 4: ((2, 180),), 6: ((2, 270),), 8: ((0, 180),), 12: ((1, 180),), 24: ((1, 90),)}
+ORIENTATIONS = {0: (), 2: ((2, 90),), 4: ((2, 180),), 6: ((2, 270),), 8: ((0, 180),), 12: ((1, 180),), 24: ((1, 90),)}
 FAULTLESS = SimulatedFaultySection()
 Vector = NDArray[np.float64]
 
 
 class LowPass:
-    """ArduPilot's LowPassFilter2p: a Butterworth of second order, at zero cut-off none."""
+    """ArduPilot's LowPassFilter2p: a second-order Butterworth filter; none at cut-off zero."""
 
     def __init__(self) -> None:
         self._cutoff_hz = -1.0
         self._before: list[Vector] = []
 
     def apply(self, value: Vector, cutoff_hz: float) -> Vector:
-        """What comes out of it for the next reading."""
+        """Return the filter's output for the next reading, (3,)."""
         if cutoff_hz <= 0:
             return value
         if cutoff_hz != self._cutoff_hz:
@@ -39,21 +39,21 @@ class LowPass:
             self._b0 = ohm**2 / whole
             self._a1, self._a2 = 2 * (ohm**2 - 1) / whole, (1 - 2 * cos(pi / 4) * ohm + ohm**2) / whole
         if not self._before:
-            settled = value / (1 + self._a1 + self._a2)  # as if it had been so for ever
+            settled = value / (1 + self._a1 + self._a2)  # steady state
             self._before = [settled, settled]
         first, second = self._before
-        held = value - self._a1 * first - self._a2 * second
-        self._before = [held, first]
-        filtered: Vector = self._b0 * (held + 2 * first + second)
+        state = value - self._a1 * first - self._a2 * second
+        self._before = [state, first]
+        filtered: Vector = self._b0 * (state + 2 * first + second)
         return filtered
 
 
 class SimulatedImu:
-    """An IMU, the `place`-th of its autopilot. `step` reads it; `rate` and `force` are what the firmware has of it."""
+    """An IMU, number `index` of its autopilot. `step` reads it; `rate` and `force` are the firmware's values."""
 
     def __init__(
         self,
-        place: int,
+        index: int,
         truth: SensorTruth,
         motion_at: Callable[[float], Sequence[float]],
         parameters: Parameters,
@@ -62,7 +62,7 @@ class SimulatedImu:
         seed: np.random.SeedSequence,
         faulty: SimulatedFaultySection = FAULTLESS,
     ) -> None:
-        self._place, self._parameters, self._px4 = place, parameters, px4
+        self._index, self._parameters, self._px4 = index, parameters, px4
         gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
         self._gyroscope, self._repeats = FrozenGyroscope(gyroscope, faulty), Repeats(faulty, seed)
         assert truth.accelerometer is not None, "an autopilot's IMU always has one"
@@ -72,11 +72,11 @@ class SimulatedImu:
         self.rate, self.force = np.zeros(3), np.zeros(3)
         self.temperature_c = 25.0
         self.time_us = 0  # of the reading, by the autopilot's clock
-        nth = str(place + 1) if place else ""
+        nth = str(index + 1) if index else ""
         if px4:
-            stems = (f"CAL_GYRO{place}_{{}}OFF", f"CAL_ACC{place}_{{}}OFF", f"CAL_ACC{place}_{{}}SCALE")
+            stems = (f"CAL_GYRO{index}_{{}}OFF", f"CAL_ACC{index}_{{}}OFF", f"CAL_ACC{index}_{{}}SCALE")
         else:
-            gyro = f"INS_GYR{nth}OFFS" if place else "INS_GYROFFS"
+            gyro = f"INS_GYR{nth}OFFS" if index else "INS_GYROFFS"
             stems = (f"{gyro}_{{}}", f"INS_ACC{nth}OFFS_{{}}", f"INS_ACC{nth}SCAL_{{}}")
         self._names = [[stem.format(axis) for axis in "XYZ"] for stem in stems]
 
@@ -85,14 +85,14 @@ class SimulatedImu:
         return list(self._repeats.next_rates(self.rate.tolist()))
 
     def step(self, at_s: float, time_us: int) -> None:
-        """Read it once at the virtual time, which is `time_us` by the autopilot's clock."""
+        """Read it once at the virtual time `at_s`, which is `time_us` by the autopilot's clock."""
         offset, force_offset, force_scale = (
             np.array([self._parameters[name] for name in names]) for names in self._names
         )
         self.temperature_c = self._gyroscope.temperature_c(at_s)
-        turned = simulated_rotation(self._parameters["SENS_BOARD_ROT" if self._px4 else "AHRS_ORIENTATION"])
-        rate = turned @ (np.array(self._gyroscope.read(at_s)) - offset)
-        force = turned @ ((np.array(self._accelerometer.read(at_s)) - force_offset) * force_scale)
+        rotation = simulated_rotation(self._parameters["SENS_BOARD_ROT" if self._px4 else "AHRS_ORIENTATION"])
+        rate = rotation @ (np.array(self._gyroscope.read(at_s)) - offset)
+        force = rotation @ ((np.array(self._accelerometer.read(at_s)) - force_offset) * force_scale)
         if self._px4:
             self._sum += (rate, force)
             self._summed += 1
@@ -106,12 +106,12 @@ class SimulatedImu:
 
 
 def simulated_rotation(number: float) -> Vector:
-    """(3, 3) what an orientation of a few that are known turns readings by. Raises ValueError of another."""
-    if int(number) not in TURNS:
+    """Return the rotation (3, 3) of the board orientation `number`. Raise ValueError if it is not simulated."""
+    if int(number) not in ORIENTATIONS:
         raise ValueError(f"the simulated autopilot has no orientation {number:g}")
-    turned = np.eye(3)
-    for axis, degrees in TURNS[int(number)]:
+    rotation = np.eye(3)
+    for axis, degrees in ORIENTATIONS[int(number)]:
         vector = [0.0, 0.0, 0.0]
         vector[axis] = np.radians(degrees)
-        turned = np.array(rotation_from_vector((vector[0], vector[1], vector[2]))) @ turned
-    return turned
+        rotation = np.array(rotation_from_vector((vector[0], vector[1], vector[2]))) @ rotation
+    return rotation

@@ -1,4 +1,4 @@
-"""The autopilots of the laboratory: their parameters, and the IMUs on the flange that they read."""
+"""The autopilots of the laboratory: their parameters, and their IMUs on the flange."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -18,9 +18,10 @@ from rig.world.instruments import FieldOf, MotionOf
 
 @dataclass(slots=True)
 class AutopilotMount:
-    """One autopilot's place: what stays there when it is switched off. `imus`: its IMU of each place, by sensor name.
+    """The place of one autopilot, with the state that it keeps without power.
 
-    A place between that no sensor names has an IMU too, which reads what the first one does.
+    `imus`: sensor names by IMU number. A number in between without a sensor has an IMU too, which reads the first one's
+    motion.
     """
 
     kind: ClassVar[str] = "autopilot"
@@ -35,22 +36,22 @@ class AutopilotMount:
 
     @property
     def pty(self) -> bool:
-        """Whether a pseudo-terminal is wanted too."""
+        """Whether it also has a pseudo-terminal."""
         return self.section.pty
 
     @property
     def stolen(self) -> float:
-        """Share of what it sends that another program reads."""
+        """The fraction of its bytes that another program reads."""
         return self.section.stolen
 
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
-        """Give it power at the virtual time `time_s`, if it has none."""
+        """Switch it on at the virtual time `time_s`, unless it is on."""
         if self.instrument is not None:
             return
         section = self.section
-        made = SimulatedAutopilot(
+        autopilot = SimulatedAutopilot(
             section.firmware,
-            [self._imu(place, motion_of, time_s) for place in range(max(self.imus) + 1)],
+            [self._imu(index, motion_of, time_s) for index in range(max(self.imus) + 1)],
             self.parameters,
             baud=section.baud or self.configured_baud,
             uid=section.uid,
@@ -62,42 +63,43 @@ class AutopilotMount:
             seed=self.world.seed,
             time_s=time_s,
         )
-        made.faults.lost, made.faults.doubled, made.faults.slowest = section.lost, section.doubled, section.slowest
-        self.instrument = made
+        faults = autopilot.faults
+        faults.lost, faults.doubled, faults.slowest = section.lost, section.doubled, section.slowest
+        self.instrument = autopilot
 
     def switch_off(self) -> None:
-        """Take its power away."""
+        """Switch it off."""
         self.instrument = None
 
-    def _imu(self, place: int, motion_of: MotionOf, time_s: float) -> SimulatedImu:
-        name = self.imus.get(place, next(iter(self.imus.values())))
+    def _imu(self, index: int, motion_of: MotionOf, time_s: float) -> SimulatedImu:
+        name = self.imus.get(index, next(iter(self.imus.values())))
         # It has an accelerometer whether the rig reads it or not.
         truth = SensorTruth(self.config.sensors[name], self.world.sensors[name], time_s, accelerometer=True)
-        of_another = [] if place in self.imus else [place]
-        seed = np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(name), *of_another])
+        extra_entropy = [] if index in self.imus else [index]
+        seed = np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(name), *extra_entropy])
         px4 = self.section.firmware == "px4"
         faulty = self.world.sensors[name].faulty
-        return SimulatedImu(place, truth, motion_of(truth), self.parameters, px4=px4, seed=seed, faulty=faulty)
+        return SimulatedImu(index, truth, motion_of(truth), self.parameters, px4=px4, seed=seed, faulty=faulty)
 
 
 def build_autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, AutopilotMount]:
-    """Autopilots by port. Raises `Refused` `autopilot_parameters` for a parameter that one does not have."""
-    at: dict[str, dict[int, str]] = {}
+    """Return the autopilots by port. Raise `Refused` `autopilot_parameters` for a parameter that one does not have."""
+    imus_by_port: dict[str, dict[int, str]] = {}
     for name, sensor in config.sensors.items():
         if sensor.mavlink is not None:
-            at.setdefault(sensor.mavlink.port, {})[sensor.mavlink.instance] = name
+            imus_by_port.setdefault(sensor.mavlink.port, {})[sensor.mavlink.instance] = name
     bauds = {sensor.mavlink.port: sensor.mavlink.baud for sensor in config.sensors.values() if sensor.mavlink}
-    found = {}
-    for port, imus in at.items():
-        said = (world.sensors[name].autopilot for name in config.sensors if name in imus.values())
-        section = next((each for each in said if each is not None), SimulatedAutopilotSection())
+    mounts = {}
+    for port, imus in imus_by_port.items():
+        sections = (world.sensors[name].autopilot for name in config.sensors if name in imus.values())
+        section = next((section for section in sections if section is not None), SimulatedAutopilotSection())
         try:
-            kept = section.parameter_file
-            parameters = Parameters(section.firmware, max(imus) + 1, section.parameters, kept)
+            file = section.parameter_file
+            parameters = Parameters(section.firmware, max(imus) + 1, section.parameters, file)
         except ValueError as error:
             raise Refused(
                 "autopilot_parameters", f"world.sensors.{imus[min(imus)]}.autopilot.parameters: {error}",
                 "Give parameters that its firmware has",
             ) from None  # fmt: skip
-        found[port] = AutopilotMount(config, world, dict(sorted(imus.items())), section, bauds[port], parameters)
-    return found
+        mounts[port] = AutopilotMount(config, world, dict(sorted(imus.items())), section, bauds[port], parameters)
+    return mounts

@@ -35,8 +35,7 @@ def mount_sensors(
 ) -> dict[str, SpiDevice]:
     """Return the board's sensors of the `world:` section by name, powered at the virtual time `time_s`.
 
-    `motion_of`: the motion that a sensor senses as a function of time, 3 components or 6. A `body` sets the
-    temperature.
+    `motion_of`: a sensor's motion as a function of time, 3 components or 6. A `body` sets the temperature.
     """
     return {
         name: _build_sensor(
@@ -66,11 +65,9 @@ def mount_magnetometers(
     }
     return {
         name: MAGNETOMETERS[config.magnetometers[name].part].register_model(
-            field_of(magnetometer),
-            magnetometer.truth,
-            seed=np.random.SeedSequence([world.seed, len(world.sensors) + index]),
+            field_of(sensor), sensor.truth, seed=np.random.SeedSequence([world.seed, len(world.sensors) + index])
         )
-        for index, (name, magnetometer) in enumerate(mounted.items())
+        for index, (name, sensor) in enumerate(mounted.items())
     }
 
 

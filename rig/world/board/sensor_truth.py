@@ -14,7 +14,7 @@ from firmware_host.emulator.parts.gyroscope import GyroTruth, Temperature, Warmi
 from rig.config.sensors.sensor_sections import MountingSection, SensorSection, mounting_matrix
 from rig.config.world.laboratory import SimulatedAccelerometerSection, SimulatedSensorSection
 from rig.world.board.heat import HeatedPart
-from rig.world.ur10e.motion.flange_motion import Components, InertialMotion, transfer_force
+from rig.world.ur10e.motion.flange_motion import BodyMotion, Components, transfer_force
 from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 
 
@@ -75,7 +75,7 @@ class SensorTruth:
         u, v, w = flange_rate
         return a * u + b * v + c * w, d * u + e * v + f * w, g * u + h * v + i * w
 
-    def sense(self, flange: InertialMotion) -> Sequence[float]:
+    def sense(self, flange: BodyMotion) -> Sequence[float]:
         """Return the motion that the part senses, rad/s and (with 6 components) g, from the flange's motion."""
         rate = self.rotate_rate(flange.rate_rad_s)
         if not self.senses_force:
@@ -83,7 +83,7 @@ class SensorTruth:
         force = transfer_force(flange.rate_rad_s, flange.change_rad_s2, flange.force_m_s2, self._offset_m)
         return (*rate, *(component / STANDARD_GRAVITY_M_S2 for component in self.rotate_rate(force)))
 
-    def readings(self, time_s: np.ndarray, flange: InertialMotion, seed: int | np.random.SeedSequence) -> np.ndarray:
+    def readings(self, time_s: np.ndarray, flange: BodyMotion, seed: int | np.random.SeedSequence) -> np.ndarray:
         """Return the readings (n, 3), rad/s, at times (n,), unrounded. `flange`: its motion as arrays (n,)."""
         columns = [np.broadcast_to(component, time_s.shape) for component in self.sense(flange)]
         return readings(self.gyro, time_s, np.column_stack(columns), seed, self.temperature_c)

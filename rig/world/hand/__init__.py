@@ -1,1 +1,1 @@
-"""The simulated hand: how somebody turns a box on a table and lays it down, and which mistakes are made with it."""
+"""The simulated hand: how a person turns a box on a table and lays it down, with that person's mistakes."""

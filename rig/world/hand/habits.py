@@ -1,6 +1,6 @@
-"""What a hand is asked to do, how well it does that, and by which mistakes it fails.
+"""The actions asked of a hand, its accuracy, and its mistakes.
 
-The sizes are those of published recordings of hands: two to five pushes a turn, peaks of 60 to 900 °/s, tremor of 6 to
+The values are those of published recordings of hands: two to five pushes a turn, peaks of 60 to 900 °/s, tremor of 6 to
 12 Hz, faces put down again within a fraction of a milliradian.
 """
 
@@ -30,27 +30,29 @@ USUAL: dict[MistakeKind, float] = {
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """A mistake, as large as `size`; None takes the usual size of its kind (`USUAL`).
+    """A mistake of magnitude `size`; None takes the usual magnitude of its kind (`USUAL`).
 
-    - `short`: the turn ends so many degrees before it is whole, as against an edge that slipped.
-    - `two_turns` for one, the turn the `other_way` round, the `wrong_face`; `skipped`: nothing is done.
-    - `crumb`: the face lies on something, tilted by so many mrad; `table_pushed`: the table leans otherwise then.
-    - `held` in the air for so many seconds, and not laid down; `lifted` by so many degrees while it should rest.
-    - `dropped`: biases have jumped; `cable_pulled` for so many seconds; `left` lying for so many; so many times
-      `too_fast`.
+    - `short`: the turn ends this many degrees early, as against an edge that slipped.
+    - `two_turns` in place of one; a turn the `other_way`; the `wrong_face`; `skipped`: no action.
+    - `crumb`: the face is tilted by this many mrad; `table_pushed`: the table's tilt changes by this many.
+    - `held`: in the air for this many seconds in place of a rest; `lifted`: by this many degrees during a rest.
+    - `dropped`: biases jump; `cable_pulled`: for this many seconds; `left`: idle for this many seconds before the
+      action;
+      `too_fast`: by this factor.
     """
 
     kind: MistakeKind
     size: float | None = None
 
     @property
-    def sized(self) -> float:
+    def magnitude(self) -> float:
+        """The magnitude, in the unit of its kind."""
         return USUAL.get(self.kind, 0.0) if self.size is None else self.size
 
 
 @dataclass(frozen=True, slots=True)
 class FlipAction:
-    """The body is laid on another face: its axis `to` then points upwards."""
+    """Lay the body on another face, so that its axis `to` points upwards."""
 
     to: Face
     mistake: Mistake | None = None
@@ -58,7 +60,7 @@ class FlipAction:
 
 @dataclass(frozen=True, slots=True)
 class TurnAction:
-    """The body is turned on its face by whole `turns`, about its axis that points upwards."""
+    """Turn the body on its face by whole `turns` about its upward axis."""
 
     turns: int
     mistake: Mistake | None = None
@@ -66,7 +68,7 @@ class TurnAction:
 
 @dataclass(frozen=True, slots=True)
 class WaitAction:
-    """The body is left alone."""
+    """Leave the body alone."""
 
     seconds: float
     mistake: Mistake | None = None
@@ -77,11 +79,12 @@ Action = FlipAction | TurnAction | WaitAction
 
 @dataclass(frozen=True, slots=True)
 class Habits:
-    """How a hand moves and lays down; sizes that are drawn anew each time are standard deviations.
+    """How a hand moves and lays down a body. Values drawn anew each time are standard deviations.
 
-    `tilt_mrad` is by how much a face that is put down again lies otherwise, `closure_mrad` by how much a turn against
-    an edge misses, `heading_mrad` a flip. The box' faces are off square by `faces_mrad`, the table leans by
-    `table_mrad`, the sensor lies `lever_arm_m` off the point about which it is turned.
+    - `tilt_mrad`: the repeatability of a face that is put down again.
+    - `closure_mrad`: by how much a turn against an edge misses; `heading_mrad`: the same of a flip.
+    - `faces_mrad`: the box' deviation from squareness; `table_mrad`: the table's tilt.
+    - `lever_arm_m`: the sensor's position from the point of rotation.
     """
 
     peak_deg_s: float = 250.0

@@ -1,1 +1,1 @@
-"""The simulated KVH 1775: what the instrument does with bytes, on a serial line of its own."""
+"""The simulated KVH 1775: its answers to bytes, on its own serial line."""

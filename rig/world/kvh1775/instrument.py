@@ -1,4 +1,4 @@
-"""The simulated KVH 1775: two modes, settings that outlast its supply, an oscillator of its own, bytes in and out.
+"""The simulated KVH 1775: two modes, non-volatile settings, its own oscillator, bytes in and out.
 
 Source: ICD 56-0298 Rev. B, sections 3.3 (modes), 3.4 (built-in test), 5 (messages), 8 (commands).
 """
@@ -20,7 +20,7 @@ from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 from rig.world.kvh1775.memory import KvhMemory
 
-INTERNAL_STEP_S = 1e-3  # at most, between two looks at the motion that a delta angle is summed of
+INTERNAL_STEP_S = 1e-3  # greatest step of the integration of a delta angle
 LINE_END = b"\r\n"
 LONGEST_COMMAND = 200
 PERFECT = MagnetometerTruth()
@@ -28,13 +28,13 @@ FAULTLESS = SimulatedFaultySection()
 
 
 def no_field(time_s: float) -> Sequence[float]:
-    """No magnetic field, as in a chamber that keeps it out."""
+    """Return zero flux density, (3,) T, as in a shielded chamber."""
     return 0.0, 0.0, 0.0
 
 
 @dataclass(slots=True)
 class KvhFaults:
-    """What a test can make wrong: the next messages to `lose`, `status` bits that are valid, built-in test bytes."""
+    """Faults that a test can set: messages to `lose`, valid `status` bits, first byte of the built-in `test`."""
 
     lose: int = 0
     status: int = ALL_VALID
@@ -42,10 +42,11 @@ class KvhFaults:
 
 
 class SimulatedKvh1775:
-    """The instrument, switched on at the virtual time `time_s`, by when it has counted `uptime_s`.
+    """The instrument, switched on at the virtual time `time_s`, when its clock reads `uptime_s`.
 
-    `motion_at`: what it feels, rate in rad/s and specific force in g; `field_at`: the flux density in its axes, T, with
-    `magnetometer` the errors of what reads that. `memory`: its settings, which it changes.
+    - `motion_at`: its motion over time, rate in rad/s and specific force in g.
+    - `field_at`: flux density in its axes over time, T; `magnetometer`: the errors of its reading.
+    - `memory`: its settings, which commands change.
     """
 
     def __init__(
@@ -68,11 +69,11 @@ class SimulatedKvh1775:
         self._serial_number = serial_number
         self._speed = 1.0 + 1e-6 * oscillator_ppm
         self._counted_from_s = time_s - uptime_s / self._speed
-        self._felt: Sequence[float] = ()
-        gyroscope = Gyroscope(lambda time_s: self._felt, truth.gyro, seed, truth.temperature_c)
+        self._sensed: Sequence[float] = ()
+        gyroscope = Gyroscope(lambda time_s: self._sensed, truth.gyro, seed, truth.temperature_c)
         self._gyroscope, self._repeats = FrozenGyroscope(gyroscope, faulty), Repeats(faulty, seed)
         self._accelerometer = Accelerometer(motion_at, truth.accelerometer, seed, truth.temperature_c)
-        self._magnetometer = Magnetometer(field_at, magnetometer, _another(seed))
+        self._magnetometer = Magnetometer(field_at, magnetometer, _derive_seed(seed))
         self._now_s = time_s
         self._sequence = 0
         self._command = bytearray()
@@ -87,20 +88,20 @@ class SimulatedKvh1775:
         return float(self._memory["BAUD"])
 
     def misbehave(self, *, lose: int = 0, status: int | None = None, test: int | None = None) -> None:
-        """Set the faults that are given; those of `lose` come on top of what is still to be lost."""
+        """Set the given faults; `lose` adds to the messages still to be lost."""
         faults = self.faults
         faults.lose += int(lose)
         faults.status = faults.status if status is None else int(status)
         faults.test = faults.test if test is None else int(test)
 
     def transmitted(self) -> bytes:
-        """What it has sent since it was asked last."""
+        """Return the bytes sent since the last call."""
         data = bytes(self._sent)
         self._sent.clear()
         return data
 
     def receive(self, data: bytes) -> None:
-        """Commands end with CR, LF or both."""
+        """Take commands, which end with CR, LF or both."""
         for byte in data:
             if byte in LINE_END:
                 line, self._command = bytes(self._command), bytearray()
@@ -110,34 +111,34 @@ class SimulatedKvh1775:
                 self._command.append(byte)
 
     def advance(self, time_s: float) -> None:
-        """Live until this virtual time, which lies in the laboratory's last tick."""
+        """Simulate until the virtual time `time_s`, which lies in the laboratory's last tick."""
         while not self.configuring and self._memory["MSYNC"] == "IMU":
             at_s = self._began_s + (self._steps + 1) * self._step_s
             if at_s > time_s:
                 break
             self._steps += 1
-            self._look(at_s)
-            if self._steps % self._steps_each == 0:
+            self._integrate(at_s)
+            if self._steps % self._message_steps == 0:
                 self._send(at_s)
         self._now_s = time_s
 
     # -- normal mode ---------------------------------------------------------------------------------------------
     def _begin(self) -> None:
-        """Messages from now on, the first after one interval."""
+        """Start sending messages, the first after one interval."""
         delta = self._memory["ROTFMT"] == "DELTA"
         interval_s = 1.0 / float(self._memory["DR"])  # of its own seconds
-        self._steps_each = ceil(interval_s / INTERNAL_STEP_S - 1e-9) if delta else 1
-        self._step_s = interval_s / self._steps_each / self._speed
+        self._message_steps = ceil(interval_s / INTERNAL_STEP_S - 1e-9) if delta else 1
+        self._step_s = interval_s / self._message_steps / self._speed
         self._began_s, self._steps = self._now_s, 0
         self._before: Sequence[float] | None = None
         self._sum = [0.0] * 6
 
-    def _look(self, at_s: float) -> None:
-        """One look at the motion: a rate is what it is now, a delta angle is summed by the trapezoidal rule."""
+    def _integrate(self, at_s: float) -> None:
+        """Take the rate at `at_s`, or add to the delta angle by the trapezoidal rule."""
         now = self._motion_at(at_s - self._truth.gyro.delay_s)
         before = self._before or now
-        if now is before:  # half of twice a number is that number
-            self._sum = [total + each for total, each in zip(self._sum, now, strict=False)]
+        if now is before:  # the mean of two equal numbers is exact
+            self._sum = [total + value for total, value in zip(self._sum, now, strict=False)]
         else:
             self._sum = [total + 0.5 * (old + new) for total, old, new in zip(self._sum, before, now, strict=False)]
         self._before = now
@@ -145,7 +146,9 @@ class SimulatedKvh1775:
     def _send(self, at_s: float) -> None:
         memory = self._memory
         delta = memory["ROTFMT"] == "DELTA"
-        self._felt = [total / self._steps_each for total in self._sum] if delta else cast(Sequence[float], self._before)
+        self._sensed = (
+            [total / self._message_steps for total in self._sum] if delta else cast(Sequence[float], self._before)
+        )
         self._sum = [0.0] * 6
         rotation = np.array(self._repeats.next_rates(self._gyroscope.read(at_s)))
         if delta:
@@ -174,7 +177,7 @@ class SimulatedKvh1775:
         self._tests_due.clear()
 
     def _field_gauss(self, at_s: float) -> NDArray[np.float64]:
-        """Read anew for every message, of which format C sends one axis; the others send none."""
+        """Return a new reading of the field, (3,) gauss. Format C sends one axis per message; the others send none."""
         if self._memory["OUTPUTFMT"] != "C":
             return np.zeros(3)
         field: NDArray[np.float64] = self._memory.axes @ np.array(self._magnetometer.read(at_s)) / GAUSS_T
@@ -194,9 +197,9 @@ class SimulatedKvh1775:
             self.configuring = True
             self._answer("CONFIG,1")
         elif not self.configuring:
-            return  # binary mode hears nothing else
+            return  # binary mode accepts no other command
         elif command == "=CONFIG,0":
-            self.configuring = False  # not answered: the messages say it
+            self.configuring = False  # the answer is that messages resume
             self._begin()
         elif command == "?IS":
             self._answer(f"IS,{self._serial_number}")
@@ -207,6 +210,6 @@ class SimulatedKvh1775:
         self._sent += text.encode("ascii", "replace") + LINE_END
 
 
-def _another(seed: np.random.SeedSequence) -> np.random.SeedSequence:
-    """A seed for the magnetometer's noise, so that it leaves that of the other triads as it is."""
+def _derive_seed(seed: np.random.SeedSequence) -> np.random.SeedSequence:
+    """Return a seed for the magnetometer's noise that leaves the noise of the other triads unchanged."""
     return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 1775))

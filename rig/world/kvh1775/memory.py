@@ -1,4 +1,4 @@
-"""The settings a KVH 1775 keeps without its supply, and the commands that ask for and change them (ICD, section 8)."""
+"""The non-volatile settings of a KVH 1775, and the commands that read and change them (ICD, section 8)."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -39,14 +39,14 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 
 
 class KvhMemory:
-    """The instrument's non-volatile memory, as its user left it: `left` over the factory's settings.
+    """The instrument's non-volatile memory: `settings` replace the factory's.
 
-    Raises ValueError for a setting the instrument does not have.
+    Raise ValueError for a setting that the instrument does not have.
     """
 
-    def __init__(self, left: Mapping[str, str]) -> None:
+    def __init__(self, settings: Mapping[str, str]) -> None:
         self._settings = dict(FACTORY)
-        for name, value in left.items():
+        for name, value in settings.items():
             if not self._set(name.upper(), value.upper()):
                 raise ValueError(f"a KVH 1775 cannot be set to {name},{value}")
 
@@ -55,46 +55,46 @@ class KvhMemory:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """(3, 3) matrix by which rates and accelerations are multiplied: any matrix, not only rotations."""
+        """Matrix (3, 3) that multiplies rates and accelerations: any matrix, not only a rotation."""
         return _matrix(self["AXES"])
 
     def obey(self, command: str) -> str:
-        """The answer to a command in capitals."""
+        """Return the answer to a command in capitals."""
         sign, name = command[:1], command[1:]
         if sign == "?" and name in self._settings:
-            return self._said(name)
+            return self._report(name)
         if command == "=RSTCFG":
             self._settings.update({**FACTORY, "BAUD": self["BAUD"]})
             return "RSTCFG"
         if sign == "=":
-            for known in self._settings:
-                if name.startswith(f"{known},") and self._set(known, name[len(known) + 1 :]):
-                    return self._said(known)
+            for setting in self._settings:
+                if name.startswith(f"{setting},") and self._set(setting, name[len(setting) + 1 :]):
+                    return self._report(setting)
         return f"INVALID,{command}"
 
-    def _said(self, name: str) -> str:
+    def _report(self, name: str) -> str:
         if name == "AXES":
             return "AXES," + ",".join(f"{value:+.6E}" for value in self.axes.ravel().tolist())
         return f"{name},{self[name]}"
 
     def _set(self, name: str, value: str) -> bool:
         if name == "AXES":
-            if not _nine_numbers(value):
+            if not _is_matrix(value):
                 return False
         elif value not in CHOICES.get(name, ()):
             return False
         self._settings[name] = value
         if (name, value) == ("MSYNC", "EXT"):
-            self._settings.update({"FILTTYPE,A": "AVE", "FILTTYPE,G": "AVE"})  # and so they stay
+            self._settings.update({"FILTTYPE,A": "AVE", "FILTTYPE,G": "AVE"})  # also after MSYNC is reset
         return True
 
 
-@lru_cache(maxsize=4)  # asked for at every message
+@lru_cache(maxsize=4)  # needed at every message
 def _matrix(text: str) -> NDArray[np.float64]:
     return np.array([float(value) for value in text.split(",")]).reshape(3, 3)
 
 
-def _nine_numbers(text: str) -> bool:
+def _is_matrix(text: str) -> bool:
     try:
         values = [float(value) for value in text.split(",")]
     except ValueError:

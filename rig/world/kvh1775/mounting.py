@@ -17,7 +17,7 @@ from rig.world.kvh1775.memory import KvhMemory
 
 @dataclass(slots=True)
 class KvhMount:
-    """One instrument's place: what stays there when it is switched off, which is its memory."""
+    """The place of one instrument, with the memory that it keeps without power."""
 
     kind: ClassVar[str] = "kvh"
     bit_error_rate: ClassVar[float] = 0.0
@@ -30,11 +30,11 @@ class KvhMount:
 
     @property
     def pty(self) -> bool:
-        """Whether a pseudo-terminal is wanted too."""
+        """Whether it also has a pseudo-terminal."""
         return _section(self.world, self.name).pty
 
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
-        """Give it power at the virtual time `time_s`, if it has none."""
+        """Switch it on at the virtual time `time_s`, unless it is on."""
         if self.instrument is not None:
             return
         sensor, section = self.config.sensors[self.name], _section(self.world, self.name)
@@ -59,21 +59,21 @@ class KvhMount:
         )
 
     def switch_off(self) -> None:
-        """Take its power away."""
+        """Switch it off."""
         self.instrument = None
 
 
 def build_kvh_mounts(config: RigConfig, world: WorldSection) -> dict[str, KvhMount]:
-    """Instruments by sensor name, each as its last user left it. Raises `Refused` `kvh_settings` for what is none."""
-    found = {}
+    """Return the instruments by sensor name. Raise `Refused` `kvh_settings` for a setting that they do not have."""
+    mounts = {}
     for name in sorted(name for name, sensor in config.sensors.items() if sensor.part == "kvh1775"):
         try:
-            found[name] = KvhMount(name, config, world, KvhMemory(_section(world, name).settings))
+            mounts[name] = KvhMount(name, config, world, KvhMemory(_section(world, name).settings))
         except ValueError as error:
             raise Refused(
                 "kvh_settings", f"world.sensors.{name}.kvh1775.settings: {error}", "Give settings of its commands"
             ) from None
-    return found
+    return mounts
 
 
 def _section(world: WorldSection, name: str) -> SimulatedKvhSection:

@@ -1,1 +1,1 @@
-"""The simulated device that prints its samples as lines, on a serial line of its own."""
+"""The simulated device that prints its samples as lines of text, on its own serial line."""

@@ -1,4 +1,4 @@
-"""The devices of the laboratory that print lines, on the flange."""
+"""The devices on the flange that print lines of text."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -16,7 +16,7 @@ from rig.world.lines.printer import Printer
 
 @dataclass(slots=True)
 class PrinterMount:
-    """One device's place."""
+    """The place of one device."""
 
     kind: ClassVar[str] = "printer"
     name: str
@@ -26,26 +26,26 @@ class PrinterMount:
 
     @property
     def section(self) -> SimulatedLinesSection:
-        """What the world says of it."""
+        """The device's section of the world."""
         return self.world.sensors[self.name].lines or SimulatedLinesSection()
 
     @property
     def pty(self) -> bool:
-        """Whether a pseudo-terminal is wanted too."""
+        """Whether it also has a pseudo-terminal."""
         return self.section.pty
 
     @property
     def bit_error_rate(self) -> float:
-        """Share of wrong bits on its line."""
+        """The fraction of wrong bits on its line."""
         return self.section.bit_error_rate
 
     @property
     def stolen(self) -> float:
-        """Share of what it prints that another program reads."""
+        """The fraction of its bytes that another program reads."""
         return self.section.stolen
 
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
-        """Give it power at the virtual time `time_s`, if it has none."""
+        """Switch it on at the virtual time `time_s`, unless it is on."""
         if self.instrument is not None:
             return
         sensor, simulated = self.config.sensors[self.name], self.world.sensors[self.name]
@@ -72,11 +72,11 @@ class PrinterMount:
         )
 
     def switch_off(self) -> None:
-        """Take its power away."""
+        """Switch it off."""
         self.instrument = None
 
 
 def build_printer_mounts(config: RigConfig, world: WorldSection) -> dict[str, PrinterMount]:
-    """Devices by sensor name."""
+    """Return the devices by sensor name."""
     printing = sorted(name for name, sensor in config.sensors.items() if sensor.part == "lines")
     return {name: PrinterMount(name, config, world) for name in printing}

@@ -1,6 +1,6 @@
-"""The simulated device: it samples by an oscillator of its own, and prints what its program formats.
+"""The simulated device: it samples by its own oscillator and prints lines of formatted numbers.
 
-It formats as C's and Python's own `%.3f` do, one number after another; nothing here knows how lines are read.
+It formats as C's and Python's `%.3f` do, one number after another, independently of the rig's parser.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,33 +20,33 @@ from rig.config.world.lines import SimulatedLinesSection
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 
-BETWEEN = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
-# What one of each unit is, in rad/s, m/s² and T; and of each unit of time in one second.
-SIZES = {
+SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+# The units in rad/s, m/s² and T; and the units of time per second.
+UNITS = {
     "rad/s": 1.0, "mrad/s": 1e-3, "deg/s": radians(1.0), "mdeg/s": radians(1e-3),
     "g": STANDARD_GRAVITY_M_S2, "mg": 1e-3 * STANDARD_GRAVITY_M_S2, "m/s2": 1.0,
     "gauss": GAUSS_T, "mgauss": 1e-3 * GAUSS_T, "uT": 1e-6, "nT": 1e-9, "T": 1.0,
 }  # fmt: skip
-IN_A_SECOND = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
+TICKS_PER_S = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
 USUAL_DECIMALS = 5
-COLOURED = "\033[0;32m{}\033[0m"  # green, as ESP-IDF's log has what is of level I
+COLOURED = "\033[0;32m{}\033[0m"  # green, as in ESP-IDF's log at level I
 LINE_END = b"\r\n"
 FAULTLESS = SimulatedFaultySection()
 
 
 @dataclass(slots=True)
 class PrinterFaults:
-    """What a test can make wrong: the next samples to `lose`; `stuck`: it prints the same line again and again."""
+    """Faults that a test can set: samples to `lose`; `stuck`: it repeats one line."""
 
     lose: int = 0
     stuck: bool = False
 
 
 class Printer:
-    """A device switched on at the virtual time `time_s`, by when it has counted `uptime_s`.
+    """A device switched on at the virtual time `time_s`, when its clock reads `uptime_s`.
 
-    `motion_at`: what it feels, rate in rad/s and specific force in g; `field_at`: the flux density in its axes, T, with
-    `magnetometer` the errors of what reads that.
+    - `motion_at`: its motion over time, rate in rad/s and specific force in g.
+    - `field_at`: flux density in its axes over time, T; `magnetometer`: the errors of its reading.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Printer:
         self._speed = 1.0 + 1e-6 * section.oscillator_ppm
         self._counted_from_s = time_s - section.uptime_s / self._speed
         self._step_s = 1.0 / rate_hz / self._speed
-        self._began_s, self._samples, self._printed = time_s, 0, 0
+        self._began_s, self._samples, self._format_value = time_s, 0, 0
         gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
         self._gyroscope, self._repeats = FrozenGyroscope(gyroscope, faulty), Repeats(faulty, seed)
         self._accelerometer = None
@@ -83,50 +83,50 @@ class Printer:
         self._line = b""
 
     def misbehave(self, *, lose: int = 0, stuck: bool | None = None) -> None:
-        """Set the faults that are given; those of `lose` come on top of what is still to be lost."""
+        """Set the given faults; `lose` adds to the samples still to be lost."""
         self.faults.lose += int(lose)
         self.faults.stuck = self.faults.stuck if stuck is None else bool(stuck)
 
     def transmitted(self) -> bytes:
-        """What it has sent since it was asked last."""
+        """Return the bytes sent since the last call."""
         data = bytes(self._sent)
         self._sent.clear()
         return data
 
     def receive(self, data: bytes) -> None:
-        """Bytes to the device, which reads none."""
+        """Ignore bytes to the device, which reads none."""
 
     def advance(self, time_s: float) -> None:
-        """Live until this virtual time, which lies in the laboratory's last tick."""
+        """Simulate until the virtual time `time_s`, which lies in the laboratory's last tick."""
         while (at_s := self._began_s + (self._samples + 1) * self._step_s) <= time_s:
             self._samples += 1
-            line = self._sampled(at_s)
+            line = self._format_sample(at_s)
             if self.faults.lose > 0:
                 self.faults.lose -= 1
             elif not (self._section.lost_fraction and self._lost.random() < self._section.lost_fraction):
                 self._line = self._line if self.faults.stuck else line
                 self._sent += self._line
-                self._printed += 1
-                if self._section.comment_every and self._printed % self._section.comment_every == 0:
+                self._format_value += 1
+                if self._section.comment_every and self._format_value % self._section.comment_every == 0:
                     self._sent += f"{self._prints.comment} still here".encode() + LINE_END
 
-    def _sampled(self, at_s: float) -> bytes:
-        """The line of a sample."""
+    def _format_sample(self, at_s: float) -> bytes:
+        """Return the line of text of the sample at `at_s`."""
         prints = self._prints
         rates = self._repeats.next_rates(self._gyroscope.read(at_s))
-        values = {axis: _printed(each, prints.rate) for axis, each in zip(("gx", "gy", "gz"), rates, strict=True)}
+        values = {axis: _format_value(rate, prints.rate) for axis, rate in zip(("gx", "gy", "gz"), rates, strict=True)}
         if self._accelerometer is not None:
             forces = self._accelerometer.read(at_s)
-            for axis, each in zip(("ax", "ay", "az"), forces, strict=True):
-                values[axis] = _printed(each, prints.acceleration)
+            for axis, force in zip(("ax", "ay", "az"), forces, strict=True):
+                values[axis] = _format_value(force, prints.acceleration)
         if prints.field is not None:
-            for axis, each in zip(("mx", "my", "mz"), self._magnetometer.read(at_s), strict=True):
-                values[axis] = _printed(each, prints.field)
-        told = prints.temperature
+            for axis, flux_density in zip(("mx", "my", "mz"), self._magnetometer.read(at_s), strict=True):
+                values[axis] = _format_value(flux_density, prints.field)
+        temperature = prints.temperature
         celsius = self._gyroscope.temperature_c(at_s)
-        decimals = 2 if told.decimals is None else told.decimals
-        warm = f"{(celsius - told.offset_c) / told.scale:.{decimals}f}"
-        values["temperature"] = warm if self._section.temperature_text is None else self._section.temperature_text
+        decimals = 2 if temperature.decimals is None else temperature.decimals
+        degrees = f"{(celsius - temperature.offset_c) / temperature.scale:.{decimals}f}"
+        values["temperature"] = degrees if self._section.temperature_text is None else self._section.temperature_text
         values["time"] = self._time(at_s)
         sequence = self._samples % prints.sequence_wrap if prints.sequence_wrap else self._samples
         values["sequence"] = str(sequence)
@@ -136,8 +136,8 @@ class Printer:
         if prints.keys:
             text = ",".join(key + number for key, number in zip(prints.keys, numbers, strict=True))
         else:
-            between = BETWEEN[prints.separator]
-            text = between.join(numbers) + between * self._section.trailing_separator
+            separator = SEPARATORS[prints.separator]
+            text = separator.join(numbers) + separator * self._section.trailing_separator
         text = prints.prefix.replace("*", str(int(1e3 * at_s))) + text
         if prints.checksum == "nmea":
             text += f"*{reduce(xor, text.lstrip('$!').encode(), 0):02X}"
@@ -147,15 +147,15 @@ class Printer:
         time = self._prints.time
         if time is None:
             return "0"
-        counted = (at_s - self._counted_from_s) * self._speed * IN_A_SECOND[time.unit]
+        counted = (at_s - self._counted_from_s) * self._speed * TICKS_PER_S[time.unit]
         counted = fmod(counted, time.wrap) if time.wrap else counted
         counted = float(np.float32(counted)) if self._section.time_in_single else counted
         return f"{counted:.{self._section.time_decimals}f}" if time.unit == "s" else str(int(counted))
 
 
-def _printed(value: float, section: LineRateSection | LineAccelerationSection | LineFieldSection | None) -> str:
-    """A reading in SI units as the program formats it."""
-    if section is None:  # it prints them in SI units, and the rig does not read them
+def _format_value(value: float, section: LineRateSection | LineAccelerationSection | LineFieldSection | None) -> str:
+    """Format a reading in SI units as the program prints it."""
+    if section is None:  # printed in SI units; the rig does not read it
         return f"{value:.{USUAL_DECIMALS}f}"
     decimals = USUAL_DECIMALS if section.decimals is None else section.decimals
-    return f"{value / section.scale / SIZES[section.unit]:.{decimals}f}"
+    return f"{value / section.scale / UNITS[section.unit]:.{decimals}f}"

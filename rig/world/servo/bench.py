@@ -13,7 +13,7 @@ from rig.world.servo.bus import SimulatedBus
 from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.truth import LineTruth, ServoTruth
 from rig.world.site import build_site
-from rig.world.ur10e.motion.flange_motion import InertialMotion, find_base_motion, propagate_motion
+from rig.world.ur10e.motion.flange_motion import BodyMotion, find_base_motion, propagate
 from rig.world.ur10e.motion.forward_kinematics import Rotation, Vector
 from rig.world.ur10e.motion.links import ArmLink
 
@@ -92,11 +92,11 @@ class ServoBench:
         """Return the shaft's angular rate about its own axis, (3,) rad/s."""
         return (0.0, 0.0, self.servo.rate_at(time_s))
 
-    def motion_at(self, time_s: float) -> InertialMotion:
-        """Return the inertial motion of a body on the shaft."""
+    def motion_at(self, time_s: float) -> BodyMotion:
+        """Return the motion of a body on the shaft."""
         angle, rate = self.servo.angle_at(time_s), self.servo.rate_at(time_s)
         change = (self.servo.rate_at(time_s + CHANGE_S) - rate) / CHANGE_S
-        return propagate_motion(find_base_motion(self._site), [(cos(angle), sin(angle))], (rate,), (change,), (SHAFT,))
+        return propagate(find_base_motion(self._site), [(cos(angle), sin(angle))], (rate,), (change,), (SHAFT,))
 
     def frames_at(self, time_s: float) -> Sequence[tuple[Rotation, Vector]]:
         """Return rotation (rows) and position (m) of the base and of the shaft."""

@@ -1,6 +1,6 @@
 """The bus: servos on one line, collisions of their answers, and the converter between them and the host."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import ceil
 
 import numpy as np
@@ -21,9 +21,7 @@ class SimulatedBus:
     next answers to lose, `spoil` the number to corrupt.
     """
 
-    def __init__(
-        self, servos: Sequence[SimulatedServo], line: LineTruth, now: Callable[[], float], seed: int = 0
-    ) -> None:
+    def __init__(self, servos: list[SimulatedServo], line: LineTruth, now: Callable[[], float], seed: int = 0) -> None:
         self.servos, self.line = servos, line
         self.lose = self.spoil = 0
         self._now = now
@@ -91,9 +89,8 @@ class SimulatedBus:
         for first_slot, answer in answers:
             for slot, byte in enumerate(answer, first_slot):
                 wire[slot] = wire.get(slot, 0xFF) & byte
-        self._send(
-            time_s + max(wire) * byte_s + 1e-3 * self.line.reply_delay_ms, bytes(wire[slot] for slot in sorted(wire))
-        )
+        end_s = time_s + max(wire) * byte_s + 1e-3 * self.line.reply_delay_ms
+        self._send(end_s, bytes(wire[slot] for slot in sorted(wire)))
 
     def _send(self, time_s: float, data: bytes) -> None:
         if self.lose > 0:

@@ -1,1 +1,1 @@
-"""The simulated controller of an arm of Universal Robots: its joints, its programs, its servers."""
+"""The simulated controller of a Universal Robots arm: its joints, its programs, its servers."""

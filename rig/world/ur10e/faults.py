@@ -1,4 +1,4 @@
-"""What can be wrong with the simulated controller beyond its modes: a safety limit, a clock, encoders, a fieldbus."""
+"""Faults of the simulated controller beyond its modes: a safety limit, a clock, encoders, a fieldbus."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -8,23 +8,24 @@ from rig.world.clock import TICK_S
 
 @dataclass(frozen=True, slots=True)
 class AtProgramStart:
-    """What happens so long after the start of every program, as by a fieldbus adapter without its connection."""
+    """An action a fixed time after the start of every program, as by a fieldbus adapter without its connection."""
 
     act: Callable[[], object]
     after_s: float
 
-    def due(self, ticks_since_start: int) -> bool:
-        """Whether it happens in the tick that is so many after a program's start."""
+    def is_due(self, ticks_since_start: int) -> bool:
+        """Return whether to act in the tick `ticks_since_start` after a program's start."""
         return ticks_since_start == round(self.after_s / TICK_S)
 
 
 @dataclass(slots=True)
 class ArmFaults:
-    """Each holds until it is set back.
+    """Faults of the arm. Each keeps its value until it is set again.
 
-    `safety_limit` is the fraction of the programmed speed that a limit of the safety settings leaves; `clock_step_s`
-    is what the controller's clock was set forward in all; `encoder_error_rad` is added to the angle that a joint (0 to
-    5) reports, and may be no number; where the `payload_stays`, none that a program sets is taken.
+    - `safety_limit`: the fraction of the programmed speed that a safety limit permits.
+    - `clock_step_s`: the sum of all steps of the controller's clock.
+    - `encoder_error_rad`: errors of reported joint angles by joint (0 to 5); may be NaN.
+    - `payload_stays`: whether programs cannot change the payload.
     """
 
     safety_limit: float = 1.0
@@ -33,7 +34,7 @@ class ArmFaults:
     at_program_start: AtProgramStart | None = None
     payload_stays: bool = False
 
-    def reported(self, q_rad: Sequence[float]) -> tuple[float, ...]:
-        """The joints' angles as the encoders report them."""
+    def report_angles(self, q_rad: Sequence[float]) -> tuple[float, ...]:
+        """Return the joint angles that the encoders report, rad."""
         errors = self.encoder_error_rad
         return tuple(q + errors.get(joint, 0.0) for joint, q in enumerate(q_rad)) if errors else tuple(q_rad)

@@ -23,7 +23,7 @@ from rig.world.ur10e.motion.forward_kinematics import Vector, flange_pose, rotat
 from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.links import NOMINAL, Links
 from rig.world.ur10e.motion.models import MODELS, ArmModel
-from rig.world.ur10e.motion.tcp_motion import TcpMotion, tcp_motion
+from rig.world.ur10e.motion.tcp_motion import TcpMotion, find_tcp_motion
 
 ROUNDING_RAD = 1e-6  # a target on a joint's limit is within it
 PROGRAM_STOP_RAD_S2 = 4.0
@@ -35,23 +35,23 @@ E_SERIES, POLYSCOPE_X = (5,), (10,)  # their first versions
 
 
 class Program(Protocol):
-    """Something the controller plays, a tick at a time."""
+    """A program that the controller plays, tick by tick."""
 
     name: str
 
     def step(self) -> bool:
-        """One tick; False when the program has ended. Raises `ProgramError`."""
+        """Play one tick; return False when the program has ended. Raise `ProgramError` for its errors."""
         ...
 
     @property
     def waiting(self) -> bool:
-        """Whether ticks change nothing until a client writes an input; False where that is not known."""
+        """Whether further ticks change nothing until a client writes an input; False if unknown."""
         ...
 
 
 @dataclass(slots=True)
 class RegisterBank:
-    """General-purpose registers of one direction."""
+    """The general-purpose registers of one direction."""
 
     bits: list[bool] = field(default_factory=lambda: [False] * 128)
     ints: list[int] = field(default_factory=lambda: [0] * 48)
@@ -60,14 +60,14 @@ class RegisterBank:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What the controller says of itself."""
+    """The controller's serial number and software version."""
 
     serial_number: str
     polyscope: tuple[int, int, int, int]
 
 
 class Robot:
-    """The controller. Everything that changes it is a method here; `step` makes it 2 ms older."""
+    """The controller. Its methods are all that changes it; `step` simulates 2 ms."""
 
     def __init__(
         self,
@@ -78,13 +78,13 @@ class Robot:
         links: Links = NOMINAL,
         *,
         model: ArmModel = MODELS["ur10e"],
-        tool_turn_rad: Vector = (0.0, 0.0, 0.0),
+        tool_rotation_rad: Vector = (0.0, 0.0, 0.0),
     ) -> None:
         self.identity = identity
         self.model = model
-        self.links = links  # as it knows them
-        # The tool's frame in the flange's (m, rotation vector rad): it stands in the same place, and may be turned.
-        self.tcp_offset = (0.0, 0.0, 0.0, *tool_turn_rad)
+        self.links = links  # the controller's, not the true ones
+        # The tool's frame in the flange's (m, rotation vector rad): same origin, possibly rotated.
+        self.tcp_offset = (0.0, 0.0, 0.0, *tool_rotation_rad)
         self.motion = motion
         self.faults = ArmFaults()
         self.remote_control = remote_control
@@ -101,7 +101,7 @@ class Robot:
         self.payload_centre_m: tuple[float, ...] = (0.0, 0.0, 0.0)
         self.loaded_program = ""
         self.messages = Messages()
-        self.watchdog_s = 0.0  # a program stops when no input came for so long; 0: no watchdog
+        self.watchdog_s = 0.0  # greatest time between inputs before a program stops; 0: no watchdog
         self._last_input_tick = 0
         self._program: Program | None = None
         self._start: tuple[int, Program] | None = None
@@ -119,7 +119,7 @@ class Robot:
 
     @robot_mode.setter
     def robot_mode(self, mode: RobotMode) -> None:
-        """Every change is told at the primary interface, this and the safety mode's."""
+        """Set the mode. Every change of it and of the safety mode is reported at the primary interface."""
         if mode != self._robot_mode:
             self.messages.report(ErrorReport(MODE_CHANGED, mode, ReportLevel.INFO))
         self._robot_mode = mode
@@ -141,11 +141,11 @@ class Robot:
 
     @property
     def reported_time_s(self) -> float:
-        """The time that it stamps its states and messages with."""
+        """The time stamp of its states and messages, s."""
         return self.time_s + self.faults.clock_step_s
 
     def step(self) -> None:
-        """Make one tick: modes due, the program's turn, the joints."""
+        """Simulate one tick: due changes of mode, the program, the joints."""
         self.tick += 1
         if self._mode_changes and self._mode_changes[0][0] <= self.tick:
             self.robot_mode = self._mode_changes.pop(0)[1]
@@ -155,9 +155,9 @@ class Robot:
             self.runtime_state, self._started_tick = RuntimeState.PLAYING, self.tick
         if self.runtime_state == RuntimeState.PLAYING:
             self._play()
-        at_start = self.faults.at_program_start
-        if at_start is not None and self._started_tick and at_start.due(self.tick - self._started_tick):
-            at_start.act()
+        start_fault = self.faults.at_program_start
+        if start_fault is not None and self._started_tick and start_fault.is_due(self.tick - self._started_tick):
+            start_fault.act()
         self.motion.step(self.time_s)
         if not self.motion.standing:
             self._still_since_tick = self.tick
@@ -167,7 +167,7 @@ class Robot:
 
     @property
     def waiting(self) -> bool:
-        """Whether the joints stand, and nothing but a client can let them move in the ticks to come."""
+        """Whether the joints are at rest, and only a client can make them move in the next ticks."""
         if self._start is not None or self._mode_changes or self.watchdog_s or not self.motion.still:
             return False
         program = self._program
@@ -185,7 +185,7 @@ class Robot:
         except OutOfReach:
             self.protective_stop(INVALID_SETPOINT)
             return
-        except (ProgramError, ValueError, ArithmeticError) as error:  # the last two: numbers that lead to none
+        except (ProgramError, ValueError, ArithmeticError) as error:  # the last two: unusable numbers
             self.messages.complain(error if isinstance(error, ProgramError) else ProgramError(str(error)))
             self.stop_program("")
             return
@@ -193,7 +193,7 @@ class Robot:
             self.stop_program("")
 
     def _settle(self) -> None:
-        """Finish the states that last until the joints have followed."""
+        """Complete the states that last until the joints have followed."""
         if self.runtime_state == RuntimeState.PAUSING and (self.motion.standing or self.motion.fraction == 0.0):
             self.runtime_state = RuntimeState.PAUSED
         elif self.runtime_state == RuntimeState.RESUMING:
@@ -203,12 +203,12 @@ class Robot:
 
     @property
     def is_polyscope_x(self) -> bool:
-        """Whether its software has a Robot API, or nothing, in place of a dashboard."""
+        """Whether its software is PolyScope X, which has a Robot API or nothing in place of a dashboard."""
         return self.identity.polyscope >= POLYSCOPE_X
 
     @property
     def local_control(self) -> bool:
-        """Whether the pendant alone may order something; the CB3 series does not know the difference."""
+        """Whether it accepts orders from the pendant only; the CB3 series has no such mode."""
         return not self.remote_control and self.identity.polyscope >= E_SERIES
 
     # -- programs ------------------------------------------------------------------------------------------------
@@ -218,14 +218,14 @@ class Robot:
 
     @property
     def ready(self) -> bool:
-        """Powered, brakes released, no safety stop: a program may run."""
+        """Whether a program may run: powered, brakes released, no safety stop."""
         return self.robot_mode == RobotMode.RUNNING and self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED)
 
     def start_program(self, program: Program) -> None:
-        """Play a program instead of what runs now.
+        """Play a program in place of the running one.
 
-        While the brakes are on it is taken and stands paused, and whatever comes while a program is paused only stops
-        that one. (Universal Robots Client Library, issue 123, seen with the maker's simulator.)
+        While the brakes are on, a program is accepted but stays paused. A program that arrives while another is paused
+        only stops that one (Universal Robots Client Library, issue 123, observed with the maker's simulator).
         """
         paused = self.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         if self.runtime_state != RuntimeState.STOPPED:
@@ -240,7 +240,7 @@ class Robot:
             self._start = (self.tick + round(START_DELAY_S * TICKS_PER_SECOND), program)
 
     def stop_program(self, reason: str) -> None:
-        """Stop the program, and the joints with it."""
+        """Stop the program and the joints."""
         if reason:
             self.messages.say(reason)
         if self._program is not None:
@@ -254,7 +254,7 @@ class Robot:
             self.runtime_state = RuntimeState.STOPPED if self.motion.standing else RuntimeState.STOPPING
 
     def pause(self) -> bool:
-        """Pause: the move is finished after play."""
+        """Pause the program; the current move continues after play. Return whether one was playing."""
         if self.runtime_state != RuntimeState.PLAYING:
             return False
         self.motion.fraction_wanted = 0.0
@@ -262,7 +262,7 @@ class Robot:
         return True
 
     def resume(self) -> bool:
-        """Go on after a pause."""
+        """Continue after a pause. Return whether that was possible."""
         if not self.ready or self.runtime_state not in (RuntimeState.PAUSING, RuntimeState.PAUSED):
             return False
         self.motion.fraction_wanted = self._fraction
@@ -270,9 +270,9 @@ class Robot:
         return True
 
     # -- safety and power ------------------------------------------------------------------------------------------
-    def protective_stop(self, why: ErrorReport = STOPPED_FOR_TEST) -> None:
+    def protective_stop(self, error: ErrorReport = STOPPED_FOR_TEST) -> None:
         if self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED):
-            self.messages.report(why)
+            self.messages.report(error)
             self._safety_stop(SafetyMode.PROTECTIVE_STOP)
 
     def emergency_stop(self) -> None:
@@ -280,7 +280,7 @@ class Robot:
         self._mode_changes = [(self.tick + round(POWER_STEP_S * TICKS_PER_SECOND), RobotMode.POWER_OFF)]
 
     def safeguard_stop(self) -> None:
-        """A light curtain or a door: the program pauses and the joints stop on their way, powered."""
+        """Stop as for a light curtain or a door: the program pauses and the joints stop on their path, powered."""
         if self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED):
             self.safety_mode = SafetyMode.SAFEGUARD_STOP
             self.pause()
@@ -293,7 +293,7 @@ class Robot:
 
     @property
     def stopped_for_s(self) -> float:
-        """Seconds since the last protective or emergency stop."""
+        """Time since the last protective or emergency stop, s."""
         return (self.tick - self._stopped_tick) * TICK_S
 
     def unlock_protective_stop(self) -> None:
@@ -301,8 +301,10 @@ class Robot:
             self.safety_mode = SafetyMode.NORMAL
 
     def release(self) -> None:
-        """Pull the emergency stop button out again, the robot stays without power; or close the safeguard and reset it,
-        what it paused stays so until it is played."""
+        """Release the emergency stop button, which leaves the robot without power, or close and reset the safeguard.
+
+        A program that the safeguard paused stays paused until play.
+        """
         if self.safety_mode in (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SAFEGUARD_STOP):
             self.safety_mode = SafetyMode.NORMAL
 
@@ -320,42 +322,42 @@ class Robot:
     def brake_release(self) -> None:
         self.power_on()
         if self.robot_mode in (RobotMode.POWER_ON, RobotMode.IDLE):
-            due = self._mode_changes[-1][0] if self._mode_changes else self.tick
-            self._mode_changes.append((due + round(POWER_STEP_S * TICKS_PER_SECOND), RobotMode.RUNNING))
+            is_due = self._mode_changes[-1][0] if self._mode_changes else self.tick
+            self._mode_changes.append((is_due + round(POWER_STEP_S * TICKS_PER_SECOND), RobotMode.RUNNING))
 
-    # -- what the operator and clients set ---------------------------------------------------------------------------
+    # -- settings of the operator and of clients -----------------------------------------------------------------------
     def set_speed_slider(self, fraction: float) -> None:
         if not isfinite(fraction):
             return
         self.speed_slider = min(max(fraction, 0.0), 1.0)
-        self._scale_anew()
+        self._update_scaling()
 
     def set_safety_limit(self, fraction: float) -> None:
-        """A limit of the safety settings leaves this fraction of the programmed speed; 1 for none."""
+        """Limit the speed to this fraction of the programmed one, as a safety limit does; 1: no limit."""
         self.faults.safety_limit = min(max(fraction, 0.0), 1.0)
-        self._scale_anew()
+        self._update_scaling()
 
     @property
     def _fraction(self) -> float:
-        """How fast a program may be played: by the slider, and by the safety settings."""
+        """The permitted fraction of the programmed speed, by the slider and by the safety limit."""
         return self.speed_slider * self.faults.safety_limit
 
-    def _scale_anew(self) -> None:
+    def _update_scaling(self) -> None:
         if self.runtime_state not in (RuntimeState.PAUSING, RuntimeState.PAUSED):
             self.motion.fraction_wanted = self._fraction
 
     def lose_operation(self, mode: RobotMode) -> None:
-        """The arm leaves its operation for another mode, as where its firmware is updated: no program goes on."""
+        """Change to another robot mode, as when the firmware is updated; the program stops."""
         self.stop_program(f"robot mode {mode.name}")
         self.motion.stop(BRAKE_RAD_S2)
         self._mode_changes = []
         self.robot_mode = mode
 
     def set_payload(self, mass_kg: float, centre_m: Sequence[float]) -> None:
-        most_kg = self.model.payload_kg
-        if not 0.0 <= mass_kg <= most_kg:
-            raise ProgramError(f"payload {mass_kg} kg is outside 0 to {most_kg} kg")
-        centre = tuple(float(each) for each in centre_m)
+        limit_kg = self.model.payload_kg
+        if not 0.0 <= mass_kg <= limit_kg:
+            raise ProgramError(f"payload {mass_kg} kg is outside 0 to {limit_kg} kg")
+        centre = tuple(float(coordinate) for coordinate in centre_m)
         if len(centre) != 3 or not all(map(isfinite, centre)):
             raise ProgramError(f"a payload's centre is three lengths, not {centre_m}")
         if not self.faults.payload_stays:
@@ -365,8 +367,8 @@ class Robot:
         if tuple(offset) != self.tcp_offset:
             raise ProgramError("not simulated: a tool centre point other than that of the installation")
 
-    def input_received(self) -> None:
-        """An RTDE client wrote an input: feeds the watchdog."""
+    def feed_watchdog(self) -> None:
+        """Feed the watchdog, because an RTDE client wrote an input."""
         self._last_input_tick = self.tick
 
     def set_watchdog(self, minimum_hz: float) -> None:
@@ -375,46 +377,46 @@ class Robot:
 
     # -- the tool's frame --------------------------------------------------------------------------------------------
     def tcp_pose(self, q_rad: Sequence[float]) -> tuple[float, ...]:
-        """Pose of the tool centre point (m, rotation vector rad) in the base's frame, at these joint angles."""
-        return self._turned(flange_pose(q_rad, self.links), 1)
+        """Return the tool centre point's pose (m, rotation vector rad) in the base frame, at these joint angles."""
+        return self._rotate_tool(flange_pose(q_rad, self.links), 1)
 
-    def flange_for(self, tcp_pose: Sequence[float]) -> tuple[float, ...]:
-        """The flange's pose that brings the tool centre point to this one."""
-        return self._turned(tcp_pose, -1)
+    def flange_pose_for(self, tcp_pose: Sequence[float]) -> tuple[float, ...]:
+        """Return the flange's pose that puts the tool centre point at `tcp_pose`."""
+        return self._rotate_tool(tcp_pose, -1)
 
-    def _turned(self, pose: Sequence[float], sign: int) -> tuple[float, ...]:
+    def _rotate_tool(self, pose: Sequence[float], sign: int) -> tuple[float, ...]:
         turn = [sign * angle for angle in self.tcp_offset[3:]]
         return rotate_pose(pose, rotation_from_vector(turn)) if any(turn) else tuple(pose)
 
-    def within_limits(self, q_rad: Sequence[float]) -> bool:
-        """Whether the joints may stand so."""
+    def is_within_limits(self, q_rad: Sequence[float]) -> bool:
+        """Return whether the joint angles are within their limits."""
         return all(abs(q) <= limit + ROUNDING_RAD for q, limit in zip(q_rad, self.model.limit_rad, strict=True))
 
-    # -- what RTDE reports -------------------------------------------------------------------------------------------
+    # -- outputs of RTDE ---------------------------------------------------------------------------------------------
     @property
     def speed_scaling(self) -> float:
-        """How much slower than the slider asks the joints go: clients multiply both."""
+        """The joints' speed per speed that the slider permits; clients multiply both."""
         return min(1.0, self.motion.fraction / self.speed_slider) if self.speed_slider else 1.0
 
     @property
     def tcp_motion(self) -> TcpMotion:
-        """How the tool centre point moves by the encoders."""
-        return tcp_motion(*self.motion.actual, self.links)
+        """The motion of the tool centre point by the encoders."""
+        return find_tcp_motion(*self.motion.actual, self.links)
 
     @property
     def target_tcp_motion(self) -> TcpMotion:
-        """How it is meant to move."""
+        """The commanded motion of the tool centre point."""
         now = self.motion.now
-        return tcp_motion(now.target_q_rad, now.target_qd_rad_s, now.target_qdd_rad_s2, self.links)
+        return find_tcp_motion(now.target_q_rad, now.target_qd_rad_s, now.target_qdd_rad_s2, self.links)
 
     @property
     def still_since_s(self) -> float:
-        """The controller's time at which the joints last moved; a paused movement stands still."""
+        """The controller's time at which the joints last moved, s; a paused move is at rest."""
         return self._moved_tick * TICK_S
 
     @property
     def steady(self) -> bool:
-        """Standing still for half a second."""
+        """Whether the joints have been at rest for half a second."""
         return (self.tick - self._still_since_tick) * TICK_S >= 0.5
 
     @property

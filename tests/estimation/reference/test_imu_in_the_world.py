@@ -8,7 +8,7 @@ from rig.estimation.reference.accelerometer_model import DELAY, Dwells
 from rig.estimation.reference.imu import solve_imu
 from rig.motion.geometry import flange_pose
 from rig.world.site import SiteTruth
-from rig.world.ur10e.motion.flange_motion import find_motion_from_cosines, transfer_force
+from rig.world.ur10e.motion.flange_motion import find_motion, transfer_force
 from rig.world.ur10e.motion.links import links
 from support.motions.arm_attitudes import joints_rad
 from support.motions.arm_sweeps import MICRO_G, joints_at, planned, signed_speed, with_readings
@@ -28,7 +28,7 @@ def read(joints: Array, speeds: Array) -> Array:
     drawing = links()
     angles = [q + link.theta_rad for q, link in zip(joints.T, drawing, strict=True)]
     turns = [(np.cos(angle), np.sin(angle)) for angle in angles]
-    felt = find_motion_from_cosines(turns, list(speeds), [0.0] * 6, drawing, SITE)
+    felt = find_motion(turns, list(speeds), [0.0] * 6, drawing, SITE)
     force = transfer_force(felt.rate_rad_s, felt.change_rad_s2, felt.force_m_s2, list(LEVER_M))
     whole = np.array([component * np.ones(len(joints)) for component in force]).T
     return np.asarray(whole @ MATRIX.T + BIAS_M_S2, dtype=np.float64)

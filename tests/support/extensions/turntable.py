@@ -20,7 +20,7 @@ from rig.data.meaning import Meaning
 from rig.errors import Problem
 from rig.motion.carried import Carried
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import Joints, Made, Row, StateField
+from rig.motion.state import Joints, Row, StateField, TurnerIdentity
 from rig.motion.steps import Motion, progress, travel
 from rig.observation.observed_run import observe_runs
 from rig.procedure import (
@@ -162,8 +162,8 @@ KIND = TurnerKind(
     look=look,
     stance=lambda report: f"table at {report.state.q_rad[0]:.2f} rad",
     problems=problems,
-    meant=lambda section: Made("Toys", None, GEOMETRY),
-    made=lambda section, report: Made("Toys", report.model, GEOMETRY),
+    meant=lambda section: TurnerIdentity("Toys", None, GEOMETRY),
+    made=lambda section, report: TurnerIdentity("Toys", report.model, GEOMETRY),
     carried=lambda section: Carried(0.0),
     words=Words(
         name="turntable",

@@ -29,7 +29,7 @@ from rig.motion.state import ARM_FIELDS, ARM_STATE_DTYPE, JOINT_NAMES
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.world.site import SiteTruth
-from rig.world.ur10e.motion.flange_motion import find_motion_from_cosines, transfer_force
+from rig.world.ur10e.motion.flange_motion import find_motion, transfer_force
 from rig.world.ur10e.motion.links import links
 
 CONFIG = """
@@ -184,7 +184,7 @@ def true_force(setup: Setup, motion: Motion, time_s: Array) -> Array:
     (q, qd), step_s = motion.joints(time_s), 1e-4
     qdd = (motion.joints(time_s + step_s)[1] - motion.joints(time_s - step_s)[1]) / (2 * step_s)
     turns = [(np.cos(angle), np.sin(angle)) for angle in q.T]
-    felt = find_motion_from_cosines(
+    felt = find_motion(
         turns, list(qd.T), list(qdd.T), links(), SiteTruth((0.0, 0.0, 0.0), (0.0, 0.0, STANDARD_GRAVITY_M_S2))
     )
     return np.column_stack(transfer_force(*felt, setup.offset_m)) / STANDARD_GRAVITY_M_S2

@@ -19,9 +19,9 @@ from rig.world.network import ClientSession
 from rig.world.section import read_world_section
 from rig.world.ur10e.interfaces.dashboard_server import DashboardSession
 from rig.world.ur10e.interfaces.primary import CONFIGURATION, STATE, PrimarySession
-from rig.world.ur10e.interfaces.primary import package as primary_package
+from rig.world.ur10e.interfaces.primary import build_package as primary_package
 from rig.world.ur10e.interfaces.rtde import RtdeSession
-from rig.world.ur10e.interfaces.rtde import package as rtde_package
+from rig.world.ur10e.interfaces.rtde import build_package as rtde_package
 from rig.world.ur10e.modes import SafetyMode
 from rig.world.ur10e.robot import Robot
 from support.laboratories.ideal import ideal

@@ -185,8 +185,8 @@ def test_a_factorys_calibration_is_still_a_ur10e_wherever_its_axes_meet(seen: Ar
     np.testing.assert_allclose(distance_to_forearm(q, arm=measured), distance_to_forearm(q), atol=3e-3)
     end = (0.0, 0.0, 0.3)
     for arm in (measured, NOMINAL):
-        far_m = distance_to_upper_arm(q, end, arm, beside_m=0.1762)
-        np.testing.assert_allclose(far_m, distance_to_upper_arm(q, end, beside_m=0.1762), atol=3e-3)
+        far_m = distance_to_upper_arm(q, end, arm, offset_m=0.1762)
+        np.testing.assert_allclose(far_m, distance_to_upper_arm(q, end, offset_m=0.1762), atol=3e-3)
 
 
 def test_another_arms_clearance_is_by_its_own_lengths() -> None:

@@ -11,7 +11,7 @@ from rig.world.clock import TICK_S
 from rig.world.laboratory import Laboratory
 from rig.world.section import read_world_section
 from rig.world.ur10e.interfaces.primary import PrimarySession
-from rig.world.ur10e.interfaces.rtde import Output, RtdeSession, package
+from rig.world.ur10e.interfaces.rtde import OutputRecipe, RtdeSession, build_package
 from rig.world.ur10e.interfaces.variables import OUTPUTS, TYPES
 from support.laboratories.ideal import ideal
 from support.paths import DEMO
@@ -79,7 +79,7 @@ def ticks(one: Laboratory, count: int) -> None:
 def value(one: Laboratory, name: str) -> np.ndarray:
     """One output, as a client reads it."""
     kind = OUTPUTS[name][0]
-    data = Output([name], 500.0, 1).pack(one.robot)
+    data = OutputRecipe([name], 500.0, 1).pack(one.robot)
     return np.array(struct.unpack(f">{TYPES[kind][0]}", data[4:]))
 
 
@@ -90,8 +90,8 @@ def rotation(one: Laboratory) -> Rotation:
 def asked(one: Laboratory, names: str) -> bytes:
     """The controller's answer to an output recipe in version 2 of the protocol."""
     session = RtdeSession(one.robot)
-    session.receive(package("V", struct.pack(">H", 2)))
-    return session.receive(package("O", struct.pack(">d", 125.0) + names.encode()))
+    session.receive(build_package("V", struct.pack(">H", 2)))
+    return session.receive(build_package("O", struct.pack(">d", 125.0) + names.encode()))
 
 
 def test_names_and_types_are_the_guides() -> None:
@@ -122,12 +122,12 @@ def test_a_recipe_as_long_as_the_makers_test_program_sends_is_taken() -> None:
     names = ["timestamp", *["actual_q"] * 1020]
     answer = asked(one, ",".join(names))
     assert len(",".join(names)) > 9_000 and answer[3] == 1 and answer[4:].count(b"VECTOR6D") == 1020
-    assert len(Output(names, 500.0, 1).pack(one.robot)) == 3 + 1 + 8 + 1020 * 48
+    assert len(OutputRecipe(names, 500.0, 1).pack(one.robot)) == 3 + 1 + 8 + 1020 * 48
 
 
 def test_values_that_no_package_has_room_for_are_refused() -> None:
     answer = asked(laboratory(), ",".join(["actual_q"] * 1400))
-    assert b"a recipe of values of 67200 bytes" in answer and answer.endswith(package("O", b"\0"))
+    assert b"a recipe of values of 67200 bytes" in answer and answer.endswith(build_package("O", b"\0"))
 
 
 def test_slider_and_scaling_multiply_to_what_the_joints_do() -> None:

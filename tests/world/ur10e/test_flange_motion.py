@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from rig.config.world.laboratory import CalibrationSection, SiteSection
 from rig.world.site import build_site
-from rig.world.ur10e.motion.flange_motion import find_flange_motion, find_motion_from_cosines, transfer_force
+from rig.world.ur10e.motion.flange_motion import find_flange_motion, find_motion, transfer_force
 from rig.world.ur10e.motion.forward_kinematics import flange_pose, flange_rate
 from rig.world.ur10e.motion.links import NOMINAL, links
 from rig.world.ur10e.motion.true_arm import build_calibrated_links
@@ -92,7 +92,7 @@ def test_arrays_of_instants_are_felt_as_single_ones() -> None:
     q, qd, qdd = rng.normal(size=(3, 6, 4))
     arm, site = build_calibrated_links(CALIBRATION), build_site(SiteSection(latitude_deg=-33))
     turns = [(np.cos(q[j] + arm[j].theta_rad), np.sin(q[j] + arm[j].theta_rad)) for j in range(6)]
-    all_at_once = find_motion_from_cosines(turns, list(qd), list(qdd), arm, site)
+    all_at_once = find_motion(turns, list(qd), list(qdd), arm, site)
     for instant in range(4):
         alone = find_flange_motion(q[:, instant].tolist(), qd[:, instant].tolist(), qdd[:, instant].tolist(), arm, site)
         for many, one in zip(all_at_once, alone, strict=True):

@@ -41,7 +41,7 @@ class Player:
         self.ticks(round(wait_s / TICK_S))
 
     def true(self, time_s: float) -> tuple[Joints, Joints, Joints]:
-        return self.errors.at(time_s, *self.motion.state_at(time_s))
+        return self.errors.true_state(time_s, *self.motion.state_at(time_s))
 
 
 def test_rates_and_accelerations_are_the_derivatives_of_the_true_angles() -> None:
@@ -67,7 +67,7 @@ def test_rates_and_accelerations_are_the_derivatives_of_the_true_angles() -> Non
 def test_a_whole_turn_of_the_encoder_is_one_of_the_joint() -> None:
     errors = JointErrors(Errors(encoder_once_rad=2e-4, encoder_twice_rad=1e-4), Random(1))
     seen = np.linspace(0.0, 2 * math.pi, 721)
-    true = np.array([errors.at(0.0, (e,) * 6, STILL, STILL)[0][3] for e in seen])
+    true = np.array([errors.true_state(0.0, (e,) * 6, STILL, STILL)[0][3] for e in seen])
     deviation = (true - seen)[:-1]
     assert deviation[0] == pytest.approx(true[-1] - 2 * math.pi, abs=1e-12)
     spectrum = 2 * np.abs(np.fft.rfft(deviation)) / len(deviation)
@@ -76,7 +76,7 @@ def test_a_whole_turn_of_the_encoder_is_one_of_the_joint() -> None:
 
 def test_zero_errors_shift_the_joints() -> None:
     zero_rad = (1e-3, 0.0, -2e-3, 0.0, 0.0, 5e-4)
-    assert JointErrors(Errors(zero_rad), Random(1)).at(0.0, STILL, STILL, STILL)[0] == pytest.approx(zero_rad)
+    assert JointErrors(Errors(zero_rad), Random(1)).true_state(0.0, STILL, STILL, STILL)[0] == pytest.approx(zero_rad)
 
 
 def test_a_joint_stands_elsewhere_when_it_comes_from_the_other_side() -> None:
@@ -94,10 +94,10 @@ def test_a_joint_stands_elsewhere_when_it_comes_from_the_other_side() -> None:
 def test_the_wrists_vibrate_with_the_asked_rms_and_frequency_and_unlocked() -> None:
     errors = JointErrors(Errors(vibration_rad_s=(2 * math.pi * 13,), vibration_rms_rad_s=0.002), Random(1))
     times_s = np.arange(0.0, 10.0, 1 / 500)
-    rates = np.array([errors.at(t, STILL, STILL, STILL)[1] for t in times_s])
+    rates = np.array([errors.true_state(t, STILL, STILL, STILL)[1] for t in times_s])
     assert np.sqrt(np.mean(rates**2, axis=0)) == pytest.approx([0, 0, 0, 0.002, 0.002, 0.002], rel=1e-3)
     assert np.abs(np.fft.rfft(rates[:, 4])).argmax() == 130
-    assert not errors.quiet(0.0)
+    assert not errors.is_quiet(0.0)
 
 
 def test_a_joint_that_stopped_swings_out_and_the_others_do_not() -> None:
@@ -105,11 +105,11 @@ def test_a_joint_that_stopped_swings_out_and_the_others_do_not() -> None:
     player.turn(1.0)
     stop_s = player.time_s
     times_s = stop_s + np.arange(0.0, 1.0, 1 / 500)
-    swing = np.array([player.errors.at(t, player.motion.q_rad, STILL, STILL)[0] for t in times_s])
+    swing = np.array([player.errors.true_state(t, player.motion.q_rad, STILL, STILL)[0] for t in times_s])
     expected = 1e-4 * np.exp(-(times_s - stop_s) / 0.2) * np.sin(2 * math.pi * 9 * (times_s - stop_s))
     assert swing[:, 5] - 1.0 == pytest.approx(expected, abs=1e-12)
     assert not swing[:, :5].any()
-    assert not player.errors.quiet(stop_s + 1.0) and player.errors.quiet(stop_s + 3.0)
+    assert not player.errors.is_quiet(stop_s + 1.0) and player.errors.is_quiet(stop_s + 3.0)
 
 
 def test_the_motion_of_a_while_ago_is_remembered() -> None:

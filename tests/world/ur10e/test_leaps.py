@@ -16,7 +16,7 @@ from rig.config.load import Loaded, parse
 from rig.plans.registry import installed, sections
 from rig.world import process
 from rig.world.process import World
-from rig.world.ur10e.interfaces.rtde import package
+from rig.world.ur10e.interfaces.rtde import build_package
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 from support.processes.waiting import PATIENCE_S
@@ -30,7 +30,7 @@ MOVE = f"def away():\n  movej({list(AWAY)}, a=8, v=3)\n  sleep(0.1)\nend\n"
 def register_input(command: int, *doubles: float) -> bytes:
     """What ur_rtde writes for its program: a command, not asynchronous, and its numbers."""
     numbers = [*doubles, *[0.0] * (8 - len(doubles))]
-    return package("U", struct.pack(">B2i8d", 1, command, 0, *numbers))
+    return build_package("U", struct.pack(">B2i8d", 1, command, 0, *numbers))
 
 
 class Laboratory:
@@ -134,8 +134,10 @@ def session(loaded: Loaded, ports: dict[str, int], dwell_s: float) -> tuple[dict
         run.passes(0.1)
         if "kvh" in ports:
             run.wires["kvh"].send(b"=CONFIG,1\r\n=DR,250\r\n=OUTPUTFMT,B\r\n=CONFIG,0\r\n")
-        states.send(package("V", struct.pack(">H", 2)) + package("O", struct.pack(">d", 125.0) + OUTPUTS.encode()))
-        states.send(package("I", INPUTS.encode()) + package("S", b""))
+        states.send(
+            build_package("V", struct.pack(">H", 2)) + build_package("O", struct.pack(">d", 125.0) + OUTPUTS.encode())
+        )
+        states.send(build_package("I", INPUTS.encode()) + build_package("S", b""))
         run.passes(dwell_s)
         run.wires["script"].send(MOVE.encode())
         run.passes(dwell_s + 0.7)

@@ -14,7 +14,7 @@ from rig.world.ur10e.controller_messages import READ_ONLY
 from rig.world.ur10e.interfaces.dashboard_server import NOT_ALLOWED, DashboardSession
 from rig.world.ur10e.interfaces.primary import PrimarySession
 from rig.world.ur10e.interfaces.robot_api import RobotApiSession
-from rig.world.ur10e.interfaces.rtde import RtdeSession, package
+from rig.world.ur10e.interfaces.rtde import RtdeSession, build_package
 from rig.world.ur10e.modes import RuntimeState
 from rig.world.ur10e.robot import Robot
 from support.laboratories.ideal import ideal
@@ -106,9 +106,9 @@ def test_registers_are_taken_in_local_control_too() -> None:
     robot = playing()
     robot.remote_control = False
     session = RtdeSession(robot)
-    session.receive(package("V", b"\0\2"))
-    assert session.receive(package("I", b"input_int_register_0")) == package("I", b"\1INT32")
-    session.receive(package("U", b"\1\0\0\0\7"))
+    session.receive(build_package("V", b"\0\2"))
+    assert session.receive(build_package("I", b"input_int_register_0")) == build_package("I", b"\1INT32")
+    session.receive(build_package("U", b"\1\0\0\0\7"))
     assert robot.inputs.ints[0] == 7
 
 

@@ -35,7 +35,7 @@ def pose_by(way_m: tuple[float, float, float]) -> list[float]:
 def played(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """(n, 6) joint angles and speeds, 500 a second."""
     times_s = np.arange(0.0, trajectory.duration_s, 0.002)
-    q, qd, _ = zip(*(trajectory.at(time_s) for time_s in times_s.tolist()), strict=True)
+    q, qd, _ = zip(*(trajectory.state_at(time_s) for time_s in times_s.tolist()), strict=True)
     return np.array(q), np.array(qd)
 
 

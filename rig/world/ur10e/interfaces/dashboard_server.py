@@ -1,8 +1,8 @@
 """The dashboard server, port 29999: one line in, one line out.
 
-Dashboard Server manual of the maker, e-Series. In local control it answers questions and refuses every order, `stop`
-among them, and so does a connection that was opened in local control until it is opened anew (Universal Robots ROS
-Driver, issues 125 and 262). One of the CB3 series does not know local control, nor questions about it.
+Source: the maker's Dashboard Server manual, e-Series. In local control it answers questions and refuses every order,
+including `stop`; so does a connection that was opened in local control, until it is reopened (Universal Robots ROS
+Driver, issues 125 and 262). The CB3 series has no local control, nor questions about it.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.robot import E_SERIES, Robot
 
 PORT = 29999
-LINE_BYTES = 1 << 16  # no command is so long
+LINE_BYTES = 1 << 16  # longer than any command
 UNLOCK_AFTER_S = 5.0
 PROGRAMS = ("wait_program.urp",)
 OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
@@ -24,7 +24,7 @@ TOO_EARLY = (
 
 
 class WaitProgram:
-    """The one program on the simulated controller's disk: it waits for ever."""
+    """The one program on the simulated controller's disk, which waits for ever."""
 
     waiting = True
 
@@ -36,7 +36,7 @@ class WaitProgram:
 
 
 class DashboardSession:
-    """One connection to the dashboard."""
+    """The world's side of one connection to the dashboard."""
 
     dialogue = True
 
@@ -46,7 +46,7 @@ class DashboardSession:
         self.closing = False
         self._buffer = bytearray()
         self._role = "none"
-        self._mode: str | None = None  # that the dashboard has set; None: the pendant controls it
+        self._mode: str | None = None  # as set by the dashboard; None: the pendant controls it
         self._questions: dict[str, Callable[[], str]] = {
             "polyscopeversion": self._polyscope,
             "version": self._version,
@@ -55,12 +55,12 @@ class DashboardSession:
             "safetystatus": lambda: f"Safetystatus: {robot.safety_mode.name}",
             "running": lambda: f"Program running: {str(self._playing).lower()}",
             "programstate": self._program_state,
-            "get loaded program": self._loaded_program,
+            "get loaded program": self._get_loaded_program,
             "isprogramsaved": lambda: f"true {robot.loaded_program}",
             "get serial number": lambda: robot.identity.serial_number,
             "get robot model": lambda: robot.model.name,
             "is in remote control": lambda: str(robot.remote_control).lower(),
-            "get operational mode": lambda: self._mode or "NONE",  # as where no password for modes is set
+            "get operational mode": lambda: self._mode or "NONE",  # no password for modes is set
             "getuserrole": self._get_role,
             "popup": lambda: "showing popup",
             "close popup": lambda: "closing popup",
@@ -82,11 +82,11 @@ class DashboardSession:
             "unlock protective stop": self._unlock,
             "restart safety": self._restart_safety,
         }
-        self._worded_orders: dict[str, Callable[[str], str]] = {
+        self._orders_with_text: dict[str, Callable[[str], str]] = {
             "load installation": lambda name: f"Loading installation: {name}" if name else "File not found: ",
             "load": self._load,
         }
-        self._worded: dict[str, Callable[[str], str]] = {
+        self._questions_with_text: dict[str, Callable[[str], str]] = {
             "popup": lambda text: "showing popup",
             "addtolog": lambda text: "Added log message",
             "set operational mode": self._set_mode,
@@ -116,7 +116,7 @@ class DashboardSession:
         pass
 
     def answer(self, line: str) -> str:
-        """The reply to one command."""
+        """Return the reply to one command."""
         key = line.lower()
         if key == "quit":
             self.closing = True
@@ -125,15 +125,15 @@ class DashboardSession:
             return self._questions[key]()
         if key in self._orders:
             return self._orders[key]() if self._may_order else NOT_ALLOWED
-        for words, handler in {**self._worded_orders, **self._worded}.items():
+        for words, handler in {**self._orders_with_text, **self._questions_with_text}.items():
             if key == words or key.startswith(words + " "):
-                allowed = self._may_order or words not in self._worded_orders
+                allowed = self._may_order or words not in self._orders_with_text
                 return handler(line[len(words) :].strip()) if allowed else NOT_ALLOWED
         return f"could not understand: '{line}'"
 
     @property
     def _may_order(self) -> bool:
-        """Whether it takes more than questions."""
+        """Whether it accepts orders."""
         return not (self._opened_in_local_control or self._robot.local_control)
 
     # -- questions ---------------------------------------------------------------------------------------------
@@ -155,7 +155,7 @@ class DashboardSession:
         paused = self._robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         return f"{'PLAYING' if self._playing else 'PAUSED' if paused else 'STOPPED'} {name}"
 
-    def _loaded_program(self) -> str:
+    def _get_loaded_program(self) -> str:
         name = self._robot.loaded_program
         return f"Loaded program: {name}" if name else "No program loaded"
 
@@ -191,7 +191,7 @@ class DashboardSession:
         return "Brake releasing"
 
     def _unlock(self) -> str:
-        """Refused until 5 s after the stop: a rule of the pendant, which the primary interface does not know."""
+        """Unlock a protective stop, at the earliest after 5 s: the pendant's rule; the primary interface has none."""
         if self._robot.safety_mode == SafetyMode.PROTECTIVE_STOP and self._robot.stopped_for_s < UNLOCK_AFTER_S:
             return TOO_EARLY
         self._robot.unlock_protective_stop()

@@ -1,7 +1,7 @@
 """The primary and secondary interfaces, ports 30001 and 30002: the robot's state ten times a second, and its messages.
 
-Client interface description of the maker for PolyScope 5: packages of a big-endian size (i32), a type (u8) and a
-payload; a robot state (16) holds sub-packages of the same form, a robot message (20) a time stamp, source and kind.
+Source: the maker's client interface description for PolyScope 5. A package is a big-endian size (i32), a type (u8) and
+a payload. A robot state (16) holds sub-packages of the same form; a robot message (20) a time stamp, source and kind.
 """
 
 import struct
@@ -19,23 +19,23 @@ STATE_HZ = 10
 ROBOT_STATE, ROBOT_MESSAGE = 16, 20
 VERSION_MESSAGE = 3
 ACCELERATION_LIMIT_RAD_S2 = 40.0  # of every joint
-NOT_CALIBRATED, CALIBRATED = 0, 2  # what KinematicsInfo says of the links: those of the model, those of this arm
-PROJECT, BUILT = b"URControl", b"simulated"  # in place of a date, as the dashboard says it
+NOT_CALIBRATED, CALIBRATED = 0, 2  # links in KinematicsInfo: the model's, this arm's
+PROJECT, BUILT = b"URControl", b"simulated"  # in place of a date, as at the dashboard
 
 
-def package(kind: int, payload: bytes) -> bytes:
+def build_package(kind: int, payload: bytes) -> bytes:
     return struct.pack(">iB", 5 + len(payload), kind) + payload
 
 
 class PrimarySession:
-    """One connection: programs come in, states and messages go out."""
+    """The world's side of one connection: programs come in, states and messages go out."""
 
     dialogue = True
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._script = ScriptSession(robot)
-        self._seen = robot.messages.last
+        self._last_sent = robot.messages.last
 
     def greeting(self) -> bytes:
         major, minor, bugfix, build = self._robot.identity.polyscope
@@ -52,9 +52,9 @@ class PrimarySession:
 
     def tick(self) -> bytes:
         data = b""
-        for message in self._robot.messages.after(self._seen):
+        for message in self._robot.messages.after(self._last_sent):
             data += _message(self._robot, message.kind, _content(message))
-            self._seen = message.number
+            self._last_sent = message.number
         if self._robot.tick % (TICKS_PER_SECOND // STATE_HZ) == 0:
             data += _state(self._robot, STATE)
         return data
@@ -64,7 +64,7 @@ class PrimarySession:
 
 
 def _message(robot: Robot, kind: int, payload: bytes) -> bytes:
-    return package(ROBOT_MESSAGE, struct.pack(">QbB", int(robot.reported_time_s * 1e6), -1, kind) + payload)
+    return build_package(ROBOT_MESSAGE, struct.pack(">QbB", int(robot.reported_time_s * 1e6), -1, kind) + payload)
 
 
 def _content(message: Message) -> bytes:
@@ -73,13 +73,11 @@ def _content(message: Message) -> bytes:
         title = message.title.encode()
         return struct.pack(">iiB", 0, 0, len(title)) + title + text
     if message.kind == MessageKind.SAFETY_MODE:
-        return struct.pack(
-            ">iiBII", 0, 0, SafetyMode[message.text], 0, 0
-        )  # which cause has which code is not simulated
+        return struct.pack(">iiBII", 0, 0, SafetyMode[message.text], 0, 0)  # the codes of causes are not simulated
     if message.error is not None:
         return struct.pack(">iiiII", *(message.error.code, message.error.argument, message.error.level), 0, 0) + text
     if message.kind == MessageKind.EXCEPTION:
-        return struct.pack(">ii", *message.place) + text
+        return struct.pack(">ii", *message.position) + text
     return text
 
 
@@ -87,7 +85,7 @@ Part = tuple[int, Callable[[Robot], bytes]]
 
 
 def _state(robot: Robot, parts: tuple[Part, ...]) -> bytes:
-    return package(ROBOT_STATE, b"".join(package(kind, content(robot)) for kind, content in parts))
+    return build_package(ROBOT_STATE, b"".join(build_package(kind, content(robot)) for kind, content in parts))
 
 
 def _robot_mode(robot: Robot) -> bytes:
@@ -129,25 +127,25 @@ def _cartesian(robot: Robot) -> bytes:
     return struct.pack(">12d", *robot.tcp_pose(robot.motion.actual_q_rad), *robot.tcp_offset)
 
 
-def _denavit_hartenberg(links: Links) -> list[float]:
-    """The Denavit–Hartenberg parameters of all six links, a, d and alpha, as both sub-packages hold them."""
+def _list_parameters(links: Links) -> list[float]:
+    """Return the Denavit–Hartenberg parameters a, d and alpha of all six links, in the order of both sub-packages."""
     return [*(link.a_m for link in links), *(link.d_m for link in links), *(link.alpha_rad for link in links)]
 
 
 def _kinematics(robot: Robot) -> bytes:
-    """The arm's own links, its maker's calibration included, and whether they are the maker's or the model's."""
+    """Return the arm's own links, including its calibration, and whether they are calibrated."""
     angles = [link.theta_rad for link in robot.links]
     status = CALIBRATED if robot.links != links(drawing=robot.model.drawing) else NOT_CALIBRATED
-    return struct.pack(">6I24dI", *[1] * 6, *angles, *_denavit_hartenberg(robot.links), status)
+    return struct.pack(">6I24dI", *[1] * 6, *angles, *_list_parameters(robot.links), status)
 
 
 def _configuration(robot: Robot) -> bytes:
-    """What the controller is set up for: its model as drawn, and what its safety settings leave of what that can do."""
+    """Return the configuration: the model's drawing, and its joint limits restricted by the safety settings."""
     model = robot.model
     positions = [value for limit in model.limit_rad for value in (-limit, limit)]
     speeds = [value for speed in model.speed_rad_s for value in (speed, ACCELERATION_LIMIT_RAD_S2)]
     defaults = [1.05, 1.4, 0.25, 1.2, 0.5]  # joint speed and acceleration, tool speed and acceleration, radius
-    drawing = _denavit_hartenberg(links(drawing=model.drawing))
+    drawing = _list_parameters(links(drawing=model.drawing))
     numbers = [*positions, *speeds, *defaults, *drawing, *[0.0] * 6]
     return struct.pack(f">{len(numbers)}d4i", *numbers, 0, 0, model.robot_type, 0)
 

@@ -1,7 +1,7 @@
-"""The Robot API of a PolyScope X: which answers of it there are, by the version of its software, and one HTTP exchange.
+"""The Robot API of PolyScope X: its answers, by the version of the software, over one HTTP exchange.
 
-The maker's client library (`DashboardClientImplX`) says what is asked and since when it is answered. Of the orders
-those about the program that runs are simulated, which are forbidden in local control.
+The maker's client library (`DashboardClientImplX`) shows the requests and the versions that answer them. Only the
+orders about the running program are simulated; they are forbidden in local control.
 """
 
 import json
@@ -13,7 +13,7 @@ from rig.world.ur10e.modes import RuntimeState
 from rig.world.ur10e.robot import Robot
 
 BASE = "/universal-robots/robot-api"
-SINCE = (10, 11)  # versions before it have none
+SINCE = (10, 11)  # older versions have no Robot API
 REQUEST_BYTES = 1 << 14
 END = b"\r\n\r\n"
 PROGRAM_STATE = "/program/v1/state"
@@ -39,12 +39,12 @@ QUESTIONS: dict[str, tuple[tuple[int, int], Answer]] = {
 
 
 def has_robot_api(robot: Robot) -> bool:
-    """Whether its software has a Robot API."""
+    """Return whether the controller's software has a Robot API."""
     return robot.identity.polyscope >= SINCE
 
 
 class RobotApiSession:
-    """One connection: a request, its answer, and the end."""
+    """The world's side of one connection: a request, its answer, and the end."""
 
     dialogue = False
 
@@ -58,10 +58,10 @@ class RobotApiSession:
 
     def receive(self, data: bytes) -> bytes:
         self._buffer += data
-        head, ended, body = bytes(self._buffer).partition(END)
+        head, has_end, body = bytes(self._buffer).partition(END)
         length = LENGTH.search(head)
-        whole = ended and len(body) >= (int(length[1]) if length else 0)
-        if self.closing or (not whole and len(self._buffer) <= REQUEST_BYTES):
+        is_complete = has_end and len(body) >= (int(length[1]) if length else 0)
+        if self.closing or (not is_complete and len(self._buffer) <= REQUEST_BYTES):
             return b""
         self.closing = True
         method, _, rest = head.partition(b"\r\n")[0].decode(errors="replace").partition(" ")
@@ -78,13 +78,13 @@ class RobotApiSession:
         if answer is None or since is None or self._robot.identity.polyscope < since or not path.startswith(BASE):
             return _http(HTTPStatus.NOT_FOUND, {"message": "not found"})
         if method == "PUT" and path == BASE + PROGRAM_STATE:
-            return self._ordered(body)
+            return self._obey(body)
         if method != "GET":
             return _http(HTTPStatus.METHOD_NOT_ALLOWED, {"message": "not simulated"})
         return _http(HTTPStatus.OK, answer(self._robot))
 
-    def _ordered(self, body: bytes) -> bytes:
-        """The answer to an order about the program that runs."""
+    def _obey(self, body: bytes) -> bytes:
+        """Carry out an order about the running program and return the answer."""
         if self._robot.local_control:
             return _http(HTTPStatus.FORBIDDEN, {"message": "the robot is in local control mode"})
         try:

@@ -1,7 +1,7 @@
-"""RTDE, port 30004: what a client asks for at the rate it asks for. Bytes in, bytes out; no sockets here.
+"""RTDE, port 30004: data packages at the rate that a client requests. Bytes in, bytes out; no sockets here.
 
-Real-Time Data Exchange guide of the maker, protocol versions 1 and 2: packages of a big-endian size (u16), a type
-(one letter) and a payload.
+Source: the maker's Real-Time Data Exchange guide, protocol versions 1 and 2. A package is a big-endian size (u16), a
+type (one letter) and a payload.
 """
 
 import struct
@@ -10,34 +10,32 @@ from dataclasses import dataclass
 from typing import Any
 
 from rig.world.clock import TICKS_PER_SECOND
-from rig.world.ur10e.interfaces.variables import INPUTS, OUTPUTS, TYPES, Get, Put, apply_masked, output_type
+from rig.world.ur10e.interfaces.variables import INPUTS, OUTPUTS, TYPES, Get, Put, apply_masked, find_output_type
 from rig.world.ur10e.robot import Robot
 
 PORT = 30004
 HEADER = struct.Struct(">HB")
-# The guide's 2048 bytes for a list of names are not held to: the maker's own test program sends four times as many.
-DATA_BYTES = (
-    0xFFFF - HEADER.size - 1
-)  # of the values of a recipe: the size of a package is a u16, the first byte its number
-INPUT_RECIPES = 255  # their number is a byte, and 0 says that there is none
+# The guide's limit of 2048 bytes for a list of names is not enforced: the maker's test program sends four times that.
+DATA_BYTES = 0xFFFF - HEADER.size - 1  # the greatest size of a recipe's values, after its number
+INPUT_RECIPES = 255  # the number is a byte, and 0 means none
 DEFAULT_HZ = 125.0  # version 1 has no frequency
-CB3_HZ, E_SERIES = 125.0, 5  # a controller before the e-Series goes no faster
+CB3_HZ, E_SERIES = 125.0, 5  # the greatest rate of controllers before the e-Series
 
 
-def package(kind: str, payload: bytes) -> bytes:
+def build_package(kind: str, payload: bytes) -> bytes:
     return HEADER.pack(HEADER.size + len(payload), ord(kind)) + payload
 
 
 @dataclass(frozen=True, slots=True)
-class Input:
-    """An input recipe: what the values of a data package are called and where they go."""
+class InputRecipe:
+    """An input recipe: names of the values of a data package, and their destinations."""
 
     layout: struct.Struct
     fields: tuple[tuple[str, int, Put], ...]  # name, number of values, destination
 
 
-class Output:
-    """An output recipe, ready to be packed: the getters in order and one precompiled layout."""
+class OutputRecipe:
+    """An output recipe: the getters in order and one precompiled layout."""
 
     def __init__(self, names: list[str], frequency_hz: float, recipe_id: int | None) -> None:
         kinds = [OUTPUTS[name][0] for name in names]
@@ -49,14 +47,14 @@ class Output:
         self._struct = struct.Struct(layout)
         self._lead = [self._struct.size, ord("U"), *self._lead]
         self._per_tick = frequency_hz / TICKS_PER_SECOND
-        self._owed = 1.0 - self._per_tick  # the first package goes out with the first tick
+        self._due_fraction = 1.0 - self._per_tick  # the first package goes out with the first tick
 
-    def due(self) -> bool:
-        """Whether this tick has a package; called once a tick."""
-        self._owed += self._per_tick
-        if self._owed < 1.0 - 1e-9:
+    def is_due(self) -> bool:
+        """Return whether this tick has a package. To be called once per tick."""
+        self._due_fraction += self._per_tick
+        if self._due_fraction < 1.0 - 1e-9:
             return False
-        self._owed -= float(int(self._owed + 1e-9))
+        self._due_fraction -= float(int(self._due_fraction + 1e-9))
         return True
 
     def pack(self, robot: Robot) -> bytes:
@@ -70,15 +68,15 @@ class Output:
 
 
 class RtdeSession:
-    """One connection's recipes and state."""
+    """The world's side of one connection, with its recipes."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self.closing = False
         self._buffer = bytearray()
         self._version = 1
-        self._output: Output | None = None
-        self._inputs: dict[int, Input] = {}
+        self._output: OutputRecipe | None = None
+        self._inputs: dict[int, InputRecipe] = {}
         self._started = False
         self._answers: dict[str, Callable[[bytes], bytes]] = {
             "V": self._negotiate, "v": self._controller_version, "O": self._setup_outputs, "I": self._setup_inputs,
@@ -87,7 +85,7 @@ class RtdeSession:
 
     @property
     def dialogue(self) -> bool:
-        """A client asks until its recipes are set up; then it reads, and writes registers."""
+        """Whether the client asks: until its recipes are set up. Then it reads, and writes registers."""
         return not self._started
 
     def greeting(self) -> bytes:
@@ -115,27 +113,27 @@ class RtdeSession:
         return answer
 
     def tick(self) -> bytes:
-        """The data package of this tick, if one is due."""
-        if self._started and self._output is not None and self._output.due():
+        """Return the data package of this tick, or nothing."""
+        if self._started and self._output is not None and self._output.is_due():
             return self._output.pack(self._robot)
         return b""
 
     def handle_close(self) -> None:
-        """The connection is gone: its inputs are free again."""
+        """Release the inputs of a closed connection."""
         claims = self._robot.claims
         for name in [name for name, owner in claims.items() if owner is self]:
             del claims[name]
 
     # -- answers -----------------------------------------------------------------------------------------------
     def _negotiate(self, payload: bytes) -> bytes:
-        (wanted,) = struct.unpack(">H", payload)
-        accepted = wanted in (1, 2)
+        (version,) = struct.unpack(">H", payload)
+        accepted = version in (1, 2)
         if accepted:
-            self._version = wanted
-        return package("V", bytes([accepted]))
+            self._version = version
+        return build_package("V", bytes([accepted]))
 
     def _controller_version(self, payload: bytes) -> bytes:
-        return package("v", struct.pack(">4I", *self._robot.identity.polyscope))
+        return build_package("v", struct.pack(">4I", *self._robot.identity.polyscope))
 
     def _setup_outputs(self, payload: bytes) -> bytes:
         frequency_hz = DEFAULT_HZ
@@ -143,20 +141,20 @@ class RtdeSession:
             (frequency_hz,) = struct.unpack_from(">d", payload)
             payload = payload[8:]
         names = _names(payload)
-        kinds = [output_type(self._robot, name) for name in names]
+        kinds = [find_output_type(self._robot, name) for name in names]
         if (size := _size(kinds)) > DATA_BYTES:
             self._output = None
-            refusal = package("O", b"\0" if self._version == 2 else b"")
+            refusal = build_package("O", b"\0" if self._version == 2 else b"")
             return self._say(f"a recipe of values of {size} bytes, the most is {DATA_BYTES}") + refusal
         fastest_hz = TICKS_PER_SECOND if self._robot.identity.polyscope[0] >= E_SERIES else CB3_HZ
         valid = "NOT_FOUND" not in kinds and bool(names) and 0.0 < frequency_hz <= fastest_hz
-        self._output = Output(names, frequency_hz, 1 if self._version == 2 else None) if valid else None
+        self._output = OutputRecipe(names, frequency_hz, 1 if self._version == 2 else None) if valid else None
         lead = bytes([valid]) if self._version == 2 else b""
-        return package("O", lead + ",".join(kinds).encode())
+        return build_package("O", lead + ",".join(kinds).encode())
 
     def _setup_inputs(self, payload: bytes) -> bytes:
         if len(self._inputs) == INPUT_RECIPES:
-            return self._say("no more input recipes") + package("I", b"\0")
+            return self._say("no more input recipes") + build_package("I", b"\0")
         names = _names(payload)
         claims = self._robot.claims
         kinds = []
@@ -168,23 +166,23 @@ class RtdeSession:
             else:
                 kinds.append(INPUTS[name][0])
         if not names or "NOT_FOUND" in kinds or "IN_USE" in kinds:
-            return package("I", b"\0" + ",".join(kinds).encode())
+            return build_package("I", b"\0" + ",".join(kinds).encode())
         for name in names:
             claims[name] = self
         recipe_id = len(self._inputs) + 1
-        self._inputs[recipe_id] = Input(
+        self._inputs[recipe_id] = InputRecipe(
             struct.Struct(">" + "".join(TYPES[kind][0] for kind in kinds)),
             tuple((name, TYPES[kind][1], INPUTS[name][1]) for name, kind in zip(names, kinds, strict=True)),
         )
-        return package("I", bytes([recipe_id]) + ",".join(kinds).encode())
+        return build_package("I", bytes([recipe_id]) + ",".join(kinds).encode())
 
     def _start(self, payload: bytes) -> bytes:
         self._started = True
-        return package("S", b"\1")
+        return build_package("S", b"\1")
 
     def _pause(self, payload: bytes) -> bytes:
         self._started = False
-        return package("P", b"\1")
+        return build_package("P", b"\1")
 
     def _data(self, payload: bytes) -> bytes:
         recipe = self._inputs.get(payload[0]) if payload else None
@@ -199,27 +197,27 @@ class RtdeSession:
             named[name] = value
             put(self._robot, value)
         apply_masked(self._robot, named)
-        self._robot.input_received()
+        self._robot.feed_watchdog()
         return b""
 
     def _message(self, payload: bytes) -> bytes:
-        """A client's text message, for the controller's log."""
+        """Log a client's text message."""
         length = payload[0] if payload else 0
         self._robot.messages.say(payload[1 : 1 + length].decode(errors="replace"))
         return b""
 
     def _say(self, text: str) -> bytes:
-        """An error message to the client, in its version's form."""
+        """Return an error message to the client, in its version's form."""
         words, error = text.encode(), 1
         if self._version == 1:
-            return package("M", bytes([error]) + words)
+            return build_package("M", bytes([error]) + words)
         source = b"RTDE"
-        return package("M", bytes([len(words)]) + words + bytes([len(source)]) + source + bytes([error]))
+        return build_package("M", bytes([len(words)]) + words + bytes([len(source)]) + source + bytes([error]))
 
 
 def _size(kinds: list[str]) -> int:
-    """Bytes that the values of these types take, or their names where these are longer."""
-    return max(struct.calcsize(">" + "".join(TYPES[each][0] for each in kinds if each in TYPES)), len(",".join(kinds)))
+    """Return the size of the values of these types, or of the list of types if that is longer."""
+    return max(struct.calcsize(">" + "".join(TYPES[kind][0] for kind in kinds if kind in TYPES)), len(",".join(kinds)))
 
 
 def _names(payload: bytes) -> list[str]:

@@ -1,9 +1,9 @@
-"""The script sockets, ports 30001 to 30003: take programs in, and recognise the one ur_rtde uploads.
+"""The script sockets, ports 30001 to 30003: they take programs and recognise the one that ur_rtde uploads.
 
-URScript manual of the maker. A text is a program once its blocks are closed; a line outside a block is a program by
-itself. The text of `rtde_control` is not interpreted but acted out (`ur_rtde_program`); other programs may use the
-statements listed in `urscript`. In local control they take nothing in: a connection that was opened in it stays
-read-only, and those that are open when it begins are closed (Universal Robots ROS Driver, issue 459).
+Source: the maker's URScript manual. A text is a program once its blocks are closed; a line outside a block is a program
+by itself. The text of `rtde_control` is not interpreted; `ur_rtde_program` simulates it. Other programs may use the
+statements of `urscript`. In local control no program is accepted: a connection opened in it stays read-only, and those
+open when it begins are closed (Universal Robots ROS Driver, issue 459).
 """
 
 import re
@@ -16,22 +16,22 @@ from rig.world.ur10e.programs.urscript import Arguments, ScriptProgram, read_mov
 from rig.world.ur10e.robot import Program, Robot
 
 PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
-TEXT_BYTES = 1 << 20  # a program is not longer; that of ur_rtde has some 60 000
+TEXT_BYTES = 1 << 20  # the longest program; that of ur_rtde has some 60 000
 REGISTER_OFFSETS = (0, 24)  # the lower and the upper half of the registers: ur_rtde takes either
 BLOCK = re.compile(r"(def|sec|thread|if|while|for)\b.*:$")
 
 
 class ScriptReader:
-    """Cuts what arrives into whole programs."""
+    """A reader that splits the arriving bytes into whole programs."""
 
     def __init__(self) -> None:
         self._partial = b""
         self._lines: list[str] = []
         self._depth = 0
-        self._size = 0  # bytes of what is not complete
+        self._size = 0  # bytes of the incomplete program
 
     def feed(self, data: bytes) -> Iterator[list[str]]:
-        """The programs that `data` completes, each as its lines. Raises `ProgramError` when one does not end."""
+        """Yield the programs that `data` completes, each as its lines. Raise `ProgramError` if one is too long."""
         self._size += len(data)
         *lines, self._partial = (self._partial + data).split(b"\n")
         for raw in lines:
@@ -52,15 +52,15 @@ class ScriptReader:
 
 
 def compile_program(robot: Robot, lines: list[str]) -> Program:
-    """The program to play for an uploaded text. Raises `ProgramError` for what the simulation does not know."""
+    """Return the program of an uploaded text. Raise `ProgramError` for statements that are not simulated."""
     text = "\n".join(lines)
     if lines[0].startswith("def rtde_control()"):
-        return ControlProgram(robot, _register_offset(text), tuple(_path(lines)))
+        return ControlProgram(robot, _parse_register_offset(text), tuple(_parse_path(lines)))
     return ScriptProgram(robot, lines)
 
 
-def _register_offset(text: str) -> int:
-    """ur_rtde writes the offset of its integer registers on the line after this one. Raises `ProgramError`."""
+def _parse_register_offset(text: str) -> int:
+    """Return the register offset, which ur_rtde writes on the line after its name. Raise `ProgramError` for others."""
     match = re.search(r"reg_offset_int\s*=[^\n]*\n\s*(\d+)", text)
     offset = int(match.group(1)) if match else 0
     if offset not in REGISTER_OFFSETS:
@@ -68,8 +68,8 @@ def _register_offset(text: str) -> int:
     return offset
 
 
-def _path(lines: list[str]) -> Iterator[ScriptMove]:
-    """The moves that ur_rtde injected into `exec_move_path`."""
+def _parse_path(lines: list[str]) -> Iterator[ScriptMove]:
+    """Yield the moves that ur_rtde injected into `exec_move_path`."""
     start = next((i for i, line in enumerate(lines) if "# inject move path" in line), len(lines))
     for line in lines[start + 1 :]:
         statement = line.strip()
@@ -94,13 +94,13 @@ ORDERS: dict[str, Callable[[Robot], object]] = {
 
 
 class ScriptSession:
-    """One connection to a script socket."""
+    """The world's side of one connection to a script socket."""
 
     dialogue = True
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._read_only = robot.local_control  # and so for as long as it is open
+        self._read_only = robot.local_control  # for as long as it is open
         self.closing = False
         self._reader = ScriptReader()
 
@@ -144,6 +144,6 @@ class ScriptSession:
 
 
 def run_secondary(program: Program) -> None:
-    """A secondary program: it takes no time, moves nothing, and leaves the running program alone."""
+    """Run a secondary program, which takes no time and does not disturb the running program."""
     if program.step():
         raise ProgramError("a secondary program may not take time")

@@ -1,11 +1,11 @@
-"""RTDE's variables: the name and type of each, where an output comes from and where an input goes."""
+"""RTDE's variables: names, types, sources of outputs, destinations of inputs."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from rig.world.ur10e.modes import RobotMode
-from rig.world.ur10e.motion.moments import Load, load
-from rig.world.ur10e.motion.tcp_motion import GRAVITY, elbow
+from rig.world.ur10e.motion.moments import Load, find_load
+from rig.world.ur10e.motion.tcp_motion import GRAVITY, find_elbow
 from rig.world.ur10e.robot import Robot
 
 Get = Callable[[Robot], Any]
@@ -19,9 +19,9 @@ TYPES = {
 
 JOINT_MODE_OFF = 239
 JOINT_MODES = {RobotMode.RUNNING: 253, RobotMode.IDLE: 255}
-CONFIGURABLE = 0xFF00  # of the bits of digital inputs and outputs, where they stand
+CONFIGURABLE = 0xFF00  # mask of the configurable digital inputs and outputs
 
-# Outputs that controllers answer for from a version on (RTDE guide, "introduced in version").
+# The first versions of controllers with these outputs (RTDE guide, "introduced in version").
 SINCE: dict[str, tuple[int, int]] = {
     "collision_detection_ratio": (5, 15),
     "time_scale_source": (5, 17),
@@ -30,10 +30,10 @@ SINCE: dict[str, tuple[int, int]] = {
 }
 
 
-def output_type(robot: Robot, name: str) -> str:
-    """The RTDE type of an output, "NOT_FOUND" for one that a controller of this version does not have."""
-    found = name in OUTPUTS and robot.identity.polyscope[:2] >= SINCE.get(name, (0, 0))
-    return OUTPUTS[name][0] if found else "NOT_FOUND"
+def find_output_type(robot: Robot, name: str) -> str:
+    """Return the RTDE type of an output; "NOT_FOUND" if a controller of this version does not have it."""
+    is_known = name in OUTPUTS and robot.identity.polyscope[:2] >= SINCE.get(name, (0, 0))
+    return OUTPUTS[name][0] if is_known else "NOT_FOUND"
 
 
 def _constant(value: Any) -> Get:
@@ -52,21 +52,21 @@ def _supply_v(robot: Robot) -> float:
     return 48.0 if robot.robot_mode >= RobotMode.POWER_ON else 0.0
 
 
-def _load(robot: Robot) -> Load:
+def _actual_load(robot: Robot) -> Load:
     motion = robot.motion
     joints = motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2
-    return load(joints, robot.payload_kg, robot.payload_centre_m, robot.links, robot.model.bodies)
+    return find_load(joints, robot.payload_kg, robot.payload_centre_m, robot.links, robot.model.bodies)
 
 
 def _target_load(robot: Robot) -> Load:
     now = robot.motion.now
     joints = now.target_q_rad, now.target_qd_rad_s, now.target_qdd_rad_s2
-    return load(joints, robot.payload_kg, robot.payload_centre_m, robot.links, robot.model.bodies)
+    return find_load(joints, robot.payload_kg, robot.payload_centre_m, robot.links, robot.model.bodies)
 
 
-def _borne(of: Callable[[Robot], Load]) -> Get:
-    """The joints' moments; without power the brakes bear everything."""
-    return lambda robot: of(robot).moments_nm if robot.robot_mode == RobotMode.RUNNING else ZERO6
+def _moments(load_of: Callable[[Robot], Load]) -> Get:
+    """Return a getter of the joints' moments, which are zero without power, when the brakes bear the load."""
+    return lambda robot: load_of(robot).moments_nm if robot.robot_mode == RobotMode.RUNNING else ZERO6
 
 
 ZERO6 = (0.0,) * 6
@@ -76,7 +76,7 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "target_q": ("VECTOR6D", lambda r: r.motion.now.target_q_rad),
     "target_qd": ("VECTOR6D", lambda r: r.motion.now.target_qd_rad_s),
     "target_qdd": ("VECTOR6D", lambda r: r.motion.now.target_qdd_rad_s2),
-    "actual_q": ("VECTOR6D", lambda r: r.faults.reported(r.motion.actual_q_rad)),
+    "actual_q": ("VECTOR6D", lambda r: r.faults.report_angles(r.motion.actual_q_rad)),
     "actual_qd": ("VECTOR6D", lambda r: r.motion.actual_qd_rad_s),
     "actual_TCP_pose": ("VECTOR6D", lambda r: r.tcp_pose(r.motion.actual_q_rad)),
     "actual_TCP_speed": ("VECTOR6D", lambda r: r.tcp_motion.speed),
@@ -85,12 +85,12 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "target_TCP_pose": ("VECTOR6D", lambda r: r.tcp_pose(r.motion.now.target_q_rad)),
     "target_TCP_speed": ("VECTOR6D", lambda r: r.target_tcp_motion.speed),
     "target_TCP_acceleration": ("VECTOR6D", lambda r: r.target_tcp_motion.acceleration),
-    "elbow_position": ("VECTOR3D", lambda r: elbow(r.motion.q_rad, r.motion.qd_rad_s, r.links)[0]),
-    "elbow_velocity": ("VECTOR3D", lambda r: elbow(r.motion.q_rad, r.motion.qd_rad_s, r.links)[1]),
-    "target_moment": ("VECTOR6D", _borne(_target_load)),
-    "actual_current_as_torque": ("VECTOR6D", _borne(_load)),
-    "actual_momentum": ("DOUBLE", lambda r: _load(r).momentum_kg_m_s),
-    "ft_raw_wrench": ("VECTOR6D", lambda r: _load(r).wrench),
+    "elbow_position": ("VECTOR3D", lambda r: find_elbow(r.motion.q_rad, r.motion.qd_rad_s, r.links)[0]),
+    "elbow_velocity": ("VECTOR3D", lambda r: find_elbow(r.motion.q_rad, r.motion.qd_rad_s, r.links)[1]),
+    "target_moment": ("VECTOR6D", _moments(_target_load)),
+    "actual_current_as_torque": ("VECTOR6D", _moments(_actual_load)),
+    "actual_momentum": ("DOUBLE", lambda r: _actual_load(r).momentum_kg_m_s),
+    "ft_raw_wrench": ("VECTOR6D", lambda r: _actual_load(r).wrench),
     "tcp_offset": ("VECTOR6D", lambda r: r.tcp_offset),
     "robot_mode": ("INT32", lambda r: r.robot_mode),
     "joint_mode": ("VECTOR6INT32", joint_modes),
@@ -174,7 +174,7 @@ def _put_bits(first: int) -> Put:
 
 
 def _ignore(robot: Robot, value: Any) -> None:
-    """A mask or an external force: it takes part in `apply_masked`, or has no physics here."""
+    """Ignore an input: a mask, which `apply_masked` uses, or a force, which is not simulated."""
 
 
 INPUTS: dict[str, tuple[str, Put]] = {
@@ -197,14 +197,14 @@ DIGITAL = (("standard", 0), ("configurable", 8), ("tool", 16))  # kind, first bi
 
 
 def apply_masked(robot: Robot, values: dict[str, Any]) -> None:
-    """Apply the inputs that act only where their mask says so."""
+    """Apply the inputs that act only if their mask is set."""
     if values.get("speed_slider_mask"):
         robot.set_speed_slider(values.get("speed_slider_fraction", robot.speed_slider))
     for kind, first in DIGITAL:
         mask = values.get(f"{kind}_digital_output_mask", 0) << first
         if mask:
-            wanted = values.get(f"{kind}_digital_output", 0) << first
-            robot.digital_outputs = robot.digital_outputs & ~mask | wanted & mask
+            bits = values.get(f"{kind}_digital_output", 0) << first
+            robot.digital_outputs = robot.digital_outputs & ~mask | bits & mask
     for index in range(2):
         if values.get("standard_analog_output_mask", 0) >> index & 1:
             robot.analog_outputs[index] = values.get(f"standard_analog_output_{index}", 0.0)

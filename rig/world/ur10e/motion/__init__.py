@@ -1,1 +1,1 @@
-"""How the simulated arm moves: trajectories, joints and their errors, links, flange."""
+"""The motion of the simulated arm: trajectories, joints and their errors, links, flange."""

@@ -1,8 +1,8 @@
-"""What a body on the flange feels: rate, its change, and specific force, carried outwards joint by joint.
+"""Inertial motion of a body on the flange: angular rate, its derivative and specific force, propagated joint by joint.
 
-Luh, Walker, Paul, On-line computational scheme for mechanical manipulators, 1980, the outward half, for Denavit and
-Hartenberg's standard frames. The base brings the Earth's rate and the push that holds it up, so that gravity, Earth
-rate and Coriolis come of themselves. A component may be a float or an array of shape (n,), all alike.
+Luh, Walker, Paul, On-line computational scheme for mechanical manipulators, 1980, the outward recursion, for standard
+Denavit–Hartenberg frames. The base has the Earth's rate and the reaction to gravity, so gravity, Earth rate and
+Coriolis terms follow. A component may be a float or an array of shape (n,), all alike.
 """
 
 from collections.abc import Sequence
@@ -13,11 +13,14 @@ from rig.world.site import SiteTruth
 from rig.world.ur10e.motion.links import ArmLink, Links
 
 Components = tuple[Any, Any, Any]  # x, y, z: floats, or arrays of one shape
+CosineAndSine = Sequence[tuple[Any, Any]]  # of every joint
 
 
-class InertialMotion(NamedTuple):
-    """What the flange feels at its origin, in its axes: rate (rad/s) and its change (rad/s²) against the stars, force
-    (m/s²)."""
+class BodyMotion(NamedTuple):
+    """Motion of a body's origin relative to inertial space, in the body's axes.
+
+    Angular rate (rad/s), its derivative (rad/s²), and specific force (m/s²).
+    """
 
     rate_rad_s: Components
     change_rad_s2: Components
@@ -26,39 +29,39 @@ class InertialMotion(NamedTuple):
 
 def find_flange_motion(
     q_rad: Sequence[float], qd_rad_s: Sequence[float], qdd_rad_s2: Sequence[float], links: Links, site: SiteTruth
-) -> InertialMotion:
-    """What the flange feels at one instant, from angles, speeds and accelerations of the six joints."""
-    return find_motion_from_cosines(find_cosines(q_rad, links), qd_rad_s, qdd_rad_s2, links, site)
+) -> BodyMotion:
+    """Return the flange's motion for angles, speeds and accelerations of the six joints."""
+    return find_motion(find_cosines(q_rad, links), qd_rad_s, qdd_rad_s2, links, site)
 
 
 def find_cosines(q_rad: Sequence[float], links: Sequence[ArmLink]) -> list[tuple[float, float]]:
-    """Cosine and sine of each joint's whole angle."""
-    turned = [angle + link.theta_rad for angle, link in zip(q_rad, links, strict=True)]
-    return [(cos(angle), sin(angle)) for angle in turned]
+    """Return cosine and sine of each joint's Denavit–Hartenberg angle."""
+    angles = [angle + link.theta_rad for angle, link in zip(q_rad, links, strict=True)]
+    return [(cos(angle), sin(angle)) for angle in angles]
 
 
-def find_motion_from_cosines(
-    turns: Sequence[tuple[Any, Any]], qd_rad_s: Sequence[Any], qdd_rad_s2: Sequence[Any], links: Links, site: SiteTruth
-) -> InertialMotion:
-    """What the flange feels, from cosine and sine of each joint's whole angle, its `theta_rad` included."""
-    return propagate_motion(find_base_motion(site), turns, qd_rad_s, qdd_rad_s2, links)
+def find_motion(
+    cosines: CosineAndSine, qd_rad_s: Sequence[Any], qdd_rad_s2: Sequence[Any], links: Links, site: SiteTruth
+) -> BodyMotion:
+    """Return the flange's motion; `cosines`: cosine and sine of each joint's Denavit–Hartenberg angle."""
+    return propagate(find_base_motion(site), cosines, qd_rad_s, qdd_rad_s2, links)
 
 
-def find_base_motion(site: SiteTruth) -> InertialMotion:
-    """What the arm's base feels."""
-    return InertialMotion(site.earth_rate_rad_s, (0.0, 0.0, 0.0), site.specific_force_m_s2)
+def find_base_motion(site: SiteTruth) -> BodyMotion:
+    """Return the motion of the arm's base."""
+    return BodyMotion(site.earth_rate_rad_s, (0.0, 0.0, 0.0), site.specific_force_m_s2)
 
 
-def propagate_motion(
-    inner: InertialMotion,
-    turns: Sequence[tuple[Any, Any]],
+def propagate(
+    inner: BodyMotion,
+    cosines: CosineAndSine,
     qd_rad_s: Sequence[Any],
     qdd_rad_s2: Sequence[Any],
     links: Sequence[ArmLink],
-) -> InertialMotion:
-    """What the last of these links feels, when the one before the first feels `inner`."""
+) -> BodyMotion:
+    """Return the motion of the last of `links`, if the body before the first has the motion `inner`."""
     (x, y, z), (u, v, w), (f, g, h) = inner
-    for (cosine, sine), speed, acceleration, link in zip(turns, qd_rad_s, qdd_rad_s2, links, strict=True):
+    for (cosine, sine), speed, acceleration, link in zip(cosines, qd_rad_s, qdd_rad_s2, links, strict=True):
         u, v, w = u + y * speed, v - x * speed, w + acceleration
         z = z + speed
         x, y = cosine * x + sine * y, cosine * y - sine * x
@@ -69,18 +72,18 @@ def propagate_motion(
         v, w = c * v + s * w, c * w - s * v
         g, h = c * g + s * h, c * h - s * g
         f, g, h = transfer_force((x, y, z), (u, v, w), (f, g, h), (link.a_m, link.d_m * s, link.d_m * c))
-    return InertialMotion((x, y, z), (u, v, w), (f, g, h))
+    return BodyMotion((x, y, z), (u, v, w), (f, g, h))
 
 
-def transfer_force(rate: Components, change: Components, force: Components, way_m: Sequence[float]) -> Components:
-    """Specific force at another point of the same body, `way_m` away, all in the body's axes."""
+def transfer_force(rate: Components, change: Components, force: Components, lever_arm_m: Sequence[float]) -> Components:
+    """Return the specific force at another point of the same body, `lever_arm_m` away, all in the body's axes."""
     x, y, z = rate
     u, v, w = change
-    a, b, c = way_m
-    along = a * x + b * y + c * z
+    a, b, c = lever_arm_m
+    projection = a * x + b * y + c * z
     square = x * x + y * y + z * z
     return (
-        force[0] + v * c - w * b + along * x - square * a,
-        force[1] + w * a - u * c + along * y - square * b,
-        force[2] + u * b - v * a + along * z - square * c,
+        force[0] + v * c - w * b + projection * x - square * a,
+        force[1] + w * a - u * c + projection * y - square * b,
+        force[2] + u * b - v * a + projection * z - square * c,
     )

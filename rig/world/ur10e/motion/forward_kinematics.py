@@ -1,6 +1,6 @@
-"""How the simulated flange turns and where it is: the world's own few lines, independent of the rig's.
+"""Forward kinematics of the simulated flange, independent of the rig's.
 
-Plain floats, because the sensors ask several hundred times a simulated second.
+Plain floats, because the sensors need them several hundred times per simulated second.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,7 +13,7 @@ Rotation = tuple[Vector, Vector, Vector]
 
 
 def flange_rate(q_rad: Sequence[float], qd_rad_s: Sequence[float], links: Links = NOMINAL) -> Vector:
-    """Angular velocity of the flange in its own frame, rad/s, carried outwards joint by joint."""
+    """Return the flange's angular velocity in its own frame, rad/s, propagated joint by joint."""
     x = y = z = 0.0
     for link, angle, speed in zip(links, q_rad, qd_rad_s, strict=True):
         z += speed
@@ -25,7 +25,7 @@ def flange_rate(q_rad: Sequence[float], qd_rad_s: Sequence[float], links: Links 
 
 
 def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rotation, Vector]]:
-    """Rotation (rows) and position (m) in the base frame of the base, then of what each link carries, flange last."""
+    """Yield rotation (rows) and position (m) in the base frame of the base and then of each link, the flange last."""
     rotation: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     position: Vector = (0.0, 0.0, 0.0)
     yield rotation, position
@@ -33,61 +33,61 @@ def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rot
         c, s = cos(angle + link.theta_rad), sin(angle + link.theta_rad)
         ca, sa = link.cos_alpha, link.sin_alpha
         x, y, z = position
-        along = rotate(rotation, (link.a_m * c, link.a_m * s, link.d_m))
-        position = x + along[0], y + along[1], z + along[2]
+        offset = rotate(rotation, (link.a_m * c, link.a_m * s, link.d_m))
+        position = x + offset[0], y + offset[1], z + offset[2]
         turn = ((c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca))
         rotation = _product(rotation, turn)
         yield rotation, position
 
 
 def rotate(rotation: Rotation, vector: Vector) -> Vector:
-    """The vector as it is after a rotation (rows)."""
+    """Return the vector rotated by `rotation` (rows)."""
     x, y, z = vector
     (a, b, c), (d, e, f), (g, h, i) = rotation
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
 
-def _product(left: Rotation, right: Rotation) -> Rotation:
-    first, second, third = (rotate(left, column) for column in zip(*right, strict=True))
-    (a, b, c), (d, e, f), (g, h, i) = first, second, third
+def _product(a_rotation: Rotation, b_rotation: Rotation) -> Rotation:
+    columns = [rotate(a_rotation, column) for column in zip(*b_rotation, strict=True)]
+    (a, b, c), (d, e, f), (g, h, i) = columns
     return (a, d, g), (b, e, h), (c, f, i)
 
 
 def flange_frame(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[Rotation, Vector]:
-    """Rotation (rows) and position (m) of the flange in the base frame."""
+    """Return rotation (rows) and position (m) of the flange in the base frame."""
     *_, flange = frames(q_rad, links)
     return flange
 
 
 def flange_pose(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[float, ...]:
-    """Position (m) and rotation vector (rad) of the flange in the base frame, the six numbers UR calls a pose."""
+    """Return position (m) and rotation vector (rad) of the flange in the base frame, which UR calls a pose."""
     rotation, position = flange_frame(q_rad, links)
     return (*position, *rotation_vector(rotation))
 
 
 def rotate_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
-    """The pose of a frame in the same place, turned: `turn` takes its vectors into the frame at `pose`."""
+    """Return the pose of a frame with the same origin whose axes are those at `pose` rotated by `turn`."""
     return (*pose[:3], *rotation_vector(_product(rotation_from_vector(pose[3:]), turn)))
 
 
 def compose_poses(frame: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
-    """A pose that is told in a frame, in that in which the frame's own pose is told: `pose_trans` of URScript."""
+    """Return the pose in the base frame of a `pose` in `frame`: `pose_trans` of URScript."""
     rotation = rotation_from_vector(frame[3:])
-    moved = (
-        origin + sum(turn * way for turn, way in zip(row, pose[:3], strict=True))
+    position = (
+        origin + sum(turn * coordinate for turn, coordinate in zip(row, pose[:3], strict=True))
         for origin, row in zip(frame[:3], rotation, strict=True)
     )
-    return (*moved, *rotation_vector(_product(rotation, rotation_from_vector(pose[3:]))))
+    return (*position, *rotation_vector(_product(rotation, rotation_from_vector(pose[3:]))))
 
 
 def rotation_vector(r: Sequence[Sequence[float]]) -> Vector:
-    """The rotation vector (rad) of a rotation matrix."""
+    """Return the rotation vector (rad) of a rotation matrix (rows)."""
     cosine = max(-1.0, min(1.0, (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0))
     angle = acos(cosine)
     x, y, z = r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]
     if angle < 1e-9:
         return x / 2.0, y / 2.0, z / 2.0
-    if pi - angle < 1e-6:  # half a turn: the antisymmetric part vanishes, the diagonal still holds the axis
+    if pi - angle < 1e-6:  # half a turn: the antisymmetric part vanishes, the diagonal gives the axis
         axis = [sqrt(max(0.0, (r[i][i] + 1.0) / 2.0)) for i in range(3)]
         largest = axis.index(max(axis))
         signs = [1.0 if i == largest or r[largest][i] >= 0.0 else -1.0 for i in range(3)]
@@ -97,7 +97,7 @@ def rotation_vector(r: Sequence[Sequence[float]]) -> Vector:
 
 
 def rotation_from_vector(vector: Sequence[float]) -> Rotation:
-    """Rows of the rotation matrix of a rotation vector (rad), Rodrigues' formula."""
+    """Return the rotation matrix (rows) of a rotation vector (rad), by Rodrigues' formula."""
     angle = sqrt(sum(component * component for component in vector))
     if angle == 0.0:
         return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

@@ -1,9 +1,9 @@
-"""What the joints do beside what their encoders say: known to nobody but the world.
+"""Errors of the joints that their encoders do not show, known only to the world.
 
 A joint's true angle is e + zero + A₁ sin(e + φ₁) + A₂ sin(2e + φ₂) − h(e) + vibration(t) + settling(t), with e the
-angle its encoder sees. Eccentric and tilted graduations err once and twice a turn; h is the friction's hysteresis in
-Dahl's form (A solid friction model, 1968): after a reversal it goes exponentially to half its width on the other side.
-A vibration that the encoder sees, too, is no part of this: it is added to e and to the true angle alike.
+angle at its encoder. Eccentric and tilted graduations err once and twice a turn. h is friction hysteresis in Dahl's
+form (A solid friction model, 1968): after a reversal it tends exponentially to half its width on the other side. A
+vibration that the encoder shows is no part of this: it is added to e and to the true angle alike.
 """
 
 from collections.abc import Sequence
@@ -14,16 +14,19 @@ from random import Random
 from rig.world.ur10e.motion.trajectory import ZERO, Joints
 from rig.world.ur10e.motion.vibration import WRISTS, Vibration
 
-REVERSAL_RAD = 0.01  # way in which hysteresis comes about: inside the ramps
-STANDING_RAD_S = 1e-6  # a joint that need not move may be asked to by rounding
-FORGOTTEN = 12.0  # settling times after which nothing is left of it
+REVERSAL_RAD = 0.01  # travel in which hysteresis develops: within the ramps
+STANDING_RAD_S = 1e-6  # slower speeds are rounding errors of joints that do not move
+NEGLIGIBLE_AFTER = 12.0  # decay times after which settling is negligible
+JointState = tuple[Joints, Joints, Joints]  # angles, speeds, accelerations
 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Sizes of errors. `hysteresis_rad`: between both directions; `vibration_rms_rad_s`: of each wrist's rate.
+    """Magnitudes of a joint's errors.
 
-    `vibration_rad_s` (of each line), `settling_rad_s`: angular frequencies.
+    - `hysteresis_rad`: the full width between both directions.
+    - `vibration_rms_rad_s`: of each wrist's rate.
+    - `vibration_rad_s` (of its tones), `settling_rad_s`: angular frequencies.
     """
 
     zero_rad: Sequence[float] = (0.0,) * 6
@@ -50,27 +53,27 @@ class Errors:
 
 
 class JointErrors:
-    """Errors of all six joints. `step` remembers where they turn back and when they stop; `at` has the true joints."""
+    """Errors of all six joints. `step` records reversals and stops; `true_state` returns the true joints."""
 
     def __init__(self, errors: Errors, random: Random) -> None:
         self._errors = errors
         self._phases = [[random.uniform(0.0, 2.0 * pi) for _ in range(3)] for _ in range(6)]
         self._direction = [0.0] * 6
-        self._reversal = [(0.0, 0.0)] * 6  # encoder's angle, and the hysteresis there
+        self._reversal = [(0.0, 0.0)] * 6  # encoder's angle and hysteresis at the last reversal
         self._moving = [False] * 6
-        self._stops = [(-inf, 0.0)] * 6  # when, and from which direction
+        self._stops = [(-inf, 0.0)] * 6  # time of the last stop, and the direction before
         first, *more = errors.vibration_rad_s
-        lines = [(first, [self._phases[joint][2] for joint in WRISTS])]
-        lines += [(turn, [random.uniform(0.0, 2.0 * pi) for _ in WRISTS]) for turn in more]
-        self._vibration = Vibration(errors.vibration_rms_rad_s, lines)
+        tones = [(first, [self._phases[joint][2] for joint in WRISTS])]
+        tones += [(turn, [random.uniform(0.0, 2.0 * pi) for _ in WRISTS]) for turn in more]
+        self._vibration = Vibration(errors.vibration_rms_rad_s, tones)
         self._settling = errors.settling_rad_s
-        self._patience_s = FORGOTTEN * errors.settling_decay_s
-        self._placed = [(0.0, 0.0, 1.0, 0.0)] * 6  # last worked out: encoder's angle; angle and its two derivatives
-        self._known = [False] * 6
-        self._stood: tuple[Joints, Joints] = ((), ())  # the encoders' angles that joints stood at last, and the true
+        self._patience_s = NEGLIGIBLE_AFTER * errors.settling_decay_s
+        self._last = [(0.0, 0.0, 1.0, 0.0)] * 6  # last result: encoder's angle; true angle and its two derivatives
+        self._is_current = [False] * 6
+        self._rest: tuple[Joints, Joints] = ((), ())  # encoder and true angles at the last rest
 
     def step(self, time_s: float, q_rad: Joints, qd_rad_s: Joints) -> None:
-        """The joints at the end of a tick, as the encoders see them."""
+        """Take the joints at the end of a tick, as the encoders read them."""
         for joint, (angle, speed) in enumerate(zip(q_rad, qd_rad_s, strict=True)):
             moving = abs(speed) > STANDING_RAD_S
             if moving:
@@ -78,25 +81,25 @@ class JointErrors:
                 if direction != self._direction[joint]:
                     self._reversal[joint] = (angle, self._hysteresis(joint, angle)[0])
                     self._direction[joint] = direction
-                    self._known[joint] = False
+                    self._is_current[joint] = False
             elif self._moving[joint]:
                 self._stops[joint] = (time_s, self._direction[joint])
             self._moving[joint] = moving
 
-    def quiet(self, time_s: float) -> bool:
-        """Whether joints that stand stand still."""
+    def is_quiet(self, time_s: float) -> bool:
+        """Return whether joints at rest do not vibrate or settle."""
         return not self._errors.vibration_rms_rad_s and not (
             self._errors.settling_rad and any(time_s - stop_s < self._patience_s for stop_s, _ in self._stops)
         )
 
-    def at(self, time_s: float, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints) -> tuple[Joints, Joints, Joints]:
-        """True angles, speeds and accelerations at a time of which the encoders' are given."""
-        if qd_rad_s is ZERO and q_rad is self._stood[0]:
-            angles, speeds, accelerations = list(self._stood[1]), [0.0] * 6, [0.0] * 6
+    def true_state(self, time_s: float, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints) -> JointState:
+        """Return true angles, speeds and accelerations, rad, for those of the encoders at a time."""
+        if qd_rad_s is ZERO and q_rad is self._rest[0]:
+            angles, speeds, accelerations = list(self._rest[1]), [0.0] * 6, [0.0] * 6
         else:
-            angles, speeds, accelerations = self._carried(q_rad, qd_rad_s, qdd_rad_s2)
+            angles, speeds, accelerations = self._encoder_to_true(q_rad, qd_rad_s, qdd_rad_s2)
             if qd_rad_s is ZERO:
-                self._stood = q_rad, tuple(angles)
+                self._rest = q_rad, tuple(angles)
         if self._errors.settling_rad:
             for joint, (stop_s, direction) in enumerate(self._stops):
                 if 0.0 <= time_s - stop_s < self._patience_s:
@@ -105,26 +108,26 @@ class JointErrors:
                     speeds[joint] += speed
                     accelerations[joint] += acceleration
         if self._errors.vibration_rms_rad_s:
-            return self._vibration.added(time_s, angles, speeds, accelerations)
+            return self._vibration.add(time_s, angles, speeds, accelerations)
         return tuple(angles), tuple(speeds), tuple(accelerations)
 
-    def _carried(
+    def _encoder_to_true(
         self, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints
     ) -> tuple[list[float], list[float], list[float]]:
-        """The true joints without vibration and settling."""
+        """Return the true joints without vibration and settling."""
         angles, speeds, accelerations = list(q_rad), list(qd_rad_s), list(qdd_rad_s2)
         for joint, (e, speed) in enumerate(zip(q_rad, qd_rad_s, strict=True)):
-            if self._placed[joint][0] != e or not self._known[joint]:  # most moves turn few joints
-                self._placed[joint] = (e, *self._place(joint, e))
-                self._known[joint] = True
-            _, angles[joint], gain, bend = self._placed[joint]
+            if self._last[joint][0] != e or not self._is_current[joint]:  # most moves use few joints
+                self._last[joint] = (e, *self._true_angle(joint, e))
+                self._is_current[joint] = True
+            _, angles[joint], gain, bend = self._last[joint]
             if speed or accelerations[joint]:
                 speeds[joint] = gain * speed
                 accelerations[joint] = gain * accelerations[joint] + bend * speed * speed
         return angles, speeds, accelerations
 
-    def _place(self, joint: int, e: float) -> tuple[float, float, float]:
-        """True angle at the encoder's, and its two derivatives by that."""
+    def _true_angle(self, joint: int, e: float) -> tuple[float, float, float]:
+        """Return the true angle at an encoder's angle, rad, and its two derivatives with respect to that."""
         errors, (once, twice, _) = self._errors, self._phases[joint]
         a, b = errors.encoder_once_rad, errors.encoder_twice_rad
         lag, slope, bend = self._hysteresis(joint, e)
@@ -135,15 +138,15 @@ class JointErrors:
         )
 
     def _hysteresis(self, joint: int, e: float) -> tuple[float, float, float]:
-        """The joint's lag, rad, and the two derivatives by the encoder's angle."""
-        turned_at, lag = self._reversal[joint]
+        """Return the joint's lag, rad, and its two derivatives with respect to the encoder's angle."""
+        reversal_rad, lag = self._reversal[joint]
         end = 0.5 * self._errors.hysteresis_rad * self._direction[joint]
-        left = (lag - end) * exp(-abs(e - turned_at) / REVERSAL_RAD)
-        return end + left, -left / REVERSAL_RAD * self._direction[joint], left / REVERSAL_RAD**2
+        excess = (lag - end) * exp(-abs(e - reversal_rad) / REVERSAL_RAD)
+        return end + excess, -excess / REVERSAL_RAD * self._direction[joint], excess / REVERSAL_RAD**2
 
-    def _settle(self, direction: float, since_s: float) -> tuple[float, float, float]:
-        """Swing of a joint that stopped so long ago: angle, rate, and its change."""
+    def _settle(self, direction: float, elapsed_s: float) -> tuple[float, float, float]:
+        """Return angle, rate and acceleration of the oscillation of a joint that stopped `elapsed_s` ago."""
         decay, turn = -1.0 / self._errors.settling_decay_s, self._settling
-        size = self._errors.settling_rad * direction * exp(decay * since_s)
-        s, c = size * sin(turn * since_s), size * cos(turn * since_s)
+        size = self._errors.settling_rad * direction * exp(decay * elapsed_s)
+        s, c = size * sin(turn * elapsed_s), size * cos(turn * elapsed_s)
         return s, decay * s + turn * c, (decay**2 - turn**2) * s + 2.0 * decay * turn * c

@@ -18,7 +18,7 @@ SCALING_RATE_PER_S = 4.0  # the speed fraction follows the slider, and pause and
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """The six joints at one time: what is asked of them, and what they do."""
+    """The six joints at one time: commanded and actual."""
 
     target_q_rad: Joints
     target_qd_rad_s: Joints
@@ -28,10 +28,10 @@ class Instant:
 
 
 class _Tick(NamedTuple):
-    """How a tick was played: where on the trajectory it began, and the time scaling there and its change."""
+    """How a tick was played: its start, its start on the trajectory, the time scaling there and its derivative."""
 
     start_s: float
-    along_s: float
+    trajectory_s: float
     fraction: float
     slope_per_s: float
     trajectory: Trajectory
@@ -40,14 +40,14 @@ class _Tick(NamedTuple):
 
 
 class JointMotion:
-    """Positions and velocities of the six joints. `step` makes a tick; `at` answers for any time inside the last one.
+    """Angles and speeds of the six joints. `step` plays a tick; `joints_at` returns any time within the last one.
 
-    `memory_s`: how long before the end of the last tick `at` answers as well. `lateness_s`: drawn once a tick, how much
-    later than at its end the encoders are read. `vibration`: that they see, of joints that stand or move by all else
-    that is said here; it is added where somebody looks.
+    - `memory_s`: the time before the last tick's end that `joints_at` covers too.
+    - `lateness_s`: draws the delay of the encoders' reading, once a tick.
+    - `vibration`: a vibration that the encoders show; it is added to their angles and to the true ones.
 
-    Three angles are in play: `target` (what a program asked for), `smooth` (the same with the servo's static error
-    taken out, so that the joint comes to rest exactly on target) and the joint's own, with the ripple.
+    Three angles are in use: `target` (commanded), `smooth` (the same without the servo's static error, so that the
+    joint comes to rest exactly on target) and the joint's own, with the ripple.
     """
 
     def __init__(
@@ -68,18 +68,18 @@ class JointMotion:
         self._lateness_s, self._late_s = lateness_s, 0.0
         self._trajectory = build_rest(tuple(start_rad))
         self._offset, self._gain = self._map(tuple(start_rad), tuple(start_rad))
-        self._smooth, self._angles = [nan] * 6, [0.0] * 6  # what was worked out last, joint by joint
-        self._scaled = True  # a stop is not stretched by the speed slider
+        self._smooth, self._angles = [nan] * 6, [0.0] * 6  # last results, joint by joint
+        self._scales = True  # a stop is not stretched by the speed slider
         self._trajectory_s = 0.0
         self._fraction = 1.0
         self.fraction_wanted = 1.0
         self._ticks = deque(
             [_Tick(0.0, 0.0, 1.0, 0.0, self._trajectory, self._offset, self._gain)], 1 + ceil(memory_s / TICK_S)
         )
-        self._stirred = 0  # ticks in memory since something moved, at most
-        self._now: Instant | None = None  # worked out when somebody asks: most ticks nobody does
+        self._moving_ticks = 0  # upper bound of the ticks in memory with motion
+        self._now: Instant | None = None  # computed on demand: most ticks need none
 
-    # -- what the joints do now ---------------------------------------------------------------------------------
+    # -- present state -------------------------------------------------------------------------------------------
     @property
     def fraction(self) -> float:
         """The time scaling in force: 1 at full speed, 0 when paused."""
@@ -87,23 +87,23 @@ class JointMotion:
 
     @property
     def standing(self) -> bool:
-        """No trajectory is being played (a paused one still is)."""
-        return self._trajectory.over(self._trajectory_s)
+        """Whether no trajectory is being played (a paused one is)."""
+        return self._trajectory.is_over(self._trajectory_s)
 
     @property
     def now(self) -> Instant:
         """The joints at the end of the last tick."""
         if self._now is None:
-            target, velocity, acceleration = self._trajectory.at(self._trajectory_s)
-            fraction = self._fraction if self._scaled else 1.0
+            target, velocity, acceleration = self._trajectory.state_at(self._trajectory_s)
+            fraction = self._fraction if self._scales else 1.0
             q, qd = self._joints(self._offset, self._gain, target, velocity, fraction)
             self._now = Instant(target, tuple(v * fraction for v in velocity), acceleration, q, qd)
         return self._now
 
     @property
     def still(self) -> bool:
-        """Whether nothing moved in the whole of the last tick, and of those in memory."""
-        return not self._stirred
+        """Whether nothing moved in the last tick and in those in memory."""
+        return not self._moving_ticks
 
     @property
     def q_rad(self) -> Joints:
@@ -120,7 +120,7 @@ class JointMotion:
 
     @property
     def _end_s(self) -> float:
-        """When the last tick ended."""
+        """The end of the last tick, s."""
         return self._ticks[-1].start_s + TICK_S
 
     @property
@@ -129,7 +129,7 @@ class JointMotion:
 
     @property
     def actual_q_rad(self) -> Joints:
-        """The joints' angles as the encoders see them, at the end of the last tick."""
+        """The joints' angles as the encoders read them at the end of the last tick."""
         step, (q_rad, qd_rad_s, _) = self._encoder_step_rad, self._vibrating(ZERO)
         if self._late_s:
             q_rad = tuple(q + v * self._late_s for q, v in zip(q_rad, qd_rad_s, strict=True))
@@ -137,28 +137,28 @@ class JointMotion:
 
     @property
     def actual_qd_rad_s(self) -> Joints:
-        """The joints' speeds as the encoders see them."""
+        """The joints' speeds as the encoders show them."""
         return self._vibrating(ZERO)[1]
 
     @property
     def actual(self) -> tuple[Joints, Joints, Joints]:
-        """Angles, speeds and accelerations as finer encoders would see them."""
+        """Angles, speeds and accelerations by encoders without steps."""
         return self._vibrating(self.qdd_rad_s2)
 
     def _vibrating(self, qdd_rad_s2: Joints) -> tuple[Joints, Joints, Joints]:
         joints = self.q_rad, self.qd_rad_s, qdd_rad_s2
-        return joints if self.vibration is None else self.vibration.added(self._end_s, *joints)
+        return joints if self.vibration is None else self.vibration.add(self._end_s, *joints)
 
-    def at(self, time_s: float) -> tuple[Joints, Joints]:
-        """True angles and speeds of the joints at a virtual time inside the last tick, or `memory_s` before it."""
-        tick, fraction, target, velocity, _ = self._played(time_s)
+    def joints_at(self, time_s: float) -> tuple[Joints, Joints]:
+        """Return angles and speeds of the joints at a virtual time within the last tick, or `memory_s` before it."""
+        tick, fraction, target, velocity, _ = self._find_tick(time_s)
         return self._joints(tick.offset, tick.gain, target, velocity, fraction)
 
     def state_at(self, time_s: float) -> tuple[Joints, Joints, Joints]:
-        """The joints' angles, speeds and accelerations, those of the ripple included."""
+        """Return the joints' angles, speeds and accelerations, including the ripple's."""
         if self.still:
             return self.now.q_rad, ZERO, ZERO
-        tick, fraction, target, velocity, acceleration = self._played(time_s)
+        tick, fraction, target, velocity, acceleration = self._find_tick(time_s)
         q, qd = self._joints(tick.offset, tick.gain, target, velocity, fraction)
         qdd = [0.0] * 6
         for joint in range(6):
@@ -171,14 +171,14 @@ class JointMotion:
                 qdd[joint] = ripple.gain(u) * change + ripple.bend(u) * speed * speed
         return q, qd, tuple(qdd)
 
-    def _played(self, time_s: float) -> tuple[_Tick, float, Joints, Joints, Joints]:
-        """The tick a time lies in, the time scaling then, and what the trajectory asks for."""
+    def _find_tick(self, time_s: float) -> tuple[_Tick, float, Joints, Joints, Joints]:
+        """Return the tick with a time, the time scaling then, and the trajectory's state."""
         tick = self._ticks[-1]
         if time_s < tick.start_s:
             tick = next((it for it in reversed(self._ticks) if it.start_s <= time_s), self._ticks[0])
         elapsed = min(max(time_s - tick.start_s, 0.0), TICK_S)
-        along = tick.along_s + (tick.fraction + 0.5 * tick.slope_per_s * elapsed) * elapsed
-        return tick, tick.fraction + tick.slope_per_s * elapsed, *tick.trajectory.at(along)
+        trajectory_s = tick.trajectory_s + (tick.fraction + 0.5 * tick.slope_per_s * elapsed) * elapsed
+        return tick, tick.fraction + tick.slope_per_s * elapsed, *tick.trajectory.state_at(trajectory_s)
 
     def _joints(
         self, offset: Joints, gain: Joints, target: Joints, velocity: Joints, fraction: float
@@ -199,33 +199,33 @@ class JointMotion:
         change = self.fraction_wanted - self._fraction
         limit = SCALING_RATE_PER_S * TICK_S
         self._fraction += max(-limit, min(limit, change))
-        fraction, slope = (begin_fraction, (self._fraction - begin_fraction) / TICK_S) if self._scaled else (1.0, 0.0)
+        fraction, slope = (begin_fraction, (self._fraction - begin_fraction) / TICK_S) if self._scales else (1.0, 0.0)
         self._ticks.append(_Tick(end_s - TICK_S, begin_s, fraction, slope, self._trajectory, self._offset, self._gain))
         if self.standing:
-            self._stirred = max(0, self._stirred - 1)
+            self._moving_ticks = max(0, self._moving_ticks - 1)
         else:
-            mean = 0.5 * (begin_fraction + self._fraction) if self._scaled else 1.0
+            mean = 0.5 * (begin_fraction + self._fraction) if self._scales else 1.0
             self._trajectory_s += mean * TICK_S
             self._now = None
-            self._stirred = self._ticks.maxlen or 1
+            self._moving_ticks = self._ticks.maxlen or 1
         if self._lateness_s is not None:
             self._late_s = self._lateness_s()
 
     # -- commands ------------------------------------------------------------------------------------------------
     def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
-        """A moveJ from standstill."""
-        # From where the joints stand: after a stop that need not be where the program wanted them.
+        """Play a moveJ from rest."""
+        # From the joints' actual angles, which after a stop need not be the program's.
         self.follow(plan_joint_move(self.q_rad, target_rad, speed_rad_s, acceleration_rad_s2, self.speed_limit_rad_s))
 
     def follow(self, trajectory: Trajectory) -> None:
-        """Any trajectory from standstill that begins where the joints are."""
+        """Play any trajectory from rest that begins at the joints' angles."""
         self._offset, self._gain = self._map(self.q_rad, trajectory.end_rad)
         self._play(trajectory, scaled=True)
 
     def speed(self, qd_rad_s: Joints, acceleration_rad_s2: float) -> None:
-        """A speedJ, from whatever the joints do now: to this velocity, and on."""
+        """Play a speedJ from the joints' present state: to this velocity, and on."""
         wanted = tuple(max(-m, min(m, v)) for v, m in zip(qd_rad_s, self.speed_limit_rad_s, strict=True))
-        velocity = self._trajectory.at(self._trajectory_s)[1]
+        velocity = self._trajectory.state_at(self._trajectory_s)[1]
         self._play(plan_speed_change(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
 
     def stop(self, deceleration_rad_s2: float) -> None:
@@ -237,14 +237,14 @@ class JointMotion:
             self._play(build_rest(self.now.target_q_rad), scaled=True)
 
     def _play(self, trajectory: Trajectory, scaled: bool) -> None:
-        self._trajectory, self._scaled, self._trajectory_s = trajectory, scaled, 0.0
+        self._trajectory, self._scales, self._trajectory_s = trajectory, scaled, 0.0
         self._now = None
 
     def _map(self, start: Joints, end: Joints) -> tuple[Joints, Joints]:
-        """Offset and gain from target to smooth angle, so that the joints stand exactly on both ends of the way."""
+        """Return offset and gain from target to smooth angle, so that the joints rest exactly on the path's ends."""
         first = [r.smooth(q) for r, q in zip(self._ripples, start, strict=True)]
         last = [r.smooth(q) for r, q in zip(self._ripples, end, strict=True)]
-        gain = tuple(  # a way shorter than any precision asked for has none
+        gain = tuple(  # a path shorter than any useful precision has none
             (v - u) / (b - a) if abs(b - a) > 1e-9 else 1.0 for u, v, a, b in zip(first, last, start, end, strict=True)
         )
         return tuple(u - g * a for u, g, a in zip(first, gain, start, strict=True)), gain

@@ -1,6 +1,6 @@
-"""An arm's links: as the drawing has them, as its controller knows them, and as they are.
+"""An arm's links: by the drawing, by its controller, and in truth.
 
-Denavit and Hartenberg's parameters, in the names of UR's calibration file (delta_theta, delta_a, delta_d, delta_alpha).
+Denavit–Hartenberg parameters, in the names of UR's calibration file (delta_theta, delta_a, delta_d, delta_alpha).
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ ZERO6 = (0.0,) * 6
 
 @dataclass(frozen=True, slots=True)
 class ArmLink:
-    """One link: a turn by its joint's angle and `theta_rad`, a way d along z and a along x, a turn by alpha about x."""
+    """A link: rotation by joint angle plus `theta_rad` about z, offsets d along z, a along x, rotation alpha on x."""
 
     theta_rad: float
     a_m: float
@@ -28,7 +28,7 @@ Drawing = tuple[tuple[float, float, int], ...]  # of each link length a, offset 
 
 
 def build_drawing(a_m: tuple[float, float], d_m: tuple[float, float, float, float]) -> Drawing:
-    """The drawing of an arm of this maker, of a2 a3 and d1 d4 d5 d6; all are bent alike."""
+    """Return the drawing of an arm of this maker from a2 a3 and d1 d4 d5 d6; the twists are the same for all."""
     (a2, a3), (d1, d4, d5, d6) = a_m, d_m
     return ((0.0, d1, 1), (a2, 0.0, 0), (a3, 0.0, 0), (0.0, d4, 1), (0.0, d5, -1), (0.0, d6, 0))
 
@@ -43,7 +43,7 @@ def links(
     alpha_rad: Sequence[float] = ZERO6,
     drawing: Drawing = UR10E,
 ) -> Links:
-    """The drawing's links with these deviations of each joint. Without any, quarter turns are exact."""
+    """Return the drawing's links with these deviations of each joint. Without any, quarter turns are exact."""
     return tuple(
         _link(theta, a + da, d + dd, quarters, twist)
         for (a, d, quarters), theta, da, dd, twist in zip(drawing, theta_rad, a_m, d_m, alpha_rad, strict=True)

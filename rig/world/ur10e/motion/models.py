@@ -1,9 +1,9 @@
-"""The arms that the simulated controller can be: what it says of each, and how it is made.
+"""The arms that the simulated controller can be.
 
-A table of its own, beside that of `rig/motion/models/`: a wrong row in one is found by the other
+This table is independent of that in `rig/motion/models/`, so that each finds a wrong row in the other
 (tests/motion/test_models.py). Drawings, speeds, masses and their centres: the maker's ROS 2 description
-(`default_kinematics.yaml`, `joint_limits.yaml`, `physical_parameters.yaml` of each model) and his article 45257; types
-and names: his client library.
+(`default_kinematics.yaml`, `joint_limits.yaml`, `physical_parameters.yaml` of each model) and article 45257; types and
+names: the maker's client library.
 """
 
 from collections.abc import Mapping
@@ -24,10 +24,11 @@ CB3: Version = (3, 15, 8, 0)
 
 @dataclass(frozen=True, slots=True)
 class ArmModel:
-    """One arm: the controller's number for its type, what its dashboard calls it, its links, what its joints may do.
+    """One arm model.
 
-    A joint's angle may be `limit_rad` to either side, its speed `speed_rad_s`. `home_deg` is where it stands when the
-    laboratory opens, if the configuration says no other pose; `polyscope` is its software where nothing else is said.
+    - `robot_type`, `name`: the controller's number of the type, and its name on the dashboard.
+    - `limit_rad`, `speed_rad_s`: greatest joint angles, to either side, and speeds.
+    - `home_deg`, `polyscope`: initial pose and software version, if the configuration has none.
     """
 
     robot_type: int
@@ -45,40 +46,40 @@ def _model(
     robot_type: int, name: str, drawing: Drawing, bodies: Bodies, *, payload_kg: float, speed_deg_s: Joints
 ) -> ArmModel:
     return ArmModel(
-        robot_type, name, drawing, (2 * pi,) * 6, tuple(radians(each) for each in speed_deg_s), payload_kg, bodies
+        robot_type, name, drawing, (2 * pi,) * 6, tuple(radians(speed) for speed in speed_deg_s), payload_kg, bodies
     )
 
 
-def _bodies(*each: tuple[float, float, float, float]) -> Bodies:
-    """Masses, kg, and their centres, m, in the frame of what each link carries."""
-    return Bodies(tuple(mass for mass, *_ in each), tuple((x, y, z) for _, x, y, z in each))
+def _build_bodies(*links: tuple[float, float, float, float]) -> Bodies:
+    """Return the bodies for mass, kg, and centre, m, of each link in its own frame."""
+    return Bodies(tuple(mass for mass, *_ in links), tuple((x, y, z) for _, x, y, z in links))
 
 
-_UR3E = _bodies(
+_UR3E = _build_bodies(
     (1.98, 0.0, -0.02, 0.0), (3.4445, 0.13, 0.0, 0.1157), (1.437, 0.05, 0.0, 0.0238),
     (0.871, 0.0, 0.0, 0.01), (0.805, 0.0, 0.0, 0.01), (0.261, 0.0, 0.0, -0.02),
 )  # fmt: skip
-_UR5E = _bodies(
+_UR5E = _build_bodies(
     (3.761, 0.0, -0.02561, 0.00193), (8.058, 0.2125, 0.0, 0.11336), (2.846, 0.15, 0.0, 0.0265),
     (1.37, 0.0, -0.0018, 0.01634), (1.3, 0.0, 0.0018, 0.01634), (0.365, 0.0, 0.0, -0.001159),
 )  # fmt: skip
-_UR10E = _bodies(
+_UR10E = _build_bodies(
     (7.369, 0.021, 0.0, 0.027), (13.051, 0.38, 0.0, 0.158), (3.989, 0.24, 0.0, 0.068),
     (2.1, 0.0, 0.007, 0.018), (1.98, 0.0, 0.007, 0.018), (0.615, 0.0, 0.0, -0.026),
 )  # fmt: skip
-_UR16E = _bodies(
+_UR16E = _build_bodies(
     (7.369, 0.0, -0.016, 0.03), (10.45, 0.302, 0.0, 0.16), (4.321, 0.194, 0.0, 0.065),
     (2.18, 0.0, -0.009, 0.011), (2.033, 0.0, 0.018, 0.012), (0.907, 0.0, 0.0, -0.044),
 )  # fmt: skip
-_UR20 = _bodies(
+_UR20 = _build_bodies(
     (16.343, 0.0, -0.061, 0.0062), (29.632, 0.5226, 0.0, 0.2098), (7.879, 0.3234, 0.0, 0.0604),
     (3.054, 0.0, -0.0026, 0.0393), (3.126, 0.0, 0.0024, 0.0379), (0.926, 0.0, 0.0, -0.0293),
 )  # fmt: skip
-_UR30 = _bodies(
+_UR30 = _build_bodies(
     (16.343, -0.0001, -0.06, 0.0069), (28.542, 0.3894, 0.0, 0.2103), (7.156, 0.2257, 0.0, 0.0629),
     (3.054, 0.0, -0.0048, 0.0353), (3.126, 0.0, 0.0046, 0.0341), (0.926, 0.0, 0.0, -0.0293),
 )  # fmt: skip
-_UR10 = _bodies(
+_UR10 = _build_bodies(
     (7.1, 0.021, 0.0, 0.027), (12.7, 0.38, 0.0, 0.158), (4.27, 0.24, 0.0, 0.068),
     (2.0, 0.0, 0.007, 0.018), (2.0, 0.0, 0.007, 0.018), (0.365, 0.0, 0.0, -0.026),
 )  # fmt: skip
@@ -113,9 +114,9 @@ MODELS: Mapping[ModelName, ArmModel] = MappingProxyType(
 
 
 def select_model(section: SimulatedArmSection, configured: ModelName) -> ArmModel:
-    """The model of a laboratory's arm, with what its safety settings leave of what its joints can do.
+    """Return the model of a laboratory's arm, restricted by its safety settings.
 
-    It is the one `configured` where the laboratory's section says no other.
+    It is the one `configured` if the laboratory's section names none.
     """
     model = MODELS[section.model or configured]
     if section.joint_limits_deg is not None:

@@ -1,7 +1,7 @@
-"""The servo's vibration: a position ripple locked to the joint's angle, so whole turns integrate exactly.
+"""The servo's vibration: a position ripple locked to the joint's angle, so that whole turns integrate exactly.
 
-q = u + Σ Aₙ sin(n u + φₙ), with u the smooth angle the joint is driven by and n whole cycles a turn. After a turn of u
-the joint has made a turn too, whatever the ripple; SIX, section on vibration, needs exactly that of the mean speed.
+q = u + Σ Aₙ sin(n u + φₙ), with u the smooth angle that drives the joint and n whole cycles a turn. After a turn of u
+the joint has made a turn too, whatever the ripple; SIX, section on vibration, needs exactly this of the mean speed.
 """
 
 from collections.abc import Sequence
@@ -17,28 +17,28 @@ class Ripple:
     components: tuple[tuple[int, float, float], ...] = ()
 
     def angle(self, smooth_rad: float) -> float:
-        """The joint's angle at the smooth angle, rad."""
+        """Return the joint's angle at the smooth angle, rad."""
         ripple = 0.0
         for n, a, phase in self.components:
             ripple += a * sin(n * smooth_rad + phase)
         return smooth_rad + ripple
 
     def gain(self, smooth_rad: float) -> float:
-        """Exact derivative of the joint's angle with respect to the smooth angle."""
+        """Return the exact derivative of the joint's angle with respect to the smooth angle."""
         ripple = 0.0
         for n, a, phase in self.components:
             ripple += a * n * cos(n * smooth_rad + phase)
         return 1.0 + ripple
 
     def bend(self, smooth_rad: float) -> float:
-        """The second derivative."""
+        """Return the second derivative of the joint's angle with respect to the smooth angle."""
         ripple = 0.0
         for n, a, phase in self.components:
             ripple += a * n * n * sin(n * smooth_rad + phase)
         return -ripple
 
     def smooth(self, angle_rad: float) -> float:
-        """A smooth angle at which the joint stands at `angle_rad` (bisection: it brackets a root for any amplitude)."""
+        """Return a smooth angle at which the joint is at `angle_rad`, by bisection, which suits any amplitude."""
         if not self.components:
             return angle_rad
         reach = sum(a for _, a, _ in self.components)
@@ -53,7 +53,7 @@ class Ripple:
 
 
 def draw_ripple(fraction: float, cycles_per_turn: Sequence[int], random: Random) -> Ripple:
-    """Components of equal rate, random phases; the RMS of the rate ripple over a turn is `fraction` of the rate."""
+    """Draw a ripple of components of equal rate; the RMS rate ripple over a turn is `fraction` of the rate."""
     if fraction == 0.0:
         return Ripple()
     rate = fraction * sqrt(2.0 / len(cycles_per_turn))

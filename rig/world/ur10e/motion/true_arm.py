@@ -1,4 +1,4 @@
-"""The arm as it is, beside what its controller knows: how its flange really moves, and in whose time."""
+"""The arm's true motion, apart from what its controller knows: its flange's motion in the world's time."""
 
 from math import pi
 from random import Random
@@ -6,7 +6,7 @@ from random import Random
 from rig.config.world.laboratory import CalibrationSection, SimulatedArmSection
 from rig.world.clock import TICK_S
 from rig.world.site import SiteTruth
-from rig.world.ur10e.motion.flange_motion import InertialMotion, find_base_motion, find_cosines, propagate_motion
+from rig.world.ur10e.motion.flange_motion import BodyMotion, find_base_motion, find_cosines, propagate
 from rig.world.ur10e.motion.forward_kinematics import Rotation, Vector, flange_rate, frames
 from rig.world.ur10e.motion.joint_errors import Errors, JointErrors
 from rig.world.ur10e.motion.joint_motion import JointMotion
@@ -14,26 +14,26 @@ from rig.world.ur10e.motion.links import UR10E, ZERO6, Drawing, Links, links
 from rig.world.ur10e.motion.trajectory import Joints
 
 STILL: Vector = (0.0, 0.0, 0.0)
-WRIST = 3  # the first of the joints that vibrate: those before it mostly stand
+WRIST = 3  # the first joint that vibrates: those before it are mostly at rest
 
 
 def build_calibrated_links(
     calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6, drawing: Drawing = UR10E
 ) -> Links:
-    """The links as the maker calibrated them; with the twists that he does not know, as they are."""
+    """Return the links by the maker's calibration. With `twist_rad`, unknown to the maker, they are the true ones."""
     return links(
         calibration.delta_theta_rad,
         [1e-3 * length for length in calibration.delta_a_mm],
         [1e-3 * length for length in calibration.delta_d_mm],
-        [known + rest for known, rest in zip(calibration.delta_alpha_rad, twist_rad, strict=True)],
+        [alpha + twist for alpha, twist in zip(calibration.delta_alpha_rad, twist_rad, strict=True)],
         drawing,
     )
 
 
 class TrueArm:
-    """Where the joints that `motion` plays really stand. Times are the world's; the controller's clock has its error.
+    """The true positions of the joints that `motion` plays. Times are the world's; the controller's clock has an error.
 
-    `ideal`: nothing but the drawing, on a ground that does not turn: then the rate is all that anybody can feel of it.
+    `ideal`: the arm is exactly its drawing on ground that does not rotate, so angular rate alone describes its motion.
     """
 
     def __init__(
@@ -49,11 +49,9 @@ class TrueArm:
         self._links = build_calibrated_links(section.calibration, section.unmodelled.twist_rad, drawing)
         errors = _errors(section)
         self._errors = JointErrors(errors, random) if errors.any else None
-        self._at_rest: InertialMotion | None = None
-        self._forearm: tuple[tuple[tuple[float, ...], ...], InertialMotion] = (
-            (),
-            find_base_motion(site),
-        )  # felt there, and how joints were
+        self._at_rest: BodyMotion | None = None
+        # The inner joints' state and the forearm's motion.
+        self._forearm: tuple[tuple[Joints, ...], BodyMotion] = ((), find_base_motion(site))
         self.ideal = (
             self._speed == 1.0
             and self._links == links(drawing=drawing)
@@ -64,33 +62,33 @@ class TrueArm:
 
     @property
     def tick_s(self) -> float:
-        """How long the controller's tick of 2 ms really lasts."""
+        """The true duration of the controller's tick of 2 ms, s."""
         return TICK_S / self._speed
 
-    def true_s(self, controller_s: float) -> float:
-        """The time when the controller's clock shows that."""
+    def true_time_s(self, controller_s: float) -> float:
+        """Return the true time at which the controller's clock reads `controller_s`."""
         return controller_s / self._speed
 
     def step(self, controller_s: float) -> None:
-        """A tick of the controller has ended."""
+        """Update after a tick of the controller."""
         if not self._motion.still:
             self._at_rest = None
             if self._errors is not None:
                 self._errors.step(controller_s, self._motion.q_rad, self._motion.qd_rad_s)
 
     def rate_at(self, time_s: float) -> Vector:
-        """Angular rate of an ideal arm's flange in its own frame, rad/s, at a time inside the last tick."""
-        return STILL if self._motion.still else flange_rate(*self._motion.at(time_s), self._links)
+        """Return the angular rate of an ideal arm's flange in its own frame, rad/s, at a time within the last tick."""
+        return STILL if self._motion.still else flange_rate(*self._motion.joints_at(time_s), self._links)
 
-    def motion_at(self, time_s: float) -> InertialMotion:
-        """All that a body on the flange feels at a time inside the last tick or the motion's memory."""
+    def motion_at(self, time_s: float) -> BodyMotion:
+        """Return the motion of the flange at a time within the last tick or the motion's memory."""
         controller_s = time_s * self._speed
-        resting = (
+        is_resting = (
             self._motion.still
             and self._motion.vibration is None
-            and (self._errors is None or self._errors.quiet(controller_s))
+            and (self._errors is None or self._errors.is_quiet(controller_s))
         )
-        if resting and self._at_rest is not None:
+        if is_resting and self._at_rest is not None:
             return self._at_rest
         q, qd, qdd = self._joints_at(controller_s)
         if self._speed != 1.0:  # the controller's seconds are not the world's
@@ -99,27 +97,24 @@ class TrueArm:
         inner = q[:WRIST], qd[:WRIST], qdd[:WRIST]
         if self._forearm[0] != inner:
             forearm = self._links[:WRIST]
-            self._forearm = (
-                inner,
-                propagate_motion(find_base_motion(self._site), find_cosines(inner[0], forearm), *inner[1:], forearm),
-            )
+            base = find_base_motion(self._site)
+            self._forearm = inner, propagate(base, find_cosines(inner[0], forearm), *inner[1:], forearm)
         wrist = self._links[WRIST:]
-        now = propagate_motion(self._forearm[1], find_cosines(q[WRIST:], wrist), qd[WRIST:], qdd[WRIST:], wrist)
-        self._at_rest = now if resting else None
+        now = propagate(self._forearm[1], find_cosines(q[WRIST:], wrist), qd[WRIST:], qdd[WRIST:], wrist)
+        self._at_rest = now if is_resting else None
         return now
 
     def frames_at(self, time_s: float) -> list[tuple[Rotation, Vector]]:
-        """Rotation (rows) and place (m) in the base frame of the base and of what each joint carries, the flange last,
-        at such a time."""
+        """Return rotation (rows) and position (m) in the base frame of the base and of each link, the flange last."""
         q, _, _ = self._joints_at(time_s * self._speed)
         return list(frames(q, self._links))
 
     def _joints_at(self, controller_s: float) -> tuple[Joints, Joints, Joints]:
-        """Angles, speeds and accelerations of the joints by the controller's seconds."""
-        joints, seen = self._motion.state_at(controller_s), self._motion.vibration
+        """Return angles, speeds and accelerations of the joints at the controller's time `controller_s`."""
+        joints, visible = self._motion.state_at(controller_s), self._motion.vibration
         if self._errors is not None:
-            joints = self._errors.at(controller_s, *joints)
-        return joints if seen is None else seen.added(controller_s, *joints)
+            joints = self._errors.true_state(controller_s, *joints)
+        return joints if visible is None else visible.add(controller_s, *joints)
 
 
 def _errors(section: SimulatedArmSection) -> Errors:

@@ -1,4 +1,4 @@
-"""A vibration of the wrists that nothing is locked to: the same at every speed, and where they stand."""
+"""A vibration of the wrists that is not locked to any angle: the same at every speed and at rest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,24 +11,24 @@ WRISTS = (3, 4, 5)
 
 @dataclass(frozen=True, slots=True)
 class Vibration:
-    """`rms_rad_s` of each wrist's rate, shared by all lines alike.
+    """A vibration of each wrist with rate `rms_rad_s`, divided equally among all tones.
 
-    `lines` are their angular frequencies in rad/s, each with the phases of the three wrists in rad.
+    `tones`: angular frequencies in rad/s, each with the phases of the three wrists in rad.
     """
 
     rms_rad_s: float
-    lines: Sequence[tuple[float, Sequence[float]]]
+    tones: Sequence[tuple[float, Sequence[float]]]
 
-    def added(
+    def add(
         self, time_s: float, q_rad: Sequence[float], qd_rad_s: Sequence[float], qdd_rad_s2: Sequence[float]
     ) -> tuple[Joints, Joints, Joints]:
-        """Angles, speeds and accelerations of joints that vibrate, of such that do not."""
+        """Return angles, speeds and accelerations of the joints with the vibration added."""
         angles, speeds, accelerations = list(q_rad), list(qd_rad_s), list(qdd_rad_s2)
-        for turn, phases_rad in self.lines:
-            size = sqrt(2.0 / len(self.lines)) * self.rms_rad_s / turn
+        for frequency_rad_s, phases_rad in self.tones:
+            amplitude_rad = sqrt(2.0 / len(self.tones)) * self.rms_rad_s / frequency_rad_s
             for joint, phase in zip(WRISTS, phases_rad, strict=True):
-                swing = size * sin(turn * time_s + phase)
-                angles[joint] += swing
-                speeds[joint] += turn * size * cos(turn * time_s + phase)
-                accelerations[joint] -= turn * turn * swing
+                offset_rad = amplitude_rad * sin(frequency_rad_s * time_s + phase)
+                angles[joint] += offset_rad
+                speeds[joint] += frequency_rad_s * amplitude_rad * cos(frequency_rad_s * time_s + phase)
+                accelerations[joint] -= frequency_rad_s * frequency_rad_s * offset_rad
         return tuple(angles), tuple(speeds), tuple(accelerations)

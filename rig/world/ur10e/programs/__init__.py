@@ -1,1 +1,1 @@
-"""Programs that the simulated controller runs: URScript, and what ur_rtde uploads."""
+"""Programs of the simulated controller: URScript, and the one that ur_rtde uploads."""

@@ -1,4 +1,4 @@
-"""Programs as cooperative threads: each a generator that gives way once a tick."""
+"""Programs as cooperative threads: generators that yield once a tick."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,15 +12,15 @@ from rig.world.ur10e.robot import Robot
 Steps = Iterator[None]
 
 NUMBER_MAX = 1e6  # of angles, lengths, speeds and accelerations, all in SI units
-SLOWEST, SLOWEST_LINE_M_S = 1e-6, 1e-3  # rad/s and m/s, and the same per second: slower ways are not planned for
-HAND_OVER_RAD_S2 = 4.0  # a move that follows a killed one lets the joints come to rest first
+SLOWEST, SLOWEST_LINE_M_S = 1e-6, 1e-3  # rad/s and m/s, and the same per second: the slowest moves
+HAND_OVER_RAD_S2 = 4.0  # deceleration before a move that follows a killed one
 
 
 @dataclass(frozen=True, slots=True)
 class ScriptMove:
     """A movej or (`straight`) movel to joint angles or (`is_pose`) a pose of the tool's frame.
 
-    Speed and acceleration in rad/s and rad/s², straight: m/s and m/s².
+    Speed and acceleration in rad/s and rad/s²; of a straight move in m/s and m/s².
     """
 
     target: tuple[float, ...]
@@ -31,7 +31,7 @@ class ScriptMove:
 
 
 def check_finite(values: Sequence[float]) -> None:
-    """Raises `ProgramError` for a number no joint can follow."""
+    """Raise `ProgramError` if a number is too large for any joint."""
     if not all(abs(value) <= NUMBER_MAX for value in values):
         raise ProgramError(f"a number no joint can follow among {list(values)}")
 
@@ -53,20 +53,20 @@ class Threads:
 
     @property
     def any(self) -> bool:
-        """Whether there are threads beside the main one."""
+        """Whether there are threads other than the main one."""
         return bool(self._threads)
 
-    def running(self, name: str) -> bool:
+    def is_running(self, name: str) -> bool:
         return name in self._threads
 
     def step(self) -> None:
-        """One tick of every thread."""
+        """Step every thread once."""
         for name, steps in list(self._threads.items()):
             if next(steps, StopIteration) is StopIteration:
                 self.kill(name)
 
     def take(self, name: str) -> None:
-        """Claim the joints. Raises `ProgramError` when another thread has them."""
+        """Claim the joints. Raise `ProgramError` if another thread has them."""
         if self._mover not in (None, name):
             raise ProgramError("another thread is already controlling the robot")
         self._mover = name
@@ -76,7 +76,7 @@ class Threads:
             self._mover = None
 
     def move(self, name: str, move: ScriptMove) -> Steps:
-        """A move on behalf of the thread `name`: ends when the joints stand at the target."""
+        """Move on behalf of the thread `name`, until the joints rest at the target."""
         if not min(move.speed, move.acceleration) >= (SLOWEST_LINE_M_S if move.straight else SLOWEST):
             raise ProgramError("a move needs a speed and an acceleration above zero")
         check_finite([*move.target, move.speed, move.acceleration])
@@ -85,14 +85,14 @@ class Threads:
         self.take(name)
         motion, links = self.robot.motion, self.robot.links
         if move.straight:
-            pose = self.robot.flange_for(move.target) if move.is_pose else flange_pose(move.target, links)
+            pose = self.robot.flange_pose_for(move.target) if move.is_pose else flange_pose(move.target, links)
             trajectory = yield from plan_straight_line(motion.q_rad, pose, move.speed, move.acceleration, links)
         else:
             target = move.target
             if move.is_pose:
-                target = solve_inverse_kinematics(self.robot.flange_for(target), motion.q_rad, links)
+                target = solve_inverse_kinematics(self.robot.flange_pose_for(target), motion.q_rad, links)
             trajectory = plan_joint_move(motion.q_rad, target, move.speed, move.acceleration, motion.speed_limit_rad_s)
-        if not self.robot.within_limits(trajectory.end_rad):
+        if not self.robot.is_within_limits(trajectory.end_rad):
             raise ProgramError("joint position out of limits: a target lies beyond a joint's limit")
         motion.follow(trajectory)
         while not motion.standing:

@@ -1,7 +1,7 @@
-"""The program that ur_rtde uploads, acted out: its register protocol, not its text.
+"""The program that ur_rtde uploads, simulated by its register protocol, not by its text.
 
-A client writes a command into input integer register 0; the program answers 2 in output integer register 0 when it is
-done, the client writes 0, the program answers 1 (ready). Real-time commands are never answered 2.
+A client writes a command into input integer register 0. When it is done, the program answers 2 in output integer
+register 0; the client writes 0, and the program answers 1 (ready). Real-time commands are never answered 2.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +28,7 @@ Command = Callable[[], Steps]
 
 @dataclass(frozen=True, slots=True)
 class SpeedTarget:
-    """Speed the joints are to have, rad/s and rad/s²; `of_tool`: the tool in the base's frame, m/s, rad/s and m/s²."""
+    """Joint speeds in rad/s and rad/s²; with `of_tool` the tool's in the base's frame, m/s, rad/s and m/s²."""
 
     speed: Joints
     acceleration: float
@@ -36,7 +36,7 @@ class SpeedTarget:
 
 
 class ControlProgram:
-    """`rtde_control`, as uploaded by ur_rtde. `path` holds the moves injected into it (moveJ with a path)."""
+    """The program `rtde_control` of ur_rtde. `path`: the moves injected into it (moveJ with a path)."""
 
     name = "rtde_control"
 
@@ -48,7 +48,7 @@ class ControlProgram:
         self._servo_target: tuple[Joints, float] = (robot.motion.now.target_q_rad, 0.1)
         self._speed_target = SpeedTarget((0.0,) * 6, 0.5)
         self._operation = self._writes = 0
-        self._heard: int | None = None  # the command that was there when the main thread last gave way between two
+        self._idle_code: int | None = None  # the command at the main thread's last yield between commands
         self._commands: dict[int, Command] = {
             1: self._movej,
             2: self._movej_ik,
@@ -73,29 +73,29 @@ class ControlProgram:
 
     @property
     def waiting(self) -> bool:
-        """Every command is done and answered, and no thread runs."""
-        return not self._threads.any and self._heard is not None and self._registers.whole(0) == self._heard
+        """Whether every command is done and answered, and no thread runs."""
+        return not self._threads.any and self._idle_code is not None and self._registers.integer(0) == self._idle_code
 
     def _loop(self) -> Steps:
         self._signal_async(-1)
-        self._registers.answer(0, READY)
+        self._registers.write_integer(0, READY)
         executing = False
         while True:
-            code = self._registers.whole(0)
+            code = self._registers.integer(0)
             if code == 0 or code in REALTIME:
                 executing = False if code == 0 else executing
                 if code:
                     yield from self._command(code)()
-                self._registers.answer(0, READY)
+                self._registers.write_integer(0, READY)
             elif not executing:
                 if code == STOP_SCRIPT:
                     return
                 yield from self._command(code)()
-                self._registers.answer(0, DONE)
+                self._registers.write_integer(0, DONE)
                 executing = True
-            self._heard = None if code in REALTIME else code
+            self._idle_code = None if code in REALTIME else code
             yield
-            self._heard = None
+            self._idle_code = None
 
     def _command(self, code: int) -> Command:
         if code in self._questions:
@@ -106,34 +106,34 @@ class ControlProgram:
         return self._commands[code]
 
     def _asynchronously(self) -> bool:
-        return self._registers.whole(1) == 1
+        return self._registers.integer(1) == 1
 
     def _signal_async(self, progress: int) -> None:
-        """The word an asynchronous operation is watched by: operation id, write count, running bit, progress."""
+        """Write the progress word of an asynchronous operation: operation id, write count, running bit, progress."""
         self._writes = (self._writes + 1) % 128
         if progress == 0:
             self._operation = (self._operation + 1) % 128
         word = self._operation << 24 | self._writes << 16
         if progress >= 0:
             word |= 1 << 15 | min(progress, 0x7FFF)
-        self._registers.answer(2, word)
+        self._registers.write_integer(2, word)
 
     # -- moves ---------------------------------------------------------------------------------------------------
-    def _asked(self, straight: bool, is_pose: bool) -> Steps:
+    def _move_to_request(self, straight: bool, is_pose: bool) -> Steps:
         *target, speed, acceleration = self._registers.doubles(0, 8)
         return self._move([ScriptMove(tuple(target), speed, acceleration, straight, is_pose)])
 
     def _movej(self) -> Steps:
-        return self._asked(straight=False, is_pose=False)
+        return self._move_to_request(straight=False, is_pose=False)
 
     def _movej_ik(self) -> Steps:
-        return self._asked(straight=False, is_pose=True)
+        return self._move_to_request(straight=False, is_pose=True)
 
     def _movel(self) -> Steps:
-        return self._asked(straight=True, is_pose=True)
+        return self._move_to_request(straight=True, is_pose=True)
 
     def _movel_fk(self) -> Steps:
-        return self._asked(straight=True, is_pose=False)
+        return self._move_to_request(straight=True, is_pose=False)
 
     def _move_path(self) -> Steps:
         return self._move(self._path)
@@ -153,7 +153,7 @@ class ControlProgram:
         self._signal_async(-1)
 
     def _kill_async(self, name: str) -> None:
-        if self._threads.running(name):
+        if self._threads.is_running(name):
             self._threads.kill(name)
             self._signal_async(-1)
 
@@ -181,23 +181,23 @@ class ControlProgram:
         *velocity, acceleration, _ = self._registers.doubles(0, 8)
         check_finite([*velocity, acceleration])
         self._speed_target = SpeedTarget(tuple(velocity), max(acceleration, 0.01), of_tool)
-        if not self._threads.running("speed"):
+        if not self._threads.is_running("speed"):
             self._threads.run("speed", self._speed_thread())
         return _nothing()
 
     def _speed_thread(self) -> Steps:
-        done = None
+        last = None
         tool: Sequence[float] = (0.0,) * 6
         while True:
             self._threads.take("speed")
-            wanted = self._speed_target
-            if wanted.of_tool:
-                tool = approach_speed(tool, wanted.speed, wanted.acceleration * TICK_S)
-                here = self._robot.motion.now.target_q_rad
-                self._robot.motion.speed(solve_joint_speeds(here, tool, self._robot.links), FOLLOWING_RAD_S2)
-            elif wanted != done:
-                self._robot.motion.speed(wanted.speed, wanted.acceleration)
-            done = wanted
+            target_speed = self._speed_target
+            if target_speed.of_tool:
+                tool = approach_speed(tool, target_speed.speed, target_speed.acceleration * TICK_S)
+                current = self._robot.motion.now.target_q_rad
+                self._robot.motion.speed(solve_joint_speeds(current, tool, self._robot.links), FOLLOWING_RAD_S2)
+            elif target_speed != last:
+                self._robot.motion.speed(target_speed.speed, target_speed.acceleration)
+            last = target_speed
             yield
 
     def _speed_stop(self) -> Steps:
@@ -212,22 +212,22 @@ class ControlProgram:
     def _servol(self) -> Steps:
         values = self._registers.doubles(0, 11)
         check_finite(values)
-        pose = self._robot.flange_for(values[:6])
+        pose = self._robot.flange_pose_for(values[:6])
         return self._servo(solve_inverse_kinematics(pose, self._robot.motion.q_rad, self._robot.links), values[9])
 
     def _servo(self, target: Joints, lookahead_s: float) -> Steps:
         self._servo_target = (target, max(lookahead_s, 0.03))
-        if not self._threads.running("servo"):
+        if not self._threads.is_running("servo"):
             self._threads.run("servo", self._servo_thread())
         return _nothing()
 
     def _servo_thread(self) -> Steps:
-        """Every tick steer towards the newest target: the way left is to be made in the look-ahead time."""
+        """Steer towards the newest target every tick, so that the rest of the path takes the look-ahead time."""
         while True:
             self._threads.take("servo")
             target, lookahead_s = self._servo_target
-            here = self._robot.motion.now.target_q_rad
-            velocity = tuple((b - a) / lookahead_s for a, b in zip(here, target, strict=True))
+            current = self._robot.motion.now.target_q_rad
+            velocity = tuple((b - a) / lookahead_s for a, b in zip(current, target, strict=True))
             self._robot.motion.speed(velocity, FOLLOWING_RAD_S2)
             yield
 

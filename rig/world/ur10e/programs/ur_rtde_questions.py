@@ -1,4 +1,4 @@
-"""What a client of ur_rtde asks and sets: the commands of its program that move nothing, by number."""
+"""Queries and settings of a client of ur_rtde: the commands of its program that move nothing, by number."""
 
 from collections.abc import Callable, Sequence
 
@@ -13,26 +13,26 @@ from rig.world.ur10e.robot import Robot
 
 
 def build_questions(robot: Robot, registers: ProgramRegisters) -> dict[int, Callable[[], None]]:
-    """Each command as a function that takes no time. Raises `ProgramError` where the program would end."""
+    """Return each command as a function that takes no time. They raise `ProgramError` if the program would end."""
 
     def put(values: Sequence[float]) -> None:
-        registers.results(values)
+        registers.write_doubles(values)
 
     def say(yes: bool) -> None:
-        registers.answer(1, int(yes))
+        registers.write_integer(1, int(yes))
 
-    def near() -> Joints:
+    def read_start() -> Joints:
         return registers.doubles(6, 6)
 
-    def joints(nearest: Joints) -> Joints:
-        """The joints that bring the tool to the asked pose."""
+    def solve_pose(start_rad: Joints) -> Joints:
+        """Return the joint angles that bring the tool to the requested pose."""
         pose = registers.doubles(0, 6)
-        check_finite([*pose, *nearest])
-        return solve_inverse_kinematics(robot.flange_for(pose), nearest, robot.links)
+        check_finite([*pose, *start_rad])
+        return solve_inverse_kinematics(robot.flange_pose_for(pose), start_rad, robot.links)
 
-    def reached(nearest: Joints) -> bool:
+    def is_reachable(start_rad: Joints) -> bool:
         try:
-            return robot.within_limits(joints(nearest))
+            return robot.is_within_limits(solve_pose(start_rad))
         except ProgramError:
             return False
 
@@ -45,25 +45,25 @@ def build_questions(robot: Robot, registers: ProgramRegisters) -> dict[int, Call
         put(compose_poses(flange_pose(q, robot.links), offset))
 
     return {
-        8: lambda: None,  # zeroFtSensor: nothing pulls at the simulated one
+        8: lambda: None,  # zeroFtSensor: no force acts on the simulated sensor
         17: set_payload,
         26: lambda: put([TICK_S]),
         29: lambda: robot.set_tcp(registers.doubles(0, 6)),
-        30: lambda: put(joints(near())),
+        30: lambda: put(solve_pose(read_start())),
         31: robot.protective_stop,
         35: lambda: robot.set_watchdog(registers.doubles(0, 1)[0]),
-        36: lambda: say(reached(robot.motion.q_rad)),
-        37: lambda: say(robot.within_limits(registers.doubles(0, 6))),
+        36: lambda: say(is_reachable(robot.motion.q_rad)),
+        37: lambda: say(robot.is_within_limits(registers.doubles(0, 6))),
         38: lambda: put([0.0] * 6),
         39: lambda: put(compose_poses(registers.doubles(0, 6), registers.doubles(6, 6))),
         40: lambda: put(robot.tcp_offset),
         43: lambda: put(robot.tcp_pose(robot.motion.actual_q_rad)),
         44: forward_kinematics,
-        46: lambda: put(joints(robot.motion.q_rad)),
+        46: lambda: put(solve_pose(robot.motion.q_rad)),
         47: lambda: say(robot.steady),
         58: lambda: put(flange_pose(robot.motion.actual_q_rad, robot.links)),
-        60: lambda: say(reached(robot.motion.q_rad)),
-        61: lambda: say(reached(near())),
+        60: lambda: say(is_reachable(robot.motion.q_rad)),
+        61: lambda: say(is_reachable(read_start())),
     }
 
 

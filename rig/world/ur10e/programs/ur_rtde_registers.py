@@ -1,4 +1,4 @@
-"""The registers over which ur_rtde and its program speak, counted from where the client wants them."""
+"""The registers of ur_rtde and its program, counted from the client's offset."""
 
 from collections.abc import Sequence
 
@@ -12,17 +12,17 @@ class ProgramRegisters:
         self._robot = robot
         self._offset = offset
 
-    def whole(self, index: int) -> int:
-        """What the client has written, as `doubles`."""
+    def integer(self, index: int) -> int:
+        """Return an integer that the client has written."""
         return self._robot.inputs.ints[self._offset + index]
 
     def doubles(self, first: int, count: int) -> tuple[float, ...]:
         start = self._offset + first
         return tuple(self._robot.inputs.doubles[start : start + count])
 
-    def answer(self, index: int, value: int) -> None:
-        """What the client reads, as `results`; the first says whether the program is ready or done."""
+    def write_integer(self, index: int, value: int) -> None:
+        """Write an integer for the client; register 0 holds the program's state, ready or done."""
         self._robot.outputs.ints[self._offset + index] = value
 
-    def results(self, values: Sequence[float]) -> None:
+    def write_doubles(self, values: Sequence[float]) -> None:
         self._robot.outputs.doubles[self._offset : self._offset + len(values)] = values

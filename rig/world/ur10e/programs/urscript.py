@@ -1,4 +1,4 @@
-"""Simple URScript programs: statements and endless loops, played one after another."""
+"""Simple URScript programs: statements and endless loops, played in sequence."""
 
 import ast
 import operator
@@ -20,7 +20,7 @@ FRAME = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:$")
 
 
 def parse_arguments(statement: str) -> dict[str, Any]:
-    """What a call gives, by keyword or by place ("0", "1", …). Raises `ProgramError` for anything but constants."""
+    """Return a call's arguments by keyword or index ("0", "1", …). Raise `ProgramError` unless all are constants."""
     match = CALL.match(statement)
     if match is None:
         raise ProgramError(f"not simulated: {statement}")
@@ -32,7 +32,7 @@ def parse_arguments(statement: str) -> dict[str, Any]:
         values = {str(i): evaluate_constant(value) for i, value in enumerate(call.args)}
         return values | {str(item.arg): evaluate_constant(item.value) for item in call.keywords}
     except (SyntaxError, ValueError, ArithmeticError, TypeError, RecursionError, MemoryError):
-        # The last two: the parser's way of saying that brackets are nested too deeply.
+        # The last two: the parser's errors for brackets nested too deeply.
         raise ProgramError(f"not simulated: {statement}") from None
 
 
@@ -42,7 +42,7 @@ OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def evaluate_constant(node: ast.expr) -> Any:
-    """What an expression of numbers is worth (`0 + 0`), or a literal. Raises ValueError, ArithmeticError."""
+    """Return the value of a literal or of an expression of numbers (`0 + 0`). Raise ValueError, ArithmeticError."""
     match node:
         case ast.BinOp(left, operation, right) if type(operation) in OPERATIONS:
             one, other = evaluate_constant(left), evaluate_constant(right)
@@ -58,7 +58,7 @@ def evaluate_constant(node: ast.expr) -> Any:
 
 
 def read_joints(value: Any) -> Joints:
-    """Six joint angles. Raises `ProgramError` when it is something else."""
+    """Return six joint angles. Raise `ProgramError` for any other value."""
     if not isinstance(value, list) or len(value) != 6:
         raise ProgramError(f"six joint angles expected, got {value}")
     return tuple(float(angle) for angle in value)
@@ -66,15 +66,15 @@ def read_joints(value: Any) -> Joints:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One statement and where it stands in the program."""
+    """A statement and its position in the program."""
 
     text: str
-    place: tuple[int, int]
+    position: tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """`while True:` and its body."""
+    """The loop `while True:` with its body."""
 
     body: "Block"
 
@@ -83,9 +83,9 @@ Block = tuple[Call | Loop, ...]
 
 
 def check_brackets(lines: Sequence[str]) -> None:
-    """Raises `ProgramError` at the line at which the controller's compiler finds that brackets do not match.
+    """Raise `ProgramError` at the line at which the controller's compiler detects unbalanced brackets.
 
-    A bracket that is left open is noticed on the line after, and the line is said as it is written.
+    An open bracket is detected on the line after, and the message contains the line as written.
     """
     depth = 0
     for number, line in enumerate(lines, 1):
@@ -97,11 +97,11 @@ def check_brackets(lines: Sequence[str]) -> None:
             raise ProgramError(f"syntax_error_on_line:{number}:{line}:", (number, 1))
 
 
-def parse(lines: Sequence[str]) -> tuple[str, Block]:
-    """The name and body of a program.
+def parse_program(lines: Sequence[str]) -> tuple[str, Block]:
+    """Return name and body of a program.
 
-    Raises `ProgramError` at the first line the simulation does not know, in the words of the maker's compiler where the
-    line is one that this would not know either.
+    Raise `ProgramError` at the first line that is not simulated; in the words of the maker's compiler if that would not
+    know it either.
     """
     check_brackets(lines)
     name = "unnamed"
@@ -132,12 +132,12 @@ def parse(lines: Sequence[str]) -> tuple[str, Block]:
 class ScriptProgram:
     """A program of the statements below and endless loops: no variables, no conditions."""
 
-    waiting = False  # nobody looks ahead for it
+    waiting = False  # unknown
 
     def __init__(self, robot: Robot, lines: Sequence[str]) -> None:
         self._robot = robot
         self._threads = Threads(robot)
-        self.name, body = parse(lines)
+        self.name, body = parse_program(lines)
         self._main = self._play(body)
 
     def step(self) -> bool:
@@ -154,11 +154,11 @@ class ScriptProgram:
             except OutOfReach:
                 raise
             except (ProgramError, TypeError, ValueError, IndexError, ArithmeticError) as error:
-                raise ProgramError(str(error), item.place) from None
+                raise ProgramError(str(error), item.position) from None
 
 
 class Arguments:
-    """The arguments of one call, found by keyword or place."""
+    """The arguments of one call, by keyword or index."""
 
     def __init__(self, statement: str) -> None:
         self._statement, self._values = statement, parse_arguments(statement)
@@ -166,15 +166,15 @@ class Arguments:
     def all(self) -> list[Any]:
         return list(self._values.values())
 
-    def __call__(self, place: str, keyword: str, default: Any = None) -> Any:
-        found = self._values.get(keyword, self._values.get(place, default))
-        if found is None:
+    def __call__(self, index: str, keyword: str, default: Any = None) -> Any:
+        value = self._values.get(keyword, self._values.get(index, default))
+        if value is None:
             raise ProgramError(f"{self._statement} needs {keyword}")
-        return found
+        return value
 
 
 def read_move(name: str, value: Arguments) -> ScriptMove:
-    """The move a `movej` or `movel` asks for; a blend radius is not used: it stops at every target."""
+    """Return the move of a `movej` or `movel`. A blend radius is not simulated: it stops at every target."""
     target = value("0", "pose" if name == "movel" else "q")
     if not isinstance(target, list | tuple) or len(target) != 6:
         raise ProgramError(f"{name}: six joint angles or a pose expected, got {target}")
