@@ -33,7 +33,7 @@ TURNTABLE_BY_HAND = replace(
     HAND,
     name="turntable_by_hand",
     section=TurntableSection,
-    meant=describe,
-    made=lambda section, report: describe(section),
+    describe_configured=describe,
+    describe_connected=lambda section, report: describe(section),
     words=replace(HAND.words, name="turntable that a hand turns", short="turntable", turned="the turntable"),
 )

@@ -15,7 +15,7 @@ from rig.errors import Refused
 from rig.estimation.arrays import Array
 
 
-class Solved(Protocol):
+class SensorSolution(Protocol):
     """A sensor's solution, g = M (m + b), from the analysis or from `result.json`."""
 
     @property
@@ -32,7 +32,9 @@ class Solved(Protocol):
     def bias_rad_s(self) -> Array | Sequence[float]: ...
 
 
-def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iterator[tuple[str, StoredCalibration]]:
+def store_calibrations(
+    config: RigConfig, results: Mapping[str, SensorSolution]
+) -> Iterator[tuple[str, StoredCalibration]]:
     """Store the solution of every sensor on the board that is to be calibrated; yield its name and its record.
 
     Raise BoardError if the board refuses, `not_stored` if it reads back another record; Refused as `find_sensor` does.
@@ -49,7 +51,7 @@ def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iter
             yield name, store(board, index, calibration_of(results[name]))
 
 
-def calibration_of(solved: Solved, entry: OverTemperatureEntry | None = None) -> Calibration:
+def calibration_of(solved: SensorSolution, entry: OverTemperatureEntry | None = None) -> Calibration:
     """Return a sensor's solution as a record for the board, dated now, with polynomials if `entry` is over temperature.
 
     Raise Refused `not_in_result` if the temperature is missing.

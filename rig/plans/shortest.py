@@ -245,7 +245,7 @@ class _Swept:
 
     def predict(self, candidate: Candidate) -> Budgets | None:
         config = _changed(self.config, procedure=candidate.procedure)
-        plan, made = plan_of(config, candidate.procedure), kind_of(config.turner).meant(config.turner)
+        plan, made = plan_of(config, candidate.procedure), kind_of(config.turner).describe_configured(config.turner)
         try:
             rates = predict_budgets(config, plan, made) if plan.sweeps else {}
             return Budgets(rates, predict_accelerometer_budgets(config, plan, made.kinematics))

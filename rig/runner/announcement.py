@@ -10,12 +10,12 @@ from rig.motion.steps import Plan, turn_words
 from rig.motion.winding import cable_words
 from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
-from rig.turners.kind import Words
+from rig.turners.kind import Wording
 
 NOBODY = "Nobody and nothing may be within its reach."
 
 
-def mounting(plan: Plan, number: int, words: Words) -> Prompt:
+def mounting(plan: Plan, number: int, words: Wording) -> Prompt:
     """The question before a stage of a plan, with its `number` from 0: whether the item is mounted for it.
 
     `words` speak of what turns it.
@@ -36,7 +36,7 @@ def mounting(plan: Plan, number: int, words: Words) -> Prompt:
 
 
 def announcement(
-    plan: Plan, report: Report, words: Words, repeated: Plan | None, mounted: Iterable[str], *, early: bool = False
+    plan: Plan, report: Report, words: Wording, repeated: Plan | None, mounted: Iterable[str], *, early: bool = False
 ) -> Prompt:
     """The question before the first motion, which depends on where the turner stands; `words` speak of it.
 

@@ -10,7 +10,7 @@ from firmware_host.client import Calibration
 from rig.analysis.design.shortest import target_of
 from rig.board.crystal import follows_crystal
 from rig.board.identify import configured_board, refusing
-from rig.board.store import Solved, calibration_of
+from rig.board.store import SensorSolution, calibration_of
 from rig.config.load import Loaded
 from rig.config.procedures.procedure_sections import SixObservationSection, ThermalSection
 from rig.data.recording.provenance import Provenance, calls_itself_simulated, provenance_of
@@ -62,7 +62,7 @@ class Connector:
     path: Path
     station: Station
     resumed: Resumption
-    found: Mapping[str, Solved] = field(default_factory=dict)
+    found: Mapping[str, SensorSolution] = field(default_factory=dict)
     memory: Memory = field(default_factory=Memory)
     connecting: Connecting | None = None
 
@@ -167,7 +167,7 @@ class Connector:
         let_go.callback(self._last_seen, turner)
         report = turner.report()
         self.station.event(ArmConnected(report, kind.words.short))
-        return turner, report, kind.made(section, report)
+        return turner, report, kind.describe_connected(section, report)
 
     def _last_seen(self, turner: Turner) -> None:
         """Tell how the turner was left: whoever looks on has last seen it move."""

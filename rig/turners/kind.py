@@ -19,7 +19,7 @@ OnState = Callable[[State], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
+class Wording:
     """The wording for a turner in documents and messages.
 
     - `name`: a noun without an article ("robot arm").
@@ -31,8 +31,8 @@ class Words:
     - `beware`: a warning for the operator before it moves.
     - `stands`: a clause on its state while the item is mounted anew.
     - `clock`: the clock that stamps its states.
-    - `told`: the source of its axes, as a clause.
-    - `traced`: the traceability of its axes, for the certificate.
+    - `axes_source`: the source of its axes, as a clause.
+    - `axes_traceability`: the traceability of its axes, for the certificate.
     """
 
     name: str
@@ -44,8 +44,8 @@ class Words:
     beware: str = ""
     stands: str = "stands still"
     clock: str = "the arm controller's clock"
-    told: str = "as its controller or the nominal model tells them"
-    traced: str = "not traceable, a contributor of the uncertainty"
+    axes_source: str = "as its controller or the nominal model tells them"
+    axes_traceability: str = "not traceable, a contributor of the uncertainty"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +59,8 @@ class TurnerKind(Generic[SectionT, ReportT]):
     - `stance`: describes its pose in a line of text.
     - `problems`: lists all reasons not to drive the last of the plans, before anything moves; without a report, those
       of the plans alone. Pure.
-    - `meant`: returns the configured turner with its nominal geometry, before any connection.
-    - `made`: returns the connected turner for the recording. Raises `Refused` if it is not the configured one.
+    - `describe_configured`: returns the configured turner with its nominal geometry, before any connection.
+    - `describe_connected`: returns the connected turner for the recording. Raises `Refused` if it is another one.
     - `carried`: returns the payload to set on the turner.
     - `fields`: the fields of its states after times and joints, in the order of `to_record`.
     """
@@ -71,10 +71,10 @@ class TurnerKind(Generic[SectionT, ReportT]):
     look: Callable[[SectionT], ReportT]
     stance: Callable[[ReportT], str]
     problems: Callable[[Sequence[Plan], SectionT, ReportT | None], list[Problem]]
-    meant: Callable[[SectionT], TurnerIdentity]
-    made: Callable[[SectionT, ReportT], TurnerIdentity]
+    describe_configured: Callable[[SectionT], TurnerIdentity]
+    describe_connected: Callable[[SectionT, ReportT], TurnerIdentity]
     carried: Callable[[SectionT], Carried]
-    words: Words
+    words: Wording
     fields: tuple[StateField, ...] = ()
 
 

@@ -11,7 +11,7 @@ from rig.config.load import STOCK_TURNERS
 from rig.config.models import TurnerSection
 from rig.errors import Refused
 from rig.errors.installed import added
-from rig.turners.kind import AnyTurner, Words
+from rig.turners.kind import AnyTurner, Wording
 
 GROUP = "rig.turners"
 
@@ -44,12 +44,12 @@ def kind_of(section: TurnerSection) -> AnyTurner:
     )
 
 
-def words_of(name: str) -> Words:
+def words_of(name: str) -> Wording:
     """Return the wording for a kind of turner, in general terms if it is not installed."""
     kind = installed().get(name)
     if kind is not None:
         return kind.words
-    return Words(
+    return Wording(
         name=f"turner of the kind {name}",
         short="turner",
         turned="it",

@@ -77,7 +77,7 @@ def test_readings_that_arrive_are_of_now_and_those_told_again_are_not(
 ) -> None:
     config, part, connected, seen = TURNERS[what]
     turner = load(CONFIGS / config, turners=sections()).config.turner
-    arm = built(kind_of(turner).meant(turner).kinematics)
+    arm = built(kind_of(turner).describe_configured(turner).kinematics)
     about = About("runs/age", "a procedure", parts={"gyro": f"{part} AGE-1"}, arm=arm)
     samples = SamplesTaken((SensorSamples("gyro", 10, 0, {"rate": (0.1, 0.0, 0.0)}),))
     with showing(driver, tmp_path, about=about) as tell:

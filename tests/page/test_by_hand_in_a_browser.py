@@ -22,7 +22,9 @@ from support.processes.waiting import wait_for
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 KIND = installed()["hand"]
 SECTION = KIND.section()
-ABOUT = About("runs/by hand", "by_hand", parts={"gyro": "lsm9ds1 HAND-1"}, arm=built(KIND.meant(SECTION).kinematics))
+ABOUT = About(
+    "runs/by hand", "by_hand", parts={"gyro": "lsm9ds1 HAND-1"}, arm=built(KIND.describe_configured(SECTION).kinematics)
+)
 TABLET, DESK, TELEPHONE = (768, 1024), (1280, 800), (390, 844)
 SHOWN = "return document.getElementById('hand').checkVisibility()"
 

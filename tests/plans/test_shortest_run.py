@@ -312,7 +312,7 @@ def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches(part: st
     unasked = {"mpu9250", "adis16465", "lsm9ds1"} - {part}
     others = [f"{where}sensors.{name}=null" for where in ("", "world.") for name in unasked]
     config = load(CONFIGS / "imu.yaml", [*said, *others], sections(installed()), turners.sections()).config
-    made = turners.kind_of(config.turner).meant(config.turner)
+    made = turners.kind_of(config.turner).describe_configured(config.turner)
     budgets = predict_accelerometer_budgets(config, plan_of(config, config.procedure), made.kinematics)
     foretold = ReachedUncertainty.of_budgets({}, budgets)
     for seed in range(5 if thorough else 1):

@@ -9,7 +9,7 @@ from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.counting import ImuCounter, LinkCounter
 from rig.sensors.mavlink.dialect import ARDUPILOT, PX4
 from rig.sensors.mavlink.orientations import RIGHT_ANGLES, board_rotation
-from rig.sensors.mavlink.parameters import Parameter, encode_value
+from rig.sensors.mavlink.parameters import AutopilotParameter, encode_value
 from rig.world.autopilot.imu import ORIENTATIONS, simulated_rotation
 
 
@@ -59,8 +59,8 @@ def test_a_clock_that_jumps_is_a_restart(back: int) -> None:
     ],
 )
 def test_whole_numbers_are_cast_by_one_and_copied_by_the_other(firmware: int, field: bytes, value: float) -> None:
-    assert Parameter("CAL_GYRO0_ID", 6, field, firmware).value == value
-    assert Parameter("X", 9, encode_value(0.1), firmware).value == np.float32(0.1)
+    assert AutopilotParameter("CAL_GYRO0_ID", 6, field, firmware).value == value
+    assert AutopilotParameter("X", 9, encode_value(0.1), firmware).value == np.float32(0.1)
 
 
 def test_orientations_are_rotations_and_those_of_the_simulated_autopilot() -> None:

@@ -50,7 +50,7 @@ def run(options: Namespace) -> int:
 def _store(options: Namespace) -> int:
     from rig.data.result_file import passed_result
     from rig.sensors.mavlink.journal import ParameterChange
-    from rig.sensors.mavlink.parameters import Parameter, encode_value
+    from rig.sensors.mavlink.parameters import AutopilotParameter, encode_value
     from rig.sensors.mavlink.writing import autopilot_id, find_unfinished_change
     from rig.station.confirm import agreed_or_refused
 
@@ -67,7 +67,7 @@ def _store(options: Namespace) -> int:
                 "See that it has that IMU, and that its firmware is no older than ArduPilot 4.0 or PX4 1.12",
             )
         new = {
-            name: Parameter(name, old[name].type, encode_value(value), link.identity.firmware)
+            name: AutopilotParameter(name, old[name].type, encode_value(value), link.identity.firmware)
             for name, value in wanted.items()
         }
         planned = ParameterChange(autopilot_id(link), link.identity.firmware, old, new, _kept(options))

@@ -82,7 +82,7 @@ def _about(folder: Path, configured: Configured, page: PageWish | None) -> "Abou
         parts={name: f"{each.part} {each.serial_number}" for name, each in config.all_sensors.items()},
         simulated=configured.loaded.simulated,
         storing=_storing(folder, configured),
-        arm=built(kind_of(config.turner).meant(config.turner).kinematics),
+        arm=built(kind_of(config.turner).describe_configured(config.turner).kinematics),
     )
 
 

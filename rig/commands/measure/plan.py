@@ -77,5 +77,5 @@ def planned(options: Namespace) -> "DryRun":
     config = found.loaded.config
     kind = kind_of(config.turner)
     refuse(kind.problems([steps], config.turner, None))
-    model = kind.meant(config.turner).model
+    model = kind.describe_configured(config.turner).model
     return DryRun(model, steps, config, repeated=found.phase.follows is not None)

@@ -31,7 +31,7 @@ from rig.report.findings.finding import Finding
 from rig.report.findings.kind import Standard, Without
 from rig.report.kinds.registry import kinds, outlets, shown
 from rig.report.words.mounts import mount_lines
-from rig.turners.kind import Words
+from rig.turners.kind import Wording
 from rig.turners.registry import words_of
 
 
@@ -150,7 +150,7 @@ class Certificate:
         return f"{self.words.name} {found.arm_maker} {found.arm_model}"
 
     @property
-    def words(self) -> Words:
+    def words(self) -> Wording:
         """How to speak of what turned the items; nothing did where the readings were recorded elsewhere."""
         return words_of(self.provenance.turner_kind or NO_ARM)
 

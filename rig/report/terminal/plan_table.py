@@ -52,7 +52,7 @@ class DryRun:
         from rig.turners.registry import kind_of
 
         turner = self.config.turner
-        return predict_limits(self.config, self.plan, kind_of(turner).meant(turner).kinematics)
+        return predict_limits(self.config, self.plan, kind_of(turner).describe_configured(turner).kinematics)
 
     @property
     def steps(self) -> Sequence[Step]:

@@ -29,15 +29,15 @@ class MagneticFieldReader:
         self, messages: NDArray[Any], numbers: NDArray[Any], times_us: NDArray[Any], host_time_s: float
     ) -> NDArray[Any]:
         """Return the readings completed by messages (n,) with these numbers (n,) and times (n,)."""
-        place = messages["sequence"].astype(np.int64) % READING_MESSAGES
+        slot = messages["sequence"].astype(np.int64) % READING_MESSAGES
         gauss = messages["fourth"].astype(np.float64)
-        is_axis = (place > 0) & np.isfinite(gauss)
+        is_axis = (slot > 0) & np.isfinite(gauss)
         # Numbers do not wrap as the sequence does: all four messages of a reading give the same.
-        readings = (numbers[is_axis] - place[is_axis]) // READING_MESSAGES + 1
+        readings = (numbers[is_axis] - slot[is_axis]) // READING_MESSAGES + 1
         rows = stamped(FIELD_SAMPLE_DTYPE, readings, times_us[is_axis], host_time_s)
         counts = np.rint(gauss[is_axis] / self._gauss_per_count)
         rows["field_counts"] = np.clip(counts, -self._limit, self._limit)[:, None]
-        rows, axes = (np.concatenate([self._rows, rows]), np.concatenate([self._axes, place[is_axis] - 1]))
+        rows, axes = (np.concatenate([self._rows, rows]), np.concatenate([self._axes, slot[is_axis] - 1]))
         latest = rows["sequence"] == (rows["sequence"][-1] if len(rows) else 0)
         incomplete = latest & ~np.any(axes[latest] == 2)  # z comes last
         self._rows, self._axes = rows[incomplete], axes[incomplete]

@@ -15,7 +15,7 @@ from typing import Any
 
 from rig.config.files.own_folder import own_folder
 from rig.errors import Refused
-from rig.sensors.mavlink.parameters import REAL32, WHOLE, Parameter
+from rig.sensors.mavlink.parameters import REAL32, WHOLE, AutopilotParameter
 
 SCHEMA = "rig.autopilot/1"
 
@@ -29,11 +29,11 @@ class ParameterChange:
 
     autopilot_id: str
     firmware: int
-    old: Mapping[str, Parameter]
-    new: Mapping[str, Parameter]
+    old: Mapping[str, AutopilotParameter]
+    new: Mapping[str, AutopilotParameter]
     backup: Path
 
-    def state(self, parameters: Mapping[str, Parameter]) -> str:
+    def state(self, parameters: Mapping[str, AutopilotParameter]) -> str:
         """Return which set `parameters` are, bit by bit: "old", "new" or, if neither, "mixture"."""
         fields = {name: parameter.field for name, parameter in parameters.items()}
         for name, expected in (("new", self.new), ("old", self.old)):
@@ -41,7 +41,7 @@ class ParameterChange:
                 return name
         return "mixture"
 
-    def to_text(self) -> str:
+    def serialize(self) -> str:
         """Return the text of the file: four bytes of each value in hexadecimal, and their values for readers."""
         sets = {
             name: {
@@ -55,7 +55,7 @@ class ParameterChange:
     def keep(self) -> None:
         """Write the file that restores them. Raise Refused `autopilot_not_kept`; an existing file is not replaced."""
         try:
-            _write(self.backup, self.to_text(), exclusive=True)
+            _write(self.backup, self.serialize(), exclusive=True)
         except OSError as error:
             raise Refused(
                 "autopilot_not_kept",
@@ -67,7 +67,7 @@ class ParameterChange:
         """Enter the change in the journal. Raise Refused `autopilot_not_kept`."""
         try:
             folder().mkdir(mode=0o700, parents=True, exist_ok=True)
-            _write(_journal_path(self.autopilot_id), self.to_text(), exclusive=False)
+            _write(_journal_path(self.autopilot_id), self.serialize(), exclusive=False)
         except OSError as error:
             raise Refused(
                 "autopilot_not_kept",
@@ -114,8 +114,8 @@ def _journal_path(autopilot_id: str) -> Path:
     return folder() / f"{sha256(autopilot_id.encode()).hexdigest()[:32]}.json"
 
 
-def _read_parameters(document: Mapping[str, Any], firmware: int) -> dict[str, Parameter]:
-    parameters = {name: Parameter(str(name), int(entry["type"]), bytes.fromhex(entry["bytes"]), firmware)
+def _read_parameters(document: Mapping[str, Any], firmware: int) -> dict[str, AutopilotParameter]:
+    parameters = {name: AutopilotParameter(str(name), int(entry["type"]), bytes.fromhex(entry["bytes"]), firmware)
              for name, entry in document.items()}  # fmt: skip
     for parameter in parameters.values():
         if len(parameter.field) != 4 or not (parameter.type in WHOLE or parameter.type == REAL32):

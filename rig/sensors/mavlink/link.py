@@ -12,7 +12,7 @@ from typing import Any
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.counting import LinkCounter
 from rig.sensors.mavlink.dialect import ARMED, FIRMWARES, dialect
-from rig.sensors.mavlink.parameters import Parameter, decode_float, extract_value
+from rig.sensors.mavlink.parameters import AutopilotParameter, decode_float, extract_value
 from rig.sensors.mavlink.port import open_port
 from rig.sensors.own_port import OwnPort, PortFaults, closing_on_failure, open_device_port
 from rig.sensors.silence import USUAL, Patience
@@ -69,7 +69,7 @@ class AutopilotLink:
         self.autopilot: Autopilot | None = None
         self.armed = False
         self._byte_count = self._other_count = 0
-        self._parameters: dict[str, Parameter] = {}
+        self._parameters: dict[str, AutopilotParameter] = {}
         self._answers: dict[int, int] = {}
         self._version: Any = None
         self._sending = threading.Lock()
@@ -92,7 +92,7 @@ class AutopilotLink:
         return self.autopilot
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
-    def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, Parameter]:
+    def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, AutopilotParameter]:
         """Read the parameters of these names; `others` may be missing.
 
         Raise SensorError `autopilot_silent` if none is answered.
@@ -117,7 +117,7 @@ class AutopilotLink:
             )
         return parameters
 
-    def set_parameter(self, parameter: Parameter) -> Parameter:
+    def set_parameter(self, parameter: AutopilotParameter) -> AutopilotParameter:
         """Set a parameter to its four bytes and return the answer. Raise SensorError `autopilot_not_set`."""
         with self.own_port.news:
             self._parameters.pop(parameter.name, None)
@@ -276,7 +276,7 @@ class AutopilotLink:
             case "PARAM_VALUE":
                 name = message.param_id
                 field = extract_value(bytes(message.get_msgbuf()))
-                self._parameters[name] = Parameter(name, message.param_type, field, self.identity.firmware)
+                self._parameters[name] = AutopilotParameter(name, message.param_type, field, self.identity.firmware)
             case "COMMAND_ACK":
                 self._answers[message.command] = message.result
             case "AUTOPILOT_VERSION":

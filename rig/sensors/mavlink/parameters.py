@@ -15,7 +15,7 @@ SINGLE = struct.Struct("<f")
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class AutopilotParameter:
     """A parameter of an autopilot: its type and the four bytes of its value as sent."""
 
     name: str

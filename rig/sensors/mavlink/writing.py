@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.journal import ParameterChange, find_change
 from rig.sensors.mavlink.link import AutopilotLink
-from rig.sensors.mavlink.parameters import Parameter
+from rig.sensors.mavlink.parameters import AutopilotParameter
 
 
 def autopilot_id(link: AutopilotLink) -> str:
@@ -13,7 +13,7 @@ def autopilot_id(link: AutopilotLink) -> str:
     return link.identity.uid or link.port
 
 
-def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, Parameter]) -> None:
+def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, AutopilotParameter]) -> None:
     """Bring an autopilot to one of the two sets of a change, `target`.
 
     Raise SensorError as `AutopilotLink.set_parameter`, and `autopilot_not_stored` if it reads back another value; after

@@ -15,7 +15,7 @@ from rig.motion.carried import Carried
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import Joints, Row, TurnerIdentity
 from rig.motion.steps import Motion, Plan
-from rig.turners.kind import OnState, TurnerKind, Words
+from rig.turners.kind import OnState, TurnerKind, Wording
 from rig.turners.turner import Turner
 
 GEOMETRY = DenavitHartenberg((), (), (), ())
@@ -126,7 +126,7 @@ def _problems(plans: Sequence[Plan], section: HandSection, report: HandReport | 
     ]
 
 
-MADE = TurnerIdentity("none", None, GEOMETRY)
+RECORDED = TurnerIdentity("none", None, GEOMETRY)
 HAND = TurnerKind(
     name="hand",
     section=HandSection,
@@ -134,10 +134,10 @@ HAND = TurnerKind(
     look=_look,
     stance=_stance,
     problems=_problems,
-    meant=lambda section: MADE,
-    made=lambda section, report: MADE,
+    describe_configured=lambda section: RECORDED,
+    describe_connected=lambda section, report: RECORDED,
     carried=lambda section: Carried(0.0),
-    words=Words(
+    words=Wording(
         name="hand",
         short="hand",
         turned="the item",

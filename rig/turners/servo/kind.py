@@ -12,7 +12,7 @@ from rig.motion.geometry import DenavitHartenberg
 from rig.motion.preflight import step_problems
 from rig.motion.state import TurnerIdentity
 from rig.motion.steps import Plan
-from rig.turners.kind import OnState, TurnerKind, Words
+from rig.turners.kind import OnState, TurnerKind, Wording
 from rig.turners.servo.models import MAKER, find_model
 from rig.turners.servo.moves import move_problems
 from rig.turners.servo.preflight import servo_problems
@@ -106,10 +106,10 @@ SERVO = TurnerKind(
     look=_look,
     stance=_stance,
     problems=_problems,
-    meant=_make_nominal,
-    made=_make_recorded,
+    describe_configured=_make_nominal,
+    describe_connected=_make_recorded,
     carried=_read_payload,
-    words=Words(
+    words=Wording(
         name="servo",
         short="servo",
         turned="the shaft",
@@ -121,8 +121,8 @@ SERVO = TurnerKind(
         "Have it within reach.",
         stands="stands still and holds its shaft as long as it has its supply",
         clock="this computer's oscillator, by a clock that nobody sets",
-        told="as the stages of the procedure say",
-        traced="not traceable; the six-observation solution knows speeds alone and does without them",
+        axes_source="as the stages of the procedure say",
+        axes_traceability="not traceable; the six-observation solution knows speeds alone and does without them",
     ),
     fields=SERVO_FIELDS,
 )

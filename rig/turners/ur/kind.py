@@ -11,7 +11,7 @@ from rig.motion.carried import read_load
 from rig.motion.model import model_of
 from rig.motion.state import ARM_FIELDS, TurnerIdentity
 from rig.motion.steps import Plan
-from rig.turners.kind import OnState, TurnerKind, Words
+from rig.turners.kind import OnState, TurnerKind, Wording
 from rig.turners.turner import Turner
 from rig.turners.ur import driver, preflight
 from rig.turners.ur.identity import identity_problems
@@ -56,10 +56,10 @@ UR = TurnerKind(
     look=_look,
     stance=_stance,
     problems=_problems,
-    meant=_make_nominal,
-    made=_make_recorded,
+    describe_configured=_make_nominal,
+    describe_connected=_make_recorded,
     carried=read_load,
-    words=Words(
+    words=Wording(
         name="robot arm",
         short="arm",
         turned="the wrists",

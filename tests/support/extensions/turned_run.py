@@ -35,7 +35,7 @@ def write(folder: Path) -> None:
     config, plan = found.loaded.config, found.phase.plan()
     kind = kind_of(config.turner)
     report = kind.look(config.turner)
-    made = kind.made(config.turner, report)
+    made = kind.describe_connected(config.turner, report)
     recorder = RunRecorder(
         folder / "run.h5",
         config=found.loaded.rig_text,

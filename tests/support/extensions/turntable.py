@@ -37,7 +37,7 @@ from rig.procedure import (
     Verbs,
     trapezoid_duration,
 )
-from rig.turners.kind import OnState, TurnerKind, Words
+from rig.turners.kind import OnState, TurnerKind, Wording
 
 JOINTS = ("table",)
 GEOMETRY = DenavitHartenberg(theta_rad=(0.0,), a_m=(0.0,), d_m=(0.2,), alpha_rad=(0.0,))
@@ -162,10 +162,10 @@ KIND = TurnerKind(
     look=look,
     stance=lambda report: f"table at {report.state.q_rad[0]:.2f} rad",
     problems=problems,
-    meant=lambda section: TurnerIdentity("Toys", None, GEOMETRY),
-    made=lambda section, report: TurnerIdentity("Toys", report.model, GEOMETRY),
+    describe_configured=lambda section: TurnerIdentity("Toys", None, GEOMETRY),
+    describe_connected=lambda section, report: TurnerIdentity("Toys", report.model, GEOMETRY),
     carried=lambda section: Carried(0.0),
-    words=Words(
+    words=Wording(
         name="turntable",
         short="table",
         turned="it",
