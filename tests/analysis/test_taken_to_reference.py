@@ -87,6 +87,7 @@ def test_u_at_the_reference_is_that_of_the_budget(outcome: Outcome) -> None:
     assert {line.name for line in entry.contributors} > {"noise", "controller clock", "thermometer beside the sensor"}
 
 
+@pytest.mark.slow
 def test_the_settings_keep_the_reference(warmed: RunData) -> None:
     assert settings_from_json(warmed.settings.to_json()).reference_c == REFERENCE_C
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
+import pytest
 from pydantic import BaseModel
 
 from rig.config.models import ArmSection, RigConfig
@@ -38,6 +39,7 @@ def test_the_committed_page_is_what_the_models_generate() -> None:
     assert page == reference(), "again: python -m rig.config.reference_page > docs/configuration.md"
 
 
+@pytest.mark.slow
 def test_every_key_says_what_it_means_and_its_unit() -> None:
     for section, key, schema in keys():
         name = f"{section}.{key}"

@@ -111,6 +111,7 @@ def test_every_error_a_page_names_is_in_the_catalogue() -> None:
         assert named <= known, page_name(page)
 
 
+@pytest.mark.slow
 def test_every_name_on_a_page_stands_in_the_source() -> None:
     """Errors wherever they stand, checks, columns, keys: what was renamed there must not live on here."""
     known = words_of_the_source() | {entry.name for entry in catalogue()} | OF_OTHERS
@@ -126,6 +127,7 @@ def test_no_line_but_a_tables_is_too_wide() -> None:
         assert not wide, page_name(page)
 
 
+@pytest.mark.slow
 def test_every_command_a_page_shows_is_one(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -42,12 +42,14 @@ def test_every_error_that_is_raised_is_in_the_table() -> None:
     assert not lines, f"a typo, or add to {PLACE}, where the alphabet has it:\n" + "\n".join(lines)
 
 
+@pytest.mark.slow
 def test_every_error_in_the_table_is_raised_somewhere() -> None:
     made = raised()
     gone = [entry.name for entry in catalogue() if entry.name not in made]
     assert not gone, f"nothing raises these any more, remove them from {PLACE}: {', '.join(gone)}"
 
 
+@pytest.mark.slow
 def test_the_table_says_how_an_error_is_raised() -> None:
     made = raised()
     wrong = [

@@ -164,6 +164,7 @@ def shared(seed: int, runs: int = 5) -> tuple[list[str], list[str], Array, Array
     return rigs, sensors, values + rng.normal(size=len(rows)) * np.hypot(std, 5e-6), std
 
 
+@pytest.mark.slow
 def test_two_rigs_whose_clocks_differ_by_40_ppm_are_told_apart_from_four_shared_sensors() -> None:
     within = seen = 0
     for seed in range(200):

@@ -45,6 +45,7 @@ def test_a_serial_number_that_was_never_entered_is_refused(place: str) -> None:
         rig.calibrations("G-9")
 
 
+@pytest.mark.slow
 def test_changes_between_two_results_are_those_of_the_command_line(
     place: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -52,6 +52,7 @@ def test_a_sweep_is_a_table_with_units_in_its_names(imu: rig.Readings) -> None:
     assert np.median(speeds[0]) > 2 and np.quantile(speeds[1], 0.2) < 0.2
 
 
+@pytest.mark.slow
 def test_what_was_not_measured_is_refused_by_name(imu: rig.Readings) -> None:
     with pytest.raises(Refused, match=r"no_such_quantity: .*field.*rate, .*acceleration"):
         imu.field  # noqa: B018

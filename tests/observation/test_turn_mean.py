@@ -70,6 +70,7 @@ def error(found: Mean, weights: Array, turn: SampledTurn) -> Array:
     return off
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag_s", [0.0, 0.004])
 @pytest.mark.parametrize(("orders", "fraction"), SLOW_BESIDE_FAST)
 def test_a_slow_ripple_beside_faster_ones_is_in_both_means_alike(

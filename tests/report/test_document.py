@@ -36,6 +36,7 @@ def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
     assert list(new["gyroscopes"]["gyro"]) == list(old["gyroscopes"]["gyro"])
 
 
+@pytest.mark.slow
 def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -> None:
     unset = Check("gyro.verification_rms", 0.0, None, "rad/s", Meaning("conformity", "gyro", "rate"))
     document = json.loads(document_of(replace(outcome, checks=(*outcome.checks, unset))).text())
@@ -60,6 +61,7 @@ def test_a_reference_has_no_solution_of_the_board() -> None:
     assert (sensors["reference"]["role"], "board" in sensors["reference"]) == ("reference", False)
 
 
+@pytest.mark.slow
 def test_a_field_the_document_does_not_have_is_not_written(outcome: Outcome) -> None:
     with pytest.raises(TypeError, match="CheckEntry has no limits"):
         entry(CheckEntry, outcome.checks[0], limits=1.0)

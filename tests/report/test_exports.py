@@ -268,6 +268,7 @@ def test_csv_solves_to_the_same_calibration(
     assert all(f"{name}: " in said for name in files - {"README.txt"}) and "Not here" in said
 
 
+@pytest.mark.slow
 def test_parquet_and_matlab_hold_the_readings(recordings: tuple[WithMotion, ...], tmp_path: Path) -> None:
     import pyarrow.parquet
     from scipy.io import loadmat

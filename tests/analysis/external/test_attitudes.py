@@ -88,6 +88,7 @@ def test_the_papers_accelerometer_and_a_magnetometer_are_found(capsys: pytest.Ca
     assert off(found["field"], FIELD_MATRIX, FIELD_T, FIELD_BIAS_T) < 4
 
 
+@pytest.mark.slow
 def test_the_papers_gyroscope_is_found_with_the_earths_rate(capsys: pytest.CaptureFixture[str]) -> None:
     found = solved(capsys, example(SWINGING), "--exact-rates")["rate"]
     assert off(found, GYRO_MATRIX, GYRO_REFERENCE_RAD_S, GYRO_BIAS_RAD_S) < 4

@@ -257,6 +257,7 @@ def test_another_part_of_the_family_is_refused_before_it_is_touched(kilobytes: i
     assert error.name == "other_microcontroller" and f"{kilobytes} KB" in error.what and chip.done == []
 
 
+@pytest.mark.slow
 def test_the_probe_of_another_board_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     from pyocd.board.board_ids import BOARD_ID_TO_INFO
 

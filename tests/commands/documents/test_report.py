@@ -31,6 +31,7 @@ def run(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_page_and_digital_certificate_lie_in_the_run_folder(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", str(run), "--dcc"]) == 0
     assert capsys.readouterr().out.split() == [str(run / "certificate.html"), str(run / "certificate.xml")]

@@ -134,12 +134,14 @@ def test_a_calibration_is_shown_and_compared(year: str, capsys: pytest.CaptureFi
     assert "not_comparable" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_check_standards_tell_of_the_rig_by_the_exit_status(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert "OUT OF CONTROL" in told(capsys, "rigs", status=1)
     document = json.loads(told(capsys, "rigs", "--json", status=1))
     assert document["rigs"][0]["check_standards"] == ["G-1"] and document["effects"] == {}
 
 
+@pytest.mark.slow
 def test_a_wrong_entry_is_voided_not_deleted(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     told(capsys, "void", "12", "--reason", "another sensor was mounted")
     document = json.loads(told(capsys, "G-1", "--json"))
@@ -154,6 +156,7 @@ def test_what_was_never_entered_is_refused_by_name(place: str, capsys: pytest.Ca
         assert "not_in_history" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_configuration_names_the_history(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     config = configuration(Path(year).parent, {"history": {"url": year}})
     assert "12" in told(capsys, "show", "12", "--history", config)

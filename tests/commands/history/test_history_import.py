@@ -72,6 +72,7 @@ def board(result: Document) -> None:
     result["provenance"]["board_unique_id"] = "another"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "named"),
     [

@@ -116,6 +116,7 @@ def test_units_are_spelt_as_in_the_section_of_a_device_that_prints_lines() -> No
     assert factors == pytest.approx([1e-7, np.radians(1e-3), 1.0], rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("told", "words"),
     [

@@ -36,6 +36,7 @@ def refused(session: Session, seed: int, known: Known = KNOWN) -> str:
     return caught.value.name
 
 
+@pytest.mark.slow
 def test_a_kvh_finds_it_and_where_it_stands() -> None:
     earth, truth = found(Session(), 1)
     std = np.sqrt(np.diag(earth.covariance_rad2_s2))
@@ -47,17 +48,20 @@ def test_a_kvh_finds_it_and_where_it_stands() -> None:
     assert abs(off) < 4 * earth.heading_std_rad < np.radians(1.5)
 
 
+@pytest.mark.slow
 def test_a_vibration_of_the_standing_arm_costs_it_nothing() -> None:
     earth, truth = found(VIBRATING, 1)
     assert (np.abs(earth.rate_rad_s - truth.earth_rad_s) < 4 * np.sqrt(np.diag(earth.covariance_rad2_s2))).all()
     assert earth.norm_std_rad_s < 0.08 * DEG_H
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [MPU9250, LSM9DS1])
 def test_a_part_that_cannot_see_it_says_so(part: Part) -> None:
     assert refused(replace(Session(), part=part), 1) == "earth_rate_not_observable"
 
 
+@pytest.mark.slow
 def test_what_is_seen_clearly_and_is_not_the_earths_rate_is_refused() -> None:
     """A table that itself turns, or a bias that follows the attitude in another way."""
     assert refused(Session(earth_rad_s=1.1 * EARTH_RATE_RAD_S), 1) == "earth_rate_not_observable"
@@ -76,6 +80,7 @@ def test_with_a_latitude_they_are() -> None:
     assert (np.abs(earth.rate_rad_s - truth.earth_rad_s)[:2] < 4 * level).all()
 
 
+@pytest.mark.slow
 def test_a_sensitivity_that_is_left_out_is_noticed() -> None:
     """5 °/h/g along the vertical: the sensor would read another Earth."""
     strong = Session(g_sensitivity_rad_s_g=tuple((-5 * DEG_H * np.eye(3)).ravel().tolist()))
@@ -102,6 +107,8 @@ def test_sweeps_alone_tell_it_only_of_an_arm_whose_axes_do_not_lean() -> None:
     assert np.sqrt(np.linalg.eigvalsh(earth.covariance_rad2_s2)[-1]) < 0.5 * DEG_H
 
 
+@pytest.mark.kernels
+@pytest.mark.slow
 def test_the_papers_matrix_and_bias_come_back() -> None:
     """On an arm that is what it says: else the rows of F turn with it."""
     exact = Session(axes=6, arm_rad=0.0, hysteresis_rad=0.0, leaning_rad=0.0)

@@ -132,6 +132,8 @@ def errors(design: Design, rms_rad: float, part: str, runs: int) -> Errors:
     return result
 
 
+@pytest.mark.kernels
+@pytest.mark.slow
 @pytest.mark.parametrize("design", [(3, True), (6, False), (6, True), (0, True)])
 @pytest.mark.parametrize("second_order", [False, True])
 def test_without_noise_the_truth_comes_back(design: Design, second_order: bool) -> None:
@@ -330,6 +332,7 @@ def _lagging(arm: Callable[[Array], Array], lag_rad: Array, joints: Array) -> Ar
     return arm(joints - lag_rad)
 
 
+@pytest.mark.slow
 def test_the_delay_turns_both_ways_apart() -> None:
     truth, _, sweeps = recorded(TWELVE, 0.0, 23.0, 1)
     late = solve(NO_DWELLS, sweeps)
@@ -397,6 +400,7 @@ def test_an_arm_that_errs_by_a_degree_is_not_trusted() -> None:
         solve(dwells, sweeps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dwell", [0, 7, 15])
 @pytest.mark.parametrize("sweeps_too", [True, False])
 def test_an_attitude_that_was_not_reached_is_named(dwell: int, sweeps_too: bool) -> None:

@@ -1,6 +1,7 @@
 """The estimator against the world's own reckoning of what a body on the flange feels, which shares nothing with it."""
 
 import numpy as np
+import pytest
 
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
@@ -34,6 +35,7 @@ def read(joints: Array, speeds: Array) -> Array:
     return np.asarray(whole @ MATRIX.T + BIAS_M_S2, dtype=np.float64)
 
 
+@pytest.mark.slow
 def test_what_the_world_lets_a_sensor_feel_gives_the_truth_back() -> None:
     harmonics = []
     for sweep in planned(6):

@@ -56,6 +56,8 @@ def revolution(seed: int, density_ug: float, vibration: float = 0.05, sweep: int
     return recorded_samples(TRUTH, EXACT, planned(6)[sweep], sampling(density_ug, vibration), rng)
 
 
+@pytest.mark.kernels
+@pytest.mark.slow
 @pytest.mark.parametrize("sweep", range(12))
 def test_vibration_neither_turns_the_result_nor_counts_as_noise(sweep: int) -> None:
     """ADIS16465: at 0.2 m from the axis a ripple of 5 % is 50 mg, its noise 0.35 mg a sample."""
@@ -67,6 +69,7 @@ def test_vibration_neither_turns_the_result_nor_counts_as_noise(sweep: int) -> N
     assert shaken.speed_rad_s == pytest.approx(still.speed_rad_s, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vibration", [0.0, 1e-12, 0.002])
 def test_a_speed_that_changes_slowly_takes_nothing_from_gravity(vibration: float) -> None:
     """Once a turn by 0.2 % it is felt as 60 µg; a regression on it could take half of gravity along."""
@@ -122,6 +125,7 @@ def test_the_stated_covariance_is_the_scatter() -> None:
     assert np.sqrt(np.mean((scatter / stated) ** 2)) == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.slow
 def test_coloured_noise_widens_the_covariance() -> None:
     samples = revolution(1, 300.0)
     white = reduced(samples)

@@ -1,6 +1,7 @@
 """What a certificate says of sweeps that were no whole turns: no circle closes, and time is not the only standard."""
 
 import numpy as np
+import pytest
 
 from rig.data.result_file import ResultDocument
 from rig.report.certificate.dcc import digital_certificate
@@ -16,6 +17,7 @@ def of_arcs(angle_rad: float) -> ResultDocument:
     )
 
 
+@pytest.mark.slow
 def test_whole_turns_close() -> None:
     for turns in (1, 3):
         found = certificate(of_arcs(2 * np.pi * turns))

@@ -214,6 +214,7 @@ def scarce(document: ResultDocument) -> ResultDocument:
     return document.model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update={"budget": budget})}})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "made",
     [result, lambda: scarce(result()), *(partial(read_result, each) for each in BUDGETED)],

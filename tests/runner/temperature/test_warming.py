@@ -53,6 +53,7 @@ def test_a_host_that_was_busy_sees_no_other_rate() -> None:
     warmed(late, 1.6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap_s", [0.3, 8.0])
 @pytest.mark.parametrize("k_per_min", [2.4, -2.4])
 def test_what_changes_too_fast_ends_by_name_however_seldom_the_host_looks(gap_s: float, k_per_min: float) -> None:
