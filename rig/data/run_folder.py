@@ -18,7 +18,7 @@ from rig.errors import Refused
 if TYPE_CHECKING:
     from rig.config.load import Loaded
 
-CONFIG, SCRIPT, RESULT = "config.yaml", "script.py", "result.json"
+CONFIG, SCRIPT, RESULT, CERTIFICATE = "config.yaml", "script.py", "result.json", "certificate.html"
 SCRIPT_IDENTITY = "script.json"
 WORLD_LATE = "world_late.txt"  # what held steps of the simulated laboratory that came late
 LOG, ARM_LOG = "log.txt", "arm_client.log"

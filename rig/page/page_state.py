@@ -17,7 +17,7 @@ from rig.data.recording.hand_events import (
     HandRestRefused,
 )
 from rig.data.result_file import read_result
-from rig.data.run_folder import RESULT
+from rig.data.run_folder import CERTIFICATE, RESULT
 from rig.motion.geometry import NOMINAL
 from rig.motion.steps import Dwell, Rest, Step, Sweep
 from rig.page import by_hand
@@ -26,7 +26,6 @@ from rig.page.arm import connected, geometry, stance
 from rig.page.history import History, rounded
 from rig.page.outcome import after_fault, after_verdict, outcome_rows, since_rows
 from rig.page.rows import Look, along, dwell_row, observation_row, parameter_rows
-from rig.report.certificate.writer import PAGE as CERTIFICATE
 from rig.report.words.mounts import mount_lines
 from rig.station.events import (
     Advice,

@@ -7,7 +7,6 @@ import numpy as np
 from pydantic import BaseModel
 
 from rig.estimation.arrays import Array
-from rig.report.entry_sources import SOURCES
 
 EntryT = TypeVar("EntryT", bound=BaseModel)
 
@@ -38,6 +37,8 @@ def counted(freedom: Array | None) -> list[Any] | None:
 
 def _attributes(kind: type[BaseModel], source: object) -> Mapping[str, str]:
     """Return the attribute of a source that fills each field of such an entry."""
+    from rig.report.entry_sources import SOURCES  # all that is analysed: only what writes entries needs it
+
     for row in SOURCES.get(kind, ()):
         if isinstance(source, row.classes):
             return row.attributes

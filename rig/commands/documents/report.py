@@ -90,13 +90,12 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
     from rig.commands.history.remember import journal_end, remember_certificate
     from rig.data.entries.magnetometer import read_reversal
     from rig.data.result_file import read_result
-    from rig.data.run_folder import RESULT, refuse_links
+    from rig.data.run_folder import CERTIFICATE, RESULT, refuse_links
     from rig.history.entered.issued import issued_certificate
     from rig.report.certificate.content import certificate_of
     from rig.report.certificate.page import certificate_page
     from rig.report.certificate.pdf import PDF
     from rig.report.certificate.statements import stated_in
-    from rig.report.certificate.writer import PAGE
     from rig.report.signatures.reason import reason_of
 
     pdf = options.pdf or (by is not None and not options.dcc)  # the page itself cannot carry a signature
@@ -106,7 +105,7 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
     certificate = certificate_of(result, stated_in(file.parent, options.overrides), turned)
     end = None if by is None else journal_end(file.parent, named_history(options.history))
     reason = reason_of(certificate, end)
-    written: dict[str, bytes] = {PAGE: certificate_page(certificate).encode()}
+    written: dict[str, bytes] = {CERTIFICATE: certificate_page(certificate).encode()}
     left_out: list[Refused] = []
     digital = _digital(certificate, by, reason, left_out if options.dcc else None) if options.dcc or pdf else {}
     if options.dcc:
@@ -122,7 +121,7 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
                 say_on_terminal("drawing the PDF")
                 try:
                     attached = {RESULT: file.read_bytes(), **digital}
-                    written[PDF] = _pdf(written[PAGE].decode(), attached, by, reason, options)
+                    written[PDF] = _pdf(written[CERTIFICATE].decode(), attached, by, reason, options)
                     write_new(folder / PDF, written[PDF])
                 except Refused as error:
                     left_out.append(error)

@@ -113,9 +113,8 @@ def _replay(recorded: "Iterator[Moment]", feed: "Feed", speed: float) -> None:
 
 
 def _ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent]":
-    from rig.data.run_folder import RESULT
+    from rig.data.run_folder import CERTIFICATE, RESULT
     from rig.page.replay import ended
-    from rig.report.certificate.writer import PAGE as CERTIFICATE
     from rig.station.events import DocumentWritten, Interrupted
 
     if (folder / CERTIFICATE).is_file():

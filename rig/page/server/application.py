@@ -11,11 +11,11 @@ from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
+from rig.data.run_folder import CERTIFICATE
 from rig.page.server.connections import Connections
 from rig.page.server.control import Control
 from rig.page.server.feed import Broadcast
 from rig.page.server.guard import CERTIFICATE_POLICY, COOKIE, Door, Guard
-from rig.report.certificate.writer import PAGE as CERTIFICATE
 
 STATIC = Path(__file__).parents[1] / "static"
 MEDIA = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}

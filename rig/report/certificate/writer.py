@@ -5,16 +5,15 @@ from pathlib import Path
 from rig.analysis.outcome import Outcome
 from rig.config.files.written_file import write_new
 from rig.data.result_file import ResultDocument
+from rig.data.run_folder import CERTIFICATE
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.statements import stated_in
 from rig.station.events import DocumentWritten, RunEvent
 
-PAGE = "certificate.html"
-
 
 def write_certificate(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
     """Write the certificate, whatever the verdict: what failed stands there too, across every page of one unfit."""
-    path = folder / PAGE
+    path = folder / CERTIFICATE
     write_new(path, certificate_page(certificate_of(document, stated_in(folder))))
     return (DocumentWritten(path),)

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rig.data.result_file import CheckEntry, ResultDocument
-from rig.report.certificate.writer import PAGE
+from rig.data.run_folder import CERTIFICATE
 from rig.report.entries.omitted import omitted_lines
 from rig.report.findings.characteristic import Term, terms
 from rig.report.findings.kind import said
@@ -46,7 +46,7 @@ def print_kept(folder: Path, document: ResultDocument, since: Sequence[str] = ()
         for line in since:  # which no ending says then
             say(line.replace("`", ""), sys.stderr)
         return
-    console, certificate = Console(highlight=False), folder / PAGE
+    console, certificate = Console(highlight=False), folder / CERTIFICATE
     lines = ending(
         document,
         folder=folder,
