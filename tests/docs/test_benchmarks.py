@@ -84,3 +84,28 @@ def test_a_short_benchmark_runs_to_its_end(benchmark: str, arguments: tuple[str,
 def test_a_benchmark_says_what_it_can(benchmark: Path, tmp_path: Path) -> None:
     said = run(benchmark, tmp_path, "--help")
     assert said.returncode == 0 and said.stdout.startswith("usage:"), said.stderr
+
+
+@pytest.mark.parametrize(
+    ("seconds", "status", "met"), [(0.05, 0, "yes"), (0.066, 0, "no, by 10%"), (0.09, 3, "no, by 50%")]
+)
+def test_a_figure_far_behind_its_goal_has_a_status_of_its_own(
+    seconds: float, status: int, met: str, tmp_path: Path
+) -> None:
+    benchmarks = ROOT / "benchmarks"
+    script = tmp_path / "measures.py"
+    figure = f'record("rig --help", {seconds}, "s", peer="python", peer_value=0.02)'
+    script.write_text(f"import sys\nsys.path.insert(0, {str(benchmarks)!r})\nfrom goals import record\n{figure}\n")
+    said = run(benchmarks / "goals.py", tmp_path, str(script))
+    assert said.returncode == status, said.stderr
+    ratio = seconds / 0.02
+    assert f"| rig --help | {seconds:.3g} s | python 0.02 s | {ratio:.3g} | ≤ 0.06 s | {met} |" in said.stdout
+
+
+def test_a_benchmark_that_fails_is_named_and_the_others_run(tmp_path: Path) -> None:
+    fails, runs = tmp_path / "fails.py", tmp_path / "runs.py"
+    fails.write_text("raise SystemExit(4)\n")
+    runs.write_text("print('it runs')\n")
+    said = run(ROOT / "benchmarks" / "goals.py", tmp_path, str(fails), str(runs))
+    assert said.returncode == 1
+    assert "it runs" in said.stdout and f"failed: {fails}" in said.stdout

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
 from firmware_host.answers import BoardIdentity, StoredCalibration
-from rig.config.load import Loaded
 from rig.data.absent import NO_ARM, NO_BOARD
 from rig.data.checked import Finite, checked
 from rig.data.entries.result_types import Utc
@@ -21,6 +20,9 @@ from rig.data.run_folder import ScriptIdentity
 from rig.data.version import VERSION
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import Report, TurnerIdentity
+
+if TYPE_CHECKING:
+    from rig.config.load import Loaded
 
 OF_FILES = ("readings_file", "motion_file")
 OPTIONAL = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "turner_kind", "board_follows_crystal")
@@ -110,7 +112,7 @@ def _program() -> dict[str, Any]:
 
 
 def provenance_of(
-    loaded: Loaded,
+    loaded: "Loaded",
     board: BoardIdentity | None,
     turner: Report,
     made: TurnerIdentity,

@@ -27,7 +27,7 @@ import numpy as np
 from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array, perpendicular_unit_vectors
-from rig.estimation.earth import EARTH_RATE_RAD_S
+from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
 from rig.estimation.gyroscope.common_errors import CommonErrors
 from rig.estimation.gyroscope.nonlinearity import curvature
 from rig.estimation.gyroscope.vector_fit import Seen, solver
@@ -38,7 +38,6 @@ FREE_RAD_S = 100 * EARTH_RATE_RAD_S  # so large before that what the readings sa
 SEEN = 10.0  # standard deviations, in the direction in which it is known least
 AGREES = 4.0  # standard deviations from the Earth's rate
 MIN_LEVEL = 0.1  # sine of the angle between the vertical and what a heading is given of
-DEG_H = np.pi / 180 / 3600  # rad/s
 REMEDY = "Add rests in attitudes turned about two axes (procedure imu), or leave procedure.earth_rate at known"
 
 

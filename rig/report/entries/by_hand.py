@@ -1,12 +1,15 @@
 """What `result.json` and the terminal say of a session by hand."""
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.data.entries.by_hand import ByHandEntry, HandErrorEntry, MoveByHandEntry, RestByHandEntry
-from rig.estimation.by_hand import HandSolution
 from rig.report.entry import entry
+
+if TYPE_CHECKING:
+    from rig.estimation.by_hand import HandSolution
 
 WORDS = {
     "face_repeatability_rad": "faces that are laid down again lie otherwise by {:.2f} mrad",
@@ -26,7 +29,7 @@ PUBLIC_NAMES = {
 UNITS = {"face_repeatability_rad": 1e3, "closure_error_rad": 1e3, "angle_fraction": 1e2}
 
 
-def by_hand_entry(solution: HandSolution) -> ByHandEntry:
+def by_hand_entry(solution: "HandSolution") -> ByHandEntry:
     """The entry of a solution."""
     return ByHandEntry(
         rests=tuple(entry(RestByHandEntry, each) for each in solution.rests),

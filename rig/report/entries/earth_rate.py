@@ -1,18 +1,21 @@
 """The Earth's rate that a gyroscope has found, as an entry of `result.json` and as a person reads it."""
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.entries.result_types import ErrorEntry
-from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.gyroscope.earth_rate import DEG_H, EarthRate
+from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
 from rig.report.entry import entry
 from rig.report.words.expanded import expanded, factor_words
 
+if TYPE_CHECKING:
+    from rig.estimation.gyroscope.earth_rate import EarthRate
 
-def earth_rate_entry(earth_rate: EarthRate) -> EarthRateEntry:
+
+def earth_rate_entry(earth_rate: "EarthRate") -> EarthRateEntry:
     """Return the entry of the Earth's rate; infinite degrees of freedom are null."""
     known = earth_rate.freedom if np.isfinite(earth_rate.freedom) else None
     return entry(EarthRateEntry, earth_rate, degrees_of_freedom=known)

@@ -1,12 +1,15 @@
 """What a result leaves out of its recording, and how this was read and solved: entries, and lines for people."""
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from rig.analysis.outcome import Outcome
 from rig.data.entries.result_types import OmittedEntry
 from rig.data.result_file import ResultDocument
-from rig.estimation.by_hand import HandSolution
 from rig.report.entry import entry
+
+if TYPE_CHECKING:
+    from rig.estimation.by_hand import HandSolution
 
 LEFT_OUT = "omitted"  # a move by hand that tells nothing
 
@@ -43,7 +46,7 @@ def _words(entry: OmittedEntry) -> str:
     return f"{entry.count} of {entry.total} {entry.what}, {entry.reason}; the first {entry.first}"
 
 
-def _rests(solution: HandSolution) -> Iterator[OmittedEntry]:
+def _rests(solution: "HandSolution") -> Iterator[OmittedEntry]:
     if solution.creeping_s:
         start_s, end_s = solution.creeping_s[0]
         yield OmittedEntry(
@@ -56,7 +59,7 @@ def _rests(solution: HandSolution) -> Iterator[OmittedEntry]:
         )
 
 
-def _moves(solution: HandSolution) -> Iterator[OmittedEntry]:
+def _moves(solution: "HandSolution") -> Iterator[OmittedEntry]:
     left_out = [number for number, move in enumerate(solution.moves, 1) if move.kind == LEFT_OUT]
     if left_out:
         yield OmittedEntry(

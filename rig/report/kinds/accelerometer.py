@@ -1,24 +1,15 @@
 """Accelerometers: scale, bias and axes from attitudes to gravity, and from sweeps (TRIAX, section III-B)."""
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
 from rig.analysis.outcome import Outcome
-from rig.analysis.read_when import of_accelerometer
-from rig.analysis.reference.acceleration import AccelerometerResult, HeldOut
 from rig.data.entries.accelerometer import AccelerometerEntry, AlignmentEntry, ValidationEntry
 from rig.data.quantity import ACCELERATION
 from rig.estimation.gyroscope.own_errors import NONLINEARITY
-from rig.estimation.reference.accelerometer_model import DELAY, SECOND
-from rig.estimation.reference.imu import MODEL
-from rig.estimation.residuals import dwell_residual_std_m_s2
-from rig.estimation.triads import Alignment
 from rig.report.c_code.c_functions import accelerometer_lines
-from rig.report.entries.external import accelerometers_elsewhere
-from rig.report.entries.triad import OF_ACCELEROMETERS, triad_entry
-from rig.report.entries.when import when_entry
 from rig.report.entry import counted, entry
 from rig.report.findings.characteristics import ACCELEROMETERS, SECOND_ORDER
 from rig.report.findings.finding import Finding
@@ -30,13 +21,27 @@ from rig.report.tables.budget import assumed_lines
 from rig.report.words.told_words import told_from, told_lines
 from rig.report.words.validity_words import warmth, when_words
 
+if TYPE_CHECKING:
+    from rig.analysis.reference.acceleration import AccelerometerResult, HeldOut
+    from rig.estimation.triads import Alignment
+
 
 def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
+    from rig.report.entries.external import accelerometers_elsewhere
+
     on_arm = {name: _entry(outcome, name, result) for name, result in outcome.accelerometers.items()}
     return accelerometers_elsewhere(outcome) | on_arm
 
 
-def _entry(outcome: Outcome, name: str, result: AccelerometerResult) -> AccelerometerEntry:
+def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> AccelerometerEntry:
+    from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
+    from rig.analysis.read_when import of_accelerometer
+    from rig.estimation.reference.accelerometer_model import DELAY, SECOND
+    from rig.estimation.reference.imu import MODEL
+    from rig.estimation.residuals import dwell_residual_std_m_s2
+    from rig.report.entries.triad import OF_ACCELEROMETERS, triad_entry
+    from rig.report.entries.when import when_entry
+
     solution = result.solution
     std = np.sqrt(np.diag(solution.covariance))
     return triad_entry(
@@ -57,14 +62,14 @@ def _entry(outcome: Outcome, name: str, result: AccelerometerResult) -> Accelero
     )  # fmt: skip
 
 
-def _alignment(alignment: Alignment) -> AlignmentEntry:
+def _alignment(alignment: "Alignment") -> AlignmentEntry:
     return entry(
         AlignmentEntry, alignment,
         std_rad=np.sqrt(np.diag(alignment.covariance_rad2)),
     )  # fmt: skip
 
 
-def _held_out(held: HeldOut) -> ValidationEntry:
+def _held_out(held: "HeldOut") -> ValidationEntry:
     return ValidationEntry(
         dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max())
     )

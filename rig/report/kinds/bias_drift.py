@@ -1,12 +1,12 @@
 """Biases by repeat: attitudes that were gone through again and again (TRIAX, section IV)."""
 
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
-from rig.analysis.temperature.bias_drift import SLOPE, Anew, BiasDrift
 from rig.data.entries.drift import BiasEntry, BiasStepEntry, DriftEntry, RepeatEntry, SlopeEntry
 from rig.data.entries.result_types import ErrorEntry, Vector3
 from rig.data.installed_kinds import quantities
@@ -14,7 +14,6 @@ from rig.data.quantity import RATE, Quantity
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM
 from rig.report.entries.error import error_entry
 from rig.report.entry import counted
 from rig.report.findings.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
@@ -27,6 +26,9 @@ from rig.report.tables.budget import heading_of
 from rig.report.words.expanded import expanded, factor_words
 from rig.station.plain_text import plain
 
+if TYPE_CHECKING:
+    from rig.analysis.temperature.bias_drift import Anew, BiasDrift
+
 
 def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
     return {
@@ -38,8 +40,11 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
     }
 
 
-def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) -> DriftEntry:
+def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: RecordedSensor) -> DriftEntry:
     """The bias of that sensor by repeat, in SI units."""
+    from rig.analysis.temperature.bias_drift import SLOPE
+    from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM
+
     held, slope = drift.held, drift.over_temperature
     anew = drift.anew.by_key(_anew, error_entry)
     return DriftEntry(
@@ -85,7 +90,7 @@ def _known(temperature_c: float) -> float | None:
     return None if np.isnan(temperature_c) else temperature_c
 
 
-def _anew(anew: Anew) -> BiasEntry:
+def _anew(anew: "Anew") -> BiasEntry:
     return BiasEntry(bias=_vector(anew.bias), std=_vector(anew.std))
 
 

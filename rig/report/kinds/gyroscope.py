@@ -7,7 +7,6 @@ import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
-from rig.analysis.read_when import of_gyroscope
 from rig.data.entries.budget import expanded_uncertainties
 from rig.data.entries.external import AttitudesEntry
 from rig.data.entries.result_types import ErrorEntry, Role
@@ -18,9 +17,6 @@ from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.report.c_code.c_functions import gyroscope_lines
 from rig.report.entries.by_hand import by_hand_lines
 from rig.report.entries.earth_rate import earth_rate_lines
-from rig.report.entries.external import rates_in_attitudes, turned
-from rig.report.entries.gyroscope import sensor_entry
-from rig.report.entries.when import when_entry
 from rig.report.findings.characteristics import GYROSCOPES, NON_ORTHOGONALITY
 from rig.report.findings.corrected import Corrected, noise_of
 from rig.report.findings.finding import Finding
@@ -35,6 +31,11 @@ from rig.report.words.validity_words import load_words, speed_words, warmth, whe
 
 def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
     """The entry is there of every run, empty where no sweeps were made."""
+    from rig.analysis.read_when import of_gyroscope
+    from rig.report.entries.external import rates_in_attitudes, turned
+    from rig.report.entries.gyroscope import sensor_entry
+    from rig.report.entries.when import when_entry
+
     made = {}
     for name, result in outcome.results.items():
         role: Role = "calibrate" if name in outcome.settings.to_calibrate else "reference"

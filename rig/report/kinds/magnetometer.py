@@ -1,22 +1,16 @@
 """Magnetometers: scale, bias and axes from attitudes to a field of known size, as mounted (TRIAX, Eq. (7))."""
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.freedom_beside import of_field_angles
 from rig.analysis.outcome import Outcome
-from rig.analysis.read_when import of_magnetometer
-from rig.analysis.reference.magnetic_field import MagnetometerResult
 from rig.data.entries.magnetometer import FieldDriftEntry, MagnetometerEntry, UniformityEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import FIELD
-from rig.estimation.reference.magnetometer import MODEL, hard_iron
 from rig.report.c_code.c_functions import magnetometer_lines
 from rig.report.entries.error import error_entry
-from rig.report.entries.external import magnetometers_elsewhere
-from rig.report.entries.triad import OF_MAGNETOMETERS, attitudes_entry
-from rig.report.entries.when import when_entry
 from rig.report.entry import counted, entry
 from rig.report.findings.characteristics import MAGNETOMETERS
 from rig.report.findings.finding import Finding
@@ -28,10 +22,15 @@ from rig.report.tables.budget import assumed_lines
 from rig.report.words.told_words import told_from, told_lines
 from rig.report.words.validity_words import when_words
 
+if TYPE_CHECKING:
+    from rig.analysis.reference.magnetic_field import MagnetometerResult
+
 FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
 
 
 def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
+    from rig.report.entries.external import magnetometers_elsewhere
+
     on_arm = outcome.magnetometers
     return {
         **magnetometers_elsewhere(outcome),
@@ -40,7 +39,13 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
     }
 
 
-def _entry(outcome: Outcome, name: str, result: MagnetometerResult) -> MagnetometerEntry:
+def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> MagnetometerEntry:
+    from rig.analysis.freedom_beside import of_field_angles
+    from rig.analysis.read_when import of_magnetometer
+    from rig.estimation.reference.magnetometer import MODEL, hard_iron
+    from rig.report.entries.triad import OF_MAGNETOMETERS, attitudes_entry
+    from rig.report.entries.when import when_entry
+
     return attitudes_entry(
         OF_MAGNETOMETERS, result, result.sensor,
         model=MODEL,

@@ -11,7 +11,6 @@ from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.result_file import ResultDocument
 from rig.report.c_code.temperature import temperature_lines
-from rig.report.entries.temperature import temperature_entry
 from rig.report.findings.characteristics import BIAS_SLOPE_AT_REFERENCE, POLYNOMIALS
 from rig.report.findings.finding import Finding
 from rig.report.findings.followed import Followed
@@ -23,6 +22,8 @@ from rig.station.plain_text import plain
 
 
 def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, OverTemperatureEntry]]:
+    from rig.report.entries.temperature import temperature_entry
+
     return {
         name: {
             quantity.name: temperature_entry(quantity, found, _sensor(outcome, name))

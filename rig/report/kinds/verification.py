@@ -1,12 +1,11 @@
 """Verifications: calibrated readings against a reference (SIX, Tables IV and V)."""
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.table import Table
 
-from rig.analysis.gyroscope.comparison import Comparison
-from rig.analysis.gyroscope.verification import Verification
 from rig.analysis.outcome import Outcome
 from rig.data.quantity import RATE
 from rig.data.result_file import (
@@ -23,12 +22,16 @@ from rig.report.findings.kind import Measured, ResultKind, Without
 from rig.report.tables import dcc_results
 from rig.station.plain_text import plain
 
+if TYPE_CHECKING:
+    from rig.analysis.gyroscope.comparison import Comparison
+    from rig.analysis.gyroscope.verification import Verification
+
 
 def _entries(outcome: Outcome) -> dict[str, VerificationEntry]:
     return {name: verification_entry(found) for name, found in outcome.verifications.items()}
 
 
-def verification_entry(verification: Verification) -> VerificationEntry:
+def verification_entry(verification: "Verification") -> VerificationEntry:
     """The statistics of both comparisons, without their curves."""
     before, reference = verification.before, verification.reference
     return entry(
@@ -42,7 +45,7 @@ def verification_entry(verification: Verification) -> VerificationEntry:
     )  # fmt: skip
 
 
-def _comparison(comparison: Comparison) -> ComparisonEntry:
+def _comparison(comparison: "Comparison") -> ComparisonEntry:
     return entry(
         ComparisonEntry, comparison,
         movement=entry(DeviationEntry, comparison.movement),

@@ -2,20 +2,23 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.data.entries.result_types import DetectionLimitEntry
 from rig.report.entry import entry
+
+if TYPE_CHECKING:
+    from rig.analysis.consistency.detection_limits import DetectionLimit
 
 FACTORS = {"1": (100.0, " %"), "rad": (math.degrees(1), "°"), "T": (1e6, " µT")}  # by which a unit is shown
 
 
-def told_from(damages: Sequence[DetectionLimit]) -> dict[str, tuple[DetectionLimitEntry, ...]]:
+def told_from(damages: Sequence["DetectionLimit"]) -> dict[str, tuple[DetectionLimitEntry, ...]]:
     """The field of `result.json`, if there is anything to say."""
     return {"detection_limits": told_from_entries(damages)} if damages else {}
 
 
-def told_from_entries(damages: Sequence[DetectionLimit]) -> tuple[DetectionLimitEntry, ...]:
+def told_from_entries(damages: Sequence["DetectionLimit"]) -> tuple[DetectionLimitEntry, ...]:
     """What `result.json` has of it: a size that is never told is null."""
     return tuple(
         entry(DetectionLimitEntry, each, size=each.size if math.isfinite(each.size) else None) for each in damages

@@ -9,7 +9,8 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.gyroscope.calibration import EARTH_RATE, SensorResult
 from rig.config.load import ConfigurationRefused, load
 from rig.data.recording.settings import settings_from_json
-from rig.estimation.gyroscope.earth_rate import DEG_H, EarthRate
+from rig.estimation.earth import DEG_H
+from rig.estimation.gyroscope.earth_rate import EarthRate
 from rig.report.entries.earth_rate import earth_rate_entry, earth_rate_lines
 from rig.report.entries.gyroscope import sensor_entry
 from rig.report.tables.axes import decimals

@@ -8,8 +8,8 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.gyroscope.earth_rate import DEG_H, EarthRate, Known, find_earth_rate
+from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
+from rig.estimation.gyroscope.earth_rate import EarthRate, Known, find_earth_rate
 from rig.estimation.gyroscope.vector_fit import explain
 from rig.study.rate_table import GYRO_MATRIX
 from support.motions.earth_seen import KVH1775, LATITUDE_RAD, LSM9DS1, MPU9250, UP, Part, Session, Truth, recorded

@@ -11,8 +11,7 @@ import yaml
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.config.load import ConfigurationRefused, load
 from rig.data.recording.run_file import read_run
-from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.gyroscope.earth_rate import DEG_H
+from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
 from support.laboratories.commands import rig
 from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import fresh_host, merge

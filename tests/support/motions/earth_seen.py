@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from rig.analysis.gyroscope.vector_inputs import WAVE_SHARE
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.earth_rate import DEG_H
+from rig.estimation.earth import DEG_H
 from rig.estimation.gyroscope.vector_fit import Seen
 from rig.estimation.statistics.rounding import Steps
 from rig.motion.geometry import AXIS_ERRORS, axis_errors, flange_axes, flange_pose
