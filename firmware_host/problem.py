@@ -15,7 +15,8 @@ class Problem(NamedTuple):  # no dataclass: the command line imports this, and m
     remedy: str
 
     def __str__(self) -> str:
-        return f"{self.name}: {self.what}. {self.remedy}."
+        stop = "" if self.remedy.endswith((".", "?", "!")) else "."
+        return f"{self.name}: {self.what}. {self.remedy}{stop}"
 
 
 class ProblemError(Exception):

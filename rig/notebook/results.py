@@ -11,6 +11,7 @@ import numpy as np
 from rig.data.recording.settings import setting
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, CharacteristicValue, rows
+from rig.notebook.frames import frame
 from rig.notebook.html import table
 from rig.notebook.readings import NoSuchSensor
 from rig.notebook.runs import Run
@@ -20,6 +21,8 @@ from rig.report.findings.finding import Finding
 from rig.report.kinds.registry import outlets, shown, terms_of
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from rig.notebook.plots import Plot
 
 
@@ -68,6 +71,24 @@ class Result(Mapping[str, Calibration]):
     def to_dict(self) -> dict[str, Any]:
         """The result as `result.json` has it: plain numbers, lists and texts."""
         return self.document.model_dump(mode="json", by_alias=True, exclude_unset=True)
+
+    def to_frame(self) -> "DataFrame":
+        """Return a pandas table with one row for each axis of each calibration, in SI units.
+
+        The index names sensor and axis; the columns are scale and bias, their expanded uncertainties and the unit of
+        the bias. Raise Refused `missing_extra`.
+        """
+        found = [(name, calibration, axis) for name, calibration in self.items() for axis in range(3)]
+        columns = {
+            "scale": [calibration.scale[axis] for _, calibration, axis in found],
+            "scale_expanded": [calibration.scale_expanded[axis] for _, calibration, axis in found],
+            "bias": [calibration.bias[axis] for _, calibration, axis in found],
+            "bias_expanded": [calibration.bias_expanded[axis] for _, calibration, axis in found],
+            "unit": [calibration.quantity.unit for _, calibration, _ in found],
+        }
+        return frame(
+            columns, [f"{name} {calibration.quantity.axes[axis]}" for name, calibration, axis in found], "axis"
+        )
 
     def plot(self) -> "Plot":
         """A plot of what models leave of each sweep, rest, attitude and repeat, sensor by sensor, and were expected to.

@@ -75,13 +75,25 @@ class LiveView:
 def _panel(progress: Progress, samples: SamplesTaken) -> Table:
     table = Table.grid(padding=(0, 2))
     table.add_row("step", f"{progress.number} of {progress.count}: {progress.step.name}")
-    table.add_row("progress", ProgressBar(total=1.0, completed=progress.fraction, width=40))
+    table.add_row("this step", _bar(progress.fraction))
+    table.add_row("the run", _bar(_fraction_of_run(progress)))
     table.add_row("arm speed", f"{degrees(progress.arm_speed_rad_s):6.2f} °/s")
     for sensor in samples.sensors:
         for name, readings in _readings(sensor):
             table.add_row(plain(name), readings)
     table.add_row("time", f"{progress.elapsed_s:5.1f} s gone, {progress.remaining_s:5.1f} s left")
     return table
+
+
+def _bar(fraction: float) -> ProgressBar:
+    """Return a bar that is green from its beginning: the library's own colour for what is not done yet is red."""
+    return ProgressBar(total=1.0, completed=fraction, width=40, complete_style="green", finished_style="green")
+
+
+def _fraction_of_run(progress: Progress) -> float:
+    """Return which part of the planned time is over."""
+    planned_s = progress.elapsed_s + progress.remaining_s
+    return progress.elapsed_s / planned_s if planned_s > 0 else progress.fraction
 
 
 def _panel_by_hand(seen: HandSeen, asked: HandAsked | None, samples: SamplesTaken) -> Table:

@@ -3,10 +3,17 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rig.errors import Refused
 from rig.errors.quoting import shorten
 from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    from rig.errors.by_way import Way
+
+WAYS: "dict[Way, str]" = {"hand": "by hand", "file": "with readings from files", "arm": "on an arm or a servomotor"}
 
 
 def add(parser: ArgumentParser) -> None:
@@ -33,7 +40,7 @@ def _check(name: str) -> Iterator[str]:
 
     if (words := words_of_name(name)) is not None:
         yield f"{words.name}: a check of the verdict. It fails when {words.means}."
-        yield f"What to do: {words.remedy.replace('`', '')}"
+        yield f"What to do: {words.remedy.replace('`', '').rstrip('.')}."
         yield "More: docs/checks.md, docs/method.md"
 
 
@@ -55,8 +62,40 @@ def _error(name: str) -> Iterator[str]:
     for entry in catalogue():
         if entry.name == name:
             yield f"{entry.name}: an error. It occurs when {entry.when}."
-            yield f"What to do: {entry.remedy}."
+            yield from _remedies(name, entry.remedy)
             yield "More: docs/errors.md"
+
+
+def _remedies(name: str, usual: str) -> Iterator[str]:
+    """Yield what to do, one line for each way if they differ, that of the latest run first."""
+    from rig.errors.by_way import remedies_by_way
+
+    remedies = remedies_by_way(name)
+    if not remedies:
+        yield f"What to do: {usual.rstrip('.')}."
+    used = _way_in_use()
+    for way in sorted(remedies, key=lambda way: way != used):
+        as_now = ", as in your latest run" if way == used else ""
+        yield f"What to do {WAYS[way]}{as_now}: {remedies[way].rstrip('.')}."
+
+
+def _way_in_use() -> "Way | None":
+    """Return how the latest run calibrates, by its configuration; None if there is no run or nothing says it."""
+    import yaml
+
+    from rig.config.files.regular_file import UnfitFile, read_regular_file
+    from rig.data.latest_run import latest_run
+    from rig.data.run_folder import CONFIG
+
+    try:
+        folder: Path = latest_run()
+        if not (folder / CONFIG).exists():
+            return "file"
+        document = yaml.safe_load(read_regular_file(folder / CONFIG, 1_000_000, follow_links=False))
+    except (Refused, OSError, UnfitFile, yaml.YAMLError):
+        return None
+    turner = document.get("turner") if isinstance(document, dict) else None
+    return "hand" if isinstance(turner, dict) and turner.get("kind") == "hand" else "arm"
 
 
 def _word(name: str) -> Iterator[str]:

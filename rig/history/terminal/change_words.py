@@ -54,15 +54,15 @@ def _size(change: Change) -> str:
     if is_scale(change.name):
         share = difference / change.before.value
         size, unit = (PERCENT, "%") if abs(share) >= PERCENT / 100 else (PPM, "ppm")
-        return f"{_signed(share / size)} {unit}"
+        return f"{signed(share / size)} {unit}"
     if change.unit == "rad":
-        return f"{_signed(difference / DEGREE_RAD)}°"
+        return f"{signed(difference / DEGREE_RAD)}°"
     shown = next((each.reading for each in quantities().values() if each.unit == change.unit), None)
     if shown is not None:
-        return f"{_signed(difference / shown.size)} {shown.name}"
-    return _signed(difference) + ("" if change.unit == "1" else f" {change.unit}")
+        return f"{signed(difference / shown.size)} {shown.name}"
+    return signed(difference) + ("" if change.unit == "1" else f" {change.unit}")
 
 
-def _signed(value: float) -> str:
-    """Three figures at most, and always a sign."""
+def signed(value: float) -> str:
+    """Return a difference in three figures at most, always with its sign."""
     return f"{'−' if value < 0 else '+'}{figures(abs(value))}"

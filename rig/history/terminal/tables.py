@@ -8,6 +8,7 @@ from rig.history.series import DRIFT_DAYS, YEAR_DAYS, Change, RigState, Subject,
 from rig.history.statistics.charts import FEWEST, Chart
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Kept, Past
+from rig.history.terminal.change_words import signed
 from rig.history.terminal.fitting_table import Column, FittingTable
 from rig.history.terminal.spark import picture
 from rig.report.findings.followed import BIASES, SCALES, Parameter, is_scale
@@ -71,11 +72,20 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
 
 
 def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
-    """The table of changes: each parameter beside the one before."""
+    """Return the table of changes: each parameter before and now, the difference, and E_n.
+
+    Where there is little room the values stand without U, which E_n holds.
+    """
+
+    def values(heading: str, parameters: Sequence[Parameter], rank: int) -> Column:
+        alone = Column(heading, [value_text(each).partition(" ±")[0] for each in parameters], number=True)
+        return Column(f"{heading} ± U", [value_text(each) for each in parameters], rank, number=True, shorter=alone)
+
     columns = (
         Column("parameter", [_with_unit(each.name, each.unit) for each in changes]),
-        Column("before ± U", [value_text(each.before) for each in changes], rank=1, number=True),
-        Column("now ± U", [value_text(each.now) for each in changes], number=True),
+        values("before", [each.before for each in changes], 2),
+        values("now", [each.now for each in changes], 1),
+        Column("difference", [signed(each.now.value - each.before.value) for each in changes], number=True),
         Column("E_n", [f"{'changed ' * each.has_changed}{each.normalised_error:.2f}" for each in changes], number=True),
     )
     return FittingTable(title, columns)
