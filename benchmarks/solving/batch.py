@@ -28,8 +28,8 @@ def averaged_readings(speed_rad_s: float) -> Array:
     means = []
     for _ in range(sim.SETS):
         scale, bias = sim.NORMAL.draw(rng)
-        F = sim.sensitivity(scale, sim.mountings(rng, sim.RUNS))
-        means.append(sim.mean_readings(rng, F, bias, sim.whole_turn(speed_rad_s, sim.NOISE_LEVELS_RAD_S[0])))
+        F = sim.build_sensitivity(scale, sim.draw_mountings(rng, sim.RUNS))
+        means.append(sim.draw_mean_readings(rng, F, bias, sim.build_whole_turn(speed_rad_s, sim.NOISE_LEVELS_RAD_S[0])))
     return np.concatenate(means)
 
 

@@ -39,8 +39,8 @@ RUNS, ROUNDS = 300, 10
 def session(seed: int) -> Session:
     """Samples by imucal's section names: `gyr_…` in rad/s, `acc_…` in m/s², each (n, 3)."""
     rng = np.random.default_rng(seed)
-    mounting = sim.mountings(rng, 1, float(np.sin(np.radians(3))))[0]
-    F = sim.sensitivity(SCALE, mounting)
+    mounting = sim.draw_mountings(rng, 1, float(np.sin(np.radians(3))))[0]
+    F = sim.build_sensitivity(SCALE, mounting)
     samples = {}
     for hold in HOLDS:
         samples[f"gyr_{hold}"] = NOISE_RAD_S * rng.normal(size=(HELD, 3)) - BIAS_RAD_S

@@ -14,7 +14,7 @@ from rig.report.exports.names import plain_names
 from rig.report.figures.verification import save
 from rig.report.findings.characteristics import every_characteristic
 from rig.report.findings.followed import BIASES, SCALES
-from rig.study.style import style
+from rig.study.style import use_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +37,7 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
         shown = [trends[each] for each in _drawn() if each in trends]
         if not shown:
             continue
-        with style():
+        with use_style():
             down = 2 * math.ceil(len(shown) / ACROSS)
             figure = Figure(figsize=(4.6 * ACROSS, 2.6 * down))
             rows = figure.subplots(down, ACROSS, sharex=True, squeeze=False, gridspec_kw=MARGINS)

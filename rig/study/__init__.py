@@ -1,1 +1,1 @@
-"""Monte-Carlo studies: the papers' figures and tables, made with the rig's own estimators."""
+"""Monte-Carlo studies: the papers' figures and tables, computed with the rig's own estimators."""

@@ -1,8 +1,8 @@
 """SIX, Eq. (8): squaring every sample before averaging, against averaging the revolution before squaring.
 
-Taken literally, Eq. (8) averages m². The mean of the squares holds the noise's variance beside the square of the mean,
-on all three axes, and that of the vibration along the turn (a part ε = 0.05 of the speed). So the estimated scale
-factors shrink by about 3 k² σ² / (2 ω²) + ε²/2.
+Taken literally, Eq. (8) averages m². The mean of the squares contains, besides the square of the mean, the variance of
+the noise on all three axes and that of the vibration along the turn (a fraction ε = 0.05 of the speed). The estimated
+scale factors therefore shrink by about 3 k² σ² / (2 ω²) + ε²/2.
 """
 
 from functools import partial
@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.six_observation import design
 from rig.study import simulation as sim
 from rig.study.report import Finding, Report, Settings, table
-from rig.study.work import in_parallel
+from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,9 +24,9 @@ ORDERS = ("mean_then_square", "square_then_mean")
 
 
 def study(settings: Settings) -> Report:
-    """30 gyroscopes × 500 runs at each noise level, 60°/s, 200 Hz."""
-    task = partial(_errors_of_one_gyroscope, settings.runs or sim.RUNS)
-    errors = np.concatenate(in_parallel(task, range(sim.SETS), settings), axis=2)  # (noises, orders, all runs, 6)
+    """Simulate 30 gyroscopes × 500 runs at each noise level, 60°/s, 200 Hz."""
+    task = partial(_simulate_gyroscope, settings.runs or sim.RUNS)
+    errors = np.concatenate(run_parallel(task, range(sim.SETS), settings), axis=2)  # (noises, orders, all runs, 6)
     rows: list[dict[str, Any]] = [
         {
             "noise_rad_s": noise,
@@ -49,21 +49,21 @@ def study(settings: Settings) -> Report:
     return Report(table(rows), findings, partial(_draw, rows), (10.0, 5.0))
 
 
-def _errors_of_one_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
-    """(noises, orders, runs, 6): relative errors of the scale factors, errors of the biases in rad/s."""
+def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
+    """Return relative errors of scale factors and errors of biases in rad/s, (noises, orders, runs, 6)."""
     scale, bias = sim.NORMAL.draw(rng)
-    F = sim.sensitivity(scale, sim.mountings(rng, runs))
+    F = sim.build_sensitivity(scale, sim.draw_mountings(rng, runs))
     errors = np.empty((len(NOISES_RAD_S), len(ORDERS), runs, 6))
     for n, noise in enumerate(NOISES_RAD_S):
-        means, squares = sim.mean_readings_and_squares(rng, F, bias, sim.whole_turn(sim.ARM_RAD_S, noise))
+        means, squares = sim.draw_means_and_squares(rng, F, bias, sim.build_whole_turn(sim.ARM_RAD_S, noise))
         for o, x in enumerate((design(means), np.concatenate([squares, means], axis=-1))):
-            k, b = _closed_form(x, sim.ARM_RAD_S)
+            k, b = _solve_closed_form(x, sim.ARM_RAD_S)
             errors[n, o] = np.concatenate([k / scale - 1, b - bias], axis=-1)
     return errors
 
 
-def _closed_form(x: Array, speed_rad_s: float) -> tuple[Array, Array]:
-    """Scale factors and biases (runs, 3) from designs (runs, 6, 6) that may hold squares made either way."""
+def _solve_closed_form(x: Array, speed_rad_s: float) -> tuple[Array, Array]:
+    """Return scale factors and biases (runs, 3) for designs (runs, 6, 6), whatever the order of averaging."""
     q = np.linalg.solve(x, np.ones((*x.shape[:-1], 1)))[..., 0]
     total = np.sum(q[:, 3:] ** 2 / (4 * q[:, :3]), axis=1, keepdims=True)
     beta = speed_rad_s**2 / (1 + total) * q

@@ -12,20 +12,20 @@ from rig.estimation.gyroscope.levenberg_marquardt import solve_levenberg_marquar
 from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.study import simulation as sim
 from rig.study.report import Finding, Report, Settings, table
-from rig.study.work import in_parallel
+from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# (scale factors, biases in rad/s) by noise level: "the majority of estimations had an error within ±…", section III-A
-# and III-C. The second gives one band for both.
+# (scale factors, biases in rad/s) by noise level: "the majority of estimations had an error within ±…", sections III-A
+# and III-C. The latter gives one band for both.
 PUBLISHED = {
     "normal": {0.035: (9.3e-4, 3.0e-3), 0.2: (5.4e-3, 1.7e-2)},
     "extreme": {0.035: (3.0e-3, 3.0e-3), 0.2: (1.8e-2, 1.8e-2)},
 }
 SPEEDS = {"3 rad/s": sim.FAST_RAD_S, "60°/s": sim.ARM_RAD_S}
-WHISKER = 1.5  # of the box: the reach of a box plot's whiskers in either direction
+WHISKER = 1.5  # reach of a box plot's whiskers, in boxes
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +36,8 @@ class _Condition:
     estimator: str
 
 
-def _conditions() -> list[_Condition]:
-    """The conditions: both estimators on whole turns; Algorithm 1 once more with white vibration."""
+def _list_conditions() -> list[_Condition]:
+    """Return the conditions: both estimators on whole turns; Algorithm 1 once more with white vibration."""
     kinds: tuple[tuple[sim.Vibration, str], ...] = (
         ("whole_turns", "algorithm_1"),
         ("whole_turns", "levenberg_marquardt"),
@@ -47,18 +47,18 @@ def _conditions() -> list[_Condition]:
 
 
 def normal(settings: Settings) -> Report:
-    """Fig. 2: scale factors U(0.8, 1.2), biases U(−0.1, 0.1) rad/s."""
+    """Reproduce Fig. 2: scale factors U(0.8, 1.2), biases U(−0.1, 0.1) rad/s."""
     return _study(sim.NORMAL, settings)
 
 
 def extreme(settings: Settings) -> Report:
-    """Fig. 5: scale factors U(1.2, 2), biases ±U(0.1, 0.2) rad/s."""
+    """Reproduce Fig. 5: scale factors U(1.2, 2), biases ±U(0.1, 0.2) rad/s."""
     return _study(sim.EXTREME, settings)
 
 
 def _study(population: sim.Population, settings: Settings) -> Report:
-    task = partial(_errors_of_one_gyroscope, population, settings.runs or sim.RUNS)
-    errors = np.concatenate(in_parallel(task, range(sim.SETS), settings), axis=1)  # (conditions, all runs, 6)
+    task = partial(_simulate_gyroscope, population, settings.runs or sim.RUNS)
+    errors = np.concatenate(run_parallel(task, range(sim.SETS), settings), axis=1)  # (conditions, all runs, 6)
     rows = [
         {
             "speed_rad_s": SPEEDS[condition.speed],
@@ -67,47 +67,47 @@ def _study(population: sim.Population, settings: Settings) -> Report:
             "estimator": condition.estimator,
             "parameter": parameter,
             "unit": "1" if column < 3 else "rad/s",
-            **_box(errors[i, :, column]),
+            **_summarise(errors[i, :, column]),
             "published_band": PUBLISHED[population.name][condition.noise_rad_s][column // 3],
         }
-        for i, condition in enumerate(_conditions())
+        for i, condition in enumerate(_list_conditions())
         for column, parameter in enumerate(PARAMETERS)
     ]
     columns = table(rows)
     return Report(columns, _findings(rows), partial(_draw, population, rows), (12.0, 8.0))
 
 
-def _errors_of_one_gyroscope(population: sim.Population, runs: int, rng: np.random.Generator, _: int) -> Array:
-    """Estimated less true parameters (conditions, runs, 6); both estimators see the same readings."""
+def _simulate_gyroscope(population: sim.Population, runs: int, rng: np.random.Generator, _: int) -> Array:
+    """Return estimated minus true parameters (conditions, runs, 6); both estimators use the same readings."""
     scale, bias = population.draw(rng)
     truth = np.concatenate([scale, bias])
-    mounting = sim.mountings(rng, runs)
+    mounting = sim.draw_mountings(rng, runs)
     means: dict[tuple[str, float, str], Array] = {}
     errors = []
-    for condition in _conditions():
+    for condition in _list_conditions():
         key = (condition.speed, condition.noise_rad_s, condition.vibration)
         speed = SPEEDS[condition.speed]
         if key not in means:
-            sweep = sim.whole_turn(speed, condition.noise_rad_s, condition.vibration)
-            means[key] = sim.mean_readings(rng, sim.sensitivity(scale, mounting), bias, sweep)
-        solve = _by_algorithm_1 if condition.estimator == "algorithm_1" else _by_levenberg_marquardt
-        errors.append(solve(means[key], sim.whole_turn(speed, condition.noise_rad_s)) - truth)
+            sweep = sim.build_whole_turn(speed, condition.noise_rad_s, condition.vibration)
+            means[key] = sim.draw_mean_readings(rng, sim.build_sensitivity(scale, mounting), bias, sweep)
+        solve = _solve_algorithm_1 if condition.estimator == "algorithm_1" else _solve_levenberg_marquardt
+        errors.append(solve(means[key], sim.build_whole_turn(speed, condition.noise_rad_s)) - truth)
     return np.array(errors)
 
 
-def _by_algorithm_1(means: Array, sweep: sim.Sweep) -> Array:
+def _solve_algorithm_1(means: Array, sweep: sim.Sweep) -> Array:
     solved = algorithm_1_batch(means, sweep.speed_rad_s)
     return np.concatenate([solved.scale, solved.bias_rad_s], axis=-1)
 
 
-def _by_levenberg_marquardt(means: Array, sweep: sim.Sweep) -> Array:
+def _solve_levenberg_marquardt(means: Array, sweep: sim.Sweep) -> Array:
     speeds, variances = np.full(6, sweep.speed_rad_s), np.full((6, 3), sweep.variance_rad2_s2)
     solved = [solve_levenberg_marquardt(mean, speeds, variances, weighted=False) for mean in means]
-    return np.array([np.concatenate([each.scale, each.bias_rad_s]) for each in solved])
+    return np.array([np.concatenate([solution.scale, solution.bias_rad_s]) for solution in solved])
 
 
-def _box(errors: Array) -> dict[str, float]:
-    """What a box plot shows: quartiles, and the whiskers at the last errors within 1.5 boxes of the box."""
+def _summarise(errors: Array) -> dict[str, float]:
+    """Return a box plot's numbers: quartiles, and whiskers at the last errors within 1.5 boxes of the box."""
     low, median, high = np.percentile(errors, [25, 50, 75])
     reach = WHISKER * (high - low)
     inside = errors[(errors >= low - reach) & (errors <= high + reach)]
@@ -122,30 +122,30 @@ def _box(errors: Array) -> dict[str, float]:
 
 
 def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
-    found = []
-    for condition in _conditions():
+    findings = []
+    for condition in _list_conditions():
         if condition.estimator != "algorithm_1":
             continue
         for group, first, unit in (("scale", "k", "1"), ("bias", "b", "rad/s")):
-            group_rows = [row for row in _of(rows, condition) if row["parameter"].startswith(first)]
+            group_rows = [row for row in _select(rows, condition) if row["parameter"].startswith(first)]
             band = np.mean([(row["whisker_high"] - row["whisker_low"]) / 2 for row in group_rows])
             name = f"{group} band, {condition.speed}, noise {condition.noise_rad_s:g} rad/s, {condition.vibration}"
-            found.append(Finding(name, float(band), unit, group_rows[0]["published_band"]))
-    apart = [
+            findings.append(Finding(name, float(band), unit, group_rows[0]["published_band"]))
+    ratios = [
         abs(a["std"] - b["std"]) / a["std"]
         for speed in SPEEDS
         for noise in sim.NOISE_LEVELS_RAD_S
         for a, b in zip(
-            _of(rows, _Condition(speed, noise, "whole_turns", "algorithm_1")),
-            _of(rows, _Condition(speed, noise, "whole_turns", "levenberg_marquardt")),
+            _select(rows, _Condition(speed, noise, "whole_turns", "algorithm_1")),
+            _select(rows, _Condition(speed, noise, "whole_turns", "levenberg_marquardt")),
             strict=True,
         )
     ]
-    found.append(Finding("largest difference of std, Algorithm 1 and Levenberg–Marquardt", max(apart), "relative"))
-    return tuple(found)
+    findings.append(Finding("largest difference of std, Algorithm 1 and Levenberg–Marquardt", max(ratios), "relative"))
+    return tuple(findings)
 
 
-def _of(rows: list[dict[str, Any]], condition: _Condition) -> list[dict[str, Any]]:
+def _select(rows: list[dict[str, Any]], condition: _Condition) -> list[dict[str, Any]]:
     return [
         row
         for row in rows
@@ -165,7 +165,7 @@ def _draw(population: sim.Population, rows: list[dict[str, Any]], figure: "Figur
     )
     for row_of_panels, noise in zip(panels, sim.NOISE_LEVELS_RAD_S, strict=True):
         for panel, (speed, estimator, title) in zip(row_of_panels, kinds, strict=True):
-            _draw_boxes(panel, _of(rows, _Condition(speed, noise, "whole_turns", estimator)))
+            _draw_boxes(panel, _select(rows, _Condition(speed, noise, "whole_turns", estimator)))
             panel.set_title(f"{title}\nnoise {noise:g} rad/s")
         row_of_panels[0].set_ylabel("estimated − true\n(scale factors: 1, biases: rad/s)")
     panels[0, 0].legend(loc="upper left")

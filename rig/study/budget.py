@@ -1,9 +1,9 @@
-"""Whether the stated uncertainty holds: sessions in which everything that may be wrong is, drawn from its distribution.
+"""Coverage of the stated uncertainty: sessions with every effect that the budget names, drawn from its distribution.
 
-JCGM 101: a draw is a session with a gyroscope, an arm and a controller of its own. Its mean readings are computed from
-the true movement, what the solver is given is what the controller would say. The interval ± 2 u of the budget must then
-cover the truth in 95 of 100 draws. Beside it stands the solver without what this rig has against each effect: no
-gravity columns, no wandering bias, the clock taken for true, and the noise alone for uncertainty.
+JCGM 101: a draw is a session with its own gyroscope, arm and controller. Its mean readings are computed from the true
+motion; the solver gets the controller's values. The interval ± 2 u of the budget must then cover the truth in 95 of 100
+draws. For comparison the solver also runs without this rig's remedies: no gravity columns, no bias random walk, no
+correction of the clock, and the noise alone for uncertainty.
 """
 
 from dataclasses import dataclass
@@ -22,17 +22,17 @@ from rig.estimation.gyroscope.vector_fit import Seen, centripetal_m_s2, explain
 from rig.estimation.gyroscope.vector_model import solve_vector_model
 from rig.estimation.statistics.bias_process import flicker_covariance
 from rig.study.report import Finding, Report, Settings, table
-from rig.study.work import in_parallel
+from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DRAWS, BATCHES = 1500, 30
 REST_S = 2.6
-# How far wrists 3, 1 and 2 swing the flange's centre: offsets d5 and d6 of a UR10e (maker's article 45257).
+# Lever arms of the flange's centre from wrists 3, 1 and 2: offsets d5 and d6 of a UR10e (maker's article 45257).
 ARMS_M = np.array([[0.0, 0.0, 0.0], [0.11985, 0.0, 0.11655], [0.0, 0.0, 0.11655]])
-STEP_S = 0.05  # of the bias's walk
-ATTITUDES = 72  # of a turn
+STEP_S = 0.05  # of the bias random walk
+ATTITUDES = 72  # per revolution
 MOUNTING_RAD, SKEW_RAD = np.radians(5.0), np.radians(0.25)
 SAMPLE_RATE_HZ = 238.0
 WARM_UP_S, STEP_K = 300.0, 1 / 16  # of the thermometer of a LSM9DS1: DocID025715, table 4
@@ -40,12 +40,18 @@ WARM_UP_S, STEP_K = 300.0, 1 / 16  # of the thermometer of a LSM9DS1: DocID02571
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """How large what may be wrong is drawn: standard deviations, but for half-widths of the clock and the offset.
+    """Magnitudes of the effects: standard deviations, but half-widths of clock, offset, nonlinearity and warming.
 
-    g-sensitivity for every element, rad/s/g; twist of each wrist's axis; jitter of the states' times; walk of the bias;
-    how far from the flange's centre the sensor sits along each axis. Half-widths, too, are odd and even nonlinearity as
-    a share of full scale, by how much the sensor warms, and what that does to bias and scale. The noise is that of a
-    LSM9DS1 by its data sheet, 0.01 °/s/√Hz, the nonlinearity that of a MPU-9250 (PS-MPU-9250A-01, table 1).
+    - `g_sensitivity_rad_s_g`: of every element; `axis_rad`: twist of each wrist's axis; `jitter_s`: of the states'
+      times.
+    - `clock`, `clock_known`: error of the controller's clock, and standard uncertainty of its correction.
+    - `walk_rad_s_sqrt_s`: bias random walk; `offset_m`: the sensor's offset from the flange's centre along each axis.
+    - `nonlinearity`: odd and even, as a fraction of full scale; `warming_k`: the sensor's warming, with its effect on
+      bias
+      and scale.
+
+    The noise is that of a LSM9DS1 by its data sheet, 0.01 °/s/√Hz, the nonlinearity that of a MPU-9250
+    (PS-MPU-9250A-01, table 1).
     """
 
     speed_rad_s: float = np.pi / 3
@@ -68,7 +74,7 @@ class Effects:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """The arm's movement: attitudes (N, 72, 3, 3) from base to flange, in the flange rates (N, 3) and arms (N, 3)."""
+    """The arm's motion: attitudes (N, 72, 3, 3) base to flange, rates (N, 3) and lever arms (N, 3) in the flange."""
 
     attitudes: Array
     rates_rad_s: Array
@@ -78,78 +84,80 @@ class Session:
 
 
 def study(settings: Settings) -> Report:
-    """Coverage of ± 2 u, and RMS of error over standard uncertainty, with and without the remedies."""
-    drawn = errors(Effects(), settings)
+    """Find the coverage of ± 2 u, and the RMS of error over standard uncertainty, with and without the remedies."""
+    ratios = errors(Effects(), settings)
     rows = [
         {
             "parameter": parameter,
             "remedies": remedies,
-            "coverage_percent": 100 * float(np.mean(np.abs(drawn[:, which, p]) < 2)),
-            "rms_error_over_u": float(np.sqrt(np.mean(drawn[:, which, p] ** 2))),
+            "coverage_percent": 100 * float(np.mean(np.abs(ratios[:, variant, p]) < 2)),
+            "rms_error_over_u": float(np.sqrt(np.mean(ratios[:, variant, p] ** 2))),
         }
-        for which, remedies in enumerate(("with", "without"))
+        for variant, remedies in enumerate(("with", "without"))
         for p, parameter in enumerate(PARAMETERS)
     ]
     return Report(table(rows), _findings(rows), partial(_draw, rows), (8.0, 4.5))
 
 
 def errors(effects: Effects, settings: Settings) -> Array:
-    """(draws, 2, 6) errors of scale and bias over their standard uncertainties, with and without the remedies."""
+    """Return errors of scale and bias over standard uncertainty, with and without the remedies, (draws, 2, 6)."""
     draws = settings.runs or DRAWS
-    shares = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
-    return np.concatenate(in_parallel(partial(_batch, effects), [share for share in shares if share], settings))
+    counts = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
+    return np.concatenate(
+        run_parallel(partial(_simulate_batch, effects), [count for count in counts if count], settings)
+    )
 
 
-def _batch(effects: Effects, rng: np.random.Generator, draws: int) -> Array:
-    return np.array([_one(effects, rng) for _ in range(draws)])
+def _simulate_batch(effects: Effects, rng: np.random.Generator, draws: int) -> Array:
+    return np.array([_simulate_session(effects, rng) for _ in range(draws)])
 
 
-def _one(effects: Effects, rng: np.random.Generator) -> Array:
+def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
     scale, bias = rng.uniform(0.9, 1.1, 3), rng.uniform(-0.02, 0.02, 3)
-    true = _session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)
-    told = _session(np.zeros((3, 2)), effects.speed_rad_s)
-    wandered, whole = _walk(rng, true.windows_s, effects.walk_rad_s_sqrt_s)
+    true = _build_session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)
+    nominal = _build_session(np.zeros((3, 2)), effects.speed_rad_s)
+    drift, mean_drift = _draw_random_walk(rng, true.windows_s, effects.walk_rad_s_sqrt_s)
     flicker = effects.instability_rad_s**2 * flicker_covariance(true.windows_s)
-    wandered = wandered + rng.multivariate_normal(np.zeros(len(flicker)), flicker, 3).T
-    axes = _skewed(rng) @ _turned(rng, MOUNTING_RAD)
+    drift = drift + rng.multivariate_normal(np.zeros(len(flicker)), flicker, 3).T
+    axes = _draw_axes(rng) @ _draw_rotation(rng, MOUNTING_RAD)
     heading, latitude = rng.uniform(0, 2 * np.pi), np.radians(effects.latitude_deg)
     earth = EARTH_RATE_RAD_S * np.array(
         [np.cos(latitude) * np.cos(heading), np.cos(latitude) * np.sin(heading), np.sin(latitude)]
     )
     up = np.array([0.0, 0.0, 1.0])
-    sensitivity = rng.normal(0, effects.g_sensitivity_rad_s_g, (3, 3))  # of the sensor's axes to what they feel
+    sensitivity = rng.normal(0, effects.g_sensitivity_rad_s_g, (3, 3))  # of the axes to specific force
     attitudes = true.attitudes.mean(axis=1)
-    ways = true.arms_m + rng.uniform(-effects.offset_m, effects.offset_m, 3)
-    force = attitudes @ up + centripetal_m_s2(true.rates_rad_s, ways) / STANDARD_GRAVITY_M_S2
-    felt = force @ axes.T @ sensitivity.T
-    turned = true.rates_rad_s + attitudes @ earth
+    lever_arms_m = true.arms_m + rng.uniform(-effects.offset_m, effects.offset_m, 3)
+    force = attitudes @ up + centripetal_m_s2(true.rates_rad_s, lever_arms_m) / STANDARD_GRAVITY_M_S2
+    g_bias = force @ axes.T @ sensitivity.T
+    rates = true.rates_rad_s + attitudes @ earth
     durations = np.diff(true.windows_s).T[0]
     variances = np.tile(effects.noise_rad_s**2 / (SAMPLE_RATE_HZ * durations)[:, None], 3)
     noise = np.sqrt(variances) * rng.standard_normal((len(durations), 3))
-    warmth, recorded_k = _warmth(rng, effects, true)
-    slope, change = (size * rng.uniform(-1, 1, 3) for size in (effects.bias_rad_s_per_k, effects.scale_per_k))
-    wandered = wandered + (warmth - np.average(warmth, weights=durations))[:, None] * slope
+    warmth, recorded_k = _draw_warming(rng, effects, true)
+    bias_slope, scale_slope = (size * rng.uniform(-1, 1, 3) for size in (effects.bias_rad_s_per_k, effects.scale_per_k))
+    drift = drift + (warmth - np.average(warmth, weights=durations))[:, None] * bias_slope
     sweeps = durations * true.rates_rad_s.any(axis=1)
-    along = _curved(turned @ axes.T, effects, rng) * (
-        1 + (warmth - np.average(warmth, weights=sweeps))[:, None] * change
+    sensed = _apply_nonlinearity(rates @ axes.T, effects, rng) * (
+        1 + (warmth - np.average(warmth, weights=sweeps))[:, None] * scale_slope
     )
-    means = along / scale - bias + felt + wandered + noise
+    means = sensed / scale - bias + g_bias + drift + noise
     clock = rng.uniform(-effects.clock, effects.clock)
     jitter = rng.normal(0, np.sqrt(2) * effects.jitter_s, len(durations)) / durations
-    said = told.rates_rad_s * (1 - clock + jitter)[:, None]
-    truth = np.concatenate([scale, bias - whole])
-    corrected = said * (1 + clock + rng.normal(0, effects.clock_known))
-    seen = Seen(
+    reported = nominal.rates_rad_s * (1 - clock + jitter)[:, None]
+    truth = np.concatenate([scale, bias - mean_drift])
+    corrected = reported * (1 + clock + rng.normal(0, effects.clock_known))
+    inputs = Seen(
         means_rad_s=means,
         variances_rad2_s2=variances,
         turns_rad_s=corrected,
         earth_rate_rad_s=np.zeros(3),
         speed_std_rad_s=np.zeros(len(durations)),
-        attitudes=told.attitudes.mean(axis=1),
-        gravity_m_s2=told.attitudes.mean(axis=1) @ (-STANDARD_GRAVITY_M_S2 * up),
-        windows_s=told.windows_s,
-        joints=told.joints,
-        arms_m=told.arms_m,
+        attitudes=nominal.attitudes.mean(axis=1),
+        gravity_m_s2=nominal.attitudes.mean(axis=1) @ (-STANDARD_GRAVITY_M_S2 * up),
+        windows_s=nominal.windows_s,
+        joints=nominal.joints,
+        arms_m=nominal.arms_m,
         sensor=KnownSensor(
             nonlinearity=effects.nonlinearity,
             full_scale_rad_s=effects.full_scale_rad_s,
@@ -160,7 +168,7 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
             temperature_step_k=STEP_K,
         ),
     )
-    explained = explain(seen, np.eye(3))
+    fit = explain(inputs, np.eye(3))
     unknown = Unknown(
         clock_std=effects.clock_known,
         clock_source="",
@@ -170,29 +178,29 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
         g_sensitivity_rad_s_per_g=effects.g_sensitivity_rad_s_g,
         earth_rate=True,
     )
-    solved, plain = explained.solution, solve_vector_model(means, said, variances)
-    with_all = (np.concatenate([solved.scale, solved.bias_rad_s]) - truth) / budget(explained, unknown).std
+    solved, plain = fit.solution, solve_vector_model(means, reported, variances)
+    with_all = (np.concatenate([solved.scale, solved.bias_rad_s]) - truth) / budget(fit, unknown).std
     without = (np.concatenate([plain.scale, plain.bias_rad_s]) - truth) / np.sqrt(np.diag(plain.covariance))
     return np.array([with_all, without])
 
 
-def _curved(along_rad_s: Array, effects: Effects, rng: np.random.Generator) -> Array:
-    """(N, 3) what a sensor takes rates along its axes for, if it is right at the speed of the sweeps."""
+def _apply_nonlinearity(along_rad_s: Array, effects: Effects, rng: np.random.Generator) -> Array:
+    """Return the rates (N, 3) that a nonlinear sensor indicates, which are right at the speed of the sweeps."""
     cube, square = effects.nonlinearity / np.array([[CUBE_MISSED], [SQUARE_MISSED]]) * rng.uniform(-1, 1, (2, 3))
-    share, swept = along_rad_s / effects.full_scale_rad_s, effects.speed_rad_s / effects.full_scale_rad_s
-    curve = cube * (share**2 - swept**2) + square * share
+    fraction, sweep_fraction = along_rad_s / effects.full_scale_rad_s, effects.speed_rad_s / effects.full_scale_rad_s
+    curve = cube * (fraction**2 - sweep_fraction**2) + square * fraction
     return np.asarray(along_rad_s * (1 + curve), dtype=np.float64)
 
 
-def _warmth(rng: np.random.Generator, effects: Effects, session: Session) -> tuple[Array, Array]:
-    """(N,) K above the start in the mean of each average, and as recorded in steps."""
+def _draw_warming(rng: np.random.Generator, effects: Effects, session: Session) -> tuple[Array, Array]:
+    """Return the temperature above the start in the mean of each average, K (N,), and the same as recorded in steps."""
     middle_s = session.windows_s.mean(axis=1)
     warmth = effects.warming_k * rng.uniform(-1, 1) * (1 - np.exp(-middle_s / WARM_UP_S))
     return warmth, STEP_K * np.round(warmth / STEP_K)
 
 
-def _session(twists: Array, speed_rad_s: float) -> Session:
-    """Six sweeps of wrists 3, 1 and 2 about flange z, y and x, each with the rest after it; then the rests.
+def _build_session(twists: Array, speed_rad_s: float) -> Session:
+    """Return six sweeps of wrists 3, 1 and 2 about flange z, y and x, each with the rest after it; then the rests.
 
     In the flange's frame a wrist's axis is fixed while that wrist turns, and `twists` (3, 2) tilt it. At home the
     flange's x, y and z point forward, left and up in the base.
@@ -205,11 +213,11 @@ def _session(twists: Array, speed_rad_s: float) -> Session:
         axis[(joint + 1) % 3], axis[(joint + 2) % 3] = twists[number]
         axis /= np.linalg.norm(axis)
         for sign in (-1.0, 1.0):
-            attitudes.append(_about(axis, -turn))
+            attitudes.append(_rotate(axis, -turn))
             rates.append(sign * speed_rad_s * axis)
             arms.append(ARMS_M[number])
             windows.append((start_s, start_s + sweep_s))
-            rest_attitudes.append(np.repeat(_about(axis, np.array([-sign * np.radians(190)])), ATTITUDES, axis=0))
+            rest_attitudes.append(np.repeat(_rotate(axis, np.array([-sign * np.radians(190)])), ATTITUDES, axis=0))
             rests.append((start_s + sweep_s + 0.4, start_s + sweep_s + 0.4 + REST_S))
             start_s += sweep_s + 3.6
         start_s += 2.0
@@ -222,8 +230,8 @@ def _session(twists: Array, speed_rad_s: float) -> Session:
     )
 
 
-def _about(axis: Array, angles_rad: Array) -> Array:
-    """(n, 3, 3) rotations about a unit axis (Rodrigues)."""
+def _rotate(axis: Array, angles_rad: Array) -> Array:
+    """Return rotations (n, 3, 3) about a unit axis, by Rodrigues' formula."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     sin, cos = np.sin(angles_rad)[:, None, None], np.cos(angles_rad)[:, None, None]
@@ -231,25 +239,25 @@ def _about(axis: Array, angles_rad: Array) -> Array:
     return rotations
 
 
-def _turned(rng: np.random.Generator, angle_rad: float) -> Array:
+def _draw_rotation(rng: np.random.Generator, angle_rad: float) -> Array:
     axis = rng.normal(size=3)
-    rotation: Array = _about(axis / np.linalg.norm(axis), np.array([angle_rad]))[0]
+    rotation: Array = _rotate(axis / np.linalg.norm(axis), np.array([angle_rad]))[0]
     return rotation
 
 
-def _skewed(rng: np.random.Generator) -> Array:
-    """Unit axes as rows (3, 3), askew by some tenths of a degree."""
+def _draw_axes(rng: np.random.Generator) -> Array:
+    """Draw unit axes as rows (3, 3), non-orthogonal by some tenths of a degree."""
     axes = np.eye(3) + np.tril(rng.normal(0, SKEW_RAD, (3, 3)), -1)
     unit: Array = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     return unit
 
 
-def _walk(rng: np.random.Generator, windows_s: Array, rate: float) -> tuple[Array, Array]:
-    """Means (N, 3) of a random walk over the windows, and (3,) over the whole time."""
+def _draw_random_walk(rng: np.random.Generator, windows_s: Array, rate: float) -> tuple[Array, Array]:
+    """Return means of a random walk over the windows (N, 3), and over the whole time (3,)."""
     times_s = np.arange(windows_s.min(), windows_s.max(), STEP_S)
     walk = np.cumsum(rate * np.sqrt(STEP_S) * rng.standard_normal((len(times_s), 3)), axis=0)
     inside = (times_s >= windows_s[:, :1]) & (times_s < windows_s[:, 1:])
-    return np.array([walk[each].mean(axis=0) for each in inside]), walk.mean(axis=0)
+    return np.array([walk[mask].mean(axis=0) for mask in inside]), walk.mean(axis=0)
 
 
 def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:

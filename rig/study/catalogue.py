@@ -1,4 +1,4 @@
-"""The studies by name. Each is a module with `study(settings) -> Report`, imported only when it is asked for."""
+"""The studies by name. Each is a module with `study(settings) -> Report`, imported only if it is requested."""
 
 import importlib
 from collections.abc import Callable
@@ -10,10 +10,9 @@ from rig.study.report import Report, Settings
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A study: what it shows, the function `module:name` that makes it, and the processor time that takes, s.
+    """A study: a summary, the function `module:name` that computes it, and its processor time on one core, s.
 
-    That is what `python benchmarks/solving/studies.py` said last, of one core and of one machine; None where nobody has
-    asked.
+    `core_s` is the last result of `python benchmarks/solving/studies.py` on one machine; None if it was not measured.
     """
 
     summary: str
@@ -21,7 +20,7 @@ class Entry:
     core_s: float | None = None
 
     def duration_s(self, jobs: int = 1) -> float | None:
-        """About how long it takes with so many processes, s."""
+        """Return the approximate duration with `jobs` processes, s."""
         return None if self.core_s is None else self.core_s / jobs
 
     def run(self, settings: Settings) -> Report:
@@ -51,7 +50,7 @@ STUDIES = {
 
 
 def find(name: str) -> Entry:
-    """The study of that name. Raises Refused `unknown_study`."""
+    """Return the study of that name. Raise Refused `unknown_study`."""
     if name not in STUDIES:
         raise Refused("unknown_study", f"there is no study {name!r}", f"Choose one of {', '.join(STUDIES)}")
     return STUDIES[name]

@@ -1,9 +1,9 @@
 """SIX, Table I: passes of Algorithm 1, and the bias at which it stops converging.
 
-Without noise the first pass leaves β0 out: k₁² = k² / (1 − β0/ω²), and b₁ = b already. So the first line of each of
-Table I's examples tells the speed it was made at, which SIX does not. Each further pass shrinks what is missing by
-Γ = β0 / (ω² − β0), alternating: k_n ≈ k (1 ± Γⁿ/2). So Algorithm 1 needs β0 < ω²/2 (SIX's "β0 < 0.5" is that at
-1 rad/s), and Table I stops counting where its four decimals stop changing, long before Σ|Δβ| ≤ 1e-6.
+Without noise the first pass omits β0: k₁² = k² / (1 − β0/ω²), and b₁ = b already. So the first line of each of Table
+I's examples implies the speed that was used, which SIX does not state. Each further pass shrinks the error by Γ = β0 /
+(ω² − β0), alternating: k_n ≈ k (1 ± Γⁿ/2). So Algorithm 1 needs β0 < ω²/2 (SIX's "β0 < 0.5" is that at 1 rad/s), and
+Table I stops counting when its four decimals stop changing, long before Σ|Δβ| ≤ 1e-6.
 """
 
 from dataclasses import dataclass
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _Example:
-    """SIX, Table I: true parameters; those after the last and the first pass; how many passes it counts."""
+    """SIX, Table I: parameters, true, after the last and after the first pass, and the number of passes."""
 
     scale: tuple[float, float, float]
     bias_rad_s: tuple[float, float, float]
-    found_scale: tuple[float, float, float]
-    found_bias_rad_s: tuple[float, float, float]
+    last_scale: tuple[float, float, float]
+    last_bias_rad_s: tuple[float, float, float]
     first_scale: tuple[float, float, float]
     passes: int
 
     @property
     def speed_rad_s(self) -> float:
-        """The speed at which the first pass gives what Table I prints: ω² = β0 / (1 − (k/k₁)²)."""
-        scale, bias, first = np.array(self.found_scale), np.array(self.found_bias_rad_s), np.array(self.first_scale)
+        """The speed at which the first pass gives Table I's values: ω² = β0 / (1 − (k/k₁)²)."""
+        scale, bias, first = np.array(self.last_scale), np.array(self.last_bias_rad_s), np.array(self.first_scale)
         missing = 1 - np.sum(scale**2) / np.sum(first**2)
         return float(np.sqrt(np.sum((scale * bias) ** 2) / missing))
 
@@ -71,18 +71,18 @@ RATIOS = np.round(np.concatenate([np.arange(0.02, 0.48, 0.02), np.arange(0.48, 0
 
 
 def study(settings: Settings) -> Report:
-    """How the estimators converge without noise, hence without random numbers: `settings` change nothing."""
+    """Show the estimators' convergence without noise, hence without random numbers: `settings` have no effect."""
     rows = []
     for name, example in TABLE_I.items():
         for speed in (sim.FAST_RAD_S, example.speed_rad_s, sim.ARM_RAD_S):
-            rows += _rows(name, np.array([example.scale]), np.array([example.bias_rad_s]), speed)
+            rows += _build_rows(name, np.array([example.scale]), np.array([example.bias_rad_s]), speed)
     growing = np.repeat(sim.ARM_RAD_S * np.sqrt(RATIOS / 3)[:, None], 3, axis=1)
-    rows += _rows("growing bias", np.ones_like(growing), growing, sim.ARM_RAD_S)
+    rows += _build_rows("growing bias", np.ones_like(growing), growing, sim.ARM_RAD_S)
     return Report(table(rows), _findings(rows), partial(_draw, rows), (10.0, 5.0))
 
 
-def _rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: float) -> list[dict[str, Any]]:
-    """One row for each gyroscope (n, 3)."""
+def _build_rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: float) -> list[dict[str, Any]]:
+    """Return one row per gyroscope (n, 3)."""
     means = speed_rad_s * sim.DIRECTIONS / scale[:, None] - bias_rad_s[:, None]
     published = algorithm_1_batch(means, speed_rad_s)
     newton = newton_batch(means, speed_rad_s)
@@ -95,7 +95,7 @@ def _rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: float) -> 
             "beta0_over_speed_squared": float(ratio),
             "algorithm_1_converged": bool(published.converged[i]),
             "algorithm_1_passes": int(published.iterations[i]),
-            "algorithm_1_passes_to_four_decimals": _passes_to_four_decimals(float(scale[i].max()), float(ratio)),
+            "algorithm_1_passes_to_four_decimals": _count_passes(float(scale[i].max()), float(ratio)),
             "newton_steps": int(newton.iterations[i]),
             "newton_largest_error": float(np.abs(errors[i]).max()),
         }
@@ -103,27 +103,27 @@ def _rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: float) -> 
     ]
 
 
-def _passes_to_four_decimals(scale: float, ratio: float) -> int | None:
-    """Passes until k (1 ± Γⁿ/2) shows its final four decimals."""
+def _count_passes(scale: float, ratio: float) -> int | None:
+    """Return the number of passes until k (1 ± Γⁿ/2) has its final four decimals; None if it never has."""
     factor = ratio / (1 - ratio) if ratio < 0.5 else 1.0
     return None if factor == 1 else int(np.ceil(np.log(2 * FOUR_DECIMALS / scale) / np.log(factor)))
 
 
 def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
-    found = []
+    findings = []
     for name, example in TABLE_I.items():
-        found.append(Finding(f"speed that the first pass implies, {name}", example.speed_rad_s, "rad/s"))
+        findings.append(Finding(f"speed that the first pass implies, {name}", example.speed_rad_s, "rad/s"))
         for row in rows:
             if row["example"] == name and row["speed_rad_s"] == example.speed_rad_s:
                 passes = row["algorithm_1_passes_to_four_decimals"]
-                found.append(Finding(f"passes to four decimals at that speed, {name}", passes, "1", example.passes))
-                found.append(Finding(f"passes to Σ|Δβ| ≤ 1e-6, {name}", row["algorithm_1_passes"], "1"))
+                findings.append(Finding(f"passes to four decimals at that speed, {name}", passes, "1", example.passes))
+                findings.append(Finding(f"passes to Σ|Δβ| ≤ 1e-6, {name}", row["algorithm_1_passes"], "1"))
     growing = [row for row in rows if row["example"] == "growing bias"]
     last = max(row["beta0_over_speed_squared"] for row in growing if row["algorithm_1_converged"])
     worst = max(row["newton_largest_error"] for row in growing)
-    found.append(Finding("largest β0/ω² at which Algorithm 1 converges", last, "1", 0.5))
-    found.append(Finding("largest error of the closed form, β0/ω² up to 32", worst, "1 or rad/s"))
-    return tuple(found)
+    findings.append(Finding("largest β0/ω² at which Algorithm 1 converges", last, "1", 0.5))
+    findings.append(Finding("largest error of the closed form, β0/ω² up to 32", worst, "1 or rad/s"))
+    return tuple(findings)
 
 
 def _draw(rows: list[dict[str, Any]], figure: "Figure") -> None:

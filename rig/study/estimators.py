@@ -1,7 +1,7 @@
-"""Every estimator's mean squared error over its own Cramér–Rao bound, the gyroscope's from the same runs.
+"""Every estimator's mean squared error over its own Cramér–Rao bound, for the gyroscope from the same runs.
 
-The six-observation estimators and the vector model have different bounds: the latter is told the direction of each turn
-and uses the rests too. The tri-axial estimators stand beside them with the rate table's data.
+The six-observation estimators and the vector model have different bounds: the latter knows the direction of each turn
+and uses the rests too. The tri-axial estimators use the rate table's data.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from rig.estimation.reference.triaxial import EqualWeights, solve_triaxial_batch
 from rig.study import rate_table as rt
 from rig.study import simulation as sim
 from rig.study.report import Finding, Report, Settings, table
-from rig.study.work import in_parallel
+from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,26 +35,26 @@ TABLE_POSES = 40
 
 
 def study(settings: Settings) -> Report:
-    """30 mounted gyroscopes × 500 runs at each speed; the tri-axial ones with 30 × 500 runs in 40 poses."""
+    """Simulate 30 mounted gyroscopes × 500 runs at each speed; tri-axial ones with 30 × 500 runs in 40 poses."""
     runs = settings.runs or sim.RUNS
-    ratios = in_parallel(partial(_gyroscope, runs), range(sim.SETS), settings)
+    ratios = run_parallel(partial(_simulate_gyroscope, runs), range(sim.SETS), settings)
     rows = list(_gyroscope_rows(np.mean(ratios, axis=0)))
-    errors = in_parallel(partial(_rate_table, runs), range(sim.SETS), settings)
-    rows += list(_rate_table_rows({name: np.mean([each[name] for each in errors], axis=0) for name in errors[0]}))
+    errors = run_parallel(partial(_simulate_rate_table, runs), range(sim.SETS), settings)
+    rows += list(_rate_table_rows({name: np.mean([run[name] for run in errors], axis=0) for name in errors[0]}))
     return Report(table(rows), _findings(rows), partial(_draw, rows), (12.0, 6.0))
 
 
-def _gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
-    """(speeds, estimators, 2, 6): mean squared error of kx ky kz bx by bz over the bound, and itself."""
+def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
+    """Return mean squared error of kx ky kz bx by bz over the bound, and itself, (speeds, estimators, 2, 6)."""
     scale, bias = sim.NORMAL.draw(rng)
-    mounting = sim.mountings(rng, 1)[0]
-    F = sim.sensitivity(scale, mounting)
+    mounting = sim.draw_mountings(rng, 1)[0]
+    F = sim.build_sensitivity(scale, mounting)
     truth = np.concatenate([scale, bias])
-    found = []
+    ratios = []
     for speed in SPEEDS.values():
-        sweep = sim.whole_turn(speed, NOISE_RAD_S)
+        sweep = sim.build_whole_turn(speed, NOISE_RAD_S)
         rates = speed * sim.DIRECTIONS
-        turns = sim.mean_readings(rng, np.broadcast_to(F, (runs, 3, 3)), bias, sweep)
+        turns = sim.draw_mean_readings(rng, np.broadcast_to(F, (runs, 3, 3)), bias, sweep)
         rest_std = NOISE_RAD_S / np.sqrt(REST_SAMPLES)
         all_means = np.concatenate([turns, rest_std * rng.normal(size=(runs, RESTS, 3)) - bias], axis=1)
         all_rates = np.concatenate([rates, np.zeros((RESTS, 3))])
@@ -62,20 +62,20 @@ def _gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
         all_variances = np.concatenate([variances, np.full((RESTS, 3), rest_std**2)])
         marquardt = [solve_levenberg_marquardt(mean, np.full(6, speed), variances, weighted=False) for mean in turns]
         estimates = (
-            _parameters(newton_batch(turns, speed)),
-            _parameters(algorithm_1_batch(turns, speed)),
-            np.array([_parameters(each) for each in marquardt]),
-            _parameters(solve_vector_batch(turns, rates, variances)),
-            _parameters(solve_vector_batch(all_means, all_rates, all_variances)),
+            _stack_parameters(newton_batch(turns, speed)),
+            _stack_parameters(algorithm_1_batch(turns, speed)),
+            np.array([_stack_parameters(solution) for solution in marquardt]),
+            _stack_parameters(solve_vector_batch(turns, rates, variances)),
+            _stack_parameters(solve_vector_batch(all_means, all_rates, all_variances)),
         )
         six = six_observation_bound(scale, rates @ mounting.T, variances)
         bounds = (six, six, six, vector_bound(F, rates, variances), vector_bound(F, all_rates, all_variances))
-        found += [_ratios(estimate - truth, bound) for estimate, bound in zip(estimates, bounds, strict=True)]
-    return np.array(found).reshape(len(SPEEDS), len(GYRO_ESTIMATORS), 2, 6)
+        ratios += [_compare(estimate - truth, bound) for estimate, bound in zip(estimates, bounds, strict=True)]
+    return np.array(ratios).reshape(len(SPEEDS), len(GYRO_ESTIMATORS), 2, 6)
 
 
-def _parameters(solution: BatchSolution | VectorBatch | LevenbergMarquardtSolution) -> Array:
-    """(…, 6) kx ky kz bx by bz."""
+def _stack_parameters(solution: BatchSolution | VectorBatch | LevenbergMarquardtSolution) -> Array:
+    """Return kx ky kz bx by bz, (…, 6)."""
     return np.concatenate([solution.scale, solution.bias_rad_s], axis=-1)
 
 
@@ -86,24 +86,26 @@ def _gyroscope_rows(ratios: Array) -> Iterator[dict[str, Any]]:
                 yield _row(f"{estimator}, {speed}", parameter, ratios[s, e, 0, p], ratios[s, e, 1, p])
 
 
-def _rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]:
-    """Estimators on a rate table, (2, 15 or 18): mean squared error of each parameter over its bound, and itself."""
-    turned = rt.attitudes(TABLE_POSES)
-    found = {}
+def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]:
+    """Return mean squared error of each parameter over its bound, and itself, (2, 15 or 18), by estimator."""
+    attitudes = rt.draw_attitudes(TABLE_POSES)
+    ratios = {}
     rates = 0.5 * np.random.default_rng(TABLE_POSES).normal(size=(TABLE_POSES, 3))  # rad/s, the same in every run
     noise = np.full((TABLE_POSES, 3), rt.GYRO_RANDOM_WALK * np.sqrt(rt.RATE_HZ))
-    model = (rt.felt(turned, rt.GYRO_REFERENCE_RAD_S) + rates) @ rt.GYRO_MATRIX.T + rt.GYRO_BIAS_RAD_S
+    model = (rt.project(attitudes, rt.GYRO_REFERENCE_RAD_S) + rates) @ rt.GYRO_MATRIX.T + rt.GYRO_BIAS_RAD_S
     readings = model + noise * rng.normal(size=(runs, *model.shape))
     truth = np.concatenate([rt.GYRO_MATRIX.ravel(), rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S])
-    bound = triaxial_bound(rt.GYRO_MATRIX, rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S, turned, noise**2, known=rates)
+    bound = triaxial_bound(
+        rt.GYRO_MATRIX, rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S, attitudes, noise**2, known=rates
+    )
     for method in METHODS:
-        theta = solve_triaxial_batch(readings, turned, noise**2, KnownVector(rates), method=method)
-        found[f"TRIAX gyroscope, {method}"] = _ratios(theta - truth, bound)
+        theta = solve_triaxial_batch(readings, attitudes, noise**2, KnownVector(rates), method=method)
+        ratios[f"TRIAX gyroscope, {method}"] = _compare(theta - truth, bound)
     reference = rt.ACCELEROMETER_REFERENCE_M_S2
     for order in (1, 2):
         second = rt.ACCELEROMETER_SECOND_ORDER if order == 2 else np.zeros(3)
-        still = rt.felt(turned, reference)
-        model = (still + second * still**2) @ rt.ACCELEROMETER_MATRIX.T + rt.ACCELEROMETER_BIAS_M_S2
+        force = rt.project(attitudes, reference)
+        model = (force + second * force**2) @ rt.ACCELEROMETER_MATRIX.T + rt.ACCELEROMETER_BIAS_M_S2
         noise = np.full((TABLE_POSES, 3), rt.ACCELEROMETER_RANDOM_WALK / np.sqrt(60))
         readings = model + noise * rng.normal(size=(runs, *model.shape))
         truth = np.concatenate([rt.ACCELEROMETER_MATRIX.ravel(), reference, rt.ACCELEROMETER_BIAS_M_S2])
@@ -113,25 +115,25 @@ def _rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]
             rt.ACCELEROMETER_MATRIX,
             reference,
             rt.ACCELEROMETER_BIAS_M_S2,
-            turned,
+            attitudes,
             noise**2,
             second_order=second if order == 2 else None,
         )
         for method in METHODS:
             theta = solve_triaxial_batch(
                 readings,
-                turned,
+                attitudes,
                 noise**2,
                 KnownNorm(float(np.linalg.norm(reference)), reference),
                 second_order=order == 2,
                 method=method,
             )
-            found[f"TRIAX accelerometer, order {order}, {method}"] = _ratios(theta - truth, bound)
-    return found
+            ratios[f"TRIAX accelerometer, order {order}, {method}"] = _compare(theta - truth, bound)
+    return ratios
 
 
-def _ratios(errors: Array, bound: Array) -> Array:
-    """(2, p) mean squared error of R runs (R, p) over the bound's diagonal, and itself."""
+def _compare(errors: Array, bound: Array) -> Array:
+    """Return mean squared error of R runs (R, p) over the bound's diagonal, and itself, (2, p)."""
     return np.array([efficiency(errors, bound), np.mean(errors**2, axis=0)])
 
 
@@ -157,7 +159,7 @@ def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
         chosen = [row[column] for row in rows if row["estimator"] == estimator and row["parameter"].startswith(first)]
         return float(np.mean(chosen))
 
-    found = [
+    findings = [
         Finding(f"MSE/bound, mean over parameters: {estimator}", mean(estimator, "", "mse_over_bound"), "1")
         for estimator in dict.fromkeys(row["estimator"] for row in rows)
     ]
@@ -165,8 +167,8 @@ def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
         published, ours = f"Algorithm 1, {speed}", f"vector model with rests, {speed}"
         for name, first in (("bias", "b"), ("scale", "k")):
             ratio = mean(published, first, "mse_si_units_squared") / mean(ours, first, "mse_si_units_squared")
-            found.append(Finding(f"{name} MSE, Algorithm 1 over vector model with rests, {speed}", ratio, "1"))
-    return tuple(found)
+            findings.append(Finding(f"{name} MSE, Algorithm 1 over vector model with rests, {speed}", ratio, "1"))
+    return tuple(findings)
 
 
 def _draw(rows: list[dict[str, Any]], figure: "Figure") -> None:

@@ -1,4 +1,4 @@
-"""Writes a study's report: its table, its findings and its plot."""
+"""Files of a study's report: its table, its findings and its plot."""
 
 import csv
 from collections.abc import Iterator, Sequence
@@ -11,15 +11,15 @@ import numpy as np
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.study.report import Columns, Finding, Report, table
-from rig.study.style import style
+from rig.study.style import use_style
 
 Format = Literal["csv", "parquet"]
 
 
 def write(report: Report, folder: Path, name: str, table_format: Format) -> tuple[Path, ...]:
-    """Write `name`.csv (or .parquet), `name`-findings.csv, `name`.svg and `name`.png; earlier ones are replaced.
+    """Write `name`.csv (or .parquet), `name`-findings.csv, `name`.svg and `name`.png, replacing earlier ones.
 
-    Raises Refused `study_folder`, `missing_extra`.
+    Raise Refused `study_folder`, `missing_extra`.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -31,27 +31,27 @@ def write(report: Report, folder: Path, name: str, table_format: Format) -> tupl
         folder / f"{name}.svg",
         folder / f"{name}.png",
     )
-    with _written(paths[0]):
+    with _remove_incomplete(paths[0]):
         if table_format == "parquet":
             _write_parquet(report.columns, paths[0])
         else:
             _write_csv(report.columns, paths[0])
-    with _written(paths[1]):
+    with _remove_incomplete(paths[1]):
         _write_csv(_findings(report.findings), paths[1])
     _write_plots(report, paths[2:])
     return paths
 
 
 @contextmanager
-def _written(path: Path) -> Iterator[None]:
-    """A file that is whole, or gone, after this block. Raises Refused `study_folder`."""
+def _remove_incomplete(path: Path) -> Iterator[None]:
+    """Remove the file if this block cannot write it completely. Raise Refused `study_folder`."""
     try:
         yield
     except OSError as error:
         with suppress(OSError):
             path.unlink()
-        what = f"{path} cannot be written: {error.strerror or error}"
-        raise Refused("study_folder", what, "Choose another with --out") from error
+        problem = f"{path} cannot be written: {error.strerror or error}"
+        raise Refused("study_folder", problem, "Choose another with --out") from error
 
 
 def _findings(findings: Sequence[Finding]) -> Columns:
@@ -71,11 +71,11 @@ def _write_csv(columns: Columns, path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
-        writer.writerows([_text(value) for value in row] for row in zip(*columns.values(), strict=True))
+        writer.writerows([_format_value(value) for value in row] for row in zip(*columns.values(), strict=True))
 
 
-def _text(value: Any) -> str:
-    """Numbers with ten digits: more than a study can mean, and the same on every machine."""
+def _format_value(value: Any) -> str:
+    """Return a value as text. Numbers have ten digits: more than a study needs, and the same on every machine."""
     if value is None:
         return ""
     return f"{value:.10g}" if isinstance(value, float | np.floating) else str(value)
@@ -93,11 +93,11 @@ def _write_parquet(columns: Columns, path: Path) -> None:
 def _write_plots(report: Report, paths: Sequence[Path]) -> None:
     from matplotlib.figure import Figure
 
-    with style():
+    with use_style():
         figure = Figure(figsize=report.size_inches, layout="constrained")
         report.draw(figure)
         for path in paths:
             # Without the date the same study gives the same file.
             metadata = {"Date": None} if path.suffix == ".svg" else {}
-            with _written(path):
+            with _remove_incomplete(path):
                 figure.savefig(path, dpi=80, metadata=metadata)

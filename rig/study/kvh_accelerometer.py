@@ -1,4 +1,4 @@
-"""TRIAX, section III-B: accelerometers in still attitudes, with second-order terms, and their bias by repeat."""
+"""TRIAX, section III-B: accelerometers in attitudes at rest, with second-order terms, and their bias by repeat."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -10,12 +10,12 @@ from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import TriaxialSolution, solve_triaxial
 from rig.study import rate_table as rt
 from rig.study.report import Finding, Report, Settings, table
-from rig.study.work import in_parallel
+from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-STILL, STILL_S = 24, 60.0  # TRIAX says N ≥ 5 attitudes and no more
+STILL, STILL_S = 24, 60.0  # TRIAX states only N ≥ 5 attitudes
 SAMPLES = round(STILL_S * rt.RATE_HZ)
 RUNS = 500
 TRUTH = np.concatenate(
@@ -35,14 +35,14 @@ PARAMETERS = {
 
 
 def study(settings: Settings) -> Report:
-    """A calibration from 24 still attitudes, 500 times, and ten repeats of ten attitudes."""
+    """Simulate a calibration from 24 attitudes at rest, 500 times, and ten repeats of ten attitudes."""
     runs = range(settings.runs or RUNS)
-    solved = in_parallel(_calibrate, runs, settings)
+    solved = run_parallel(_calibrate, runs, settings)
     estimates = np.array([theta for theta, _, _ in solved])
-    rows = rt.parameter_rows("residual", PARAMETERS, TRUTH, estimates, solved[0][1])
+    rows = rt.build_parameter_rows("residual", PARAMETERS, TRUTH, estimates, solved[0][1])
     residuals = np.array([residual for _, _, residual in solved]) / rt.MG
     sample_noise = rt.ACCELEROMETER_RANDOM_WALK * np.sqrt(rt.RATE_HZ) / rt.MG
-    drift = _drift(settings.seed)
+    drift = _simulate_drift(settings.seed)
     findings = (
         Finding("largest residual std, with second-order terms", float(residuals[:, 0].mean()), "mg", 0.3901),
         Finding("largest mean residual of an attitude, with second-order terms", float(residuals[:, 1].mean()), "mg"),
@@ -51,44 +51,44 @@ def study(settings: Settings) -> Report:
         Finding("largest error of F", float(np.abs(estimates[0, :9] - TRUTH[:9]).max()), "1"),
         Finding("largest error of the bias", float(np.abs(estimates[0, 12:15] - TRUTH[12:15]).max() / rt.MG), "mg"),
         Finding("norm of gravity", float(np.linalg.norm(estimates[0, 9:12])), "m/s²", rt.GRAVITY_M_S2),
-        Finding("RMS error of the drifting bias, F and reference held", rt.drift_error(drift, "held", "mg"), "mg"),
-        Finding("RMS error of the drifting bias, everything anew", rt.drift_error(drift, "free", "mg"), "mg"),
+        Finding("RMS error of the drifting bias, F and reference held", rt.rms_drift_error(drift, "held", "mg"), "mg"),
+        Finding("RMS error of the drifting bias, everything anew", rt.rms_drift_error(drift, "free", "mg"), "mg"),
     )
     return Report(table(rows), findings, partial(_draw, rows, drift), (12.0, 5.0))
 
 
 def _calibrate(rng: np.random.Generator, _: int) -> tuple[Array, Array, Array]:
-    """θ (18,), its standard deviations (18,), and residuals (3,) in m/s².
+    """Return θ (18,), its standard deviations (18,), and residuals (3,) in m/s².
 
-    These are the largest standard deviation of single corrected samples, and the largest mean of an attitude with and
+    The residuals are the largest standard deviation of corrected samples, and the largest mean of an attitude with and
     without second-order terms.
     """
-    turned = rt.attitudes(STILL)
-    still = rt.felt(turned, rt.ACCELEROMETER_REFERENCE_M_S2)
-    model = (still + rt.ACCELEROMETER_SECOND_ORDER * still**2) @ rt.ACCELEROMETER_MATRIX.T + rt.ACCELEROMETER_BIAS_M_S2
+    attitudes = rt.draw_attitudes(STILL)
+    force = rt.project(attitudes, rt.ACCELEROMETER_REFERENCE_M_S2)
+    model = (force + rt.ACCELEROMETER_SECOND_ORDER * force**2) @ rt.ACCELEROMETER_MATRIX.T + rt.ACCELEROMETER_BIAS_M_S2
     noise = rt.ACCELEROMETER_RESIDUAL_M_S2 * rng.normal(size=(STILL, SAMPLES, 3))
     samples = model[:, None] + noise
     means = samples.mean(axis=1)
-    full, first = _solve(means, turned, second_order=True), _solve(means, turned, second_order=False)
+    full, first = _solve(means, attitudes, second_order=True), _solve(means, attitudes, second_order=False)
     predicted = means - full.residuals
     deviation = (samples - predicted[:, None]).reshape(-1, 3) @ np.linalg.inv(full.matrix).T
     residuals = np.array([deviation.std(axis=0).max(), np.abs(full.residuals).max(), np.abs(first.residuals).max()])
     return full.theta, np.sqrt(np.diag(full.covariance)), residuals
 
 
-def _solve(means: Array, turned: Array, *, second_order: bool) -> TriaxialSolution:
+def _solve(means: Array, attitudes: Array, *, second_order: bool) -> TriaxialSolution:
     return solve_triaxial(
         means,
-        turned,
+        attitudes,
         np.full(means.shape, rt.ACCELEROMETER_RESIDUAL_M_S2**2 / SAMPLES),
         KnownNorm(float(np.linalg.norm(rt.ACCELEROMETER_REFERENCE_M_S2)), (0.0, 0.0, -1.0)),
         second_order=second_order,
     )
 
 
-def _drift(seed: int) -> list[dict[str, Any]]:
-    """TRIAX, Fig. 6: a jump after the first repeat, then hardly any change."""
-    sensor = rt.Drifting(
+def _simulate_drift(seed: int) -> list[dict[str, Any]]:
+    """Return TRIAX, Fig. 6: a jump after the first repeat, then hardly any change."""
+    sensor = rt.DriftingSensor(
         rt.ACCELEROMETER_MATRIX,
         rt.ACCELEROMETER_REFERENCE_M_S2,
         rt.ACCELEROMETER_SECOND_ORDER,
@@ -96,16 +96,16 @@ def _drift(seed: int) -> list[dict[str, Any]]:
         np.repeat([0.0, 0.3 * rt.MG, 0.03 * rt.MG], [1, 1, rt.REPEATS - 2]),
         rt.ACCELEROMETER_RANDOM_WALK,
     )
-    return sensor.repeats(np.random.default_rng([seed, rt.REPEATS]), rt.MG, "mg")
+    return sensor.simulate_repeats(np.random.default_rng([seed, rt.REPEATS]), rt.MG, "mg")
 
 
 def _draw(rows: list[dict[str, Any]], drift: list[dict[str, Any]], figure: "Figure") -> None:
-    left, right = figure.subplots(1, 2)
+    first, second = figure.subplots(1, 2)
     positions = np.arange(len(rows))
-    left.bar(positions, [row["std_over_runs"] / row["std_by_covariance"] for row in rows], color="tab:blue", alpha=0.7)
-    left.axhline(1.0, color="k", linestyle="--", label="covariance as stated")
-    left.set_xticks(positions, [row["parameter"].replace("_", " ") for row in rows], rotation=75, fontsize=7)
-    left.set(ylabel="σ over runs / σ by covariance", title=f"{STILL} attitudes of {STILL_S:.0f} s, 25 Hz")
-    left.legend(loc="lower right")
-    rt.draw_drift(right, drift, "mg", 0.5, "bias, mg")
-    right.set_title("TRIAX Fig. 6: bias by repeat")
+    first.bar(positions, [row["std_over_runs"] / row["std_by_covariance"] for row in rows], color="tab:blue", alpha=0.7)
+    first.axhline(1.0, color="k", linestyle="--", label="covariance as stated")
+    first.set_xticks(positions, [row["parameter"].replace("_", " ") for row in rows], rotation=75, fontsize=7)
+    first.set(ylabel="σ over runs / σ by covariance", title=f"{STILL} attitudes of {STILL_S:.0f} s, 25 Hz")
+    first.legend(loc="lower right")
+    rt.draw_drift(second, drift, "mg", 0.5, "bias, mg")
+    second.set_title("TRIAX Fig. 6: bias by repeat")

@@ -1,8 +1,8 @@
-"""TRIAX, section III-A: a fiber-optic gyroscope on a swinging rate table, the Earth's rate, and its bias day by day.
+"""TRIAX, section III-A: fiber-optic gyroscope on an oscillating rate table, Earth's rate, and its bias day by day.
 
-TRIAX finds residuals of up to 0.0475 °/s and calls them in agreement with the angle random walk of 0.012 °/√h; at 25 Hz
-that random walk makes 0.001 °/s. The rest must be the table's vibration, as TRIAX suspects for its x axis. Both levels
-are simulated, as white noise: `random_walk` and `residual`.
+TRIAX reports residuals of up to 0.0475 °/s and considers them consistent with the angle random walk of 0.012 °/√h; at
+25 Hz that random walk gives 0.001 °/s. The rest must be the table's vibration, as TRIAX suspects for its x axis. Both
+levels are simulated, as white noise: `random_walk` and `residual`.
 """
 
 from functools import partial
@@ -15,12 +15,12 @@ from rig.estimation.reference.reference_model import KnownVector
 from rig.estimation.reference.triaxial import solve_triaxial
 from rig.study import rate_table as rt
 from rig.study.report import Finding, Report, Settings, table
-from rig.study.work import in_parallel
+from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DURATION_S = 1200.0  # TRIAX does not state it; its Fig. 2 shows a movement of minutes
+DURATION_S = 1200.0  # not stated by TRIAX, whose Fig. 2 shows a motion of minutes
 RUNS = 20
 NOISES_RAD_S = {
     "random_walk": rt.GYRO_RANDOM_WALK * np.sqrt(rt.RATE_HZ),
@@ -35,51 +35,51 @@ PARAMETERS = {
 
 
 def study(settings: Settings) -> Report:
-    """The swinging calibration, 20 times at either noise, and ten repeats of ten still attitudes."""
+    """Simulate the calibration in oscillation, 20 times at either noise, and ten repeats of ten attitudes at rest."""
     rows: list[dict[str, Any]] = []
     findings = []
     for kind, noise in NOISES_RAD_S.items():
-        solved = in_parallel(partial(_calibrate, noise), range(settings.runs or RUNS), settings)
+        solved = run_parallel(partial(_calibrate, noise), range(settings.runs or RUNS), settings)
         estimates = np.array([theta for theta, _, _ in solved])
-        kind_rows = rt.parameter_rows(kind, PARAMETERS, TRUTH, estimates, solved[0][1])
+        kind_rows = rt.build_parameter_rows(kind, PARAMETERS, TRUTH, estimates, solved[0][1])
         rows += kind_rows
         norms = np.linalg.norm(estimates[:, 9:12], axis=1) / rt.DEG_H
         residual = np.degrees(np.max([residual for _, _, residual in solved]))
-        off = float(norms.std(ddof=1))
+        norm_std = float(norms.std(ddof=1))
         findings += [
             Finding(f"largest residual std, {kind}", float(residual), "deg/s", 0.0475),
             Finding(f"norm of the Earth's rate, {kind}, mean", float(norms.mean()), "deg/h", 15.4035),
-            Finding(f"norm of the Earth's rate, {kind}, std of one calibration", off, "deg/h"),
+            Finding(f"norm of the Earth's rate, {kind}, std of one calibration", norm_std, "deg/h"),
             Finding(f"largest error of F, {kind}", float(np.abs(estimates[0, :9] - TRUTH[:9]).max()), "1"),
         ]
     true_norm = rt.EARTH_RATE_RAD_S / rt.DEG_H
     printed = float(np.linalg.norm(rt.GYRO_REFERENCE_RAD_S)) / rt.DEG_H
-    drift = _drift(settings.seed)
+    drift = _simulate_drift(settings.seed)
     findings += [
         Finding("printed Earth rate against 7.2921159e-5 rad/s", 100 * (printed / true_norm - 1), "%", 2.69),
         Finding("printed Earth rate against 15 deg/h", 100 * (printed / 15 - 1), "%", 2.69),
         Finding(
-            "RMS error of the drifting bias, F and reference held", rt.drift_error(drift, "held", "deg_h"), "deg/h"
+            "RMS error of the drifting bias, F and reference held", rt.rms_drift_error(drift, "held", "deg_h"), "deg/h"
         ),
-        Finding("RMS error of the drifting bias, everything anew", rt.drift_error(drift, "free", "deg_h"), "deg/h"),
+        Finding("RMS error of the drifting bias, everything anew", rt.rms_drift_error(drift, "free", "deg_h"), "deg/h"),
     ]
     return Report(table(rows), tuple(findings), partial(_draw, rows, drift), (12.0, 5.0))
 
 
 def _calibrate(noise_rad_s: float, rng: np.random.Generator, _: int) -> tuple[Array, Array, float]:
-    """θ (15,), its standard deviations (15,), and the largest standard deviation of the corrected readings' error."""
-    turned, rates = rt.swinging(DURATION_S)
-    truth = rt.felt(turned, rt.GYRO_REFERENCE_RAD_S) + rates
+    """Return θ (15,), its standard deviations (15,), and the largest standard deviation of the corrected errors."""
+    attitudes, rates = rt.simulate_oscillation(DURATION_S)
+    truth = rt.project(attitudes, rt.GYRO_REFERENCE_RAD_S) + rates
     readings = truth @ rt.GYRO_MATRIX.T + rt.GYRO_BIAS_RAD_S + noise_rad_s * rng.normal(size=truth.shape)
-    solved = solve_triaxial(readings, turned, np.full(readings.shape, noise_rad_s**2), KnownVector(rates))
+    solved = solve_triaxial(readings, attitudes, np.full(readings.shape, noise_rad_s**2), KnownVector(rates))
     corrected = (readings - solved.bias) @ np.linalg.inv(solved.matrix).T
     theta = np.concatenate([solved.matrix.ravel(), solved.reference, solved.bias])
     return theta, np.sqrt(np.diag(solved.covariance)), float((corrected - truth).std(axis=0).max())
 
 
-def _drift(seed: int) -> list[dict[str, Any]]:
-    """TRIAX, Fig. 4: the bias stays below 1 deg/h; here it takes steps of 0.1 deg/h an hour."""
-    sensor = rt.Drifting(
+def _simulate_drift(seed: int) -> list[dict[str, Any]]:
+    """Return TRIAX, Fig. 4: the bias stays below 1 deg/h; here it takes steps of 0.1 deg/h an hour."""
+    sensor = rt.DriftingSensor(
         rt.GYRO_MATRIX,
         rt.GYRO_REFERENCE_RAD_S * (rt.EARTH_RATE_RAD_S / np.linalg.norm(rt.GYRO_REFERENCE_RAD_S)),
         np.zeros(3),
@@ -87,26 +87,26 @@ def _drift(seed: int) -> list[dict[str, Any]]:
         np.repeat([0.0, 0.1 * rt.DEG_H], [1, rt.REPEATS - 1]),
         rt.GYRO_RANDOM_WALK,
     )
-    return sensor.repeats(np.random.default_rng([seed, rt.REPEATS]), rt.DEG_H, "deg_h")
+    return sensor.simulate_repeats(np.random.default_rng([seed, rt.REPEATS]), rt.DEG_H, "deg_h")
 
 
 def _draw(rows: list[dict[str, Any]], drift: list[dict[str, Any]], figure: "Figure") -> None:
-    left, right = figure.subplots(1, 2)
+    first, second = figure.subplots(1, 2)
     chosen = [row for row in rows if row["unit"] == "deg/h"]
     names = list(dict.fromkeys(row["parameter"] for row in chosen))
     for shift, kind, colour in ((-0.12, "random_walk", "tab:blue"), (0.12, "residual", "tab:orange")):
-        of_kind = [row for row in chosen if row["noise"] == kind]
-        left.errorbar(
+        noise_rows = [row for row in chosen if row["noise"] == kind]
+        first.errorbar(
             np.arange(len(names)) + shift,
-            [row["mean_estimate"] - row["true"] for row in of_kind],
-            [row["std_over_runs"] for row in of_kind],
+            [row["mean_estimate"] - row["true"] for row in noise_rows],
+            [row["std_over_runs"] for row in noise_rows],
             fmt="o",
             color=colour,
             label=f"noise {np.degrees(NOISES_RAD_S[kind]):.4f} °/s ({kind.replace('_', ' ')})",
         )
-    left.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], rotation=30)
-    left.set(ylabel="estimated − true, deg/h; bars: σ of one calibration")
-    left.set_title(f"swinging for {DURATION_S / 60:.0f} min, 25 Hz")
-    left.legend()
-    rt.draw_drift(right, drift, "deg_h", 1.0, "bias, deg/h")
-    right.set_title("TRIAX Fig. 4: bias by repeat")
+    first.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], rotation=30)
+    first.set(ylabel="estimated − true, deg/h; bars: σ of one calibration")
+    first.set_title(f"swinging for {DURATION_S / 60:.0f} min, 25 Hz")
+    first.legend()
+    rt.draw_drift(second, drift, "deg_h", 1.0, "bias, deg/h")
+    second.set_title("TRIAX Fig. 4: bias by repeat")

@@ -1,8 +1,8 @@
 """Errors of the six-observation method and of the vector model against mounting error and non-orthogonality.
 
-Six averaged sweeps tell ‖K (m + b)‖ alone, so how the sensor is mounted does not matter, but its axes must stand at
-right angles: what they miss goes into the scale factors, to second order where the sensor is mounted straight, but
-times the mounting error, hence to first order, where it is not. The vector model finds both angles instead.
+Six averaged sweeps determine only ‖K (m + b)‖, so the sensor's mounting does not matter, but its axes must be
+orthogonal: their non-orthogonality enters the scale factors, to second order if the sensor is mounted straight, but
+times the mounting error, hence to first order, if it is not. The vector model estimates both angles.
 """
 
 from functools import partial
@@ -15,14 +15,14 @@ from rig.estimation.gyroscope.batch import BatchSolution, newton_batch
 from rig.estimation.gyroscope.vector_model import VectorBatch, solve_vector_batch
 from rig.study import simulation as sim
 from rig.study.report import Finding, Report, Settings, table
-from rig.study.work import in_parallel
+from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOUNTING_DEG = (0.0, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0)
 SKEW_DEG = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)
-# What is varied, through which angles, and how far askew the sensor is mounted meanwhile (None: by these angles).
+# The varied quantity, its angles, and the mounting error meanwhile (None: these angles).
 SWEEPS: dict[str, tuple[tuple[float, ...], float | None]] = {
     "mounting": (MOUNTING_DEG, None),
     "non-orthogonality, mounted straight": (SKEW_DEG, 0.0),
@@ -33,9 +33,9 @@ NOISES_RAD_S = (0.0, sim.NOISE_LEVELS_RAD_S[0])
 
 
 def study(settings: Settings) -> Report:
-    """30 gyroscopes × 500 mountings at each angle, 60°/s, noise 0.035 rad/s, and once more without noise."""
-    task = partial(_errors_of_one_gyroscope, settings.runs or sim.RUNS)
-    squares = np.mean(in_parallel(task, range(sim.SETS), settings), axis=0)  # (sweeps, angles, noises, estimators, 2)
+    """Simulate 30 gyroscopes × 500 mountings at each angle, 60°/s, noise 0.035 rad/s, and again without noise."""
+    task = partial(_simulate_gyroscope, settings.runs or sim.RUNS)
+    squares = np.mean(run_parallel(task, range(sim.SETS), settings), axis=0)  # (sweeps, angles, noises, estimators, 2)
     rows = [
         {
             "varied": varied,
@@ -53,18 +53,18 @@ def study(settings: Settings) -> Report:
     return Report(table(rows), _findings(rows), partial(_draw, rows), (13.0, 5.0))
 
 
-def _errors_of_one_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
-    """Mean squares (sweeps, angles, noises, estimators, 2) of relative scale errors and of bias errors."""
+def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
+    """Return mean squares of relative scale errors and of bias errors, (sweeps, angles, noises, estimators, 2)."""
     scale, bias = sim.NORMAL.draw(rng)
     squares = np.empty((len(SWEEPS), len(SKEW_DEG), len(NOISES_RAD_S), len(ESTIMATORS), 2))
     for v, (angles, askew) in enumerate(SWEEPS.values()):
         for a, angle in enumerate(angles):
-            mounting = _mounted(rng, runs, angle if askew is None else askew)
-            skew = None if askew is None else _skewed(rng, runs, np.radians(angle))
-            F = sim.sensitivity(scale, mounting, skew)
+            mounting = _draw_mountings(rng, runs, angle if askew is None else askew)
+            skew = None if askew is None else _draw_axes(rng, runs, np.radians(angle))
+            F = sim.build_sensitivity(scale, mounting, skew)
             for n, noise in enumerate(NOISES_RAD_S):
-                sweep = sim.whole_turn(sim.ARM_RAD_S, noise)
-                means = sim.mean_readings(rng, F, bias, sweep)
+                sweep = sim.build_whole_turn(sim.ARM_RAD_S, noise)
+                means = sim.draw_mean_readings(rng, F, bias, sweep)
                 rates = sweep.speed_rad_s * sim.DIRECTIONS
                 solved: tuple[BatchSolution | VectorBatch, ...] = (
                     newton_batch(means, sweep.speed_rad_s),
@@ -78,8 +78,8 @@ def _errors_of_one_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Arr
     return squares
 
 
-def _mounted(rng: np.random.Generator, runs: int, angle_deg: float) -> Array:
-    """Rotations (runs, 3, 3) by exactly this angle about any axis."""
+def _draw_mountings(rng: np.random.Generator, runs: int, angle_deg: float) -> Array:
+    """Draw rotations (runs, 3, 3) by exactly this angle about random axes."""
     from scipy.spatial.transform import Rotation
 
     axis = rng.normal(size=(runs, 3))
@@ -87,8 +87,8 @@ def _mounted(rng: np.random.Generator, runs: int, angle_deg: float) -> Array:
     return np.asarray(Rotation.from_rotvec(axis).as_matrix(), dtype=np.float64)
 
 
-def _skewed(rng: np.random.Generator, runs: int, angle_rad: float) -> Array:
-    """Unit axes as rows (runs, 3, 3), all three angles off 90° by `angle_rad` either way; x straight, y in x–y."""
+def _draw_axes(rng: np.random.Generator, runs: int, angle_rad: float) -> Array:
+    """Draw unit axes as rows (runs, 3, 3), all three angles ±`angle_rad` from 90°; x straight, y in x–y."""
     sines = np.sin(angle_rad) * rng.choice([-1.0, 1.0], size=(runs, 3))
     gram = np.broadcast_to(np.eye(3), (runs, 3, 3)).copy()
     for pair, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
@@ -97,13 +97,13 @@ def _skewed(rng: np.random.Generator, runs: int, angle_rad: float) -> Array:
 
 
 def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
-    found = []
+    findings = []
     for row in rows:
-        shown = row["angle_deg"] == 20.0 if row["varied"] == "mounting" else row["angle_deg"] in (1.0, 2.0)
-        if shown and row["noise_rad_s"] == 0:
+        is_reported = row["angle_deg"] == 20.0 if row["varied"] == "mounting" else row["angle_deg"] in (1.0, 2.0)
+        if is_reported and row["noise_rad_s"] == 0:
             name = f"RMS scale error without noise, {row['estimator']}, {row['varied']} {row['angle_deg']:g}°"
-            found.append(Finding(name, row["scale_rms_percent"], "%"))
-    return tuple(found)
+            findings.append(Finding(name, row["scale_rms_percent"], "%"))
+    return tuple(findings)
 
 
 def _draw(rows: list[dict[str, Any]], figure: "Figure") -> None:

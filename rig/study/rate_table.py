@@ -1,4 +1,4 @@
-"""A simulated three-axis rate table with a KVH 1775 on it: the numbers of TRIAX, and its movements."""
+"""A simulated three-axis rate table with a KVH 1775 on it: the numbers of TRIAX, and its motions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,23 +32,23 @@ ACCELEROMETER_MATRIX = np.array(
 )
 ACCELEROMETER_SECOND_ORDER = 1e-4 * np.array([0.0972, -0.9478, -0.1764])  # 1/(m/s²)
 ACCELEROMETER_BIAS_M_S2 = np.array([0.9664, -0.4173, 0.8803]) * MG
-ACCELEROMETER_REFERENCE_M_S2 = -np.array([0.015499, -0.004079, 9.800597])  # Eq. (11): what is felt is −g
+ACCELEROMETER_REFERENCE_M_S2 = -np.array([0.015499, -0.004079, 9.800597])  # Eq. (11): specific force is −g
 ACCELEROMETER_RANDOM_WALK = 0.070104 / 60  # m/s/√s, from 0.070104 m/s/√h
 ACCELEROMETER_RESIDUAL_M_S2 = 0.3901 * MG
 
 
-def attitudes(count: int) -> Array:
-    """Rotations (count, 3, 3), body to table: the same ones every time, spread over all directions."""
+def draw_attitudes(count: int) -> Array:
+    """Return the same random rotations (count, 3, 3), body to table, every time, spread over all directions."""
     from scipy.spatial.transform import Rotation
 
     quaternions = np.random.default_rng(1775).normal(size=(count, 4))
     return np.asarray(Rotation.from_quat(quaternions).as_matrix(), dtype=np.float64)
 
 
-def swinging(duration_s: float) -> tuple[Array, Array]:
-    """Attitudes (N, 3, 3) and body rates (N, 3) in rad/s while all three axes swing by ±60°, each at its own pace.
+def simulate_oscillation(duration_s: float) -> tuple[Array, Array]:
+    """Return attitudes (N, 3, 3) and body rates (N, 3), rad/s, of oscillations by ±60° about all three axes.
 
-    TRIAX shows its movement only as a picture; what matters is that every axis turns and tilts.
+    TRIAX shows its motion only as a figure; the essential is that every axis turns and tilts.
     """
     from scipy.spatial.transform import Rotation
 
@@ -57,7 +57,7 @@ def swinging(duration_s: float) -> tuple[Array, Array]:
     amplitude = np.pi / 3
     yaw, pitch, roll = (amplitude * np.sin(pace[:, None] * time_s)).astype(np.float64)
     yaw_rate, pitch_rate, roll_rate = amplitude * pace[:, None] * np.cos(pace[:, None] * time_s)
-    turned = Rotation.from_euler("ZYX", np.stack([yaw, pitch, roll], axis=1)).as_matrix()
+    attitudes = Rotation.from_euler("ZYX", np.stack([yaw, pitch, roll], axis=1)).as_matrix()
     rates = np.stack(
         [
             roll_rate - yaw_rate * np.sin(pitch),
@@ -66,20 +66,20 @@ def swinging(duration_s: float) -> tuple[Array, Array]:
         ],
         axis=1,
     )
-    return np.asarray(turned, dtype=np.float64), rates
+    return np.asarray(attitudes, dtype=np.float64), rates
 
 
-def felt(turned: Array, reference: Array) -> Array:
-    """Rᵀ v_ref (N, 3) from attitudes (N, 3, 3), body to table."""
-    return np.asarray(reference @ turned, dtype=np.float64)
+def project(attitudes: Array, reference: Array) -> Array:
+    """Return Rᵀ v_ref (N, 3) for attitudes (N, 3, 3), body to table."""
+    return np.asarray(reference @ attitudes, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
-class Drifting:
-    """A sensor whose bias moves from one repeat to the next.
+class DriftingSensor:
+    """A sensor whose bias changes from one repeat to the next.
 
-    F (3, 3), reference (3,), second-order terms (3,), the first bias (3,), the standard deviations of
-    its steps before each repeat, and the random walk that limits an average; all in the unit of the readings.
+    F (3, 3), reference (3,), second-order terms (3,), the first bias (3,), the standard deviations of its steps before
+    each repeat, and the random walk that limits an average; all in the unit of the readings.
     """
 
     matrix: Array
@@ -89,15 +89,15 @@ class Drifting:
     bias_steps: Array
     random_walk: float
 
-    def repeats(self, rng: np.random.Generator, unit: float, unit_name: str) -> list[dict[str, Any]]:
-        """TRIAX, Figs. 4 and 6: one row for each repeat, with the bias in `unit`.
+    def simulate_repeats(self, rng: np.random.Generator, unit: float, unit_name: str) -> list[dict[str, Any]]:
+        """Return one row per repeat, with the bias in `unit`, as in TRIAX, Figs. 4 and 6.
 
-        `held`: F and the reference are known from a calibration before, only the bias is found. `free`: all parameters
-        are found anew from the ten attitudes, with the reference's norm known.
+        `held`: F and the reference are known from an earlier calibration, only the bias is estimated. `free`: all
+        parameters are estimated from the ten attitudes, with the reference's norm known.
         """
-        turned = attitudes(ATTITUDES)
-        still = felt(turned, self.reference)
-        model = (still + self.second_order * still**2) @ self.matrix.T
+        attitudes = draw_attitudes(ATTITUDES)
+        force = project(attitudes, self.reference)
+        model = (force + self.second_order * force**2) @ self.matrix.T
         variance = self.random_walk**2 / AVERAGED_S
         biases = self.bias + np.cumsum(self.bias_steps[:, None] * rng.normal(size=(REPEATS, 3)), axis=0)
         rows = []
@@ -105,17 +105,17 @@ class Drifting:
             means = model + bias + np.sqrt(variance) * rng.normal(size=model.shape)
             free = solve_triaxial(
                 means,
-                turned,
+                attitudes,
                 np.full(means.shape, variance),
                 KnownNorm(float(np.linalg.norm(self.reference)), self.reference),
                 second_order=bool(self.second_order.any()),
             )
-            held = np.mean(means - model, axis=0)
+            fixed = np.mean(means - model, axis=0)
             free_std = np.sqrt(np.diag(free.covariance)[12:15])
             row: dict[str, Any] = {"repeat": repeat + 1}
             for i, axis in enumerate("xyz"):
                 row[f"true_bias_{axis}_{unit_name}"] = bias[i] / unit
-                row[f"held_bias_{axis}_{unit_name}"] = held[i] / unit
+                row[f"held_bias_{axis}_{unit_name}"] = fixed[i] / unit
                 row[f"free_bias_{axis}_{unit_name}"] = free.bias[i] / unit
                 row[f"free_bias_std_{axis}_{unit_name}"] = free_std[i] / unit
             row[f"held_bias_std_{unit_name}"] = np.sqrt(variance / ATTITUDES) / unit
@@ -124,7 +124,7 @@ class Drifting:
 
 
 def draw_drift(panel: "Axes", rows: list[dict[str, Any]], unit_name: str, limit: float, label: str) -> None:
-    """The bias by repeat: true, found with F held, and found anew."""
+    """Draw the bias by repeat: true, estimated with F fixed, and estimated with all parameters."""
     drift = table(rows)
     for axis, colour in zip("xyz", ("tab:blue", "tab:orange", "tab:green"), strict=True):
         panel.plot(drift["repeat"], drift[f"true_bias_{axis}_{unit_name}"], color=colour, label=f"{axis}, true")
@@ -146,16 +146,16 @@ def draw_drift(panel: "Axes", rows: list[dict[str, Any]], unit_name: str, limit:
     panel.legend(fontsize=7, ncols=2)
 
 
-def drift_error(rows: list[dict[str, Any]], kind: str, unit_name: str) -> float:
-    """RMS error of the bias over repeats and axes."""
+def rms_drift_error(rows: list[dict[str, Any]], kind: str, unit_name: str) -> float:
+    """Return the RMS error of the bias over repeats and axes."""
     errors = [row[f"{kind}_bias_{a}_{unit_name}"] - row[f"true_bias_{a}_{unit_name}"] for row in rows for a in "xyz"]
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-def parameter_rows(
+def build_parameter_rows(
     kind: str, names: Mapping[str, tuple[str, float]], truth: Array, estimates: Array, stated: Array
 ) -> list[dict[str, Any]]:
-    """One row for each parameter: `names` gives its unit and the size of it; `estimates` (runs, p), `stated` (p,) σ."""
+    """Return one row per parameter. `names`: unit and its size; `estimates` (runs, p); `stated` (p,) σ."""
     return [
         {
             "noise": kind,

@@ -1,4 +1,4 @@
-"""What a study is given and what it hands back; nothing here computes, plots or writes."""
+"""Input and output of a study; nothing here computes, plots or writes."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ Columns = Mapping[str, Sequence[Any] | NDArray[Any]]
 
 
 class Progress(Protocol):
-    """Hands on the results of a study's tasks as they come, and may show how many of `total` have come."""
+    """A function that passes on the results of a study's tasks, and may show their number out of `total`."""
 
     def __call__(self, results: Iterable[Any], total: int) -> Iterable[Any]: ...
 
 
-def unseen(results: Iterable[Any], total: int) -> Iterable[Any]:
-    """The progress that shows nothing."""
+def pass_on(results: Iterable[Any], total: int) -> Iterable[Any]:
+    """Return the results without showing progress."""
     return results
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """`runs` per parameter set (None: as many as the paper, or the study, has), the seed, and how the work is spread.
+    """The seed, the `runs` per parameter set (None: the paper's or the study's own), and the distribution of work.
 
     `jobs` is joblib's `n_jobs`; None leaves it to the surrounding `joblib.parallel_config`, one process without any.
     """
@@ -33,12 +33,12 @@ class Settings:
     seed: int = 1
     runs: int | None = None
     jobs: int | None = None
-    progress: Progress = unseen
+    progress: Progress = pass_on
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One number a study was made for, beside the published one where there is one, both in `unit`."""
+    """One number of a study and, if there is one, the published value, both in `unit`."""
 
     quantity: str
     value: float
@@ -47,13 +47,13 @@ class Finding:
 
     @property
     def ratio(self) -> float | None:
-        """Ours over the published one; None where there is none, or where it is zero."""
+        """The value over the published one; None if that is missing or zero."""
         return self.value / self.published if self.published else None
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A study's results: `columns` of its table (unit in each name), findings, and how to draw the plot."""
+    """A study's results: `columns` of its table (unit in each name), findings, and the function that draws the plot."""
 
     columns: Columns
     findings: tuple[Finding, ...]
@@ -62,6 +62,6 @@ class Report:
 
 
 def table(rows: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Rows of equal keys as columns."""
+    """Return rows of equal keys as columns."""
     listed = list(rows)
     return {name: [row[name] for row in listed] for name in listed[0]}

@@ -1,16 +1,16 @@
 """Simulated gyroscopes and their averaged sweeps, vectorised over runs: SIX, section III.
 
-A sweep's mean reading is drawn directly. The mean of N samples with white noise σ is Gaussian with σ/√N, so no sample
-need be made; where a study squares the samples first, the mean of the squares is drawn exactly too.
+A sweep's mean reading is drawn directly. The mean of N samples with white noise σ is Gaussian with σ/√N, so samples are
+not needed; if a study squares the samples first, the mean of the squares is drawn exactly too.
 
-Two models of the servo's vibration, which SIX gives as "rotation noise" of 5 % of the speed:
+Two models of the servo's vibration, which SIX describes as "rotation noise" of 5 % of the speed:
 
 `whole_turns`
-    Vibration moves the arm to and fro about the even turn; it integrates to the whole turn that the joint makes. Its
-    mean over the turn is zero by geometry. This is what a servo with a position loop does.
+    Vibration oscillates about the even turn, and integrates to the joint's whole turn. Its mean over the turn is zero
+    by geometry, as with a servo that has a position loop.
 `white`
-    The speed of each sample is drawn independently. The mean speed of the sweep is then off by 5 % / √N, which is to
-    say that the joint misses its own end stop. SIX's wording reads like this one; its figures do not.
+    The speed of each sample is drawn independently. The mean speed of the sweep is then off by 5 % / √N: the joint
+    misses its own end stop. SIX's wording suggests this model; its figures do not.
 """
 
 from dataclasses import dataclass
@@ -36,14 +36,14 @@ DIRECTIONS: Array = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 
 
 @dataclass(frozen=True, slots=True)
 class Population:
-    """Uniform ranges that gyroscopes are drawn from: scale factors, and magnitudes of the bias, whose sign is even."""
+    """Uniform ranges of gyroscopes: scale factors, and magnitudes of the bias, whose sign is random."""
 
     name: str
     scale: tuple[float, float]
     bias_rad_s: tuple[float, float]
 
     def draw(self, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Scale factors (3,) and biases (3,) in rad/s of one gyroscope."""
+        """Draw scale factors (3,) and biases (3,), rad/s, of one gyroscope."""
         sign = rng.choice([-1.0, 1.0], size=3)
         return rng.uniform(*self.scale, size=3), sign * rng.uniform(*self.bias_rad_s, size=3)
 
@@ -54,7 +54,7 @@ EXTREME = Population("extreme", (1.2, 2.0), (0.1, 0.2))
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """What all six sweeps of a run share: turn rate, noise of one sample, samples averaged, kind of vibration."""
+    """The properties of all six sweeps of a run: turn rate, noise of a sample, number of samples, kind of vibration."""
 
     speed_rad_s: float
     noise_rad_s: float
@@ -67,20 +67,20 @@ class Sweep:
         return self.noise_rad_s**2 / self.samples
 
 
-def samples_in_a_turn(speed_rad_s: float) -> int:
-    """How many samples fall into one revolution."""
+def count_turn_samples(speed_rad_s: float) -> int:
+    """Return the number of samples in one revolution."""
     return round(RATE_HZ * 2 * np.pi / speed_rad_s)
 
 
-def whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibration = "whole_turns") -> Sweep:
-    """A revolution sampled at 200 Hz."""
-    return Sweep(speed_rad_s, noise_rad_s, samples_in_a_turn(speed_rad_s), vibration)
+def build_whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibration = "whole_turns") -> Sweep:
+    """Return a sweep of one revolution sampled at 200 Hz."""
+    return Sweep(speed_rad_s, noise_rad_s, count_turn_samples(speed_rad_s), vibration)
 
 
-def mountings(rng: np.random.Generator, runs: int, largest: float = LARGEST_MISALIGNMENT) -> Array:
-    """Rotations (runs, 3, 3) that take flange to sensor axes, askew by a sine from U(0, largest) in any direction.
+def draw_mountings(rng: np.random.Generator, runs: int, largest: float = LARGEST_MISALIGNMENT) -> Array:
+    """Draw rotations (runs, 3, 3) from flange to sensor axes, with a sine from U(0, largest) about random axes.
 
-    SIX says "misalignment U(0 %, 10 %)" and no more; here it is the part of the turn that falls on wrong axes.
+    SIX states only "misalignment U(0 %, 10 %)"; here it is the part of the turn that falls on wrong axes.
     """
     from scipy.spatial.transform import Rotation
 
@@ -90,40 +90,38 @@ def mountings(rng: np.random.Generator, runs: int, largest: float = LARGEST_MISA
     return np.asarray(Rotation.from_rotvec(angle * axis).as_matrix(), dtype=np.float64)
 
 
-def sensitivity(scale: Array, mounting: Array, skew: Array | None = None) -> Array:
-    """F (…, 3, 3) of m = F ω − b, from scale factors (3,), mountings (…, 3, 3) and skewed unit axes (…, 3, 3)."""
+def build_sensitivity(scale: Array, mounting: Array, skew: Array | None = None) -> Array:
+    """Return F (…, 3, 3) of m = F ω − b for scale factors (3,), mountings (…, 3, 3), skewed unit axes (…, 3, 3)."""
     intrinsic = np.diag(1 / scale) if skew is None else np.diag(1 / scale) @ skew
     return np.asarray(intrinsic @ mounting, dtype=np.float64)
 
 
-def mean_readings(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> Array:
-    """Averaged readings (…, 6, 3) in rad/s of the six sweeps, for F (…, 3, 3), before anything is squared."""
-    return _mean_and_vibration(rng, F, bias_rad_s, sweep)[0]
+def draw_mean_readings(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> Array:
+    """Draw averaged readings (…, 6, 3), rad/s, of the six sweeps, for F (…, 3, 3), before anything is squared."""
+    return _draw_means(rng, F, bias_rad_s, sweep)[0]
 
 
-def mean_readings_and_squares(
-    rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep
-) -> tuple[Array, Array]:
-    """Averaged readings and averages of squared readings, both (…, 6, 3), of the same samples, drawn exactly.
+def draw_means_and_squares(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> tuple[Array, Array]:
+    """Draw averaged readings and averages of squared readings, both (…, 6, 3), of the same samples, exactly.
 
     With d = n + c v the deviation of a sample from the mean, n noise and v the vibration common to the axes: v enters
     through Σ(v − v̄)² ~ χ²(N − 1), the noise along v through one Gaussian z, and its rest through χ²(N − 2), so that
     Σ(d − d̄)² = (σ z + c √Σ(v − v̄)²)² + σ² χ²(N − 2).
     """
-    mean, per_vibration = _mean_and_vibration(rng, F, bias_rad_s, sweep)
+    mean, per_vibration = _draw_means(rng, F, bias_rad_s, sweep)
     shape, count = mean.shape, sweep.samples
-    swing = VIBRATION_FRACTION * sweep.speed_rad_s * np.sqrt(rng.chisquare(count - 1, size=(*shape[:-1], 1)))
-    along = sweep.noise_rad_s * rng.normal(size=shape) + per_vibration * swing
-    scatter = along**2 + sweep.noise_rad_s**2 * rng.chisquare(count - 2, size=shape)
+    vibration_size = VIBRATION_FRACTION * sweep.speed_rad_s * np.sqrt(rng.chisquare(count - 1, size=(*shape[:-1], 1)))
+    axis_noise = sweep.noise_rad_s * rng.normal(size=shape) + per_vibration * vibration_size
+    scatter = axis_noise**2 + sweep.noise_rad_s**2 * rng.chisquare(count - 2, size=shape)
     return mean, mean**2 + scatter / count
 
 
-def _mean_and_vibration(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> tuple[Array, Array]:
-    """Mean readings (…, 6, 3), and what each axis reads (…, 6, 3) of 1 rad/s along the turn."""
-    along = np.asarray(np.einsum("...ij,sj->...si", F, DIRECTIONS), dtype=np.float64)
+def _draw_means(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> tuple[Array, Array]:
+    """Draw mean readings (…, 6, 3); return also each axis' reading per rad/s along the turn, (…, 6, 3)."""
+    per_rate = np.asarray(np.einsum("...ij,sj->...si", F, DIRECTIONS), dtype=np.float64)
     speed: Array | float = sweep.speed_rad_s
     if sweep.vibration == "white":
         error = VIBRATION_FRACTION * sweep.speed_rad_s / np.sqrt(sweep.samples)
-        speed = sweep.speed_rad_s + error * rng.normal(size=(*along.shape[:-1], 1))
-    noise = np.sqrt(sweep.variance_rad2_s2) * rng.normal(size=along.shape)
-    return np.asarray(speed * along - bias_rad_s + noise, dtype=np.float64), along
+        speed = sweep.speed_rad_s + error * rng.normal(size=(*per_rate.shape[:-1], 1))
+    noise = np.sqrt(sweep.variance_rad2_s2) * rng.normal(size=per_rate.shape)
+    return np.asarray(speed * per_rate - bias_rad_s + noise, dtype=np.float64), per_rate

@@ -1,4 +1,4 @@
-"""SIX, Fig. 3: readings of a gyroscope in a swinging movement, before and after calibration."""
+"""SIX, Fig. 3: readings of a gyroscope in oscillation, before and after calibration."""
 
 from functools import partial
 from typing import TYPE_CHECKING
@@ -22,24 +22,26 @@ PUBLISHED_ESTIMATE = (0.9070, 1.0502, 0.8735, 0.0529, 0.0802, -0.0994)
 
 
 def study(settings: Settings) -> Report:
-    """One calibration at 3 rad/s, then a sine of 1 rad/s and 0.75 Hz about an axis equally far from x, y and z.
+    """Simulate a calibration at 3 rad/s, then a sine of 1 rad/s and 0.75 Hz about an axis equally far from x, y and z.
 
-    SIX corrects "using Eq. (1)"; with g = K m + b as printed, its own estimates would leave the readings off by
-    (1 − k) b. The correction here is g = K (m + b).
+    SIX corrects "using Eq. (1)"; with g = K m + b as printed, its own estimates would leave errors of (1 − k) b. The
+    correction here is g = K (m + b).
     """
     rng = np.random.default_rng(settings.seed)
-    still = sim.mean_readings(rng, np.diag(1 / SCALE), BIAS_RAD_S, sim.whole_turn(sim.FAST_RAD_S, NOISE_RAD_S))
-    solved = newton_batch(still[None], sim.FAST_RAD_S)
+    means = sim.draw_mean_readings(
+        rng, np.diag(1 / SCALE), BIAS_RAD_S, sim.build_whole_turn(sim.FAST_RAD_S, NOISE_RAD_S)
+    )
+    solved = newton_batch(means[None], sim.FAST_RAD_S)
     scale, bias = solved.scale[0], solved.bias_rad_s[0]
     time_s = np.arange(round(DURATION_S * sim.RATE_HZ)) / sim.RATE_HZ
-    wanted = AMPLITUDE_RAD_S * np.sin(2 * np.pi * FREQUENCY_HZ * time_s)
-    turned = wanted + sim.VIBRATION_FRACTION * np.abs(wanted) * rng.normal(size=len(wanted))
-    rate = np.repeat(turned[:, None] / np.sqrt(3), 3, axis=1)
+    desired = AMPLITUDE_RAD_S * np.sin(2 * np.pi * FREQUENCY_HZ * time_s)
+    actual = desired + sim.VIBRATION_FRACTION * np.abs(desired) * rng.normal(size=len(desired))
+    rate = np.repeat(actual[:, None] / np.sqrt(3), 3, axis=1)
     reading = rate / SCALE - BIAS_RAD_S + NOISE_RAD_S * rng.normal(size=rate.shape)
     corrected = scale * (reading + bias)
     columns: Columns = {
         "time_s": time_s,
-        "desired_rad_s": wanted,
+        "desired_rad_s": desired,
         **{f"true_{axis}_rad_s": rate[:, i] for i, axis in enumerate("xyz")},
         **{f"reading_{axis}_rad_s": reading[:, i] for i, axis in enumerate("xyz")},
         **{f"calibrated_{axis}_rad_s": corrected[:, i] for i, axis in enumerate("xyz")},
@@ -53,19 +55,19 @@ def study(settings: Settings) -> Report:
             mean, rms = np.mean(readings[:, i] - rate[:, i]), np.sqrt(np.mean((readings[:, i] - rate[:, i]) ** 2))
             findings.append(Finding(f"mean error of {axis} {when} calibration", float(mean), "rad/s"))
             findings.append(Finding(f"RMS error of {axis} {when} calibration", float(rms), "rad/s"))
-    return Report(columns, tuple(findings), partial(_draw, time_s, wanted, reading, corrected), (12.0, 6.0))
+    return Report(columns, tuple(findings), partial(_draw, time_s, desired, reading, corrected), (12.0, 6.0))
 
 
-def _draw(time_s: Array, wanted: Array, reading: Array, corrected: Array, figure: "Figure") -> None:
+def _draw(time_s: Array, desired: Array, reading: Array, corrected: Array, figure: "Figure") -> None:
     panels = figure.subplots(2, 2, sharex=True, sharey=True).flat
     next_panel = iter(panels)
     overview = next(next_panel)
-    overview.plot(time_s, wanted, "k")
+    overview.plot(time_s, desired, "k")
     overview.set(title="desired rate about the axis of rotation", ylabel="rad/s")
     for i, panel in enumerate(next_panel):
         panel.plot(time_s, reading[:, i], color="tab:orange", linewidth=0.8, label="before calibration")
         panel.plot(time_s, corrected[:, i], color="tab:blue", linewidth=0.8, label="after calibration")
-        panel.plot(time_s, wanted / np.sqrt(3), "k--", label="desired")
+        panel.plot(time_s, desired / np.sqrt(3), "k--", label="desired")
         panel.set(title=f"axis {'xyz'[i]}", xlabel="time, s", ylabel="rad/s")
         panel.legend(loc="lower right")
     figure.suptitle("SIX Fig. 3: a swing of 1 rad/s at 0.75 Hz, noise 0.035 rad/s, vibration 5 %")

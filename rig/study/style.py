@@ -1,15 +1,15 @@
-"""How figures look: alike wherever they are drawn."""
+"""The style of figures, the same wherever they are drawn."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 
 @contextmanager
-def style() -> Iterator[None]:
-    """What is drawn within looks alike, and its SVG has the same bytes each time.
+def use_style() -> Iterator[None]:
+    """Draw alike within this block, with the same bytes of SVG each time.
 
-    matplotlib takes its settings from a file in the working folder, which may be somebody else's run folder and let
-    LaTeX set the words. So they are put back to its own defaults.
+    matplotlib reads settings from a file in the working folder, which may be another user's run folder and let LaTeX
+    set the text. So its own defaults are restored.
     """
     import matplotlib as mpl
 

@@ -1,4 +1,4 @@
-"""Spreads a study's tasks over processes, or over a cluster, without changing its results."""
+"""Distribution of a study's tasks over processes, or over a cluster, without changing its results."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -11,22 +11,22 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def in_parallel(
+def run_parallel(
     task: Callable[[np.random.Generator, Item], Result], items: Sequence[Item], settings: Settings
 ) -> list[Result]:
-    """`task(rng, item)` for every item, in order.
+    """Return `task(rng, item)` for every item, in order.
 
-    Every item has a random stream of its own, spawned from the seed by its place in `items`, so that the results do not
-    depend on how many processes there are. The joblib back end is the one of the surrounding `joblib.parallel_config`.
+    Every item has its own random stream, spawned from the seed by its index in `items`, so that results do not depend
+    on the number of processes. The joblib back end is that of the surrounding `joblib.parallel_config`.
     """
     from joblib import Parallel, delayed
 
     seeds = np.random.SeedSequence(settings.seed).spawn(len(items))
     results = Parallel(n_jobs=settings.jobs, return_as="generator")(
-        delayed(_seeded)(task, seed, item) for seed, item in zip(seeds, items, strict=True)
+        delayed(_run)(task, seed, item) for seed, item in zip(seeds, items, strict=True)
     )
     return list(settings.progress(results, len(items)))
 
 
-def _seeded(task: Callable[[np.random.Generator, Item], Result], seed: np.random.SeedSequence, item: Item) -> Result:
+def _run(task: Callable[[np.random.Generator, Item], Result], seed: np.random.SeedSequence, item: Item) -> Result:
     return task(np.random.default_rng(seed), item)

@@ -11,7 +11,7 @@ from rig.study import rate_table as rt
 
 SEEDS = 30
 EARTH_RAD_S = rt.GYRO_REFERENCE_RAD_S * (rt.EARTH_RATE_RAD_S / np.linalg.norm(rt.GYRO_REFERENCE_RAD_S))
-TURNED = rt.attitudes(rt.ATTITUDES)
+TURNED = rt.draw_attitudes(rt.ATTITUDES)
 
 
 def stands(model: Array, biases: Array, variance: float, seed: int) -> list[list[Stand]]:
@@ -53,7 +53,7 @@ def test_an_accelerometer_s_bias_is_as_good_as_its_bound() -> None:
     """TRIAX, Fig. 6: ten attitudes of six minutes, a jump after the first repeat."""
     truth = rt.ACCELEROMETER_BIAS_M_S2 + np.repeat([[0.0, 0, 0], [0.3 * rt.MG, -0.1 * rt.MG, 0]], [1, 9], axis=0)
     variance = rt.ACCELEROMETER_RANDOM_WALK**2 / rt.AVERAGED_S
-    model = rt.felt(TURNED, rt.ACCELEROMETER_REFERENCE_M_S2) @ rt.ACCELEROMETER_MATRIX.T
+    model = rt.project(TURNED, rt.ACCELEROMETER_REFERENCE_M_S2) @ rt.ACCELEROMETER_MATRIX.T
     gravity = float(np.linalg.norm(rt.ACCELEROMETER_REFERENCE_M_S2))
     site = Site((0.0, 0.0, -1.0), gravity, None)
     drifts = [
@@ -77,7 +77,7 @@ def test_a_gyroscope_s_bias_is_as_good_as_its_bound() -> None:
     """TRIAX, Fig. 4. What F is wrong by in the Earth's rate is the same in every repeat, and no drift."""
     truth = np.cumsum(0.1 * rt.DEG_H * np.random.default_rng(4).normal(size=(rt.REPEATS, 3)), axis=0)
     variance = rt.GYRO_RANDOM_WALK**2 / rt.AVERAGED_S
-    model = rt.felt(TURNED, EARTH_RAD_S) @ rt.GYRO_MATRIX.T
+    model = rt.project(TURNED, EARTH_RAD_S) @ rt.GYRO_MATRIX.T
     x, y, z = EARTH_RAD_S.tolist()
     site = Site((0.0, 0.0, -1.0), 9.8, (x, y, z))
     drifts = [rate_drift(stands(model, truth, variance, seed), site) for seed in range(SEEDS)]

@@ -88,7 +88,7 @@ def test_drawn_moments_are_those_of_real_samples() -> None:
     rng = np.random.default_rng(5)
     sweep = sim.Sweep(2.0, 0.3, 12)
     F, bias, runs = np.diag([1.1, 0.9, 1.0]), np.array([0.1, -0.2, 0.05]), 20000
-    mean, square = sim.mean_readings_and_squares(rng, np.broadcast_to(F, (runs, 3, 3)), bias, sweep)
+    mean, square = sim.draw_means_and_squares(rng, np.broadcast_to(F, (runs, 3, 3)), bias, sweep)
     vibration = sim.VIBRATION_FRACTION * sweep.speed_rad_s * rng.normal(size=(runs, sweep.samples))
     speed = sweep.speed_rad_s + vibration - vibration.mean(axis=1, keepdims=True)
     samples = speed[..., None] * F[0] - bias + sweep.noise_rad_s * rng.normal(size=(runs, sweep.samples, 3))

@@ -15,7 +15,7 @@ from rig.errors import Fault
 from rig.estimation.statistics.allan import FLICKER, Read
 from rig.report.figures.verification import save
 from rig.station.plain_text import plain
-from rig.study.style import style
+from rig.study.style import use_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +62,7 @@ def draw_at_rest(sensors: Mapping[str, SensorAtRest], folder: Path) -> list[Path
         curves = each.quantities.results
         if not curves:
             continue
-        with style():
+        with use_style():
             figure = Figure(figsize=(5.5 * len(curves), 4.6), layout="constrained")
             for axes, (quantity, seen) in zip(np.ravel(figure.subplots(1, len(curves))), curves.items(), strict=True):
                 _draw(axes, quantity, seen)

@@ -15,7 +15,7 @@ from rig.config.files.written_file import new_file
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.station.events import NotPlotted, Plotted, RunEvent
-from rig.study.style import style
+from rig.study.style import use_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,7 +47,7 @@ def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent,
     from matplotlib.figure import Figure
 
     for picture in pictures:
-        with style():
+        with use_style():
             figure = Figure(figsize=picture.size, layout=picture.layout)
             picture.draw(figure)
             figure.suptitle(picture.title)

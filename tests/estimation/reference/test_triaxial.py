@@ -15,7 +15,7 @@ from rig.study.rate_table import (
     GYRO_MATRIX,
     GYRO_RANDOM_WALK,
     GYRO_REFERENCE_RAD_S,
-    swinging,
+    simulate_oscillation,
 )
 from support.motions.rate_table import attitudes, noisy
 
@@ -37,7 +37,7 @@ def readings(r: Array, rates: Array | None = None, theta: Array = THETA) -> Arra
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_the_published_gyroscope_is_found_from_25_hz_samples(method: EqualWeights) -> None:
-    r, rates = swinging(600)  # ten minutes
+    r, rates = simulate_oscillation(600)  # ten minutes
     variances = np.full((len(r), 3), GYRO_RANDOM_WALK**2 * 25)
     solution = solve_triaxial(noisy(readings(r, rates), variances), r, variances, KnownVector(rates), method=method)
     std = np.sqrt(np.diag(solution.covariance))
@@ -83,7 +83,7 @@ def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights, s
 
 @pytest.mark.slow
 def test_noise_in_slow_readings_biases_the_published_estimate_and_only_that() -> None:
-    r, rates = swinging(40)
+    r, rates = simulate_oscillation(40)
     rates = 0.02 * rates  # ten times the noise that TRIAX reports of single samples
     variances = np.full((1000, 3), np.radians(0.0475) ** 2)
     exact = readings(r, rates)

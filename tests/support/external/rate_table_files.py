@@ -21,8 +21,8 @@ from rig.study.rate_table import (
     GYRO_RANDOM_WALK,
     GYRO_REFERENCE_RAD_S,
     RATE_HZ,
-    attitudes,
-    swinging,
+    draw_attitudes,
+    simulate_oscillation,
 )
 
 STILL, DWELL_S, BETWEEN_S = 16, 4.0, 1.0
@@ -42,7 +42,7 @@ def write_all(folder: Path) -> None:
 
 def _still(folder: Path, rng: np.random.Generator) -> None:
     """Sixteen attitudes at rest, accelerometer and magnetometer."""
-    turned = attitudes(STILL)
+    turned = draw_attitudes(STILL)
     time_s = np.arange(round(STILL * (DWELL_S + BETWEEN_S) * RATE_HZ)) / RATE_HZ
     where = turned[(time_s // (DWELL_S + BETWEEN_S)).astype(int)]
     felt = ACCELEROMETER_REFERENCE_M_S2 @ where
@@ -58,7 +58,7 @@ def _still(folder: Path, rng: np.random.Generator) -> None:
 
 def _swinging(folder: Path, rng: np.random.Generator) -> None:
     """All three axes swing: an attitude and a rate for every sample of the gyroscope."""
-    turned, rates = swinging(SWINGING_S)
+    turned, rates = simulate_oscillation(SWINGING_S)
     felt = (GYRO_REFERENCE_RAD_S @ turned + rates) @ GYRO_MATRIX.T + GYRO_BIAS_RAD_S
     felt += GYRO_RANDOM_WALK * np.sqrt(RATE_HZ) * rng.normal(size=felt.shape)
     time_s = np.arange(len(felt)) / RATE_HZ
