@@ -133,24 +133,9 @@ def _link_coefficients(arm: DenavitHartenberg) -> Array:
     A link rotates about z, goes along z and along x, rotates about x.
     """
     (cos, sin), terms = _twists(arm), np.zeros((arm.joints, 3, 4, 4))
-    terms[:, 0, 0, 0], terms[:, 0, 1, 1], terms[:, 0, 1, 2], terms[:, 0, 0, 3] = (
-        1.0,
-        cos,
-        -sin,
-        arm.a_m,
-    )
-    terms[:, 1, 1, 0], terms[:, 1, 0, 1], terms[:, 1, 0, 2], terms[:, 1, 1, 3] = (
-        1.0,
-        -cos,
-        sin,
-        arm.a_m,
-    )
-    terms[:, 2, 2, 1], terms[:, 2, 2, 2], terms[:, 2, 2, 3], terms[:, 2, 3, 3] = (
-        sin,
-        cos,
-        arm.d_m,
-        1.0,
-    )
+    terms[:, 0, 0, 0], terms[:, 0, 1, 1], terms[:, 0, 1, 2], terms[:, 0, 0, 3] = 1.0, cos, -sin, arm.a_m
+    terms[:, 1, 1, 0], terms[:, 1, 0, 1], terms[:, 1, 0, 2], terms[:, 1, 1, 3] = 1.0, -cos, sin, arm.a_m
+    terms[:, 2, 2, 1], terms[:, 2, 2, 2], terms[:, 2, 2, 3], terms[:, 2, 3, 3] = sin, cos, arm.d_m, 1.0
     return terms
 
 

@@ -42,8 +42,7 @@ def clearance_problems(
     """Return the problems of steps that bring flange, payload's centre or extension too near to forearm or upper arm.
 
     Lengths are those of `arm`, or else of the model's drawing. A motion from or to an attitude keeps `dwell_room_m`
-    from the forearm, all others `sweep_room_m`. The motion from the arm's present pose is checked if the plan begins
-    there.
+    from the forearm, all others `sweep_room_m`. The motion from the arm's pose is checked if the plan begins there.
     """
     problems = []
     for path in _list_paths(plan, model):

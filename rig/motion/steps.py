@@ -137,9 +137,8 @@ Step = Sweep | Transfer | Rest | Dwell
 class Stage:
     """A part of a plan with its own recording, before which the operator mounts the item by the `instruction`.
 
-    `mount` (3 rows of 3) is the nominal rotation from the flange's frame to the item's, in which the sensors' mountings
-    are given. `indices` are those of its sweeps in the whole procedure; `begins`: the number of the plan's steps before
-    it.
+    `mount` (3 rows of 3) is the nominal rotation from the flange's frame to the item's, which the sensors' mountings
+    refer to. `indices` are those of its sweeps in the whole procedure; `begins`: the number of earlier steps.
     """
 
     mount: tuple[Vector3, Vector3, Vector3]
@@ -213,11 +212,9 @@ def progress(motion: Motion, elapsed_s: NDArray[np.float64]) -> NDArray[np.float
     distance = max(map(abs, travel(motion.start_q_rad, motion.target_q_rad)))
     ramp_s = min(motion.speed_rad_s / motion.acceleration_rad_s2, motion.duration_s / 2)
     elapsed_s = elapsed_s.clip(0.0, motion.duration_s)
-    inner_s = np.minimum(elapsed_s, motion.duration_s - elapsed_s)
-    covered = motion.acceleration_rad_s2 * (
-        np.minimum(inner_s, ramp_s) ** 2 / 2 + ramp_s * (inner_s - ramp_s).clip(min=0.0)
-    )
-    fraction: NDArray[np.float64] = np.where(elapsed_s < motion.duration_s / 2, covered, distance - covered) / distance
+    end_s = np.minimum(elapsed_s, motion.duration_s - elapsed_s)
+    gone = motion.acceleration_rad_s2 * (np.minimum(end_s, ramp_s) ** 2 / 2 + ramp_s * (end_s - ramp_s).clip(min=0.0))
+    fraction: NDArray[np.float64] = np.where(elapsed_s < motion.duration_s / 2, gone, distance - gone) / distance
     return fraction
 
 

@@ -42,16 +42,12 @@ WARM_UP_S, STEP_K = 300.0, 1 / 16  # of the thermometer of a LSM9DS1: DocID02571
 class Effects:
     """Magnitudes of the effects: standard deviations, but half-widths of clock, offset, nonlinearity and warming.
 
-    - `g_sensitivity_rad_s_g`: of every element; `axis_rad`: twist of each wrist's axis; `jitter_s`: of the states'
-      times.
-    - `clock`, `clock_known`: error of the controller's clock, and standard uncertainty of its correction.
-    - `walk_rad_s_sqrt_s`: bias random walk; `offset_m`: the sensor's offset from the flange's centre along each axis.
-    - `nonlinearity`: odd and even, as a fraction of full scale; `warming_k`: the sensor's warming, with its effect on
-      bias
-      and scale.
+    - `g_sensitivity_rad_s_g` of every element; `axis_rad`, twist of each wrist's axis; `jitter_s` of states' times;
+    - `clock`, `clock_known`: error of the controller's clock, and standard uncertainty of its correction;
+    - `walk_rad_s_sqrt_s`, bias random walk; `offset_m`, the sensor's offset from the flange's centre, by axis;
+    - `nonlinearity` as a fraction of full scale; `warming_k`, with its effect on bias and scale.
 
-    The noise is that of a LSM9DS1 by its data sheet, 0.01 °/s/√Hz, the nonlinearity that of a MPU-9250
-    (PS-MPU-9250A-01, table 1).
+    The noise is a LSM9DS1's by its data sheet, 0.01 °/s/√Hz, the nonlinearity a MPU-9250's (PS-MPU-9250A-01, table 1).
     """
 
     speed_rad_s: float = np.pi / 3
@@ -103,9 +99,7 @@ def errors(effects: Effects, settings: Settings) -> Array:
     """Return errors of scale and bias over standard uncertainty, with and without the remedies, (draws, 2, 6)."""
     draws = settings.runs or DRAWS
     counts = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
-    return np.concatenate(
-        run_parallel(partial(_simulate_batch, effects), [count for count in counts if count], settings)
-    )
+    return np.concatenate(run_parallel(partial(_simulate_batch, effects), [n for n in counts if n], settings))
 
 
 def _simulate_batch(effects: Effects, rng: np.random.Generator, draws: int) -> Array:

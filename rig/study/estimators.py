@@ -95,9 +95,8 @@ def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[st
     model = (rt.project(attitudes, rt.GYRO_REFERENCE_RAD_S) + rates) @ rt.GYRO_MATRIX.T + rt.GYRO_BIAS_RAD_S
     readings = model + noise * rng.normal(size=(runs, *model.shape))
     truth = np.concatenate([rt.GYRO_MATRIX.ravel(), rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S])
-    bound = triaxial_bound(
-        rt.GYRO_MATRIX, rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S, attitudes, noise**2, known=rates
-    )
+    gyroscope = rt.GYRO_MATRIX, rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S
+    bound = triaxial_bound(*gyroscope, attitudes, noise**2, known=rates)
     for method in METHODS:
         theta = solve_triaxial_batch(readings, attitudes, noise**2, KnownVector(rates), method=method)
         ratios[f"TRIAX gyroscope, {method}"] = _compare(theta - truth, bound)

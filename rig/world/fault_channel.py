@@ -11,8 +11,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     payload mass_kg · payload_stays on          a payload set on the pendant; programs cannot change it
     at_program_start then after_s               another request, carried out `after_s` after the start of every program,
                                                 as by a fieldbus adapter that is set to stop; null: none
-    step_clock seconds · encoder joint error_rad   a step of the controller's clock; an error of a joint's reported
-    angle
+    step_clock seconds · encoder joint error_rad   the controller's clock steps; a joint's reported angle has an error
     register_in_use name · register_free name   an RTDE input that a fieldbus claims
     registers_in_use first last                 all integer and double inputs from number `first` to number `last`
     close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)

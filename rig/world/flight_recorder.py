@@ -22,10 +22,9 @@ NS_PER_S = 1e9
 
 
 class FlightRecorder:
-    """A recorder that writes to the file `path`, or to stderr if that is None.
+    """A recorder that writes to the file `path`, never through a link, or to stderr if that is None.
 
-    The file is created with the first record and never through a link. `waits_for` names the clients that the world
-    waits for. A record that cannot be written is lost, because the world must not wait for it.
+    `waits_for` names the clients that the world waits for. A record that cannot be written is lost.
     """
 
     def __init__(self, path: Path | None, waits_for: Callable[[], str]) -> None:

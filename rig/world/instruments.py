@@ -26,10 +26,9 @@ class SimulatedInstrument(Device, Protocol):
 class InstrumentMount(Protocol):
     """The place of an instrument, with the state that it keeps without power.
 
-    - `kind`: what control requests call it.
-    - `pty`: whether its port is also a pseudo-terminal.
-    - `bit_error_rate`: the fraction of wrong bits on its line, to begin with.
-    - `stolen`: the fraction of its bytes that another program reads, to begin with.
+    `kind`: its name in control requests; `pty`: whether its port is also a pseudo-terminal. To begin with,
+    `bit_error_rate` is the fraction of wrong bits on its line, and `stolen` the fraction of bytes that another program
+    reads.
     """
 
     @property

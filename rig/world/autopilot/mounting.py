@@ -20,8 +20,7 @@ from rig.world.instruments import FieldOf, MotionOf
 class AutopilotMount:
     """The place of one autopilot, with the state that it keeps without power.
 
-    `imus`: sensor names by IMU number. A number in between without a sensor has an IMU too, which reads the first one's
-    motion.
+    `imus`: sensor names by IMU number. A number in between without a sensor has an IMU with the first one's motion.
     """
 
     kind: ClassVar[str] = "autopilot"

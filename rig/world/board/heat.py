@@ -10,8 +10,7 @@ from rig.config.world.thermal import SimulatedThermalSection
 class HeatedPart:
     """A sensor on the body. Its thermometer follows the body, its elements follow the thermometer with hysteresis.
 
-    The hysteresis is a play operator: `branch` is 1 after warming, -1 after cooling, and between these during a
-    reversal.
+    The hysteresis is a play operator: `branch` is 1 after warming, -1 after cooling, in between during a reversal.
     """
 
     def __init__(self, section: SimulatedThermalSection) -> None:

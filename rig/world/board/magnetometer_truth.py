@@ -16,8 +16,7 @@ from rig.world.site import Vector
 class MountedMagnetometer:
     """A magnetometer mounted on the flange; `truth` holds its errors.
 
-    It sits as `mounting` states, rotated by the rotation vector `mounting_error_deg`, `offset_mm` from the flange's
-    centre.
+    It sits as `mounting` states, rotated by the vector `mounting_error_deg`, `offset_mm` from the flange's centre.
     """
 
     def __init__(

@@ -21,10 +21,8 @@ from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 class SensorTruth:
     """A sensor with its true errors, `gyro` and `accelerometer`. The latter is None if nothing reads it.
 
-    - `accelerometer`: simulate it even if the rig does not read it.
-    - `powered_s`: when the part gets power, which starts its warm-up.
-    - `part`: the heated part that sets its temperature, in place of a warm-up.
-    - `data_rate_ppm`: the error of its own oscillator, positive if fast.
+    `powered_s`: when the part gets power and begins to warm up; a heated `part` sets its temperature instead.
+    `data_rate_ppm`: the error of its own oscillator, positive if fast.
     """
 
     def __init__(

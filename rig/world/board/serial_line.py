@@ -46,10 +46,9 @@ class Device(Protocol):
 class SerialLine:
     """A line between a device of the laboratory (None: without power) and the host's end.
 
-    - `host_baud`: the host's baud rate if the transport does not carry it. None: the same as the device's.
-    - `silent`: whether the line loses everything in both directions.
-    - `bit_error_rate`: the probability that a bit from the device is wrong.
-    - `stolen`: the probability that in a tick another program on the same port takes the end of the bytes.
+    `host_baud`: the host's baud rate if the transport does not carry it (None: the device's). A `silent` line loses
+    everything. Each bit from the device is wrong with the probability `bit_error_rate`; with the probability `stolen`
+    another program on the same port takes the end of a tick's bytes.
     """
 
     def __init__(self, device: Callable[[], Device | None], seed: int = 0) -> None:

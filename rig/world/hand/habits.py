@@ -36,9 +36,8 @@ class Mistake:
     - `two_turns` in place of one; a turn the `other_way`; the `wrong_face`; `skipped`: no action.
     - `crumb`: the face is tilted by this many mrad; `table_pushed`: the table's tilt changes by this many.
     - `held`: in the air for this many seconds in place of a rest; `lifted`: by this many degrees during a rest.
-    - `dropped`: biases jump; `cable_pulled`: for this many seconds; `left`: idle for this many seconds before the
-      action;
-      `too_fast`: by this factor.
+    - `dropped`: biases jump; `cable_pulled`: for this many seconds; `left`: idle for this many seconds before.
+    - `too_fast`: by this factor.
     """
 
     kind: MistakeKind
@@ -81,10 +80,9 @@ Action = FlipAction | TurnAction | WaitAction
 class Habits:
     """How a hand moves and lays down a body. Values drawn anew each time are standard deviations.
 
-    - `tilt_mrad`: the repeatability of a face that is put down again.
-    - `closure_mrad`: by how much a turn against an edge misses; `heading_mrad`: the same of a flip.
-    - `faces_mrad`: the box' deviation from squareness; `table_mrad`: the table's tilt.
-    - `lever_arm_m`: the sensor's position from the point of rotation.
+    `tilt_mrad`: repeatability of a face put down again; `closure_mrad`, `heading_mrad`: by how much a turn against an
+    edge and a flip miss; `faces_mrad`: the box' deviation from squareness; `table_mrad`: the table's tilt;
+    `lever_arm_m`: the sensor's position from the point of rotation.
     """
 
     peak_deg_s: float = 250.0

@@ -68,9 +68,8 @@ class SimulatedHand:
             case WaitAction(seconds):
                 self.lies_from_s = start_s + seconds
             case FlipAction(to):
-                self._flip(
-                    self._draw_other_face(to) if mistake and mistake.kind == "wrong_face" else to, start_s, mistake
-                )
+                face = self._draw_other_face(to) if mistake and mistake.kind == "wrong_face" else to
+                self._flip(face, start_s, mistake)
             case TurnAction(turns):
                 self._turn(turns, start_s, mistake)
         return self.lies_from_s

@@ -44,9 +44,8 @@ class KvhFaults:
 class SimulatedKvh1775:
     """The instrument, switched on at the virtual time `time_s`, when its clock reads `uptime_s`.
 
-    - `motion_at`: its motion over time, rate in rad/s and specific force in g.
-    - `field_at`: flux density in its axes over time, T; `magnetometer`: the errors of its reading.
-    - `memory`: its settings, which commands change.
+    `motion_at`: its motion over time, rate in rad/s and specific force in g; `field_at`: flux density in its axes, T;
+    `magnetometer`: the errors of its reading; `memory`: its settings, which commands change.
     """
 
     def __init__(
@@ -146,9 +145,8 @@ class SimulatedKvh1775:
     def _send(self, at_s: float) -> None:
         memory = self._memory
         delta = memory["ROTFMT"] == "DELTA"
-        self._sensed = (
-            [total / self._message_steps for total in self._sum] if delta else cast(Sequence[float], self._before)
-        )
+        now = cast(Sequence[float], self._before)
+        self._sensed = [total / self._message_steps for total in self._sum] if delta else now
         self._sum = [0.0] * 6
         rotation = np.array(self._repeats.next_rates(self._gyroscope.read(at_s)))
         if delta:

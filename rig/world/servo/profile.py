@@ -28,6 +28,9 @@ class ProfileSegment(NamedTuple):
         return self.rate_rad_s + self.acceleration_rad_s2 * (time_s - self.start_s)
 
 
+Profile = list[ProfileSegment]
+
+
 class ProfileStart(NamedTuple):
     """The state in which a profile begins."""
 
@@ -36,9 +39,7 @@ class ProfileStart(NamedTuple):
     rate_rad_s: float
 
 
-def plan_timed(
-    start: ProfileStart, goal_rad: float, total_s: float, ramp_s: float, limit_rad_s: float
-) -> list[ProfileSegment]:
+def plan_timed(start: ProfileStart, goal_rad: float, total_s: float, ramp_s: float, limit_rad_s: float) -> Profile:
     """Plan a move of `total_s` with ramps of `ramp_s`; it takes longer if it would exceed `limit_rad_s`."""
     distance_rad = goal_rad - start.angle_rad
     ramp_s = min(ramp_s, total_s / 2)
@@ -49,9 +50,7 @@ def plan_timed(
     return _build_trapezoid(start, cruise_rad_s, ramp_s, total_s - 2 * ramp_s, ramp_s)
 
 
-def plan_limited(
-    start: ProfileStart, goal_rad: float, speed_rad_s: float, acceleration_rad_s2: float
-) -> list[ProfileSegment]:
+def plan_limited(start: ProfileStart, goal_rad: float, speed_rad_s: float, acceleration_rad_s2: float) -> Profile:
     """Plan a move of at most `speed_rad_s`, with ramps of `acceleration_rad_s2`."""
     v0, a = start.rate_rad_s, acceleration_rad_s2
     distance_rad = goal_rad - start.angle_rad
@@ -63,9 +62,7 @@ def plan_limited(
     return _build_trapezoid(start, peak_rad_s, up_s, max(0.0, cruise_s), down_s)
 
 
-def _build_trapezoid(
-    start: ProfileStart, cruise_rad_s: float, up_s: float, cruise_s: float, down_s: float
-) -> list[ProfileSegment]:
+def _build_trapezoid(start: ProfileStart, cruise_rad_s: float, up_s: float, cruise_s: float, down_s: float) -> Profile:
     """Return the segments, split where the rate changes sign, so that the gear's play can be followed."""
     segments: list[ProfileSegment] = []
     time_s, angle_rad, rate_rad_s = start

@@ -8,13 +8,10 @@ from dataclasses import dataclass, field
 class ServoTruth:
     """One servo. Angles and rates are the shaft's.
 
-    - `settings`: EEPROM values other than the factory's, by the manual's names.
-    - `encoder_once_…`, `encoder_twice_…`: the encoder's error e₁ sin(θ + φ₁) + e₂ sin(2θ + φ₂); AS5045-class parts are
-      within ±1.3° in all.
-    - `ripple_fraction`: the gear's ripple as a fraction of the rate, `ripple_per_turn` times a revolution.
-    - `lag_s`: by which the shaft follows the profile.
-    - `tick_ppm`: the error of its clock, positive if fast.
-    - `fall_deg_s`: the rate at which the shaft falls with torque off; 0: its load is balanced.
+    `settings`: EEPROM values other than the factory's, by the manual's names. The encoder's error is e₁ sin(θ + φ₁) +
+    e₂ sin(2θ + φ₂); AS5045-class parts are within ±1.3° in all. The gear's ripple is a fraction of the rate,
+    `ripple_per_turn` times a revolution; the shaft follows the profile with `lag_s`. `tick_ppm`: the error of its
+    clock, positive if fast. With torque off the shaft falls with `fall_deg_s` (0: its load is balanced).
     """
 
     model: str = "XM430-W350"
@@ -41,11 +38,9 @@ class ServoTruth:
 
 @dataclass(frozen=True, slots=True)
 class LineTruth:
-    """The connection between host and servos.
+    """The connection between host and servos. `latency_ms`: interval at which bytes are passed on (0: at once).
 
-    - `latency_ms`: the interval at which the converter passes bytes on (0: at once).
-    - `echo`: whether the host receives its own bytes, as with one-wire converters.
-    - `reply_delay_ms`: an additional delay of every reply.
+    `echo`: the host receives its own bytes, as with one-wire converters. `reply_delay_ms`: extra delay of every reply.
     """
 
     latency_ms: float = 0.0

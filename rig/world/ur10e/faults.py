@@ -20,12 +20,11 @@ class AtProgramStart:
 
 @dataclass(slots=True)
 class ArmFaults:
-    """Faults of the arm. Each keeps its value until it is set again.
+    """Faults of the arm, each until it is set again. `payload_stays`: programs cannot change the payload.
 
-    - `safety_limit`: the fraction of the programmed speed that a safety limit permits.
-    - `clock_step_s`: the sum of all steps of the controller's clock.
-    - `encoder_error_rad`: errors of reported joint angles by joint (0 to 5); may be NaN.
-    - `payload_stays`: whether programs cannot change the payload.
+    `safety_limit`: the fraction of the programmed speed that a safety limit permits. `clock_step_s`: the sum of all
+    steps of the controller's clock. `encoder_error_rad`: errors of reported joint angles by joint (0 to 5), which may
+    be NaN.
     """
 
     safety_limit: float = 1.0

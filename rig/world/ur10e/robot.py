@@ -301,10 +301,7 @@ class Robot:
             self.safety_mode = SafetyMode.NORMAL
 
     def release(self) -> None:
-        """Release the emergency stop button, which leaves the robot without power, or close and reset the safeguard.
-
-        A program that the safeguard paused stays paused until play.
-        """
+        """Release the emergency stop button, without power, or reset the safeguard; a program stays paused."""
         if self.safety_mode in (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SAFEGUARD_STOP):
             self.safety_mode = SafetyMode.NORMAL
 

@@ -131,8 +131,7 @@ def _sample_line(
         except np.linalg.LinAlgError:
             return segments, inf
         excess = max(excess, float(np.max(np.abs(next_qd) / limits)))
-        segments.append(
-            MotionSegment(step_s, tuple(q.tolist()), tuple(qd.tolist()), tuple(((next_qd - qd) / step_s).tolist()))
-        )
+        qdd = (next_qd - qd) / step_s
+        segments.append(MotionSegment(step_s, tuple(q.tolist()), tuple(qd.tolist()), tuple(qdd.tolist())))
         q, qd = q + (qd + next_qd) * (step_s / 2.0), next_qd
     return segments, excess

@@ -17,10 +17,7 @@ CosineAndSine = Sequence[tuple[Any, Any]]  # of every joint
 
 
 class BodyMotion(NamedTuple):
-    """Motion of a body's origin relative to inertial space, in the body's axes.
-
-    Angular rate (rad/s), its derivative (rad/s²), and specific force (m/s²).
-    """
+    """A body's angular rate (rad/s), its derivative (rad/s²), specific force (m/s²): inertial, in the body's axes."""
 
     rate_rad_s: Components
     change_rad_s2: Components

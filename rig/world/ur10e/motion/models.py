@@ -26,9 +26,8 @@ CB3: Version = (3, 15, 8, 0)
 class ArmModel:
     """One arm model.
 
-    - `robot_type`, `name`: the controller's number of the type, and its name on the dashboard.
-    - `limit_rad`, `speed_rad_s`: greatest joint angles, to either side, and speeds.
-    - `home_deg`, `polyscope`: initial pose and software version, if the configuration has none.
+    `limit_rad` and `speed_rad_s`: greatest joint angles, to either side, and speeds. `home_deg` and `polyscope`:
+    initial pose and software version, if the configuration has none. `name` is the dashboard's.
     """
 
     robot_type: int

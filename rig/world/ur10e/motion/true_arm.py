@@ -37,17 +37,12 @@ class TrueArm:
     """
 
     def __init__(
-        self,
-        section: SimulatedArmSection,
-        site: SiteTruth,
-        motion: JointMotion,
-        random: Random,
-        drawing: Drawing = UR10E,
+        self, arm: SimulatedArmSection, site: SiteTruth, motion: JointMotion, random: Random, drawing: Drawing = UR10E
     ) -> None:
         self._motion, self._site = motion, site
-        self._speed = 1.0 + 1e-6 * section.clock_ppm
-        self._links = build_calibrated_links(section.calibration, section.unmodelled.twist_rad, drawing)
-        errors = _errors(section)
+        self._speed = 1.0 + 1e-6 * arm.clock_ppm
+        self._links = build_calibrated_links(arm.calibration, arm.unmodelled.twist_rad, drawing)
+        errors = _errors(arm)
         self._errors = JointErrors(errors, random) if errors.any else None
         self._at_rest: BodyMotion | None = None
         # The inner joints' state and the forearm's motion.
