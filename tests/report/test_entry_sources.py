@@ -6,7 +6,6 @@ from types import MappingProxyType
 import pytest
 
 from rig.data.entries.budget import ClockComparisonEntry
-from rig.report import entry as entry_module
 from rig.report.entry import entry
 from rig.report.entry_sources import SOURCES, Row
 
@@ -34,7 +33,7 @@ class Renamed:
 def table(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the entry be filled from these classes."""
     rows = (Row((Comparison, Renamed), {"clock": "by", "error": "error", "std": "std"}),)
-    monkeypatch.setattr(entry_module, "SOURCES", MappingProxyType({ClockComparisonEntry: rows}))
+    monkeypatch.setattr("rig.report.entry_sources.SOURCES", MappingProxyType({ClockComparisonEntry: rows}))
 
 
 def test_a_key_is_filled_by_the_table_and_not_by_an_attribute_of_its_name() -> None:
