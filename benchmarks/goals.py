@@ -60,7 +60,7 @@ GOALS = {
     "by hand, RMS error of scale": Goal(1 / 4, "ratio"),
     "decode to batches, three sensors": Goal(8.0, "ratio", most=False),
     "decode to batches, one at 952 Hz": Goal(8.0, "ratio", most=False),
-    "decode a KVH 1775": Goal(50.0, most=False),
+    "decode a KVH 1775": Goal(40.0, most=False),
     "decode lines": Goal(5.0, "ratio", most=False),
     "operator's page, five browsers": Goal(2.0),
 }

@@ -2,7 +2,8 @@
 
 `rig solve`, `show`, `plan`, `check` and `--help`, each in a process of its own, by the demonstration's configuration
 and a frozen recording of six sweeps. Printed are wall time and processor time (user and system, child processes
-included), the least of all rounds. The table has the wall time.
+included), the least of all rounds. The table has the processor time: the other tells of
+whatever else the computer does, too.
 """
 
 import argparse
@@ -42,7 +43,7 @@ def main() -> None:
     for what, arguments in COMMANDS.items():
         walls_s, processor_s = zip(*(took_s(*arguments) for _ in range(rounds)), strict=True)
         print(f"{what:20} {min(walls_s):6.2f} s, {min(processor_s):6.2f} s of a processor")
-        record(what, min(walls_s), "s")
+        record(what, min(processor_s), "s of a processor")
 
 
 if __name__ == "__main__":
