@@ -24,8 +24,8 @@ class SampleBatch(NamedTuple):
     """Samples of one sensor in the order of their sequence numbers, which have no gap inside a batch.
 
     `dropped` is the board's latest count of conversions lost on its side since the start; `samples` is (n,) of
-    `SAMPLE_DTYPE`, of `IMU_SAMPLE_DTYPE` where accelerations come along, of `FIELD_SAMPLE_DTYPE` of a magnetometer. In
-    the mode "raw" their counts are the part's, in the mode "calibrated" they are microradians per second.
+    `SAMPLE_DTYPE`, with accelerations of `IMU_SAMPLE_DTYPE`, for a magnetometer of `FIELD_SAMPLE_DTYPE`. Their counts
+    are the part's in the mode "raw", and microradians per second in the mode "calibrated".
     """
 
     sensor: int
@@ -35,28 +35,28 @@ class SampleBatch(NamedTuple):
 
 
 def sample_batches(frames: Iterable[Frame], host_time_s: float) -> Iterator[SampleBatch]:
-    """The batches of frames of a stream that came together at `host_time_s`, as few as there can be.
+    """Yield the batches of frames of a stream that came together at `host_time_s`, as few as possible.
 
-    Those of a sensor come in their order; a batch ends where samples are missing, or their kind changes.
+    Batches of a sensor are in order; a batch ends at missing samples, or at a change of their kind.
     """
     runs = _runs(frames)
     samples = {name: _samples(name, runs, host_time_s) for name in {run[0].name for run in runs}}
-    taken = dict.fromkeys(samples, 0)
+    position = dict.fromkeys(samples, 0)
     for run in runs:
         name, first, last = run[0].name, run[0].values, run[-1].values
-        begin = taken[name]
-        taken[name] += last["sequence"] + last["count"] - first["sequence"]
+        start = position[name]
+        position[name] += last["sequence"] + last["count"] - first["sequence"]
         mode = protocol.MODES[last["mode"]]
-        yield SampleBatch(last["sensor"], mode, last["dropped"], samples[name][begin : taken[name]])
+        yield SampleBatch(last["sensor"], mode, last["dropped"], samples[name][start : position[name]])
 
 
 def _runs(frames: Iterable[Frame]) -> list[list[Frame]]:
-    """Return the frames of each sensor that go on where the one before ended; those of a sensor in their order."""
+    """Return runs of consecutive frames of each sensor, in order."""
     runs, latest = list[list[Frame]](), dict[int, list[Frame]]()
     for frame in frames:
         sensor = frame.values["sensor"]
         run = latest.get(sensor)
-        if run is not None and _goes_on(run[-1], frame):
+        if run is not None and _continues(run[-1], frame):
             run.append(frame)
         else:
             latest[sensor] = run = [frame]
@@ -67,7 +67,7 @@ def _runs(frames: Iterable[Frame]) -> list[list[Frame]]:
 def _samples(name: str, runs: Sequence[Sequence[Frame]], host_time_s: float) -> np.ndarray:
     """Return the samples (n,) of all frames of that name, run after run.
 
-    They are put together as bytes and taken apart once: most of what a frame costs alone is the same for many.
+    Joining their bytes and decoding once shares most of a frame's cost.
     """
     frames = [frame for run in runs if run[0].name == name for frame in run]
     items = np.frombuffer(b"".join([frame.content for frame in frames]), protocol.MESSAGE_BY_NAME[name].item_dtype)
@@ -90,11 +90,13 @@ def _samples(name: str, runs: Sequence[Sequence[Frame]], host_time_s: float) -> 
     return samples
 
 
-def _goes_on(before: Frame, frame: Frame) -> bool:
-    """Whether the samples of a sensor's frame follow those of the one before, of the same kind."""
-    was, now = before.values, frame.values
+def _continues(before: Frame, frame: Frame) -> bool:
+    """Return whether the samples of a sensor's frame follow those of the one before, of the same kind."""
+    previous, current = before.values, frame.values
     return bool(
-        frame.name == before.name and now["mode"] == was["mode"] and now["sequence"] == was["sequence"] + was["count"]
+        frame.name == before.name
+        and current["mode"] == previous["mode"]
+        and current["sequence"] == previous["sequence"] + previous["count"]
     )
 
 

@@ -126,9 +126,7 @@ class Message:
         return None if any(field.rows for field in self.fields) else tuple(field.name for field in self.fields)
 
     def name_values(self, values: tuple[Any, ...]) -> dict[str, Any]:
-        """Return the values that `head` unpacks, by field name; a vector is a tuple of three, a matrix of its three
-        rows.
-        """
+        """Return the values that `head` unpacks, by field name; vectors as tuples of three, matrices of three rows."""
         if self._names is not None:  # a short path for frequent frames
             return dict(zip(self._names, values))  # noqa: B905 - as many as `head` unpacks
         rest = iter(values)

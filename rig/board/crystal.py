@@ -1,4 +1,4 @@
-"""Whether the board's clock is locked to its crystal."""
+"""The check that the board's clock is locked to its crystal."""
 
 import time
 

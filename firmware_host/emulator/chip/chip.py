@@ -28,8 +28,7 @@ _SENSOR_BUS_FUNCTIONS = {"PB3": 5, "PB4": 5, "PB5": 5}
 
 
 class Chip:
-    """Everything around the core. `on_reset(cause)` is called to reset the chip, `on_clock` after a change of its
-    clock.
+    """Everything around the core. `on_reset(cause)` is called to reset the chip, `on_clock` after a change of clock.
 
     Cause is one of the RESET_… flags of `rcc`.
     """

@@ -122,7 +122,7 @@ def section_of(port: str, baud: int | None, name: str, seconds: tuple[float, flo
         _tell(reason)
     for gap in found.gaps:
         _tell(f"CANNOT TELL {gap}")
-    return printable_lines(section(shape, found, port, baud, name, known=known))
+    return printable_lines(section(shape, found, port, baud, name, user=known))
 
 
 def _tell(what: str) -> None:

@@ -37,8 +37,8 @@ class LineBatch:
     """Decoded lines: `values` (n, columns) of the samples, as printed, and the lines that were none.
 
     A value that the device does not provide is NaN, and so is text in an unused column. `samples_before` (m,): the
-    number of this block's samples before each rejected line (no sample, no comment). `first_rejected`: the start of the
-    first of them.
+    number of this block's samples before each rejected line (no sample, no comment). `first_rejected`: how the first
+    begins.
     """
 
     values: Array

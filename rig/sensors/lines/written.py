@@ -13,7 +13,7 @@ ROUND = (1, 2, 2.5, 4, 5, 8, 10)
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """What no line shows and the user states, None if that is open; `by_hand` asks for what a session by hand finds."""
+    """The user's statements on what no line shows, None for an open one; `by_hand`: for a session by hand."""
 
     serial_number: str | None = None
     range_deg_s: str | None = None
@@ -21,9 +21,9 @@ class Stated:
     by_hand: bool = False
 
 
-def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, known: Stated | None = None) -> str:
+def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, user: Stated | None = None) -> str:
     """Return the YAML of `sensors`; `?` stands for what is to be looked up, and `rig check` refuses it by the key."""
-    known = known or Stated()
+    user = user or Stated()
     lines: dict[str, object] = {"columns": _format_list(guess.columns)}
     if shape.keys:
         lines["keys"] = _format_list([_quote(key) for key in shape.keys])
@@ -46,14 +46,14 @@ def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu",
         "sensors:",
         f"  {name}:",
         "    part: lines",
-        f"    serial_number: {_stated(known.serial_number)}  # of this specimen",
+        f"    serial_number: {_fill(user.serial_number)}  # of this specimen",
         f"    rate_hz: {_round_rate(guess.rate_hz):g}",
-        f"    range_deg_s: {_stated(known.range_deg_s)}  # full scale to which the device's program sets the gyroscope",
+        f"    range_deg_s: {_fill(user.range_deg_s)}  # full scale to which the device's program sets the gyroscope",
     ]
     if "a" in guess.units:
-        range_g = _stated(known.range_g)
+        range_g = _fill(user.range_g)
         rows.append(f"    acceleration: {{range_g: {range_g}}}  # … and the accelerometer; without this it is not read")
-    if known.by_hand:
+    if user.by_hand:
         rows.append("    correction: matrix  # the right angles of the axes are found too")
     rows += ["    serial:", f"      port: {port}", f"      baud: {baud}", "    lines:"]
     rows += [f"      {key}: {value}" for key, value in lines.items()]
@@ -74,7 +74,7 @@ def _format_value(value: object) -> str:
     return f'"{GAP}"' if value == GAP else str(value)
 
 
-def _stated(value: str | None) -> str:
+def _fill(value: str | None) -> str:
     return f'"{GAP}"' if value is None else value
 
 

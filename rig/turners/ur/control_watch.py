@@ -33,8 +33,8 @@ ControlMode = Remote | Literal["gone"]
 class ControlWatch:
     """A thread that calls `on_problem` once, if the arm at `host` can no longer be stopped by its ports.
 
-    `newest_s()` returns the time of the newest state (monotonic time): a lost link loses the ports too, and is reported
-    as such elsewhere.
+    `newest_s()` returns the time of the newest state (monotonic time): a lost link, which the link reports, loses them
+    too.
     """
 
     def __init__(

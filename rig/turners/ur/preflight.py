@@ -1,6 +1,4 @@
-"""Pre-flight of the arm: the problems that can be foreseen before it moves. Pure: plans and a report in, problems
-out.
-"""
+"""Pre-flight of the arm: problems that can be foreseen before it moves. Pure: plans and a report in, problems out."""
 
 import math
 from collections.abc import Sequence

@@ -180,8 +180,7 @@ class _Child:
     def watch_move(self) -> NoReturn:
         """Report the end of a move.
 
-        In a thread of its own: the client answers only between the work of its own threads, and heartbeats must not
-        wait for that.
+        In a thread of its own: the client answers only between the work of its own threads, and heartbeats cannot wait.
         """
         while True:
             time.sleep(MOVE_POLL_S)
