@@ -44,11 +44,11 @@ class Client:
         self._lines = self.process.stdout
 
     def says(self, line: str) -> None:
-        said = self.next()
-        assert said == line, f"the client said {said!r} instead of {line!r}"
+        answer = self.next()
+        assert answer == line, f"the client said {answer!r} instead of {line!r}"
 
     def next(self) -> str:
-        """The next line the script says; what ur_rtde prints in between is passed over."""
+        """Return the next line of the script, skipping what ur_rtde prints in between."""
         for line in self._lines:
             if line.startswith(">"):
                 return line[1:].strip()

@@ -43,10 +43,10 @@ class ArmRelay:
             sink.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        for each in self._sockets:
+        for connection in self._sockets:
             with suppress(OSError):
-                each.shutdown(socket.SHUT_RDWR)
-            each.close()
+                connection.shutdown(socket.SHUT_RDWR)
+            connection.close()
 
 
 @contextmanager

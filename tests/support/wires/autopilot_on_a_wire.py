@@ -74,8 +74,8 @@ class AutopilotOnAWire:
         truth = SensorTruth(section("x"), self._simulated)
         px4 = self._firmware == "px4"
         imus = [
-            SimulatedImu(place, truth, self._motion_at, self.parameters, px4=px4, seed=np.random.SeedSequence(place))
-            for place in range(self._imus)
+            SimulatedImu(index, truth, self._motion_at, self.parameters, px4=px4, seed=np.random.SeedSequence(index))
+            for index in range(self._imus)
         ]
         self.autopilot = SimulatedAutopilot(
             self._firmware,

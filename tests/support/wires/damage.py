@@ -59,18 +59,18 @@ def _insert(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
 
 
 def _splice(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    """From a place on it goes on as another message."""
+    """Continue with another message from a random byte on."""
     other = random.choice(messages)
     bad[random.randrange(len(bad) + 1) :] = other[random.randrange(len(other) + 1) :]
 
 
 def _swap(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    at = random.randrange(len(bad) + 1)
-    bad[:] = bad[at:] + bad[:at]
+    split = random.randrange(len(bad) + 1)
+    bad[:] = bad[split:] + bad[:split]
 
 
 def _mislead(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    """Its size says something else."""
+    """Replace the size."""
     wrong = random.choice((0, 1, 2, 3, 5, len(bad) + 1, 2 * len(bad), 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF))
     bad[:4] = struct.pack(">I", wrong) if random.random() < 0.5 else struct.pack(">H", wrong & 0xFFFF) + bad[2:4]
 

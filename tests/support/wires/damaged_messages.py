@@ -110,10 +110,10 @@ def _read_states(host: str) -> str:
 
 
 def _ask_dashboard(host: str) -> str:
-    with dashboard.Dashboard(host, PATIENCE_S) as there:
-        assert isinstance(there.program_running(), bool)
-        assert there.is_in_remote_control() in (True, False, None)
-        assert (there.polyscope() + there.serial_number()).isprintable()
+    with dashboard.Dashboard(host, PATIENCE_S) as client:
+        assert isinstance(client.program_running(), bool)
+        assert client.is_in_remote_control() in (True, False, None)
+        assert (client.polyscope() + client.serial_number()).isprintable()
     return "read"
 
 
@@ -134,7 +134,7 @@ class Reader:
 def _primary_states() -> Sequence[bytes]:
     robot = _laboratory().robot
     return [
-        primary_package(16, b"".join(primary_package(kind, of(robot)) for kind, of in parts))
+        primary_package(16, b"".join(primary_package(kind, content(robot)) for kind, content in parts))
         for parts in (STATE, (*STATE, *CONFIGURATION), CONFIGURATION)
     ]
 
@@ -284,8 +284,8 @@ def _what_was_said(name: str, answer: bytes, robot: Robot) -> str:
     if name == "dashboard":
         refused = b"could not understand" in answer or b"Failed" in answer or b"not found" in answer
         return "refused in words" if refused else "answered" if answer else "waiting for the rest"
-    said = [message.kind.name for message in robot.messages.after(robot.messages.last - 1)]
-    return "refused as an exception of the program" if said == ["EXCEPTION"] else "taken, or waiting for the rest"
+    newest = [message.kind.name for message in robot.messages.after(robot.messages.last - 1)]
+    return "refused as an exception of the program" if newest == ["EXCEPTION"] else "taken, or waiting for the rest"
 
 
 def _recover(laboratory: Laboratory) -> None:

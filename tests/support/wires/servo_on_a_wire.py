@@ -27,7 +27,7 @@ class _FarEnd:
         self._now = clock.time_s
 
         def bus(now: Callable[[], float]) -> SimulatedBus:
-            return SimulatedBus([SimulatedServo(each, now()) for each in truths], line, now, seed=7)
+            return SimulatedBus([SimulatedServo(truth, now()) for truth in truths], line, now, seed=7)
 
         self.far = BusOnALine(bus, self._now, clock.move_on, pty=pty)
         self.far.line.host_baud = None if pty else BAUD
@@ -135,13 +135,13 @@ class ServoOnAWire:
 
     @property
     def angle_rad(self) -> float:
-        found: float = self.do("angle_rad")
-        return found
+        value: float = self.do("angle_rad")
+        return value
 
     @property
     def rate_rad_s(self) -> float:
-        found: float = self.do("rate_rad_s")
-        return found
+        value: float = self.do("rate_rad_s")
+        return value
 
     def close(self) -> None:
         self.do("end")

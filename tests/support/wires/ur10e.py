@@ -10,5 +10,5 @@ UR10E = turner_model("ur10e")
 
 
 def plan_problems(plan: Plan, carried: Carried) -> list[Problem]:
-    """What is wrong with a plan for a UR10e."""
+    """Return the problems of a plan for a UR10e."""
     return judged.plan_problems(plan, carried, UR10E)
