@@ -16,7 +16,7 @@ from imucal import FerrarisCalibration, FerrarisSignalRegions
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.by_hand import HandRecording, SessionConditions, solve_by_hand
 from rig.estimation.by_hand.session import FACES
-from rig.observation.by_hand.handled import handled
+from rig.observation.by_hand.handled import segment_session
 from rig.world.hand.habits import Action, TurnAction
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
@@ -77,7 +77,7 @@ def main(sessions: int) -> None:
     lasting_s = 0.0
     for seed in range(sessions):
         recorded = handle(SESSION, seed, rest_s=REST_S)
-        session = handled(recorded.time_s, recorded.rates, recorded.acceleration)
+        session = segment_session(recorded.time_s, recorded.rates, recorded.acceleration)
         lasting_s += float(np.ptp(recorded.time_s)) / sessions
         found = (by_imucal(session), solve_by_hand(session, SessionConditions(20.0)).turned.matrix)
         for each, matrix in zip(errors.values(), found, strict=True):

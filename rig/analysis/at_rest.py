@@ -15,7 +15,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.observation.arm_rests import still_samples
 from rig.observation.average import Stream, on_the_arms_clock
-from rig.observation.by_hand.steadiness import check_at_rest, whole_stretches
+from rig.observation.by_hand.steadiness import check_at_rest, contiguous_slices
 from rig.observation.external.csv_samples import Samples
 from rig.observation.motion.arm_motion import motion_of
 from rig.observation.reference.acceleration import accelerations
@@ -73,7 +73,7 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
     """
     for quantity, readings in samples.readings.items():
         check_at_rest(samples.time_s, readings, quantity)
-    pieces = [inside for inside in whole_stretches(samples.time_s) if inside.stop - inside.start > 2]
+    pieces = [inside for inside in contiguous_slices(samples.time_s) if inside.stop - inside.start > 2]
     return SensorAtRest(
         None,
         attempt_each(

@@ -12,7 +12,7 @@ from pathlib import Path
 from rig.batch.batch import Batch, BatchEnded, Begun, Entry, PartBegun, PartEnded, after, state_of
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.files.written_file import open_to_append
-from rig.data.checked import checked, parsed
+from rig.data.checked import parse_json, validate
 from rig.data.run_folder import empty_folder, folder_of_its_own, refuse_links
 from rig.errors import Refused
 
@@ -93,9 +93,9 @@ def _not_gone_on_with(folder: Path, why: str) -> Refused:
 
 def _entries(text: bytes) -> Iterator[Entry]:
     for line in text.splitlines():
-        said = parsed(line)
+        said = parse_json(line)
         kind = _KINDS[said.pop("entry")]
-        yield checked(kind, said, "entry")
+        yield validate(kind, said, "entry")
 
 
 def _append(path: Path, entry: Entry) -> None:

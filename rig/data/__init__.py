@@ -1,1 +1,1 @@
-"""What lies on disk: the run file, the run folder, the result."""
+"""Data on disk: the run file, the run folder, the result."""

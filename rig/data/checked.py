@@ -1,4 +1,4 @@
-"""Plain values, as JSON has them, into what they mean: each of the type and in the range its annotation says."""
+"""Plain values, as in JSON, validated against the type and range of their annotation."""
 
 import json
 import re
@@ -17,29 +17,29 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 OfJoints = Annotated[tuple[Finite, ...], Field(max_length=MAX_JOINTS)]  # the one that stands on the ground first
 Kind = TypeVar("Kind")
 Document = TypeVar("Document", bound=BaseModel)
-MOST_VALUES = 200_000  # the largest of a run has 3,000; every wrong one of them costs a thousand bytes to tell
-MOST_RECORDED = 50_000  # of a text or an event in a recording, where they are as dear
+MOST_VALUES = 200_000  # the largest of a run has 3,000; the message on each wrong one takes a thousand bytes
+MOST_RECORDED = 50_000  # in a text or an event of a recording, with the same cost
 SEPARATORS = (b",", b"[", b"{")  # in JSON, before each value but the first
-LARGEST_NUMBER = 1e100  # in SI units: what is beyond that overflows where it is squared, and nothing measured is
+LARGEST_NUMBER = 1e100  # in SI units: a larger one overflows if it is squared, and no measured value is as large
 UNSEEN = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ud800-\\udfff]")
 _adapters: dict[type[Any], TypeAdapter[Any]] = {}
 
 
-def checked(kind: type[Kind], document: Any, where: str) -> Kind:
-    """A value of that type. Keys it does not know are left out. Raises ValueError naming the first wrong value."""
+def validate(kind: type[Kind], document: Any, where: str) -> Kind:
+    """Return a value of type `kind`, without unknown keys. Raise ValueError naming the first wrong value."""
     try:
         value: Kind = _adapter(kind).validate_python(document)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join((where, *map(str, first["loc"])))
-        raise ValueError(f"{place} is {quote(first['input'])}: {first['msg']}") from None
+        path = ".".join((where, *map(str, first["loc"])))
+        raise ValueError(f"{path} is {quote(first['input'])}: {first['msg']}") from None
     return value
 
 
 def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: str, remedy: str) -> Document:
-    """A JSON file of that kind; `what` it is a result of, for messages. Raises Refused `no_result`, `not_a_result`."""
+    """Return a JSON file of type `kind`, called a result of `what`. Raise Refused `no_result`, `not_a_result`."""
     try:
-        return kind.model_validate(parsed(read_regular_file(file, limit_bytes), MOST_VALUES))
+        return kind.model_validate(parse_json(read_regular_file(file, limit_bytes), MOST_VALUES))
     except (UnfitFile, OSError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused("no_result", f"{file} cannot be read: {why}", remedy) from error
@@ -56,57 +56,57 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
         raise Refused("not_a_result", f"{file} is no result of {what}: {error}", remedy) from error
 
 
-def parsed(content: str | bytes, most: int = MOST_RECORDED) -> Any:
-    """The value of JSON that anybody may have written, its texts printable.
+def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
+    """Return the value of JSON from any source, with its texts made printable.
 
-    Raises ValueError for a number that cannot be measured, a key that stands twice, over `most` values; RecursionError.
+    Raise ValueError for a number that cannot be measured, a duplicate key, or more than `most` values; RecursionError.
     """
     content = content.encode() if isinstance(content, str) else content
     if sum(map(content.count, SEPARATORS)) > most:
         raise ValueError(f"it holds over {most} values")
-    found = json.loads(
+    value = json.loads(
         content,
-        parse_float=_measured,
-        parse_int=_measured,
-        parse_constant=_measured,
-        object_pairs_hook=each_key_once,
+        parse_float=_parse_number,
+        parse_int=_parse_number,
+        parse_constant=_parse_number,
+        object_pairs_hook=refuse_duplicate_keys,
     )
-    return seen(found)
+    return sanitize(value)
 
 
-def each_key_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object of a JSON file. Raises ValueError if a key stands twice: readers take different ones."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
+def refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of a JSON file. Raise ValueError for a duplicate key: readers would take different ones."""
+    document = dict(pairs)
+    if len(document) < len(pairs):
         keys = [key for key, _ in pairs]
         raise ValueError(f"the key {quote(next(key for key in keys if keys.count(key) > 1))} stands there twice")
-    return found
+    return document
 
 
-def _measured(text: str) -> int | float:
-    """A number of a JSON file. Raises ValueError for one that nothing could have found."""
+def _parse_number(text: str) -> int | float:
+    """Return a number of a JSON file. Raise ValueError for one that no measurement has."""
     value = float(text)
     if not abs(value) <= LARGEST_NUMBER:
         raise ValueError(f"{quote(text)} is no number that can be measured")
     return value if set(text) & set(".eE") else int(text)
 
 
-def seen(value: Any) -> Any:
-    """A JSON value in whose texts nothing is hidden: a terminal, a certificate and a C header show all there is.
+def sanitize(value: Any) -> Any:
+    """Return a JSON value without hidden characters, so that a terminal, a certificate and a C header show all of it.
 
-    Raises RecursionError.
+    Raise RecursionError.
     """
     if isinstance(value, str):
-        return UNSEEN.sub(lambda found: printable(found[0]), value)
+        return UNSEEN.sub(lambda match: printable(match[0]), value)
     if isinstance(value, list):
-        return [seen(each) for each in value]
+        return [sanitize(item) for item in value]
     if isinstance(value, dict):
-        return {seen(key): seen(each) for key, each in value.items()}
+        return {sanitize(key): sanitize(item) for key, item in value.items()}
     return value
 
 
 def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
-    """The adapter of a type, made once: that takes a while."""
+    """Return the adapter of a type; cached, since building one takes a while."""
     if kind not in _adapters:
         _adapters[kind] = TypeAdapter(kind)
     return _adapters[kind]

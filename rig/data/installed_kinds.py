@@ -1,4 +1,4 @@
-"""Kinds of sensors that a package adds, through the entry-point group `rig.kinds`, and all quantities with theirs."""
+"""Kinds of sensors that packages add through the entry-point group `rig.kinds`, and all quantities including theirs."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -13,12 +13,12 @@ GROUP = "rig.kinds"
 
 
 class InstalledKind(Protocol):
-    """What a package says of a kind of sensor: each room takes what is its own, and knows nothing of the others.
+    """A package's description of a kind of sensor, of which each room takes its own part.
 
-    - `quantity` is what it measures: its row of the table.
-    - `solve` takes the sensor's name, its placements at rest and the site, and returns what is found
+    - `quantity` is the measured one: its row of the table.
+    - `solve` takes the sensor's name, its placements at rest and the site, and returns the solution
       (`rig.analysis.installed_kinds`).
-    - `result` is the kind of result (`rig.report.findings.kind.ResultKind`), which shows that everywhere.
+    - `result` is the kind of result (`rig.report.findings.kind.ResultKind`), for every outlet.
     """
 
     @property
@@ -31,7 +31,7 @@ class InstalledKind(Protocol):
 
 @cache
 def installed_kinds() -> tuple[InstalledKind, ...]:
-    """The kinds of the packages installed here. Raises Refused `kind_not_loaded`."""
+    """Return the kinds of the packages installed here. Raise Refused `kind_not_loaded`."""
     return tuple(kind for _, kind in added(GROUP, _not_loaded))
 
 
@@ -41,12 +41,12 @@ def _not_loaded(what: str, remedy: str) -> Refused:
 
 @cache
 def quantities() -> Mapping[str, Quantity]:
-    """Every quantity by its name, those of installed kinds of sensors too."""
+    """Return every quantity by its name, including those of installed kinds of sensors."""
     every = (*OF_THE_RIG, *(kind.quantity for kind in installed_kinds()))
-    return MappingProxyType({each.name: each for each in every})
+    return MappingProxyType({quantity.name: quantity for quantity in every})
 
 
 @cache
 def measured() -> Mapping[str, Quantity | Scalar]:
-    """Everything that a channel may be of, by its name: quantities, and what has no axes."""
-    return MappingProxyType({**quantities(), **{each.name: each for each in SCALARS}})
+    """Return everything that a channel may hold, by its name: quantities, and scalars without axes."""
+    return MappingProxyType({**quantities(), **{scalar.name: scalar for scalar in SCALARS}})

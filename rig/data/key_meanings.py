@@ -1,4 +1,4 @@
-"""What the keys of `result.json` mean: the table that its JSON schema and the page of public names are made from."""
+"""The meanings of the keys of `result.json`: the table for its JSON schema and the page of public names."""
 
 import re
 from collections.abc import Mapping
@@ -12,22 +12,22 @@ _DEGREES_OF_FREEDOM = re.compile(r"(.+)_degrees_of_freedom")
 
 @cache
 def meanings() -> Mapping[str, str]:
-    """Return the table: a meaning for each `key`, and for each `Entry.key` that means another thing in that entry."""
+    """Return the table: a meaning for each `key`, and for each `Entry.key` that has another meaning in that entry."""
     lines = _TABLE.read_text(encoding="utf-8").splitlines()
     rows = (line.partition(" | ") for line in lines if line and not line.startswith("#"))
     return {key: meaning for key, _, meaning in rows}
 
 
 def meaning_of(entry: str, key: str) -> str:
-    """Return what a key means in an entry, which is named without its ending `Entry`. Raises KeyError if none is told.
+    """Return the meaning of a key in an entry, named without its ending `Entry`. Raise KeyError without one.
 
-    Standard uncertainties and their degrees of freedom have the meaning that their name says.
+    Standard uncertainties and their degrees of freedom have the meaning that their name gives.
     """
     table = meanings()
-    if (found := table.get(f"{entry}.{key}", table.get(key))) is not None:
-        return found
-    if (named := _DEGREES_OF_FREEDOM.fullmatch(key)) is not None:
-        return f"degrees of freedom of the standard uncertainty of `{named[1]}`; null if infinite"
-    if (named := _STD.fullmatch(key)) is not None:
-        return f"standard uncertainty of `{named[1]}{named[2]}`"
+    if (meaning := table.get(f"{entry}.{key}", table.get(key))) is not None:
+        return meaning
+    if (match := _DEGREES_OF_FREEDOM.fullmatch(key)) is not None:
+        return f"degrees of freedom of the standard uncertainty of `{match[1]}`; null if infinite"
+    if (match := _STD.fullmatch(key)) is not None:
+        return f"standard uncertainty of `{match[1]}{match[2]}`"
     raise KeyError(f"{entry}.{key}")

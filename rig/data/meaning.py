@@ -1,4 +1,4 @@
-"""What a check of the verdict means."""
+"""The meaning of a check of the verdict."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -6,16 +6,16 @@ from typing import Protocol
 
 from rig.config.judging.limits import Kind, Parameter
 
-HELD: tuple[Parameter, Parameter] = ("scale", "bias")
+JUDGED_PARAMETERS: tuple[Parameter, Parameter] = ("scale", "bias")
 
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What a check is of: conformity of the item, a property of which is held, or fitness of the measurement for use.
+    """The subject of a check: conformity of a property of the item, or fitness of the measurement for use.
 
-    `quantity` and `parameter` are those of the `sensor` that are held; None where it is of no single one. `sweep` is
-    the one of the plan, by index, that contradicts the others and that `rig resume` repeats. `what` names what is told
-    of the quantity, `scale_std`: by it the words of the check are found.
+    `quantity` and `parameter` are those of the `sensor` that is judged; None for no single one. `sweep` is the one of
+    the plan, by index, that contradicts the others and that `rig resume` repeats. `what` names the criterion,
+    `scale_std`: the words of the check are found by it.
     """
 
     kind: Kind
@@ -27,7 +27,7 @@ class Meaning:
 
 
 class Judged(Protocol):
-    """A check, as it was made or as a result tells it."""
+    """A check, as it was made or as a result holds it."""
 
     @property
     def means(self) -> Meaning: ...
@@ -36,7 +36,14 @@ class Judged(Protocol):
 
 
 def limit_held(checks: Iterable[Judged], sensor: str, quantity: str, parameter: Parameter) -> float | None:
-    """The limit of conformity that a parameter of a sensor's quantity is held to, None where no check holds it."""
-    held = "conformity", sensor, quantity, parameter
-    of = ((each.means, each.limit) for each in checks)
-    return next((limit for each, limit in of if (each.kind, each.sensor, each.quantity, each.parameter) == held), None)
+    """Return the limit of conformity for a parameter of a sensor's quantity; None if no check judges it."""
+    subject = "conformity", sensor, quantity, parameter
+    limits = ((check.means, check.limit) for check in checks)
+    return next(
+        (
+            limit
+            for meaning, limit in limits
+            if (meaning.kind, meaning.sensor, meaning.quantity, meaning.parameter) == subject
+        ),
+        None,
+    )

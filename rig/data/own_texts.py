@@ -1,4 +1,4 @@
-"""What the user of this computer has run: configurations and scripts, known by their text wherever they lie.
+"""Configurations and scripts that the user of this computer has run, recognized by their text wherever they lie.
 
 An empty file for each, named by its SHA-256, in a folder of the user's own: nothing to parse, nothing to lock.
 """
@@ -12,7 +12,7 @@ from rig.errors import Refused
 
 
 def note_own(*texts: str) -> None:
-    """Note that this user has run these texts. One that cannot be noted is not known later, and then asked about."""
+    """Note that this user has run these texts. A text that cannot be noted is asked about later."""
     with suppress(OSError, Refused):
         folder = _folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -21,12 +21,12 @@ def note_own(*texts: str) -> None:
 
 
 def is_own(sha256: str) -> bool:
-    """Whether the text with this hash, in hexadecimal, was run by this user on this computer."""
+    """Return whether the text with this hash, in hexadecimal, was run by this user on this computer."""
     with suppress(Refused):
         return len(sha256) == 64 and sha256.isalnum() and (_folder() / sha256).is_file()
     return False
 
 
 def _folder() -> Path:
-    """Where they are noted. Raises as `own_folder`."""
+    """Return the folder of the notes. Raise as `own_folder`."""
     return own_folder() / "own"

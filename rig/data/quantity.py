@@ -1,7 +1,7 @@
-"""What sensors measure: every name, unit and size that is written or shown of a quantity, in one table.
+"""The quantities that sensors measure: every name, unit and size that is written or shown of them, in one table.
 
-A quantity's names in files end with its `suffix`: `bias_m_s2`, `x_m_s2`. A new quantity is a row here, or comes with a
-kind of sensor that somebody has installed (`rig.data.installed_kinds`).
+A quantity's names in files end with its `suffix`: `bias_m_s2`, `x_m_s2`. A new quantity is a row here, or comes with an
+installed kind of sensor (`rig.data.installed_kinds`).
 """
 
 from collections.abc import Iterable
@@ -25,7 +25,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Mistaken:
-    """A `unit` that readings are often given in by mistake, how to `mend` that, and more than any part reads, in SI."""
+    """A `unit` in which readings are often given by mistake, the remedy, and more than any part reads, in SI."""
 
     unit: str
     mend: str
@@ -36,16 +36,16 @@ class Mistaken:
 class Quantity:
     """One quantity that a sensor measures along its axes.
 
-    - `sensor` is what measures it. `unit` is that of SI, `suffix` the same in names.
-    - `reading` is the unit of a reading on a screen, `bias` that of a bias with at least so many `decimals`, `drift`
-      that of what the bias does over hours, `residuals` those that what a model leaves is drawn in, from the largest.
-    - `walk` is what its white noise is called, `walk_suffix` the SI unit of that in names, `walk_unit` a shown one.
-    - `steady` is how far the means of two neighbouring seconds may be apart at rest, beside their noise: no bias moves
-      so fast, but a hand does, and half a degree of tilt is more. A field within a room changes by a tenth of that.
-    - `d_si` is the unit as a digital certificate writes it. `towards` is what a sensor at rest is turned towards.
-    - `mistaken` is for what unit its readings are taken by mistake.
-    - `offset` is how many times the bias a reading is off at nothing: −1 where a bias is what corrects it, m = g/k − b.
-    - `axes`: the letters of the axes that it is measured along.
+    - sensor: the kind of sensor; unit: that of SI; suffix: the same in names.
+    - reading: the unit of a reading on a screen; bias: that of a bias with at least so many decimals; drift: that of
+      its change over hours; residuals: those of the residuals in a figure, from the largest.
+    - walk: the name of its white noise; walk_suffix: the SI unit of that in names; walk_unit: a displayed one.
+    - steady: largest difference between the means of two neighbouring seconds at rest, besides noise: no bias moves so
+      fast, but a hand does, and half a degree of tilt is more. A field within a room changes by a tenth of that.
+    - d_si: the unit as a digital certificate writes it. towards: what a sensor at rest is turned towards.
+    - mistaken: the unit in which readings are given by mistake.
+    - offset: the reading at zero over the bias: −1 if the bias is a correction, m = g/k − b.
+    - axes: the letters of its axes.
     """
 
     name: str
@@ -71,25 +71,25 @@ class Quantity:
         return self.name
 
     def named(self, what: str) -> str:
-        """The name in a file of `what` in this quantity's unit: `bias_rad_s`."""
+        """Return the name in a file of `what` in this quantity's unit: `bias_rad_s`."""
         return f"{what}_{self.suffix}"
 
-    def of(self, sensor: str) -> str:
-        """How the readings of a sensor of that name are called: that a gyroscope reads rates goes without saying."""
-        return self.beside(sensor) if self.prefix else sensor
+    def label(self, sensor: str) -> str:
+        """Return the label of a sensor's readings: the name alone for a gyroscope's rates."""
+        return self.full_label(sensor) if self.prefix else sensor
 
     @property
     def prefix(self) -> str:
-        """What names of its checks, limits and columns begin with, as `acceleration_`; nothing for a rate."""
+        """Beginning of the names of its checks, limits and columns, as `acceleration_`; empty for a rate."""
         return "" if self.name == RATE.name else f"{self.name}_"
 
-    def beside(self, sensor: str) -> str:
-        """How they are called where others of that sensor stand too."""
+    def full_label(self, sensor: str) -> str:
+        """Return the label of a sensor's readings among others of that sensor."""
         return f"{sensor}, {self.sensor}"
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The columns of its readings in a table, one for each axis."""
+        """Columns of its readings in a table, one for each axis."""
         return tuple(self.named(axis) for axis in self.axes)
 
     @property
@@ -104,7 +104,7 @@ class Quantity:
 
     @property
     def parameter_signs(self) -> tuple[float, ...]:
-        """What takes scale factors, then biases, to those of a model whose biases are part of the reading, and back."""
+        """Factors from scale factors, then biases, to those of a model with the biases in the reading, and back."""
         return (1.0,) * len(self.axes) + (float(self.offset),) * len(self.axes)
 
 
@@ -112,7 +112,8 @@ class Quantity:
 class Scalar:
     """One quantity without axes, which is recorded, shown and exported, and never calibrated.
 
-    `sensor` is what measures it, `unit` that of its values, `suffix` the same in names, `reading` the one on a screen.
+    `sensor` is the kind of sensor, `unit` that of its values, `suffix` the same in names, `reading` the one on a
+    screen.
     """
 
     name: str
@@ -122,7 +123,7 @@ class Scalar:
     reading: Unit
 
     def named(self, what: str) -> str:
-        """The name in a file of `what` in this quantity's unit: `pressure_pa`."""
+        """Return the name in a file of `what` in this quantity's unit: `pressure_pa`."""
         return f"{what}_{self.suffix}"
 
     @property
@@ -196,7 +197,7 @@ PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", Unit("hPa", 100.0)
 SCALARS: Final = (TEMPERATURE, PRESSURE)
 
 
-def of_news(quantities: Iterable[str]) -> list[str]:
-    """Names of the quantities of a sensor that are told: its temperature only where it measures nothing else."""
+def select_displayed(quantities: Iterable[str]) -> list[str]:
+    """Return the names of a sensor's quantities to display: its temperature only if it measures nothing else."""
     names = list(quantities)
     return [name for name in names if name != TEMPERATURE.name] or names

@@ -49,26 +49,23 @@ SCHEMA: Final = "rig.result/1"
 SIZE_MAX_BYTES = 16_000_000  # a run of six sweeps with its verification has 66,000
 
 
-def _known(quantity: str) -> str:
+def _check_quantity(quantity: str) -> str:
     if quantity not in quantities():
         raise ValueError(f"is no quantity that the rig or a package installed here knows: {', '.join(quantities())}")
     return quantity
 
 
-QuantityName = Annotated[str, AfterValidator(_known)]
+QuantityName = Annotated[str, AfterValidator(_check_quantity)]
 
 
 class CheckEntry(Entry):
-    """One limit of the verdict; `value` is null where nothing was measured, `limit` where none was set.
+    """One limit of the verdict; `value` is null if nothing was measured, `limit` if none was set.
 
-    Where the value has an expanded uncertainty: `uncertainty` and its `coverage_factor`, by how much the
-    `decision_rule` has it stay below the limit (`guard_band`), and the probability that it is accepted although it is
-    beyond the limit.
-
-    `kind` says whether it holds a property of the item (conformity) or asks whether the measurement is fit for use;
-    `sensor`, `quantity` and `parameter` what of which sensor is judged, where it is of a single one; `sweep` which
-    contradicts the others; `criterion` by what the quantity is judged, null where the package that made the check does
-    not say.
+    - If the value has an expanded uncertainty: uncertainty, its coverage_factor, the guard_band by which the
+      decision_rule keeps it below the limit, and the probability that a value beyond the limit is accepted.
+    - kind: conformity of a property of the item, or fitness of the measurement for use; sensor, quantity, parameter:
+      the judged one, if it is a single one; sweep: the one that contradicts the others; criterion: the name of the
+      quantity that is judged, null if the package that made the check does not give it.
     """
 
     name: str
@@ -89,12 +86,12 @@ class CheckEntry(Entry):
 
     @property
     def means(self) -> Meaning:
-        """What it says it is of."""
+        """Meaning of the check."""
         return Meaning(self.kind, self.sensor, self.quantity, self.parameter, self.sweep, self.criterion)
 
 
 class StoredPolynomialsEntry(Entry):
-    """What a temperature changed of a stored calibration: rows for (T − `temperature_c`)ⁿ, n from 1 to 3, by axis.
+    """Changes of a stored calibration with temperature: rows for (T − `temperature_c`)ⁿ, n from 1 to 3, by axis.
 
     `scale_change` is added to 1 and multiplies m + b, `bias_change_rad_s` is added to b. Beyond `range_c` it is as at
     its ends.
@@ -123,7 +120,7 @@ class StoredCalibrationEntry(Entry):
 
 
 class KinematicsEntry(Entry):
-    """The Denavit–Hartenberg parameters of what turned that were reckoned with, from the ground on; of an arm six."""
+    """The Denavit–Hartenberg parameters of the turner in the calculation, from the ground on; six joints of an arm."""
 
     theta_rad: OfJoints
     a_m: OfJoints
@@ -132,16 +129,16 @@ class KinematicsEntry(Entry):
 
 
 class FileEntry(Entry):
-    """A file that was read: what it was called, and its SHA-256 in hexadecimal."""
+    """An input file: its name, and its SHA-256 in hexadecimal."""
 
     name: str
     sha256: str
 
 
 class ProvenanceEntry(Entry):
-    """What was measured with what, and when. Later versions may add to it.
+    """The provenance of a result. Later versions may add to it.
 
-    `readings_file` and `motion_file` of readings recorded elsewhere; no arm and no board are named then.
+    `readings_file` and `motion_file` are those of external readings, without arm and board.
     """
 
     model_config = ConfigDict(frozen=True, extra="allow", defer_build=True)
@@ -185,11 +182,11 @@ class EstimateEntry(Entry):
 
 
 class VectorEntry(Entry):
-    """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange.
+    """The vector model's solution: the six parameters, and the directions of the three axes.
 
-    `residuals_std_rad_s` is what the solve expects each residual to scatter by; `…_degrees_of_freedom` are those of
-    the standard deviations of that name, null where they have no end. Both are left out of a solution
-    without a budget, as that of sweeps of a file.
+    - residuals_std_rad_s: standard deviation that the solution expects of each residual.
+    - …_degrees_of_freedom: those of the standard deviations of that name, null if infinite.
+    - Both are left out of a solution without a budget, as that of sweeps of a file.
     """
 
     model: str
@@ -240,9 +237,9 @@ class AverageEntry(Entry):
 
 
 class ObservationEntry(Entry):
-    """One revolution and the mean reading over it; of a joint, where an arm made it.
+    """One revolution and the mean reading over it; with its joint if an arm made it.
 
-    `angle_rad` is how far it turned: 2π, several of these, or an arc by the encoders; null of a file that tells speeds.
+    `angle_rad` is the angle turned: 2π, several of these, or an arc by the encoders; null for a file of speeds.
     """
 
     sweep: int
@@ -274,7 +271,7 @@ class TimeBaseEntry(Entry):
 
 
 class BoardSolutionEntry(Entry):
-    """What the board solved for by one method, in single precision."""
+    """The board's solution by one method, in single precision."""
 
     sensor: str
     method: str
@@ -297,22 +294,22 @@ class BoardEntry(Entry):
 
 
 class GyroscopeEntry(Entry):
-    """A sensor's calibration by the chosen estimator, what it rests on, and what the other estimators say.
+    """A sensor's calibration by the chosen estimator, its observations, and the solutions of the other estimators.
 
-    - `covariance` is that of noise and of a bias that wanders, `covariance_combined` holds all of the `budget`; both
-      are there where the vector model was chosen.
-    - `correction_matrix` is M of g = M (m + b), by which the board and the C header correct readings.
-    - `speeds_rad_s` are those of the sweeps: found at one speed, either way, the calibration is valid at that speed,
-      and there is no `nonlinearity`. `axis_rate_ranges_rad_s`: the smallest and the largest rate along each of the
-      sensor's own axes in the sweeps that determine its scale factor.
-    - `temperature_c` is the mean over the samples of all sweeps. `scale_conditions` and `bias_conditions`
-      say when each was read, and how warm it was then: scale factors are found from sweeps, biases from rests too.
-    - A reference has no `board`: the board solves only for the sensors that are to be calibrated.
-    - `earth_rate` is there where it was to be found, or says why it was not.
-    - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
-    - `in_attitudes` is there where a file told the attitudes, and no arm turned it; what nobody told, as its range and
-      its temperature, is null then. `by_angles` is there where sweeps of a file were solved by how far the body turned,
-      `by_hand` where a hand turned it on a table.
+    - covariance: that of noise and of the bias random walk; covariance_combined holds all of the budget. Both are there
+      if the vector model was chosen.
+    - correction_matrix: M of g = M (m + b), by which the board and the C header correct readings.
+    - speeds_rad_s: those of the sweeps. A calibration at one speed, either way, is valid at that speed, and has no
+      nonlinearity. axis_rate_ranges_rad_s: the smallest and the largest rate along each of the sensor's own axes in the
+      sweeps that determine its scale factor.
+    - temperature_c: mean over the samples of all sweeps. scale_conditions, bias_conditions: times and temperature of
+      the readings for each: scale factors come from sweeps, biases from rests too.
+    - board: null for a reference: the board solves only for the sensors that are to be calibrated.
+    - earth_rate: only if it was to be estimated, or the reason without it.
+    - detection_limits: faults during the recording, and the size from which on each is detected.
+    - in_attitudes: only if a file gave the attitudes instead of an arm; what is unknown then, as range and temperature,
+      is null. by_angles: only if sweeps of a file were solved by the angle turned. by_hand: only if it was turned by
+      hand.
     """
 
     part: str
@@ -356,7 +353,7 @@ class GyroscopeEntry(Entry):
 
 
 class RotationEntry(Entry):
-    """How two sensors sit to each other: `matrix` takes a vector of the reference's frame into the sensor's."""
+    """The rotation between two sensors: `matrix` takes a vector of the reference's frame into the sensor's."""
 
     matrix: Matrix3
     vector_rad: Vector3
@@ -376,11 +373,9 @@ class DeviationEntry(Entry):
 
 
 class RevolutionErrorEntry(Entry):
-    """Mean reading less mean reference over one revolution; `gravity_rad_s` is what of it gravity adds, if known.
+    """Mean reading less mean reference over one revolution; `gravity_rad_s` is gravity's part of it, if known.
 
-    Or over an arc: `angle_rad` is how far the joint turned.
-
-    With gravity the flange's circling, which is felt as gravity is.
+    Over an arc `angle_rad` is the angle turned. Gravity includes the flange's circling, which acts on a sensor like it.
     """
 
     sweep: int
@@ -393,7 +388,7 @@ class RevolutionErrorEntry(Entry):
 
 
 class ComparisonEntry(Entry):
-    """A sensor's readings beside the reference's; `noise_rad_s` is null without rests; one delay a recording."""
+    """A sensor's readings compared with the reference's; `noise_rad_s` is null without rests; a delay per recording."""
 
     movement: DeviationEntry
     sweeps: DeviationEntry
@@ -422,7 +417,7 @@ class VerificationEntry(Entry):
 
 
 class MountEntry(Entry):
-    """How the item sat in a stage, counted from 1, beside how it was to be mounted, against the first stage.
+    """The mounting of the item in a stage, counted from 1, against the planned one, both relative to the first stage.
 
     `rotation_rad` is a rotation vector in the item's frame, `std_rad` has the standard deviations of its components.
     """
@@ -433,17 +428,18 @@ class MountEntry(Entry):
 
 
 class ResultDocument(Entry):
-    """The result of a run, of schema "rig.result/1"; `gyroscopes` is empty where stored calibrations were verified.
+    """The result of a run, of schema "rig.result/1".
 
-    It is also empty where no sweeps were made, `accelerometers` where none were calibrated, `magnetometers` where none
-    were recorded; one that was recorded and not calibrated says why.
-    `bias_drift` holds the biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
-    `over_temperature` holds calibrations over temperature in the same way: then all else is at their reference.
-    `unsolved` says of readings from elsewhere why a quantity has no solution, by sensor, then by the quantity's name.
-    `omitted` is what of these readings was left out, `notes` how they were read where that is no matter of course.
-    `others` are results of kinds that packages add, by the kind's key: what stands there only the package knows.
-    `mounts` are there of a run of several stages, for each but the first.
-    A sensor's name becomes that of files: what a configuration does not take for one is none here either.
+    - gyroscopes: empty for a verification of stored calibrations, and without sweeps; accelerometers, magnetometers:
+      empty if none was calibrated or recorded; one that was recorded and not calibrated has the reason.
+    - bias_drift: biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
+    - over_temperature: calibrations over temperature, keyed in the same way: then all else is at their reference.
+    - unsolved: why a quantity of external readings has no solution, by sensor, then by the quantity's name.
+    - omitted: parts of these readings that were left out; notes: remarks on how they were read.
+    - others: results of kinds that packages add, by the kind's key, in the package's own format.
+    - mounts: of a run of several stages, for each but the first.
+
+    A sensor's name becomes that of files: the rules of a configuration apply here too.
     """
 
     schema_name: Literal["rig.result/1"] = Field(alias="schema")  # as SCHEMA
@@ -464,12 +460,12 @@ class ResultDocument(Entry):
     mounts: tuple[MountEntry, ...] = ()
 
     def text(self) -> str:
-        """The result as JSON; what was left out stays out."""
+        """Return the result as JSON, without unset fields."""
         return json.dumps(self.model_dump(by_alias=True, exclude_unset=True), indent=2, allow_nan=False)
 
 
 def schema_text() -> str:
-    """The JSON schema of `result.json`, as docs/result.schema.json has it."""
+    """Return the JSON schema of `result.json`, as in docs/result.schema.json."""
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **ResultDocument.model_json_schema()}
     for name, entry in {"ResultDocument": schema, **schema["$defs"]}.items():
         for key, described in entry.get("properties", {}).items():
@@ -478,18 +474,18 @@ def schema_text() -> str:
 
 
 def write_result(document: ResultDocument, folder: Path) -> None:
-    """`result.json` into a run folder, whole or not at all: it ends the run."""
+    """Write `result.json` into a run folder, completely or not at all: it ends the run."""
     write_new(folder / RESULT, document.text() + "\n")
 
 
 def read_result(path: Path) -> ResultDocument:
-    """The `result.json` of a run folder or at `path` itself. Raises Refused `no_result`, `not_a_result`."""
+    """Return the `result.json` of a run folder or at `path` itself. Raise Refused `no_result`, `not_a_result`."""
     remedy = "Give a run folder or its result.json"
     return read_document(ResultDocument, _file(path), SIZE_MAX_BYTES, what="a run", remedy=remedy)
 
 
-def passed_result(path: Path) -> ResultDocument:
-    """A result whose verdict is a pass. Raises Refused `no_result`, `not_a_result`, `verdict_failed`."""
+def read_passed_result(path: Path) -> ResultDocument:
+    """Return a result whose verdict is a pass. Raise Refused `no_result`, `not_a_result`, `verdict_failed`."""
     result = read_result(path)
     if result.verdict != "pass":
         failed = ", ".join(check.name for check in result.checks if not check.passed)

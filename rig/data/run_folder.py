@@ -1,4 +1,4 @@
-"""What lies where in a run folder, and how to go on with one."""
+"""The files of a run folder, and the command that resumes one."""
 
 import itertools
 import json
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
-from rig.data.checked import checked
+from rig.data.checked import validate
 from rig.data.latest_run import note_run
 from rig.errors import Refused
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 CONFIG, SCRIPT, RESULT, CERTIFICATE = "config.yaml", "script.py", "result.json", "certificate.html"
 SCRIPT_IDENTITY = "script.json"
-WORLD_LATE = "world_late.txt"  # what held steps of the simulated laboratory that came late
+WORLD_LATE = "world_late.txt"  # the causes of late steps of the simulated laboratory
 LOG, ARM_LOG = "log.txt", "arm_client.log"
 IDENTITY_MAX_BYTES = 10_000
 _BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # of the names of recordings, by what is streamed
@@ -28,19 +28,19 @@ _BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # of the names of recordin
 
 @dataclass(frozen=True, slots=True)
 class ScriptIdentity:
-    """Which script a run was begun with: what its file was called, and the SHA-256 of its text in hexadecimal."""
+    """The script with which a run was begun: the name of its file, and the SHA-256 of its text in hexadecimal."""
 
     name: str
     sha256: str
 
 
 def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: ScriptIdentity) -> Path:
-    """A run folder with the configuration as used, the script's text and what is known of it, nothing else.
+    """Make a run folder with the configuration as used, the script's text and its identity, nothing else.
 
-    Raises Refused `run_folder`.
+    Raise Refused `run_folder`.
     """
     parent = Path(loaded.config.output.folder)
-    with _written(out or parent):
+    with _refuse_unwritable(out or parent):
         folder = out or folder_of_its_own(parent, loaded.config.procedure.name)
         empty_folder(folder, or_else=f", or go on with: {resuming(folder)}")
         note_run(folder)
@@ -49,7 +49,7 @@ def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: Script
 
 
 def discard(folder: Path) -> None:
-    """Remove a new run folder in which nothing was measured; it stays where somebody has laid something else there."""
+    """Remove a new run folder in which nothing was measured; it stays if it holds other files."""
     begun = [folder / name for name in (CONFIG, SCRIPT, SCRIPT_IDENTITY, WORLD_LATE, LOG, ARM_LOG)]
     with suppress(OSError):
         for path in [*begun, *(file for readings in _BEGINNINGS for file in recordings(folder, readings))]:
@@ -58,11 +58,11 @@ def discard(folder: Path) -> None:
 
 
 def empty_folder(folder: Path, *, or_else: str = "") -> Path:
-    """A folder of that name with nothing in it, made if it is not there; `or_else` is what else to do if it has.
+    """Make a folder, or return an empty one of that name; `or_else` is a further remedy if it is not empty.
 
-    Raises Refused `run_folder`.
+    Raise Refused `run_folder`.
     """
-    with _written(folder):
+    with _refuse_unwritable(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
             raise Refused("run_folder", f"{folder} is not empty", f"Choose another with --out{or_else}")
@@ -70,8 +70,8 @@ def empty_folder(folder: Path, *, or_else: str = "") -> Path:
 
 
 @contextmanager
-def _written(folder: Path) -> Iterator[None]:
-    """Raises Refused `run_folder` where the system refuses to write there."""
+def _refuse_unwritable(folder: Path) -> Iterator[None]:
+    """Raise Refused `run_folder` if the system refuses to write there."""
     try:
         yield
     except OSError as error:
@@ -79,7 +79,7 @@ def _written(folder: Path) -> Iterator[None]:
 
 
 def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
-    """All of these new files or, on a full disk, none: half of a configuration would be resumed from."""
+    """Write all of these new files or, on a full disk, none: half of a configuration would be resumed from."""
     begun: list[Path] = []
     try:
         for name, text in texts.items():
@@ -93,7 +93,7 @@ def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
 
 
 def folder_of_its_own(parent: Path, what: str) -> Path:
-    """A folder that was not there, named after time and `what` it is of; several may begin in one second."""
+    """Make a new folder, named after time and `what` it holds; several may begin in one second."""
     parent.mkdir(parents=True, exist_ok=True)
     name = f"{datetime.now(UTC):%Y-%m-%dT%H-%M-%SZ}-{what}"
     folder, numbers = parent / name, itertools.count(2)
@@ -105,10 +105,10 @@ def folder_of_its_own(parent: Path, what: str) -> Path:
 
 
 def script_identity(folder: Path) -> ScriptIdentity:
-    """Which script a run folder was begun with. Raises Refused `another_script` when it does not say."""
+    """Return the script with which a run folder was begun. Raise Refused `another_script` if it is not recorded."""
     path = folder / SCRIPT_IDENTITY
     try:
-        return checked(ScriptIdentity, json.loads(read_regular_file(path, IDENTITY_MAX_BYTES)), "script")
+        return validate(ScriptIdentity, json.loads(read_regular_file(path, IDENTITY_MAX_BYTES)), "script")
     except (UnfitFile, OSError, ValueError, RecursionError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused(
@@ -119,30 +119,30 @@ def script_identity(folder: Path) -> ScriptIdentity:
 
 
 def recordings(folder: Path, readings: str) -> list[Path]:
-    """The recordings of "raw" or of "calibrated" readings, in the order they were made: run.h5, run-2.h5, …"""
+    """Return the recordings of "raw" or of "calibrated" readings, in the order they were made: run.h5, run-2.h5, …"""
     return sorted(folder.glob(f"{_BEGINNINGS[readings]}*.h5"), key=lambda path: (len(path.name), path.name))
 
 
 def next_recording(folder: Path, readings: str) -> Path:
-    """Where the next one goes."""
+    """Return the path of the next recording."""
     count = len(recordings(folder, readings))
     return folder / f"{_BEGINNINGS[readings]}{f'-{count + 1}' if count else ''}.h5"
 
 
 def resuming(folder: Path) -> str:
-    """The command that goes on with an interrupted run."""
+    """Return the command that resumes an interrupted run."""
     return f"rig resume {shlex.quote(str(folder))}"
 
 
-def refuse_links(*places: Path) -> None:
-    """Refuse to write through a link, or into a pipe, that somebody may have laid into a folder.
+def refuse_links(*paths: Path) -> None:
+    """Refuse to write through a link, or into a pipe, that may have been put into a folder.
 
-    Raises Refused `not_written_through` where one of the places is there and neither a regular file nor a folder.
+    Raise Refused `not_written_through` if a path exists and is neither a regular file nor a folder.
     """
-    for place in places:
-        if place.is_symlink() or (place.exists() and not (place.is_file() or place.is_dir())):
+    for path in paths:
+        if path.is_symlink() or (path.exists() and not (path.is_file() or path.is_dir())):
             raise Refused(
                 "not_written_through",
-                f"{place} is a link, a pipe or a device, and the rig does not write through it",
+                f"{path} is a link, a pipe or a device, and the rig does not write through it",
                 "Look where the link leads; remove it, or name another folder with --out",
             )

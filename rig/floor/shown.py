@@ -6,7 +6,7 @@ from datetime import date, timedelta
 from typing import Any
 
 from rig.batch.status import NEWEST, Now
-from rig.data.checked import checked, parsed
+from rig.data.checked import parse_json, validate
 from rig.errors.quoting import shorten
 from rig.history.series import rig_states, subjects, trends
 from rig.history.stations import LONGEST, Told
@@ -98,7 +98,7 @@ def _read(told: str) -> dict[str, Any]:
     try:
         if len(told) > LONGEST:
             raise ValueError(f"it is longer than {LONGEST} characters")
-        now = checked(Now, parsed(told), "told")
+        now = validate(Now, parse_json(told), "told")
     except (ValueError, RecursionError):
         return {}
     counts = {shorten(state): count for state, count in [*(now.counts or {}).items()][:MOST_STATES]}

@@ -34,7 +34,7 @@ def average_rests(
 def trim_rest(motion: ArmMotion, rest: Window) -> Window | None:
     """Return a rest without its beginning and end; None if the arm moved in it or too few states cover it."""
     still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
-    moved_rad = motion.moved_rad(still)
+    moved_rad = motion.travel_rad(still)
     return still if moved_rad is not None and moved_rad <= MAX_TRAVEL_AT_REST_RAD else None
 
 

@@ -25,15 +25,15 @@ NO_STEPS = Steps(0.0)
 class Average:
     """The average of a gyroscope's readings over a window, and its uncertainty.
 
-    - `mean_rad_s` (3,): the mean.
-    - `variance_rad2_s2` (3,): variance of the mean. It includes the drift of the bias and the rounding.
-    - `noise_rad_s` (3,): standard deviation of one sample.
-    - `start_s`, `end_s`: the window on the controller's clock.
-    - `attitude` (3, 3): mean rotation from the arm's base frame into the flange's; None without an arm.
-    - `drift_rad2_s2` (3,): the part of the variance by drift of the bias from rest to rest.
-    - `freedom` (3,): degrees of freedom of the noise's part of the variance, infinite if they were not counted.
-    - `lines_hz` (k,): frequencies of the vibrations that were removed from the mean.
-    - `rounding_rad2_s2` (3,): the part of the variance by rounding to steps.
+    - mean_rad_s (3,): the mean.
+    - variance_rad2_s2 (3,): variance of the mean. It includes the drift of the bias and the rounding.
+    - noise_rad_s (3,): standard deviation of one sample.
+    - start_s, end_s: the window on the controller's clock.
+    - attitude (3, 3): mean rotation from the arm's base frame into the flange's; None without an arm.
+    - drift_rad2_s2 (3,): the part of the variance by drift of the bias from rest to rest.
+    - freedom (3,): degrees of freedom of the noise's part of the variance, infinite if they were not counted.
+    - lines_hz (k,): frequencies of the vibrations that were removed from the mean.
+    - rounding_rad2_s2 (3,): the part of the variance by rounding to steps.
     """
 
     mean_rad_s: Array
@@ -99,7 +99,7 @@ class Stream:
         if not self.sensor.measures(TEMPERATURE):
             return float("nan")
         thermometer = self.sensor.channel(TEMPERATURE)
-        return float(thermometer.in_unit(float(thermometer.counts(self.raw)[inside].mean())))
+        return float(thermometer.convert(float(thermometer.counts(self.raw)[inside].mean())))
 
 
 def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: KnownMotion) -> Stream:

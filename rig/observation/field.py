@@ -98,14 +98,14 @@ def field_tests(
 
 
 def _is_at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) -> bool:
-    away_rad = recording.motion.away_rad(rest, home_q_rad)
+    away_rad = recording.motion.max_distance_rad(rest, home_q_rad)
     return away_rad is not None and away_rad < AT_HOME_RAD
 
 
 def _mean(run: RunData, name: str, samples: NDArray[Any], where: str, thresholds: ObservationThresholds) -> Mean:
     check_complete(run.sensors[name], samples, where, thresholds)
     channel = run.sensors[name].channel(FIELD)
-    if channel.saturated(samples).any():
+    if channel.is_saturated(samples).any():
         raise Fault(
             "saturation",
             f"in {where} the field is beyond the magnetometer's range",

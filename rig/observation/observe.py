@@ -45,20 +45,19 @@ MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # a stuck sensor causes th
 class Observation:
     """One revolution, or one arc of a joint, averaged.
 
-    - `sweep`: index of the sweep in the plan. `joint_name`, `direction`: what turned; None in data recorded elsewhere.
-    - `axis` ("x", "y", "z"), `sign`: the sensor axis that is nominally along the turn.
-    - `axis_flange` (3,), `speed_rad_s`: the arm's mean rate by the weights of the mean reading: its unit vector in the
+    - sweep: index of the sweep in the plan. joint_name, direction: what turned; None in data recorded elsewhere.
+    - axis ("x", "y", "z"), sign: the sensor axis that is nominally along the turn.
+    - axis_flange (3,), speed_rad_s: the arm's mean rate by the weights of the mean reading: its unit vector in the
       flange's frame, and its size (2π/T nominally; Δθ/T of an arc).
-    - `speed_std_rad_s`: standard deviation of the speed, if the arm's states are too far apart to locate the turn's
-      ends.
-    - `lost`: number of samples missing from the average.
-    - `axis_errors` (13, 3): change of the axis per radian of each of the arm's errors
+    - speed_std_rad_s: standard deviation of the speed, if the arm's states are too far apart to locate the turn's ends.
+    - lost: number of samples missing from the average.
+    - axis_errors (13, 3): change of the axis per radian of each of the arm's errors
       (`rig.motion.geometry.AXIS_ERRORS`).
-    - `arm_m` (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.
-    - `acceleration`: the accelerometer's readings in the same turn, if one is to be calibrated.
-    - `angle_rad`: angle of an arc; `arc_rad`: the joint's angles at its ends, the lower first. None for whole turns,
-      over which an encoder's periodic error cancels.
-    - `ripple`: RMS unevenness of the turn, relative to its rate.
+    - arm_m (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.
+    - acceleration: the accelerometer's readings in the same turn, if one is to be calibrated.
+    - angle_rad: angle of an arc; arc_rad: the joint's angles at its ends, the lower first. None for whole turns, over
+      which an encoder's periodic error cancels.
+    - ripple: RMS unevenness of the turn, relative to its rate.
     """
 
     sweep: int
@@ -228,7 +227,7 @@ def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: ND
     waves = harmonics(turn.angle_rad * fraction, 2 * turn.beats)[covered]
     if not turn.closed:
         waves -= waves.mean(axis=0)  # over an arc gravity's part stays in the mean; the attitudes account for it
-    rates = motion.sampled_rates(time_s)[covered]
+    rates = motion.rates_at_samples(time_s)[covered]
     return SampledTurn(
         share=fraction[covered],
         rates_rad_s=rates,
@@ -262,7 +261,7 @@ def _count_lost(stream: Stream, inside: slice, where: str, settings: Observation
 
 
 def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
-    saturated = stream.sensor.channel(RATE).saturated(stream.raw[inside])
+    saturated = stream.sensor.channel(RATE).is_saturated(stream.raw[inside])
     if saturated.any():
         raise Fault(
             "saturation",

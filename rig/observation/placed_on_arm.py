@@ -12,7 +12,7 @@ from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.average import steps_of
 from rig.observation.external.placements import Placements, Rested
 from rig.observation.observed_run import ObservedRun
-from rig.observation.reference.acceleration import check_complete, without_leaving
+from rig.observation.reference.acceleration import check_complete, trim_dwell
 from rig.observation.statistics.mean import Mean, even_mean
 from rig.observation.windows import Dwelt, Window, dwelt, inside
 
@@ -29,7 +29,7 @@ def placements_on_arm(
     readings: dict[int, tuple[Window, Mean, Array]] = {}
     for recording in recordings:
         for finished in dwelt(recording.run):
-            settled = without_leaving(recording.run, finished)
+            settled = trim_dwell(recording.run, finished)
             mean = _average_dwell(recording, name, quantity, settled, thresholds)
             readings[settled.dwell.index] = settled.window, mean, _sensor_attitude(recording, name, settled.window)
     if not readings:
@@ -57,7 +57,7 @@ def _average_dwell(
     channel, time_s = recording.run.sensors[name].channel(quantity), recording.time_s(name)
     samples = recording.run.samples[name][inside(time_s, dwell.window)]
     check_complete(recording.run.sensors[name], samples, where, thresholds)
-    if channel.saturated(samples).any():
+    if channel.is_saturated(samples).any():
         raise Fault("saturation", f"in {where} the {quantity} is beyond the sensor's range", "Choose a wider range")
     steps = steps_of(recording.run.samples[name], recording.run.sensors[name], quantity)
     return even_mean(channel.values(samples), steps)

@@ -7,7 +7,7 @@ from typing import Any
 
 from rig.analysis.check import Check
 from rig.data.installed_kinds import quantities
-from rig.data.meaning import HELD, limit_held
+from rig.data.meaning import JUDGED_PARAMETERS, limit_held
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import CONFIG, resuming
 from rig.page.about import About
@@ -26,7 +26,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str]) -> list[Row]:
     """
     rows = []
     for found in shown(result):
-        scale, bias = (limit_held(result.checks, found.sensor, found.quantity.name, of) for of in HELD)
+        scale, bias = (limit_held(result.checks, found.sensor, found.quantity.name, of) for of in JUDGED_PARAMETERS)
         if found.scale is None:  # limits are those of a calibration
             bias = None
         rows.append(
@@ -61,7 +61,7 @@ def since_rows(since: Iterable[Since]) -> dict[str, Row]:
                     "changed": [name in each.changed for name in names],
                 }
         row["changed"] = list(each.changed)
-        rows[quantity.of(each.sensor)] = row
+        rows[quantity.label(each.sensor)] = row
     return rows
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from rig.analysis.check import Check
 from rig.data.installed_kinds import measured
-from rig.data.quantity import TEMPERATURE, Quantity, Scalar, Unit, of_news
+from rig.data.quantity import TEMPERATURE, Quantity, Scalar, Unit, select_displayed
 from rig.data.recording.events import BoardNotObserved, BoardObserved
 from rig.data.recording.hand_events import (
     HandAsked,
@@ -279,7 +279,7 @@ class Shown:
 def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, Unit]]:
     """What a sensor sends, and the unit it is shown in: that of its bias."""
     known = measured()
-    for of in (known[name] for name in of_news(sensor.latest)):
+    for of in (known[name] for name in select_displayed(sensor.latest)):
         yield of, of.bias if isinstance(of, Quantity) else of.reading
 
 

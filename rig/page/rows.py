@@ -74,7 +74,7 @@ def dwell_row(read: ReadAtRest) -> Row:
 
 
 def _dwell(of: QuantityInDwell) -> Row:
-    return {"sensor": of.quantity.of(of.sensor), "sweep": of.index, "by": "host", "dwell": of.dwell}
+    return {"sensor": of.quantity.label(of.sensor), "sweep": of.index, "by": "host", "dwell": of.dwell}
 
 
 def look_of(partial: SoFar) -> Look:

@@ -23,7 +23,7 @@ from rig.data.run_folder import ARM_LOG, refuse_links
 from rig.errors import Refused
 from rig.motion.state import Report, TurnerIdentity
 from rig.motion.steps import Plan
-from rig.observation.by_hand.runs import told_of
+from rig.observation.by_hand.runs import collect_inputs
 from rig.plans.motions.temperature_course import Course
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
@@ -90,7 +90,7 @@ class Connector:
                 acquisition.expect(name, sensor)
             kind = kind_of(self.loaded.config.turner)
             turner, report, made = self._connect_turner(kind, stack, acquisition)
-            recorded = RecordedTurner.of(kind.name, made, report.joints, kind.fields)
+            recorded = RecordedTurner.build(kind.name, made, report.joints, kind.fields)
             made_with = self._provenance(kind, board, report, made)
             recording = self._record(stack, made_with, recorded, described)
             acquisition.recorder = recording.recorder
@@ -227,7 +227,7 @@ class Connector:
             settings=self.settings.by_hand,
             name=name,
             sensor=described[name],
-            told=told_of(self.settings, made_with, described[name]),
+            told=collect_inputs(self.settings, made_with, described[name]),
             earlier=self.resumed.earlier,
         )
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rig.board.crystal import follows_crystal
 from rig.board.identify import refusing
 from rig.config.models import SensorsConfig
-from rig.data.quantity import of_news
+from rig.data.quantity import select_displayed
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Refused
 from rig.observation.timebase import NOMINAL_DRIFT
@@ -61,7 +61,7 @@ class ReadingsFile:
         self.path = path
         self.follows_crystal = follows_crystal
         self._microsecond_s = 1e-6 * (1 + NOMINAL_DRIFT) if follows_crystal else 1e-6
-        told = of_news(each.quantity for each in sensor.channels)
+        told = select_displayed(each.quantity for each in sensor.channels)
         self._channels = [each for each in sensor.channels if each.quantity in told]
         columns = [column for each in self._channels for column in each.measures.columns]
         self._count = SensorCount(name, sensor)

@@ -2,7 +2,7 @@
 
 from rig.config.sensors.stated_temperature import StatedTemperatureSection
 from rig.data.quantity import Quantity
-from rig.data.recording.channel import Channel, of_stated_temperature, of_three_axes
+from rig.data.recording.channel import Channel, stated_temperature_channel, triad_channel
 
 FULL_SCALE_COUNTS = 1 << 30  # half of the 32-bit range, and finer than single precision near the end
 DEGREES_PER_COUNT = 0.01
@@ -11,11 +11,11 @@ FIELD_FULL_SCALE_T = 1e-3  # range of samples of a magnetometer without a stated
 
 def fine_axes(quantity: Quantity, end_of_scale: float) -> Channel:
     """Return the channel of three axes with a full scale of `FULL_SCALE_COUNTS`."""
-    return of_three_axes(quantity, end_of_scale / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS, end_of_scale)
+    return triad_channel(quantity, end_of_scale / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS, end_of_scale)
 
 
 def thermometer_channels(provided: Channel | None, stated: StatedTemperatureSection | None) -> tuple[Channel, ...]:
     """Return the channel of the temperature that the source provides, else of the stated one; none without both."""
     if provided is not None:
         return (provided,)
-    return () if stated is None else (of_stated_temperature(stated.stated_c, stated.stated_within_k),)
+    return () if stated is None else (stated_temperature_channel(stated.stated_c, stated.stated_within_k),)

@@ -12,7 +12,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 from rig.data.installed_kinds import measured
-from rig.data.quantity import of_news
+from rig.data.quantity import select_displayed
 from rig.data.recording.hand_events import HandAsked
 from rig.errors.quoting import printable_lines
 from rig.station.by_hand_words import live_rows
@@ -111,7 +111,7 @@ def _panel_by_hand(seen: HandSeen, asked: HandAsked | None, samples: SamplesTake
 def _readings(sensor: SensorSamples) -> list[tuple[str, str]]:
     """The rows of a sensor, one for each quantity that it sends; the first says how many samples came."""
     came, rows = f"{sensor.samples} samples, {sensor.lost} lost", list[tuple[str, str]]()
-    for quantity in of_news(sensor.latest):
+    for quantity in select_displayed(sensor.latest):
         of = measured()[quantity]
         shown = " ".join(f"{component / of.reading.size:+7.2f}" for component in sensor.latest[quantity])
         name, more = (f"{sensor.sensor}, {of.sensor}", "") if rows else (sensor.sensor, f", {came}")

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.live import Live
 
 from rig.data.quantity import FIELD, PRESSURE, RATE
-from rig.data.recording.channel import Channel, of_three_axes, stamped
+from rig.data.recording.channel import Channel, stamp_samples, triad_channel
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunData, RunRecorder, read_run
 from rig.errors import Refused
@@ -36,8 +36,8 @@ IN_COUNTS = replace(BAROMETER, channels=(Channel(PRESSURE.name, "pressure_counts
 
 
 def test_readings_become_the_nearest_numbers_that_fit_and_nothing_else_is_written() -> None:
-    sensor = replace(BAROMETER, channels=(of_three_axes(FIELD, 0.5, 100, None), *BAROMETER.channels))
-    samples = stamped(sensor.sample_dtype, np.array([3, 5]), np.array([30, 50]), 7.0)
+    sensor = replace(BAROMETER, channels=(triad_channel(FIELD, 0.5, 100, None), *BAROMETER.channels))
+    samples = stamp_samples(sensor.sample_dtype, np.array([3, 5]), np.array([30, 50]), 7.0)
     sensor.channel(FIELD).fill(samples, np.array([[0.2, 0.3, -1.0], [1e12, -1e12, 0.0]]))
     assert samples["field_counts"].tolist() == [[0, 1, -2], [2**31 - 1, 1 - 2**31, 0]]
     sensor.channel(PRESSURE).fill(samples, np.array([PRESSURE_PA, 0.25]))

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from rig.data.recording.events import from_lines
+from rig.data.recording.events import decode_events
 from rig.data.recording.extract import extract, reason
 from rig.data.recording.motion_file import MOTIONS
 from rig.data.recording.recorded_turner import turner_of
@@ -201,7 +201,7 @@ def test_what_a_terminal_would_obey_is_made_seen() -> None:
 )  # fmt: skip
 def test_an_event_that_never_was_is_refused(changes: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=f"event 1 cannot be understood: .*{complaint}"):
-        list(from_lines(json.dumps({**lines()[0], **changes}).encode() + b"\n"))
+        list(decode_events(json.dumps({**lines()[0], **changes}).encode() + b"\n"))
 
 
 @pytest.mark.parametrize("key", ["speed_rad_s", "acceleration_rad_s2", "duration_s"])
@@ -210,7 +210,7 @@ def test_a_sweep_that_no_joint_makes_is_refused(key: str, value: float) -> None:
     first = lines()[0]
     first["detail"]["sweep"][key] = value
     with pytest.raises(ValueError, match="no such sweep"):
-        list(from_lines(json.dumps(first).encode() + b"\n"))
+        list(decode_events(json.dumps(first).encode() + b"\n"))
 
 
 @pytest.mark.parametrize("index", [-1, 10**9])
@@ -218,7 +218,7 @@ def test_a_sweep_that_no_plan_counts_is_refused(index: int) -> None:
     first = lines()[0]
     first["detail"]["sweep"]["index"] = index
     with pytest.raises(ValueError, match="no such sweep"):
-        list(from_lines(json.dumps(first).encode() + b"\n"))
+        list(decode_events(json.dumps(first).encode() + b"\n"))
 
 
 def column(name: str, key: str, value: float) -> Callable[[h5py.File], None]:

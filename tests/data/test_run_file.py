@@ -20,7 +20,7 @@ from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.config.judging.limits import Limits
 from rig.config.load import load
 from rig.data.quantity import FIELD, RATE
-from rig.data.recording.channel import of_thermometer, of_three_axes
+from rig.data.recording.channel import thermometer_channel, triad_channel
 from rig.data.recording.events import (
     BoardNotObserved,
     BoardObserved,
@@ -49,7 +49,7 @@ SENSOR = RecordedSensor(
     part="lsm9ds1",
     serial_number="LSM9DS1-001",
     rate_hz=238.0,
-    channels=(of_three_axes(RATE, 1.527e-4, 32767, 4.276), of_thermometer(0.0625, 25.0)),
+    channels=(triad_channel(RATE, 1.527e-4, 32767, 4.276), thermometer_channel(0.0625, 25.0)),
     mounting=((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 )
 SETTINGS = RunSettings(
@@ -115,7 +115,7 @@ def some_samples(first: int, count: int) -> np.ndarray[Any, Any]:
 def test_a_magnetometer_comes_back_beside_the_gyroscopes(tmp_path: Path) -> None:
     """Equal in all that is known of it: a run that is gone on with asks whether it is the same."""
     path = tmp_path / "run.h5"
-    field = of_three_axes(FIELD, 1.4e-8, 32767, 4e-4)
+    field = triad_channel(FIELD, 1.4e-8, 32767, 4e-4)
     compass = RecordedSensor("lsm9ds1_magnetometer", "M1", 80.0, (field,), SENSOR.mounting)
     samples = np.zeros(300, FIELD_SAMPLE_DTYPE)
     samples["sequence"] = np.arange(300)

@@ -38,7 +38,7 @@ def test_what_is_known_of_a_sensor_is_recorded_its_part_s_where_nothing_is_said(
     for what in OF_SENSORS:
         part = getattr(PARTS["adis16465"], what)
         assert getattr(said, what)["reference"] == (0.7 if what == "acceleration_bias_mg_k" else part)
-    assert said.of("acceleration_bias_instability_ug", "reference") == 3.6
+    assert said.stated_size("acceleration_bias_instability_ug", "reference") == 3.6
 
 
 @pytest.mark.parametrize(("section", "key"), [("uncertainty", "axis_deg"), ("observation", "max_lost_fraction")])

@@ -10,7 +10,7 @@ from rig.errors import RigError
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand import HandSolution, SessionConditions, assess_progress, solve_by_hand
 from rig.estimation.sensor_axes import SensorAxes
-from rig.observation.by_hand.handled import Segmenter, handled
+from rig.observation.by_hand.handled import Segmenter, segment_session
 from rig.observation.by_hand.runs import NotCounted
 from rig.world.hand.habits import Action, Face, FlipAction, Mistake, MistakeKind, TurnAction
 from support.external.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, creeping, handle
@@ -44,7 +44,7 @@ MISTAKES: dict[MistakeKind, tuple[int, float | None, set[str]]] = {
 
 def solved(recorded: Recorded, *, level: bool = True, told: SessionConditions = TOLD) -> HandSolution:
     felt = recorded.acceleration if level else None
-    return solve_by_hand(handled(recorded.time_s, recorded.rates, felt), told)
+    return solve_by_hand(segment_session(recorded.time_s, recorded.rates, felt), told)
 
 
 def refused(recorded: Recorded, *, level: bool = True, told: SessionConditions = TOLD) -> str | None:
@@ -246,7 +246,7 @@ CREEPS = {
 @pytest.mark.parametrize(("axis", "rest_s", "level"), CREEPS.values(), ids=CREEPS)
 def test_a_rest_that_creeps_is_left_out_and_costs_no_session(axis: str, rest_s: float, level: bool) -> None:
     recorded = handle(SESSION, 8, rest_s=rest_s)
-    rest = handled(recorded.time_s, recorded.rates, recorded.acceleration).rests[6]
+    rest = segment_session(recorded.time_s, recorded.rates, recorded.acceleration).rests[6]
     assert rest.acceleration_m_s2 is not None
     about = rest.acceleration_m_s2 if axis == "vertical" else np.cross(rest.acceleration_m_s2, [0.3, 0.5, 0.8])
     slowly = np.radians(0.15) * about / np.linalg.norm(about)
@@ -262,7 +262,7 @@ def test_a_rest_that_creeps_is_left_out_and_costs_no_session(axis: str, rest_s: 
 @pytest.mark.parametrize("after", [0, 2, 9, 16])
 def test_a_bias_that_jumps_for_good_ends_a_session_at_the_right_rest(after: int) -> None:
     recorded = handle(SESSION, 3)
-    session = handled(recorded.time_s, recorded.rates, recorded.acceleration)
+    session = segment_session(recorded.time_s, recorded.rates, recorded.acceleration)
     jumped = recorded.time_s > session.moves[after].end_s - 0.15
     step = np.radians(0.15) * np.array([0.6, -0.8, 0.0])
     with pytest.raises(RigError) as refusal:
@@ -303,7 +303,7 @@ def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     for start in range(0, len(recorded.time_s), 12):
         rows = slice(start, start + 12)
         if feed.feed(recorded.time_s[rows], recorded.rates[rows], recorded.acceleration[rows]):
-            found = assess_progress(refused.without(feed.handled), TOLD)
+            found = assess_progress(refused.filter_session(feed.handled), TOLD)
             known.append(found.expanded_scale.max())
             if found.fault_of_last is not None:
                 asked.append((len(known), found.fault_of_last.problem.name))
@@ -311,5 +311,5 @@ def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     assert asked == [(12, "turn_not_closed")]
     assert known[0] > 0.1 and known[-1] < 6e-4
     assert (np.diff(known[8:]) < 1e-3).all()
-    faces: set[Face | str | None] = set(assess_progress(refused.without(feed.handled), TOLD).faces)
+    faces: set[Face | str | None] = set(assess_progress(refused.filter_session(feed.handled), TOLD).faces)
     assert faces == {"+x", "-x", "+y", "-y", "+z", "-z"}

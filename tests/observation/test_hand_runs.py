@@ -12,7 +12,7 @@ from rig.errors import Fault
 from rig.estimation.by_hand.session import HandRecording, Move, Rest, SessionConditions
 from rig.estimation.by_hand.solution import solve_by_hand
 from rig.motion.by_hand import FACES
-from rig.observation.by_hand.runs import NotCounted, turned_face
+from rig.observation.by_hand.runs import NotCounted, rotate_face
 from support.paths import RECORDINGS
 
 SECOND_US = 1_000_000
@@ -33,7 +33,7 @@ def starts(found: HandRecording) -> list[float]:
 def test_a_refused_move_is_left_out_and_both_its_rests_stay() -> None:
     refused = NotCounted()
     refused.take(HandMoveRefused(4 * SECOND_US, 6 * SECOND_US, "turn_not_closed"), 0.0)
-    found = refused.without(session(4))
+    found = refused.filter_session(session(4))
     assert starts(found) == [0.0, 3.0, 6.0, 9.0]
     assert [move.left_out for move in found.moves] == [False, True, False]
 
@@ -41,7 +41,7 @@ def test_a_refused_move_is_left_out_and_both_its_rests_stay() -> None:
 def test_a_refused_rest_is_a_pause_of_the_move_through_it() -> None:
     refused = NotCounted()
     refused.take(HandRestRefused(3 * SECOND_US, 3 * SECOND_US + 1000, "not_flat"), 0.0)
-    found = refused.without(session(4))
+    found = refused.filter_session(session(4))
     assert starts(found) == [0.0, 6.0, 9.0]
     assert [(move.start_s, move.end_s, move.peak_rad_s) for move in found.moves] == [(1.0, 6.0, 2.0), (7.0, 9.0, 3.0)]
 
@@ -49,33 +49,33 @@ def test_a_refused_rest_is_a_pause_of_the_move_through_it() -> None:
 def test_a_refused_rest_at_the_end_leaves_the_rest_before_as_the_last() -> None:
     refused = NotCounted()
     refused.take(HandRestRefused(9 * SECOND_US, 10 * SECOND_US, "not_flat"), 0.0)
-    found = refused.without(session(4))
+    found = refused.filter_session(session(4))
     assert (starts(found), len(found.moves)) == ([0.0, 3.0, 6.0], 2)
 
 
 def test_of_a_session_that_was_begun_anew_the_rest_is_left() -> None:
     refused = NotCounted()
     refused.take(HandBegunAnew(6 * SECOND_US, "table_moved"), 0.0)
-    found = refused.without(session(5))
+    found = refused.filter_session(session(5))
     assert starts(found) == [6.0, 9.0, 12.0]
     assert [move.peak_rad_s for move in found.moves] == [3.0, 4.0]
 
 
 def test_the_way_across_two_recordings_ties_nothing() -> None:
-    found = NotCounted(seams=[5.0]).without(session(4))
+    found = NotCounted(seams=[5.0]).filter_session(session(4))
     assert [move.left_out for move in found.moves] == [False, True, False]
 
 
 def test_a_recording_that_goes_on_has_a_clock_of_its_own() -> None:
     refused = NotCounted()
     refused.take(HandMoveRefused(0, 2 * SECOND_US, "clipping"), 4.0)
-    assert [move.left_out for move in refused.without(session(4)).moves] == [False, True, False]
+    assert [move.left_out for move in refused.filter_session(session(4)).moves] == [False, True, False]
 
 
 def test_a_face_has_the_name_of_the_axis_that_it_turns_to() -> None:
     quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    assert [turned_face(face, quarter) for face in ("+x", "+y", "-z")] == ["-y", "+x", "-z"]
-    assert all(turned_face(turned_face(face, quarter), quarter.T) == face for face in FACES)
+    assert [rotate_face(face, quarter) for face in ("+x", "+y", "-z")] == ["-y", "+x", "-z"]
+    assert all(rotate_face(rotate_face(face, quarter), quarter.T) == face for face in FACES)
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from rig.config.sensors.sensor_catalogue import PARTS as DATA_SHEETS
 from rig.errors import Refused
 from rig.estimation.by_hand import SessionConditions, solve_by_hand
 from rig.estimation.gyroscope.budget import Budget, Contributor
-from rig.observation.by_hand.handled import handled
+from rig.observation.by_hand.handled import segment_session
 from rig.plans.by_hand import Wanted as Asked
 from rig.plans.by_hand import listed
 from rig.plans.registry import installed, sections
@@ -141,7 +141,7 @@ def reached_by_hand(of: Run, seed: int) -> ReachedUncertainty:
     actions: list[Action] = [TurnAction(each.turns) if each.turns else FlipAction(each.face) for each in asked]
     part = Part(SAMPLED_HZ, noise_of(of), clock_ppm=20.0)
     told = handle(actions, seed, part, rest_s=1.5)
-    session = handled(told.time_s, told.rates, told.acceleration)
+    session = segment_session(told.time_s, told.rates, told.acceleration)
     return ReachedUncertainty.of_budgets({"gyro": solve_by_hand(session, SessionConditions(50.0)).budget})
 
 

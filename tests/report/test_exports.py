@@ -15,7 +15,7 @@ from rig.cli import main
 from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import ACCELERATION
-from rig.data.recording.channel import of_three_axes
+from rig.data.recording.channel import triad_channel
 from rig.data.recording.run_file import read_run
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.errors import Refused
@@ -323,7 +323,7 @@ def with_accelerations(observed: ObservedRun) -> ObservedRun:
         samples[name] = old[name]
     samples["acceleration_counts"] = (1, 2, 3)
     sensor = observed.run.sensors["gyro"]
-    sensor = replace(sensor, channels=(*sensor.channels, of_three_axes(ACCELERATION, 0.25, 32767, 20.0)))
+    sensor = replace(sensor, channels=(*sensor.channels, triad_channel(ACCELERATION, 0.25, 32767, 20.0)))
     return replace(observed, run=replace(observed.run, samples={"gyro": samples}, sensors={"gyro": sensor}))
 
 

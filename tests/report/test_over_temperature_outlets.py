@@ -60,7 +60,7 @@ def test_the_result_holds_the_sensor_and_agrees_with_its_calibration(
     calibration = result.gyroscopes["imu"]
 
     assert calibration.temperature_c == REFERENCE_C
-    assert np.allclose(entry.at(REFERENCE_C)[0], calibration.scale) and np.allclose(
+    assert np.allclose(entry.evaluate(REFERENCE_C)[0], calibration.scale) and np.allclose(
         entry.bias[0], calibration.bias_rad_s
     )
     assert any(line.name == "polynomials over temperature" for line in calibration.budget.contributors)  # type: ignore[union-attr]
@@ -132,7 +132,7 @@ def test_the_header_corrects_by_temperature(
     result: ResultDocument, entry: OverTemperatureEntry, tmp_path: Path, asked_c: float
 ) -> None:
     taken_c = min(asked_c, entry.range_c[1])
-    scale, bias = (np.array(each) for each in entry.at(taken_c))
+    scale, bias = (np.array(each) for each in entry.evaluate(taken_c))
     matrix = np.array(result.gyroscopes["imu"].correction_matrix) * (scale / entry.scale[0])
 
     *rate, held = c_of(calibration_header(result), tmp_path, asked_c)
@@ -147,7 +147,7 @@ def named(lines: str, separator: str, name: int, value: int) -> dict[str, float]
 
 def ours(entry: OverTemperatureEntry, temperature_c: float) -> Array:
     """The reading less what it is off at no rate, by the nearer end outside."""
-    found: Array = READING + np.array(entry.at(float(np.clip(temperature_c, *entry.range_c)))[1])
+    found: Array = READING + np.array(entry.evaluate(float(np.clip(temperature_c, *entry.range_c)))[1])
     return found
 
 

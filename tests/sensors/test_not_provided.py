@@ -39,7 +39,7 @@ ALL_NEW = 0x103F
     ],
 )
 def test_every_marker_of_none_is_known(absent: Absent, value: object, flags: int, provided: bool) -> None:
-    assert absent.provided(np.array([value]), np.array([flags])).tolist() == [provided]
+    assert absent.mask_provided(np.array([value]), np.array([flags])).tolist() == [provided]
 
 
 @pytest.mark.parametrize("message", ["RAW_IMU", "SCALED_IMU"])

@@ -8,7 +8,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault
 from rig.estimation.by_hand import HandSolution, SessionConditions, solve_by_hand
 from rig.estimation.by_hand.session import FACES
-from rig.observation.by_hand.handled import handled
+from rig.observation.by_hand.handled import segment_session
 from rig.observation.external.csv_samples import Samples
 from rig.observation.stuck_check import check_reads
 
@@ -21,7 +21,7 @@ def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> Sensor
     Raise Fault and Refused as `rig.estimation.by_hand.solve_by_hand`, and `stuck_sensor`.
     """
     check_reads(samples.readings[RATE], RATE)
-    session = handled(samples.time_s, samples.readings[RATE], samples.readings.get(ACCELERATION))
+    session = segment_session(samples.time_s, samples.readings[RATE], samples.readings.get(ACCELERATION))
     solution = solve_by_hand(session, read_conditions(columns))
     return build_hand_result(item, solution, matrix_correction(solution.turned))
 

@@ -9,7 +9,7 @@ from rig.analysis.verdict import judge
 from rig.data.recording.run_file import RunData
 from rig.errors import Refused
 from rig.estimation.by_hand import solve_by_hand
-from rig.observation.by_hand.runs import session_of, told_of
+from rig.observation.by_hand.runs import collect_inputs, session_of
 
 
 def calibrate_by_hand(runs: Sequence[RunData]) -> Outcome:
@@ -23,7 +23,7 @@ def calibrate_by_hand(runs: Sequence[RunData]) -> Outcome:
         )
     results = {}
     for name in settings.to_calibrate:
-        conditions = told_of(settings, runs[0].provenance, runs[0].sensors[name])
+        conditions = collect_inputs(settings, runs[0].provenance, runs[0].sensors[name])
         solution = solve_by_hand(session_of(runs, name), conditions)
         uses_matrix = name in settings.matrix_corrected
         corrected_by = matrix_correction(solution.turned) if uses_matrix else diagonal_correction(solution.scale)

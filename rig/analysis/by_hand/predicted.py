@@ -12,7 +12,7 @@ from rig.config.procedures.hand_sections import ByHandSection
 from rig.config.procedures.stage_section import rotation_by
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.config.sensors.sensor_sections import SensorSection, mounting_matrix
-from rig.data.recording.settings import ByHand, Uncertainty, by_hand_of, uncertainty_of
+from rig.data.recording.settings import ByHand, Uncertainty, hand_settings, uncertainty_of
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.fit import fit_session
 from rig.estimation.by_hand.session import HandRecording, SessionConditions, axis_of
@@ -20,8 +20,8 @@ from rig.estimation.by_hand.solution import summarise_fit
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.budget import Budget
 from rig.motion.by_hand import Face, Instruction
-from rig.observation.by_hand.handled import handled
-from rig.observation.by_hand.runs import ITS_OWN_CLOCK, turned_face
+from rig.observation.by_hand.handled import segment_session
+from rig.observation.by_hand.runs import ITS_OWN_CLOCK, rotate_face
 
 FLIP_S, TURN_S = 1.5, 2.5  # a move, from rest to rest; assumed
 ASKED_S = 1.0  # from the end of a rest to the next move: the operator reads the instruction; assumed
@@ -41,7 +41,7 @@ def predict_hand_budgets(
 
     `section` states how square the item's faces are. Raise Fault `no_fit`.
     """
-    uncertainty, section_values = uncertainty_of(config), by_hand_of(section)
+    uncertainty, section_values = uncertainty_of(config), hand_settings(section)
     budgets = {}
     for name, sensor in config.to_calibrate.items():
         session = _session(sensor, moves, rest_s)
@@ -52,7 +52,7 @@ def predict_hand_budgets(
 
 
 def _conditions(sensor: SensorSection, uncertainty: Uncertainty, procedure: ByHand) -> SessionConditions:
-    first = None if sensor.acceleration is not None else turned_face(FIRST, mounting_matrix(sensor.mounting))
+    first = None if sensor.acceleration is not None else rotate_face(FIRST, mounting_matrix(sensor.mounting))
     clock = "the board's crystal" if sensor.on_board else ITS_OWN_CLOCK
     return SessionConditions(uncertainty.crystal_ppm, clock, procedure.box_rad, first_face=first)
 
@@ -80,7 +80,7 @@ def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float)
     rates, acceleration = read(turning_rad_s, part.angle_random_walk_rad_sqrt_s), None
     if sensor.acceleration is not None:
         acceleration = read(STANDARD_GRAVITY_M_S2 * up, part.acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2)
-    return handled(np.arange(len(rates)) / SAMPLED_HZ, rates, acceleration)
+    return segment_session(np.arange(len(rates)) / SAMPLED_HZ, rates, acceleration)
 
 
 def _sample_rotation(lasting_s: float, face: Face, rotation: Array) -> tuple[Array, Array]:

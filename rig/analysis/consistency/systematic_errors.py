@@ -112,7 +112,7 @@ def build_known_errors(
 ) -> KnownErrors:
     """Return the known errors of the sensor `name` of that range."""
     steady = np.array([angle.startswith(("twist", "zero")) for angle in ANGLES])
-    cube, square = (uncertainty.of(what, name) / 100 / np.sqrt(3) for what in CURVE)
+    cube, square = (uncertainty.stated_size(what, name) / 100 / np.sqrt(3) for what in CURVE)
     return KnownErrors(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
         repeatability_rad=uncertainty.repeatability_std_rad,

@@ -43,7 +43,7 @@ from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.temperature.over_temperature import OverTemperature
 from rig.observation.external.attitude_import import placed_by
-from rig.observation.external.csv_import import ExternalData, averaged
+from rig.observation.external.csv_import import ExternalData, average_sweeps
 from rig.observation.external.csv_samples import Samples, samples_in
 from rig.observation.external.omitted import Omitted
 from rig.observation.external.turns import TurnedData
@@ -125,7 +125,7 @@ def _by_hand(read: ReadElsewhere, name: str | None) -> OfSensor:
 
 def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:
     chosen = None if name is None else estimator_among(BY_SWEEPS, name)
-    data, polynomials = averaged(_samples(read), read.motion), None
+    data, polynomials = average_sweeps(_samples(read), read.motion), None
     if reference_c is not None and data.turned is not None:
         raise Refused(
             "bad_option",

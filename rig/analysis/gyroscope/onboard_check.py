@@ -125,7 +125,7 @@ def _observation(run: RunData, seen: BoardObserved) -> _Observation:
     gyroscope = run.sensors[seen.sensor].channel(RATE)
     counts = gyroscope.counts(samples)[used]
     mean = counts.mean(axis=0) if missing == 0 and len(counts) else np.full(3, np.nan)
-    return _Observation(gyroscope.in_unit(mean), seen.speed_rad_s, averaged=True)
+    return _Observation(gyroscope.convert(mean), seen.speed_rad_s, averaged=True)
 
 
 def _of(run: RunData, sensor: str) -> Iterator[OfTheBoard]:

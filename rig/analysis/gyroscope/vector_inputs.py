@@ -108,11 +108,11 @@ def known_sensor(
 ) -> KnownSensor:
     """Return what is stated of the sensor `name` of that range, and how warm it was in each average (N,)."""
     return KnownSensor(
-        nonlinearity=known.of("nonlinearity_percent", name) / 100,
+        nonlinearity=known.stated_size("nonlinearity_percent", name) / 100,
         full_scale_rad_s=full_scale_rad_s,
-        bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name))),
-        scale_per_k=PPM * known.of("scale_ppm_k", name),
-        instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name) / 3600)),
+        bias_rad_s_per_k=float(np.radians(known.stated_size("bias_deg_s_k", name))),
+        scale_per_k=PPM * known.stated_size("scale_ppm_k", name),
+        instability_rad_s=float(np.radians(known.stated_size("bias_instability_deg_h", name) / 3600)),
         temperature_c=temperature_c,
         temperature_step_k=temperature_step_k,
     )
@@ -194,7 +194,7 @@ def known_of(surroundings: Surroundings, name: str) -> Known:
     return Known(
         up=np.array(site.up),
         latitude_rad=site.latitude_rad,
-        g_sensitivity=uncertainty.of("g_sensitivity_deg_s_g", name) > 0,
+        g_sensitivity=uncertainty.stated_size("g_sensitivity_deg_s_g", name) > 0,
         repeatability_rad=uncertainty.repeatability_std_rad,
         state_jitter_s=surroundings.state_jitter_s,
     )
@@ -222,7 +222,7 @@ def unknown_of(
         mount_rad=float(np.radians(known.mount_deg)),
         stamp_std_s=stamp_std_s or 0.0,
         sensor_offset_m=known.sensor_offset_mm / 1000,
-        g_sensitivity_rad_s_per_g=float(np.radians(known.of("g_sensitivity_deg_s_g", name))),
+        g_sensitivity_rad_s_per_g=float(np.radians(known.stated_size("g_sensitivity_deg_s_g", name))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
         earth_freedom=np.inf if earth_rate is None else earth_rate.freedom,

@@ -63,7 +63,7 @@ def sheet_of(known: Uncertainty, name: str, range_m_s2: float) -> Sheet:
     """What is known of the accelerometer of the sensor `name`, as its data sheet or the configuration has it."""
 
     def of(what: OfSensor) -> float:
-        return known.of(what, name)
+        return known.stated_size(what, name)
 
     return Sheet(
         nonlinearity_percent=of("acceleration_nonlinearity_percent"),

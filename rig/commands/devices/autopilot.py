@@ -48,13 +48,13 @@ def run(options: Namespace) -> int:
 
 
 def _store(options: Namespace) -> int:
-    from rig.data.result_file import passed_result
+    from rig.data.result_file import read_passed_result
     from rig.sensors.mavlink.journal import ParameterChange
     from rig.sensors.mavlink.parameters import AutopilotParameter, encode_value
     from rig.sensors.mavlink.writing import autopilot_id, find_unfinished_change
     from rig.station.confirm import agreed_or_refused
 
-    result = passed_result(options.result)
+    result = read_passed_result(options.result)
     with _connected(options) as (link, sections):
         for problem in find_unfinished_change(link):
             raise problem

@@ -27,7 +27,7 @@ from rig.commands.laboratory.own_address import loaded_here
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.quantity import RATE
-from rig.data.result_file import ResultDocument, passed_result
+from rig.data.result_file import ResultDocument, read_passed_result
 from rig.errors import Fault, Refused
 from rig.report.terminal.board_info import BoardInfo, BoardSensor, print_info, print_stored
 from rig.station.confirm import agreed_or_refused
@@ -76,7 +76,7 @@ def read(options: Namespace) -> int:
 
 def write(options: Namespace) -> int:
     """Store a run's calibration on the board, of one sensor or of all that were to be calibrated."""
-    result = passed_result(options.result)
+    result = read_passed_result(options.result)
     with _connected(options) as (config, board):
         refuse_other_firmware(board.identity)
         places = _places(board, config, options.sensor, config.to_calibrate)

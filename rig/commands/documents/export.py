@@ -43,7 +43,7 @@ def files(options: Namespace) -> list[Path]:
 
     `--at-temperature`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
     Returns the files. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of
-    readings as `open_run` and `exported`, of calibrations as `passed_result`, `at_temperature` and the format do.
+    readings as `open_run` and `exported`, of calibrations as `read_passed_result`, `at_temperature` and the format do.
     """
     from rig.plans.recorded import open_run
     from rig.report.exports.recorded import exported
@@ -87,11 +87,11 @@ def _made(folder: Path, *, own: bool) -> None:
 
 
 def _calibrations(run: Path, moved: tuple[str, str] | None) -> "Calibrations":
-    from rig.data.result_file import passed_result, read_result
+    from rig.data.result_file import read_passed_result, read_result
     from rig.report.exports.calibrations import calibrations
     from rig.report.exports.temperature import at_temperature
 
-    found = calibrations(passed_result(run))
+    found = calibrations(read_passed_result(run))
     if moved is None:
         return found
     temperature, drift = moved

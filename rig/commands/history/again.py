@@ -13,7 +13,7 @@ from rig.commands.history.questions import opened
 from rig.commands.history.spread import Answered, Cluster, Processes, Solve, one_by_one, spread
 from rig.commands.history.waiting import answer_of
 from rig.config.files.written_file import write_new
-from rig.data.recording.settings import known_setting
+from rig.data.recording.settings import find_setting
 from rig.data.run_folder import refuse_links
 from rig.data.version import VERSION
 from rig.errors import Fault, Refused
@@ -72,7 +72,7 @@ def _question(options: Namespace) -> Question:
             "bad_option", f"--u-fraction {options.u_fraction} is no part of U", "Give a number above 0, as 0.1"
         )
     for item in options.overrides:
-        known_setting(item)
+        find_setting(item)
     if options.estimator is not None:
         known_estimator(options.estimator)
     return Question(VERSION, tuple(options.overrides), options.estimator)

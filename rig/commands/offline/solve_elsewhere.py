@@ -113,7 +113,7 @@ def run(options: Namespace) -> int:
     """Solve the two files and print the result; with `--out` a run folder too, entered in the history.
 
     Returns 0, or 1 where a check of the solves failed. Raises Refused `bad_option`, `run_folder`, as
-    `recorded_in_files`, and whatever the solve finds wrong.
+    `build_recording`, and whatever the solve finds wrong.
     """
     from rig.analysis.analyses import calibrate
     from rig.commands.history.remember import since_lines
@@ -141,10 +141,10 @@ def run(options: Namespace) -> int:
 def _recording(options: Namespace) -> "RunData":
     import numpy as np
 
-    from rig.data.checked import checked
+    from rig.data.checked import validate
     from rig.data.recording.motion_file import Item
     from rig.data.recording.settings import Elsewhere, Site
-    from rig.observation.external.from_files import Files, recorded_in_files
+    from rig.observation.external.from_files import Files, build_recording
 
     for name in ("gravity_m_s2", "field_t", "window_s"):
         value: float | None = getattr(options, name)
@@ -161,7 +161,7 @@ def _recording(options: Namespace) -> "RunData":
     said = {"name": options.name, "part": options.part, "serial_number": options.serial_number}
     item = {key: word for key, word in said.items() if word is not None}
     try:
-        told = checked(Item, item, "sensor")
+        told = validate(Item, item, "sensor")
     except ValueError as error:
         raise Refused("bad_option", str(error), "Give names of letters and digits, of 40 characters at most") from None
     recorded: datetime | None = options.recorded
@@ -174,7 +174,7 @@ def _recording(options: Namespace) -> "RunData":
         files = Files(options.run, options.sweeps, "sweeps", told, recorded, named)
     else:
         files = Files(options.run, options.attitudes, "attitudes", told, recorded, named)
-    return recorded_in_files(
+    return build_recording(
         files,
         Site(
             up=(x, y, z),

@@ -1,1 +1,1 @@
-"""What `result.json` says of each kind of result."""
+"""The entries of `result.json`, by kind of result."""

@@ -1,4 +1,4 @@
-"""What `result.json` says of accelerometers."""
+"""Accelerometers in `result.json`."""
 
 from rig.data.entries.budget import BudgetEntry
 from rig.data.entries.result_types import (
@@ -29,10 +29,10 @@ class AccelerationSolutionEntry(Entry):
 
 
 class DwellEntry(Entry):
-    """A dwell: the mean reading in an attitude, its standard deviation, and what the model leaves of it.
+    """A dwell: the mean reading in an attitude, its standard deviation, and its residual from the model.
 
-    `residual_std_m_s2` is what the solve expects that to scatter by. `attitude` takes a vector of the
-    arm's base frame into the flange's.
+    `residual_std_m_s2` is the standard deviation that the solution expects of the residual. `attitude` takes a vector
+    of the arm's base frame into the flange's.
     """
 
     index: int
@@ -49,7 +49,7 @@ class DwellEntry(Entry):
 
 
 class ValidationEntry(Entry):
-    """The last repeat of the attitudes, which the calibration does not know: size of acceleration less gravity."""
+    """The last repeat of the attitudes, which the calibration does not use: size of acceleration less gravity."""
 
     dwells: int
     rms_m_s2: float
@@ -57,7 +57,7 @@ class ValidationEntry(Entry):
 
 
 class AlignmentEntry(Entry):
-    """The small rotation vector that takes the gyroscope's frame into the accelerometer's beside it."""
+    """The small rotation vector that takes the gyroscope's frame into that of the accelerometer in the same device."""
 
     rotation_rad: Vector3
     std_rad: Vector3
@@ -66,20 +66,20 @@ class AlignmentEntry(Entry):
 class AccelerometerEntry(Entry):
     """A calibration a = F (s + φ s²) + b of the specific force s in the flange's frame.
 
-    - `covariance` is that of scale and bias by the solution alone, `covariance_combined` all of it, of which `budget`
-      says what makes it up. `gravity_m_s2` is what the scale is relative to.
-    - With its `nonlinearity` in the `budget`, `scale` is that of the readings at 1 g up and 1 g down, `bias_m_s2` the
-      reading at 0 g, whatever curve the sensor has between.
-    - `reference_m_s2` is the specific force at rest in the arm's base frame, `attitude_error_rad` how far the arm's
-      attitudes are off about each axis, by the readings' own account.
-    - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind
-      the gyroscope, are there where sweeps were made.
-    - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
-    - `conditions`: when scale and bias were read, and how warm it was then; `temperature_c` is that temperature.
-    - `…_degrees_of_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
-    - `placement`: where a file told the attitudes, and no arm held them; nobody told range and temperature then.
-    - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
-      matrix) where there is an `alignment`, else in the right-angled frame nearest to the accelerometer's own axes.
+    - covariance: of scale and bias by the solution alone; covariance_combined: all of it, itemized in budget.
+    - gravity_m_s2: the size of gravity to which the scale is relative.
+    - With its nonlinearity in the budget, scale is that of the readings at 1 g up and 1 g down, bias_m_s2 the reading
+      at 0 g, whatever curve the sensor has between.
+    - reference_m_s2: specific force at rest in the arm's base frame; attitude_error_rad: error of the arm's attitudes
+      about each axis, by the readings.
+    - lever_arm_m, from the sweeps' axes to the sensor in the flange's frame, and delay_s, its lag behind the gyroscope:
+      only with sweeps.
+    - detection_limits: faults during the recording, and the size from which on each is detected.
+    - conditions: times and temperature of the readings for scale and bias; temperature_c is that temperature.
+    - …_degrees_of_freedom: degrees of freedom of the standard deviations of that name, null if infinite.
+    - placement: only if a file gave the attitudes instead of an arm; range and temperature are unknown then.
+    - correction_matrix: M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole matrix)
+      with an alignment, else in the right-angled frame nearest to the accelerometer's own axes.
     """
 
     part: str

@@ -1,4 +1,4 @@
-"""The uncertainty's part of `result.json`."""
+"""The uncertainty in `result.json`."""
 
 import math
 from collections.abc import Sequence
@@ -9,16 +9,16 @@ from pydantic import Field
 from rig.data.entries.result_types import Entry, Vector6
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 
-IN_U = "how well is in u"  # ends the source of what was found, and of which no degrees of freedom are left to count
+IN_U = "how well is in u"  # ends the source of an estimate whose uncertainty u has no degrees of freedom of its own
 # Infinite degrees of freedom are null.
 Freedom6 = Annotated[tuple[float | None, ...], Field(min_length=6, max_length=6)]
 
 
 class ContributorEntry(Entry):
-    """One line of the budget; `half_width` in `unit` is null where it was measured.
+    """One line of the budget; `half_width` in `unit` is null if it was measured.
 
-    Of a normal distribution it is the expanded uncertainty (k = 2) that somebody stated.
-    `std` and `variance_fraction` (of the variance) are those of kx ky kz bx by bz; units 1 and that of the biases.
+    Of a normal distribution it is the stated expanded uncertainty (k = 2). `std` and `variance_fraction` (of the
+    variance) are those of kx ky kz bx by bz; units 1 and that of the biases.
     """
 
     name: str
@@ -33,7 +33,7 @@ class ContributorEntry(Entry):
 
 
 class BudgetEntry(Entry):
-    """What makes up `covariance_combined`; `expanded` is `coverage_factors` × `std`.
+    """The contributors to `covariance_combined`; `expanded` is `coverage_factors` × `std`.
 
     These are Student's t of the effective `degrees_of_freedom`, so that each interval holds the true value with its
     part of `coverage_probabilities`. `coverage_factor` is the largest of them.
@@ -48,20 +48,22 @@ class BudgetEntry(Entry):
     coverage_probabilities: Vector6
 
     @property
-    def known(self) -> tuple[float, ...]:
-        """Effective degrees of freedom of each, infinite ones too."""
-        return tuple(math.inf if each is None else each for each in self.degrees_of_freedom)
+    def effective_dof(self) -> tuple[float, ...]:
+        """Effective degrees of freedom, with inf for null."""
+        return tuple(math.inf if dof is None else dof for dof in self.degrees_of_freedom)
 
 
 def expanded_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequence[float]]) -> Sequence[float]:
-    """(6,) U of scale and bias, by the budget; without one, two standard deviations by the solution's covariance."""
+    """Return U (6,) of scale and bias, by the budget; without one, two standard deviations by the solution's
+    covariance.
+    """
     if budget is not None:
         return budget.expanded
     return [COVERAGE_FACTOR * covariance[i][i] ** 0.5 for i in range(len(covariance))]
 
 
 class BiasProcessEntry(Entry):
-    """How the bias wandered: a mean over `averaging_time_s`; an hour changes it by `hour_std_rad_s` (1σ)."""
+    """The random walk of the bias: a mean over `averaging_time_s`; an hour changes it by `hour_std_rad_s` (1σ)."""
 
     random_walk_rad_s_sqrt_s: float
     scatter_rad_s: float
@@ -79,7 +81,7 @@ class ClockComparisonEntry(Entry):
 
 
 class ClockEntry(Entry):
-    """How much too fast the controller's clock ran, a fraction, and by what it is known; speeds are corrected."""
+    """The rate error of the controller's clock, a fraction, and the comparisons that show it; speeds are corrected."""
 
     error: float
     std: float

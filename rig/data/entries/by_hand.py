@@ -1,4 +1,4 @@
-"""What `result.json` says of a gyroscope that a hand turned on a table."""
+"""Gyroscopes turned by hand in `result.json`."""
 
 from typing import Literal
 
@@ -6,9 +6,9 @@ from rig.data.entries.result_types import Entry
 
 
 class RestByHandEntry(Entry):
-    """A rest: which axis of the body pointed upwards, null on no face, and how far it is off the others.
+    """A rest: the body's axis that pointed upwards, null on no face, and its agreement with the others.
 
-    `normalised_residual` is its largest residual over what such residuals are.
+    `normalised_residual` is its largest residual over the standard deviation of such residuals.
     """
 
     face: str | None
@@ -16,9 +16,9 @@ class RestByHandEntry(Entry):
 
 
 class MoveByHandEntry(Entry):
-    """A move from a rest to the next: a flip to another face, or so many whole turns on a face, by `angle_rad` in all.
+    """A move from a rest to the next: a flip to another face, or whole `turns` on a face, by `angle_rad` in all.
 
-    `closure_error_rad` is by how much a turn missed where it began, null of flips and where no edge was stated.
+    `closure_error_rad` is a turn's end less its beginning, null for flips and without a stated edge.
     """
 
     kind: Literal["flip", "turn", "omitted"]
@@ -29,7 +29,7 @@ class MoveByHandEntry(Entry):
 
 
 class HandErrorEntry(Entry):
-    """How large an error of a hand or a part was found to be, what is stated of it, and what is refused."""
+    """The estimated size of an error of a hand or a part, the stated one, and the limit."""
 
     name: str
     estimate: float
@@ -38,11 +38,11 @@ class HandErrorEntry(Entry):
 
 
 class ByHandEntry(Entry):
-    """A session by hand: its rests and moves, and what was found of the hand.
+    """A session by hand: its rests and moves, and the errors of the hand.
 
-    `chi_square` is what the solution leaves of all rests and moves, with so many degrees of `degrees_of_freedom`.
-    `session_std` (3,) of the scale is by this session and its clock alone; the budget has beside them by how much
-    recordings of real hands have been seen to disagree with themselves.
+    `chi_square`, with `degrees_of_freedom`, is that of the residuals of all rests and moves. `session_std` (3,) of the
+    scale is by this session and its clock alone; the budget adds the disagreement seen between recordings of real
+    hands.
     """
 
     rests: tuple[RestByHandEntry, ...]

@@ -1,4 +1,4 @@
-"""What `result.json` says of biases by repeat."""
+"""Biases by repeat in `result.json`."""
 
 from rig.data.entries.result_types import Entry, ErrorEntry, Freedom3, Vector3
 
@@ -11,7 +11,7 @@ class BiasEntry(Entry):
 
 
 class BiasStepEntry(Entry):
-    """A move of the bias before `repeat`, counted from 1, by `change`, known to `std`; most along `axis`."""
+    """A step of the bias before `repeat`, counted from 1, by `change` with `std`; most along `axis`."""
 
     repeat: int
     axis: str
@@ -22,7 +22,7 @@ class BiasStepEntry(Entry):
 class RepeatEntry(Entry):
     """One repeat of all attitudes: its bias with scale, axes and reference fixed, and with all of them estimated.
 
-    `time_s` is that of its middle since the first's.
+    `time_s` is that of its middle from the first's.
     """
 
     time_s: float
@@ -32,7 +32,7 @@ class RepeatEntry(Entry):
 
 
 class SlopeEntry(Entry):
-    """Slope of the bias over temperature, per °C, in the range that was seen; it holds nowhere else."""
+    """Slope of the bias over temperature, per °C, valid only in the range that was recorded."""
 
     slope: Vector3
     std: Vector3
@@ -44,13 +44,13 @@ class SlopeEntry(Entry):
 class DriftEntry(Entry):
     """One quantity's bias by repeat, in its `unit`.
 
-    - `common_std` is what all biases share beside their own; `scatter_ratio` how many times more the readings scatter
-      from repeat to repeat than they do within a dwell.
-    - `degrees_of_freedom` are those of the standard deviations of `scale_fixed`, null where they have no end.
-    - A steady bias has `steps` with the probability `false_alarm_probability`.
-    - `temperature_slope` is the slope of the bias over temperature. Temperatures are `temperature_stated` where the
-      sensor has no thermometer.
-    - `part`, `serial_number` and `full_scale`, in the same unit, say whose bias it is.
+    - `common_std`: standard deviation that all biases share; `scatter_ratio`: scatter of the readings from repeat to
+      repeat over that within a dwell.
+    - `degrees_of_freedom`: those of the standard deviations of `scale_fixed`, null if infinite.
+    - `false_alarm_probability`: probability that a steady bias shows `steps`.
+    - `temperature_slope`: slope of the bias over temperature. Temperatures are `temperature_stated` if the sensor has
+      no thermometer.
+    - `part`, `serial_number`, `full_scale` (in the same unit): those of the sensor.
     """
 
     unit: str
@@ -71,5 +71,5 @@ class DriftEntry(Entry):
     @property
     def range_c(self) -> tuple[float, float] | None:
         """Coldest and warmest repeat, °C; None if no temperature is known."""
-        known = [repeat.temperature_c for repeat in self.repeats if repeat.temperature_c is not None]
-        return (min(known), max(known)) if known else None
+        temperatures_c = [repeat.temperature_c for repeat in self.repeats if repeat.temperature_c is not None]
+        return (min(temperatures_c), max(temperatures_c)) if temperatures_c else None

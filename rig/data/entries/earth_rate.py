@@ -1,17 +1,17 @@
-"""What `result.json` says of the Earth's rate that a gyroscope has found."""
+"""The Earth's rate, measured by a gyroscope, in `result.json`."""
 
 from rig.data.entries.result_types import Entry, Freedom, Matrix3, Vector3
 
 
 class EarthRateEntry(Entry):
-    """The Earth's rate in the frame of the arm's base, as sweeps and rests of a sensor tell it.
+    """The Earth's rate in the frame of the arm's base, by the sweeps and rests of a sensor.
 
-    - `latitude_rad` and `heading_rad` are what it says of the place: the latitude by its angle to `up`, north positive,
-      and where the base's x axis points, from north over east; null where that axis points up or down.
-    - `vertical_fixed` says that its vertical part was not found but held to what a given latitude makes of it, for the
-      sake of the g-sensitivity; then `latitude_rad` says how well the level part found fits that latitude.
-    - `birge_ratio` is the ratio of the residuals to what was expected; above 1 it has inflated `covariance_rad2_s2`.
-    - `degrees_of_freedom` are those of the standard deviations; null where they have no end.
+    - `latitude_rad`, `heading_rad`: the latitude by its angle to `up`, north positive, and the direction of the base's
+      x axis, from north over east; null if that axis points up or down.
+    - `vertical_fixed`: its vertical part was not estimated but fixed by a given latitude, for the sake of the
+      g-sensitivity; then `latitude_rad` shows the agreement of the level part with that latitude.
+    - `birge_ratio`: ratio of the residuals to their expectation; above 1 it has inflated `covariance_rad2_s2`.
+    - `degrees_of_freedom`: those of the standard deviations; null if infinite.
     """
 
     rate_rad_s: Vector3
@@ -28,5 +28,5 @@ class EarthRateEntry(Entry):
     degrees_of_freedom: Freedom
 
     def freedoms(self, count: int) -> list[Freedom]:
-        """Degrees of freedom of `count` of the entry's numbers."""
+        """Return the degrees of freedom of `count` of the entry's numbers."""
         return [self.degrees_of_freedom] * count

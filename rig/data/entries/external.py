@@ -1,10 +1,10 @@
-"""What `result.json` says of a gyroscope whose motion a file tells, in sweeps or in attitudes."""
+"""Gyroscopes whose motion a file gives, in sweeps or in attitudes, in `result.json`."""
 
 from rig.data.entries.result_types import Covariance, Entry, ErrorEntry, PositiveVector3, Vector3
 
 
 class OmittedIncrementsEntry(Entry):
-    """Increments that could not be made: the `error`, how many, and when the first of them began."""
+    """Increments that could not be made: the `error`, their number, and when the first of them began."""
 
     error: str
     count: int
@@ -21,13 +21,13 @@ class RateSolutionEntry(Entry):
 
 
 class IncrementsEntry(Entry):
-    """What was found beside scale and bias of a gyroscope that was followed from attitude to attitude.
+    """Estimates in addition to scale and bias, of a gyroscope integrated from attitude to attitude.
 
-    - `window_s` is how long the windows are over which attitudes were averaged; their attitudes are off by
-      `attitude_std_rad` about each axis, and their clock is `clock_offset_s` off the readings', which is allowed for.
-    - `angle_random_walk_rad_sqrt_s` is the gyroscope's own; intervals of the recording differ by `matrix_scatter` in F,
-      by `bias_scatter_rad_s` in b.
-    - `omitted` are increments that could not be made, `rejected` how many contradicted all others.
+    - window_s: length of the windows over which attitudes were averaged; attitude_std_rad: their error about each axis;
+      clock_offset_s: offset of their clock from the readings', which is corrected.
+    - angle_random_walk_rad_sqrt_s: the gyroscope's own; matrix_scatter, bias_scatter_rad_s: scatter of F and b between
+      intervals of the recording.
+    - omitted: increments that could not be made; rejected: number of those that contradicted all others.
     """
 
     increments: int
@@ -44,10 +44,10 @@ class IncrementsEntry(Entry):
 
 
 class AnglesEntry(Entry):
-    """Sweeps of a file that were solved by how far the body turned from rest to rest: the numbers of their `rows`.
+    """Sweeps of a file that were solved by the angle turned from rest to rest: the numbers of their `rows`.
 
-    A turn ends within `angle_std_rad` of what is said of it, its axis leans by `axis_std_rad`, the largest of all; they
-    count as `uncertainty_inflation` times as uncertain, for they contradict each other.
+    `angle_std_rad`, `axis_std_rad`: standard deviations of a turn's end and of its axis, the largest of all, multiplied
+    by `uncertainty_inflation` because the turns contradict each other.
     """
 
     rows: tuple[int, ...]
@@ -57,13 +57,12 @@ class AnglesEntry(Entry):
 
 
 class AttitudesEntry(Entry):
-    """What attitudes tell of a gyroscope beside scale and bias.
+    """Results from attitudes in addition to a gyroscope's scale and bias.
 
     `earth_rate_rad_s` is the Earth's rate in the axes of the table, with its standard deviations, or `earth_rate_error`
-    why it was not found.
-    `by_increments` has what increments of angle between attitudes add; it is null where the rates were exact.
-    `other_methods` are the solutions of the other methods. `covariance` is that of F row by row, the Earth's rate and
-    c of m = F ω + c.
+    the reason without it. `by_increments` holds the results from increments of angle between attitudes, null if the
+    rates were exact. `other_methods` are the solutions of the other methods. `covariance` is that of F row by row, the
+    Earth's rate and c of m = F ω + c.
     """
 
     earth_rate_rad_s: Vector3 | None

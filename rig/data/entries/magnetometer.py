@@ -1,4 +1,4 @@
-"""What `result.json` says of magnetometers."""
+"""Magnetometers in `result.json`."""
 
 import json
 from pathlib import Path
@@ -38,10 +38,10 @@ class FieldSolutionEntry(Entry):
 
 
 class FieldDwellEntry(Entry):
-    """A dwell: the mean reading in an attitude, its standard deviation, and what the model leaves of it.
+    """A dwell: the mean reading in an attitude, its standard deviation, and its residual from the model.
 
-    `residual_std_t` is what the solve expects that to scatter by. `attitude` takes a vector of the arm's base frame
-    into the flange's.
+    `residual_std_t` is the standard deviation that the solution expects of the residual. `attitude` takes a vector of
+    the arm's base frame into the flange's.
     """
 
     index: int
@@ -57,9 +57,10 @@ class FieldDwellEntry(Entry):
 
 
 class UniformityEntry(Entry):
-    """Whether the field was the same in all attitudes: χ² of the residuals, and `limit`, what noise rarely makes it.
+    """A test that the field was the same in all attitudes: χ² of the residuals, and `limit`, which noise rarely
+    exceeds.
 
-    `attitude_error_rad` is what the attitudes were allowed to be off about each axis, by the accelerometer's account.
+    `attitude_error_rad` is the assumed error of the attitudes about each axis, by the accelerometer.
     """
 
     chi_square: float
@@ -69,8 +70,7 @@ class UniformityEntry(Entry):
 
 
 class FieldDriftEntry(Entry):
-    """The largest change of the readings between two tests in one attitude, its σ, its χ², and what noise rarely makes
-    that."""
+    """The largest change of the readings between two tests in one attitude, its σ, its χ² and the limit of that."""
 
     change_t: Vector3
     std_t: Vector3
@@ -82,20 +82,19 @@ class MagnetometerEntry(Entry):
     """A calibration m = F B + b of the magnetic field B in the axes of the nominal mounting.
 
     - It is that of the magnetometer as it is mounted: iron and currents that turn with it are part of F and b, and
-      `hard_iron_t` is F⁻¹ b. No limit of the verdict judges it.
-    - `arm_field_in_bias`: the arm's own field, as far as it turns with the flange, is in the bias, and no residual
-      shows it. Runs with the sensor turned over tell them apart (`rig reversal`).
-    - `extension_m` is where it sits on the flange, `uniformity` whether the field was the same in all attitudes,
-      `drift` whether it stayed the same, null where it was not tested.
-    - `covariance` is that of scale and bias by the solution alone, `covariance_combined` all of it, of which `budget`
-      says what makes it up. `field_t` is what the scale is relative to.
-    - `field_base_t` is the field in the arm's base frame, `attitude_error_rad` how far the arm's attitudes are off
-      about each axis, by the readings' own account.
-    - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
-    - `conditions`: when scale and bias were read; `non_orthogonality_degrees_of_freedom` are null where they have no
-      end.
-    - `placement`: where a file told the attitudes, and no arm held them; nobody told its range then.
-    - `correction_matrix` is M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
+      hard_iron_t is F⁻¹ b. No limit of the verdict judges it.
+    - arm_field_in_bias: the arm's own field, as far as it turns with the flange, is in the bias, and no residual shows
+      it. Runs with the sensor turned over separate them (`rig reversal`).
+    - extension_m: its position on the flange; uniformity: test that the field was the same in all attitudes; drift:
+      test that it stayed the same, null without tests.
+    - covariance: of scale and bias by the solution alone; covariance_combined: all of it, itemized in budget. field_t:
+      the size of the field to which the scale is relative.
+    - field_base_t: the field in the arm's base frame; attitude_error_rad: error of the arm's attitudes about each axis,
+      by the readings.
+    - detection_limits: faults during the recording, and the size from which on each is detected.
+    - conditions: times of the readings; non_orthogonality_degrees_of_freedom: null if infinite.
+    - placement: only if a file gave the attitudes instead of an arm; the range is unknown then.
+    - correction_matrix: M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
     """
 
     part: str
@@ -135,7 +134,7 @@ class MagnetometerEntry(Entry):
 
 
 class AsMountedEntry(Entry):
-    """One run of a reversal: how the sensor was mounted, and the bias found so, with the arm's field in it."""
+    """One run of a reversal: the sensor's mounting, and the bias in it, the arm's field included."""
 
     run: str
     started_utc: Utc
@@ -146,14 +145,14 @@ class AsMountedEntry(Entry):
 
 
 class ReversalEntry(Entry):
-    """A magnetometer's bias and the arm's field, told apart by turning the sensor over.
+    """A magnetometer's bias and the arm's field, separated by turning the sensor over.
 
-    - `bias_t` is the sensor's own, but on an axis that was never turned over: `arm_field_in_bias` is true there, and it
-      is the bias as mounted.
-    - `arm_field_t` is the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
-    - `covariance` is that of bias and arm's field; `chi_square` whether the runs agree on what they share.
-    - `scale` and `correction_matrix` are the means of the runs'. `…_degrees_of_freedom` are those of the standard
-      deviations of that name, null where they have no end.
+    - bias_t: the sensor's own, except on an axis that was never turned over: arm_field_in_bias is true there, and it is
+      the bias as mounted.
+    - arm_field_t: the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
+    - covariance: of bias and arm's field; chi_square: agreement of the runs on their common parameters.
+    - scale, correction_matrix: the means of the runs'. …_degrees_of_freedom: those of the standard deviations of that
+      name, null if infinite.
     """
 
     part: str
@@ -177,17 +176,17 @@ class ReversalEntry(Entry):
 
 
 class ReversalDocument(Entry):
-    """What `rig reversal` finds, by magnetometer, of schema "rig.reversal/1"."""
+    """The result of `rig reversal`, by magnetometer, of schema "rig.reversal/1"."""
 
     schema_name: Literal["rig.reversal/1"] = Field(alias="schema")
     magnetometers: dict[str, ReversalEntry]
 
     def text(self) -> str:
-        """The document as JSON."""
+        """Return the document as JSON."""
         return json.dumps(self.model_dump(by_alias=True), indent=2, allow_nan=False)
 
 
 def read_reversal(path: Path) -> ReversalDocument:
-    """What `rig reversal … --out` wrote. Raises Refused `no_result`, `not_a_result`."""
+    """Return the document that `rig reversal … --out` wrote. Raise Refused `no_result`, `not_a_result`."""
     remedy = "Give the file of `rig reversal RUN RUN --out FILE`"
     return read_document(ReversalDocument, path, REVERSAL_MAX_BYTES, what="a reversal", remedy=remedy)

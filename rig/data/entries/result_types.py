@@ -1,4 +1,4 @@
-"""What the entries of `result.json` are made of."""
+"""The types of which the entries of `result.json` are made."""
 
 from datetime import datetime
 from typing import Annotated, Literal
@@ -14,7 +14,7 @@ Matrix3 = tuple[Vector3, Vector3, Vector3]
 
 
 def covariance(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-    """Such rows, unless they are no square or hold a negative variance: ValueError."""
+    """Return the rows. Raise ValueError if they are not square or hold a negative variance."""
     if any(len(row) != len(rows) for row in rows):
         raise ValueError("must have as many columns as rows")
     if any(row[i] < 0 for i, row in enumerate(rows)):
@@ -40,15 +40,15 @@ Method = Literal["attitude_weighted", "maximum_likelihood", "as_published"]
 class Entry(BaseModel):
     """A part of the document."""
 
-    # What a later version has added is ignored when it is read.
+    # Keys that a later version adds are ignored on reading.
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class ConditionsEntry(Entry):
-    """When readings were taken, from when to when (UTC, by the arm controller's clock since the recording's start).
+    """The time of readings, from start to end (UTC, by the arm controller's clock since the recording's start).
 
     `mean_utc` is the middle of the readings, `temperature_c` their mean by the sensor's own thermometer, which stayed
-    between the two of `temperature_range_c`; null where it has none. A temperature without range was stated, not read.
+    between the two of `temperature_range_c`; null without one. A temperature without range was stated, not read.
     """
 
     from_utc: Utc
@@ -59,16 +59,16 @@ class ConditionsEntry(Entry):
 
     @property
     def temperature_stated(self) -> bool:
-        """Whether nobody read the temperature that it says."""
+        """Whether its temperature was stated instead of read."""
         return self.temperature_c is not None and self.temperature_range_c is None
 
 
 class PlacementEntry(Entry):
-    """How a body was laid down in attitudes that a file tells, in the unit of the readings.
+    """The placements of a body in attitudes that a file gives, in the unit of the readings.
 
-    `placement_std` is by how much a placement was found to change each reading beside its attitude, null where the
-    method does not ask; `rests_without_attitude` rests without an attitude have told of it too. `rows_omitted` of the
-    file's rows were none, for the body moved in them. `covariance` is that of all that was found, in its order.
+    `placement_std` is the standard deviation of a reading from one placement to another besides its attitude, null if
+    the method does not estimate it, with `rests_without_attitude` further rests. `rows_omitted` rows of the file were
+    left out because the body moved. `covariance` is that of all estimates, in its order.
     """
 
     placement_std: float | None
@@ -80,11 +80,11 @@ class PlacementEntry(Entry):
 
 
 class DetectionLimitEntry(Entry):
-    """The smallest `size` of a `fault` that the `check` detects in 95 of 100 recordings; null where it detects none.
+    """The smallest `size` of a `fault` that the `check` detects in 95 of 100 recordings; null if it detects none.
 
     This is the minimal detectable bias (Baarda 1968). For a change half-way it is the complete change.
     `error_over_expanded` is the largest error of a scale factor or bias just below that size, in multiples of its
-    expanded uncertainty; null where it was not computed.
+    expanded uncertainty; null if it was not computed.
     """
 
     fault: str
@@ -95,10 +95,10 @@ class DetectionLimitEntry(Entry):
 
 
 class OmittedEntry(Entry):
-    """What was left out of a recording: `count` of `total` `what` (rows, increments, readings), where the `first` is.
+    """Parts left out of a recording: `count` of `total` `what` (rows, increments, readings), and where the `first` is.
 
-    The `reason` begins with the name of an error, where there is one. `quantity` is the one that it is missing from;
-    null where it is missing from all.
+    The `reason` begins with the name of an error, if there is one. `quantity` is the one that it is missing from; null
+    if it is missing from all.
     """
 
     quantity: str | None
@@ -110,6 +110,6 @@ class OmittedEntry(Entry):
 
 
 class ErrorEntry(Entry):
-    """Why an estimator that stands beside the chosen one has no solution."""
+    """The reason why an estimator in addition to the chosen one has no solution."""
 
     error: str

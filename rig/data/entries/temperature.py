@@ -1,4 +1,4 @@
-"""What `result.json` says of a calibration over temperature."""
+"""Calibrations over temperature in `result.json`."""
 
 from typing import Annotated, Literal
 
@@ -10,7 +10,7 @@ Cubic = Annotated[tuple[Vector3, ...], Field(min_length=4, max_length=4)]
 
 
 class TemperatureContributorEntry(Entry):
-    """What makes up the uncertainty; `std` is that of kx ky kz bx by bz at the reference temperature."""
+    """A contributor to the uncertainty; `std` is that of kx ky kz bx by bz at the reference temperature."""
 
     name: str
     kind: Literal["A", "B"]
@@ -33,11 +33,13 @@ class AtTemperatureEntry(Entry):
 class OverTemperatureEntry(Entry):
     """Scale and bias of one quantity of a sensor: Σ coefficient (T − reference)ⁿ, n from 0 to 3, in SI units per Kⁿ.
 
-    The bias has the sign that it has in the calibration, and its `unit`. Both hold in `range_c` and nowhere else, by
-    the part's own thermometer, in `table` from one end to the other. `orders` are those that the readings call for, of
-    scale and bias; `covariance` (24, 24) is in the order scale n = 0 x y z, n = 1 x y z, …, then the bias. `hysteresis`
-    is how far a warming sensor is from the middle of warming and cooling, where that is largest, null if it did not go
-    both ways: then it is not in the uncertainty. `lag_s` is by how much the thermometer is behind.
+    - The bias has the sign that it has in the calibration, and its unit.
+    - range_c: where both are valid, by the part's own thermometer; table: values from one end to the other.
+    - orders: those that the readings require, of scale and bias.
+    - covariance (24, 24): in the order scale n = 0 x y z, n = 1 x y z, …, then the bias.
+    - hysteresis: largest distance of a warming sensor from the middle of warming and cooling, null without both: then
+      it is not in the uncertainty.
+    - lag_s: lag of the thermometer.
     """
 
     part: str
@@ -58,12 +60,15 @@ class OverTemperatureEntry(Entry):
     hysteresis_std: Vector6 | None
     repeats: int
 
-    def at(self, temperature_c: float) -> tuple[Vector3, Vector3]:
-        """Scale and bias at a temperature, wherever it is."""
+    def evaluate(self, temperature_c: float) -> tuple[Vector3, Vector3]:
+        """Return scale and bias at a temperature, inside the range or not."""
         powers = [(temperature_c - self.reference_c) ** n for n in range(4)]
 
         def value(cubic: Cubic) -> Vector3:
-            x, y, z = (sum(power * each[i] for power, each in zip(powers, cubic, strict=True)) for i in range(3))
+            x, y, z = (
+                sum(power * coefficients[i] for power, coefficients in zip(powers, cubic, strict=True))
+                for i in range(3)
+            )
             return x, y, z
 
         return value(self.scale), value(self.bias)

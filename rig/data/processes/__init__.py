@@ -1,1 +1,1 @@
-"""Reading files of others in a process of its own, and what ends processes."""
+"""Files of others read in a process of its own, and the signals that end processes."""

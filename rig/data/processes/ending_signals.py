@@ -1,4 +1,4 @@
-"""The signals by which somebody may end or suspend a program from outside, and the interrupt that they become."""
+"""The signals that end or suspend a program from outside, and the interrupt that they become."""
 
 import _thread
 import signal
@@ -7,8 +7,8 @@ import time
 from types import FrameType
 from typing import Final
 
-# Not among them: SIGKILL and SIGSTOP, which nobody can handle; SIGSEGV, SIGABRT and the like, which say that the
-# program has broken down; SIGPIPE and SIGXFSZ, which Python ignores; SIGTTIN, which waits until somebody can answer.
+# Not among them: SIGKILL and SIGSTOP, which no program can handle; SIGSEGV, SIGABRT and the like, which mean that the
+# program has crashed; SIGPIPE and SIGXFSZ, which Python ignores; SIGTTIN, which waits for a terminal.
 _BY_KEYS_AND_SYSTEM = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")  # Windows has the first two
 _BY_PROGRAMS = (
     *("SIGUSR1", "SIGUSR2", "SIGALRM", "SIGVTALRM", "SIGPROF", "SIGIO", "SIGPWR", "SIGSTKFLT", "SIGXCPU"),
@@ -20,27 +20,27 @@ def _numbers(names: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(int(getattr(signal, name)) for name in names if hasattr(signal, name))
 
 
-def _of_real_time() -> tuple[int, ...]:
+def _real_time_signals() -> tuple[int, ...]:
     if not hasattr(signal, "SIGRTMIN"):
         return ()
     return tuple(range(signal.SIGRTMIN, signal.SIGRTMAX + 1))
 
 
 MEANT_SIGNALS: Final = _numbers(_BY_KEYS_AND_SYSTEM)  # which mean that the program should end or be suspended
-OTHER_SIGNALS: Final = _numbers(_BY_PROGRAMS) + _of_real_time()  # which mean anything, and end it by default
+OTHER_SIGNALS: Final = _numbers(_BY_PROGRAMS) + _real_time_signals()  # which mean anything, and end it by default
 ENDING_SIGNALS: Final = (*MEANT_SIGNALS, *OTHER_SIGNALS)
 
 
-BURST_S = 1.0  # a stop takes less: what comes within it of the first asks for the same
+BURST_S = 1.0  # a stop takes less: further signals within it ask for the same
 LATER_S = 0.001
 _LOCK_METHODS = ("__enter__", "__exit__", "_acquire_restore", "_release_save")  # of `threading`, written in Python
 
 
 class Interrupts:
-    """Raises KeyboardInterrupt in the main thread when signals come, where nothing is left half done by it.
+    """The handler that raises KeyboardInterrupt in the main thread for a signal, without leaving a lock half taken.
 
-    One that is raised while `threading` takes or leaves a lock would leave it taken, and whoever stops the arm needs
-    the same locks. The way out of a wait takes its lock again: a second one must not come before that.
+    An exception while `threading` takes or leaves a lock would leave it taken, and stopping the arm needs the same
+    locks. The way out of a wait takes its lock again: a second exception must not come before that.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class Interrupts:
     def hear(self, number: int, frame: FrameType | None, text: str = "") -> None:
         """Raise, as the handler of a signal; not in a burst of them, and a moment later while a lock is being taken.
 
-        For a lock that another thread does not give back it waits no longer than for a burst.
+        For a lock that another thread does not return it waits no longer than for a burst.
         """
         now_s = time.monotonic()
         if now_s - self._raised_s < BURST_S:
@@ -69,7 +69,7 @@ class Interrupts:
 
 
 def _takes_a_lock(frame: FrameType | None) -> bool:
-    """Return whether what runs in a frame, or has called it, takes or leaves a lock."""
+    """Return whether the code of a frame, or one of its callers, takes or leaves a lock."""
     while frame is not None:
         if frame.f_code.co_filename == threading.__file__ and frame.f_code.co_name in _LOCK_METHODS:
             return True
@@ -90,7 +90,7 @@ INTERRUPTS: Final = Interrupts()
 
 
 def signal_name(number: int) -> str:
-    """Return what a signal is called: `SIGUSR1`; `signal 40` where it has no name."""
+    """Return the name of a signal: `SIGUSR1`; `signal 40` if it has none."""
     try:
         return signal.Signals(number).name
     except ValueError:

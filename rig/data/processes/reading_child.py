@@ -1,7 +1,7 @@
-"""Reads one file as a process: `python -m rig.data.processes.reading_child`, with a request as JSON on stdin.
+"""The process that reads one file: `python -m rig.data.processes.reading_child`, with a request as JSON on stdin.
 
-Writes what the reader yields to stdout, for `rig.data.processes.reading_process`: a line of JSON for a dict, an array
-in NumPy's format. What cannot be read ends in one line on stderr and a `Status`.
+Writes the parts that the reader yields to stdout, for `rig.data.processes.reading_process`: a line of JSON for a dict,
+an array in NumPy's format. A failure ends in one line on stderr and a `Status`.
 """
 
 import errno
@@ -31,12 +31,12 @@ def _main() -> NoReturn:
     try:
         with _output() as out:
             for part in _read(request):
-                out.write(_encoded(part))
+                out.write(_encode(part))
     except Refused as refused:
         _end(Status.REFUSED, json.dumps(refused.problem))
     except MemoryError:
         _end(Status.NO_MEMORY)
-    except Exception as error:  # of whatever kind: what a file is damaged into is up to chance
+    except Exception as error:  # of any kind: a damaged file may raise anything
         code = error.errno if isinstance(error, OSError) else None
         if code == errno.EFBIG and written_bytes == limits["written_bytes"]:
             _end(Status.TOO_LONG)
@@ -47,7 +47,7 @@ def _main() -> NoReturn:
 
 
 def _output() -> BinaryIO:
-    """Return what stdout was, which from now on is nowhere: libraries print what they think of a file."""
+    """Return the former stdout, and redirect stdout to nowhere: libraries print their comments on a file."""
     out = os.fdopen(os.dup(1), "wb")
     with Path(os.devnull).open("wb") as nowhere:
         os.dup2(nowhere.fileno(), 1)
@@ -60,7 +60,7 @@ def _read(request: Mapping[str, Any]) -> Iterator[Part]:
     return parts
 
 
-def _encoded(part: Part) -> bytes:
+def _encode(part: Part) -> bytes:
     if isinstance(part, dict):
         return json.dumps(part).encode() + b"\n"
     encoded = io.BytesIO()
@@ -69,7 +69,7 @@ def _encoded(part: Part) -> bytes:
 
 
 def _end_with_parent() -> None:
-    """Let the system kill this process as soon as nobody waits for it any more; Ctrl-C is for whoever does."""
+    """Let the system kill this process when its parent ends; Ctrl-C is for the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":
         import ctypes
@@ -78,7 +78,7 @@ def _end_with_parent() -> None:
 
 
 def _limit(limits: Mapping[str, Any]) -> int | None:
-    """Let this process take no more than the limits; return how long a file may be that it writes."""
+    """Limit the resources of this process; return the largest length of a file that it may write."""
     try:
         import resource
     except ModuleNotFoundError:  # Windows
@@ -91,11 +91,11 @@ def _limit(limits: Mapping[str, Any]) -> int | None:
 
 
 def _lower(what: int, limit: int) -> int:
-    """Lower a limit of this process, unless it is lower already; return what it is then."""
+    """Lower a limit of this process, unless it is lower already; return the resulting limit."""
     import resource
 
     soft, hard = resource.getrlimit(what)
-    limit = min(limit, *(each for each in (soft, hard) if each != resource.RLIM_INFINITY), limit)
+    limit = min(limit, *(current for current in (soft, hard) if current != resource.RLIM_INFINITY), limit)
     resource.setrlimit(what, (limit, hard))
     return limit
 

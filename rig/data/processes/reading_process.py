@@ -1,9 +1,8 @@
-"""Reads a file that somebody else made in a process of its own, within limits of memory, time and room.
+"""Reading of a foreign file in a process of its own, within limits of memory, time and disk space.
 
-A library may not come back from a damaged file, a few bytes may unpack to gigabytes, and nothing in a process can end
+A library may not return from a damaged file, a few bytes may unpack to gigabytes, and nothing in a process can end
 that, no signal either. So a file is read where it can be ended from outside (`rig.data.processes.reading_child`), and
-only what was read whole reaches the rig. Whatever this program reads from others goes this way: recordings, bags, logs,
-tables.
+only complete results reach the rig. All foreign files are read so: recordings, bags, logs, tables.
 """
 
 import json
@@ -33,22 +32,22 @@ Part: TypeAlias = "dict[str, Any] | NDArray[Any]"
 Reader = Callable[..., Iterator[Part]]
 
 MOST_FILES = 10_000  # in a folder: a bag is split into one for every minute or gigabyte
-MAX_UNPACKED = 20  # times what lies on the disk: readings with noise come to a fifth of that, zeros to a thousandth
-SPARE_BYTES = 32_000_000  # … and what a small file may come to
+MAX_UNPACKED = 20  # times the size on disk: readings with noise unpack to a quarter of that, zeros to a thousand times
+SPARE_BYTES = 32_000_000  # … and the allowance of a small file
 MEMORY_BYTES, MEMORY_TIMES_STORED = 320 << 20, 2  # address space: half of the first are the libraries
 PROCESSOR_S, PROCESSOR_S_PER_BYTE = 8.0, 1e-6  # a slow computer reads 3 MB of readings a second, packed 1 MB
-IDLE_TIMES_PROCESSOR = 1.5  # how long it may take in all where nothing else keeps the processor busy
+IDLE_TIMES_PROCESSOR = 1.5  # duration in all, on an otherwise idle processor, over the time on it
 TICK_S, GONE_S = 0.1, 1.0
-SPARED = 6  # at most so many times that, when the reading process gets no processor
-# A file that somebody made loads no plugin of HDF5; and threads for linear algebra reserve memory by gigabytes.
-ENVIRONMENT = {f"{each}_NUM_THREADS": "1" for each in ("OPENBLAS", "OMP", "MKL")} | {"HDF5_PLUGIN_PRELOAD": "::"}
+SPARED = 6  # factor on that, at most, if the reading process gets no processor
+# A foreign file must load no plugin of HDF5; and threads for linear algebra would reserve gigabytes of memory.
+ENVIRONMENT = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")} | {"HDF5_PLUGIN_PRELOAD": "::"}
 COMPLAINT_BYTES = 65_536
 LONGEST_REASON = 300  # characters
 OUT_OF_TIME = getattr(signal, "SIGXCPU", None)  # which the system sends to a process that has used up its time
 
 
 class Status(IntEnum):
-    """How a reading process ends."""
+    """The exit status of a reading process."""
 
     READ = 0
     UNREADABLE = 1
@@ -60,10 +59,10 @@ class Status(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ReadingLimits:
-    """What a process that reads a file may take.
+    """The resources of a process that reads a file.
 
     `memory_bytes` of address space; `processor_s` on a processor, and `idle_s` altogether; `written_bytes` for each
-    file that it writes, of what it read and of what it unpacked.
+    file that it writes, for its results and for unpacking.
     """
 
     memory_bytes: int
@@ -73,15 +72,15 @@ class ReadingLimits:
 
 
 class UnreadableFile(Exception):
-    """Why a file was not read, as the end of the sentence that names it."""
+    """The reason why a file was not read, as the end of the sentence that names it."""
 
 
 class CostlyFile(UnreadableFile):
-    """A file that takes more to be read than one of its size may."""
+    """A file that takes more to read than one of its size may."""
 
 
 def limits_for(stored_bytes: int) -> ReadingLimits:
-    """Return what may be taken to read a file, or a folder of files, of that size on the disk."""
+    """Return the limits for reading a file, or a folder of files, of that size on the disk."""
     processor_s = PROCESSOR_S + PROCESSOR_S_PER_BYTE * stored_bytes
     return ReadingLimits(
         memory_bytes=MEMORY_BYTES + MEMORY_TIMES_STORED * stored_bytes,
@@ -98,27 +97,27 @@ def stored_bytes(path: Path) -> int:
     OSError as `open` does.
     """
     if not path.is_dir():
-        return _stored_in_file(path)
+        return _file_size_on_disk(path)
     with os.scandir(path) as entries:
         files = [entry.name for entry in islice(entries, MOST_FILES + 1) if not entry.is_dir()]
     if len(files) > MOST_FILES:
         raise UnfitFile(f"it holds more than {MOST_FILES} files")
-    return sum(_stored_in_file(path / name, f"{name!r:.60}") for name in files)
+    return sum(_file_size_on_disk(path / name, f"{name!r:.60}") for name in files)
 
 
-def _stored_in_file(path: Path, called: str = "it") -> int:
+def _file_size_on_disk(path: Path, name: str = "it") -> int:
     try:
         with open_regular_file(path, RECORDING_MAX_BYTES) as file:
             size, stored = os.fstat(file.fileno()).st_size, size_without_holes(file)
     except UnfitFile as error:
-        raise UnfitFile(str(error).replace("it ", f"{called} ", 1)) from None
+        raise UnfitFile(str(error).replace("it ", f"{name} ", 1)) from None
     if size > MAX_UNPACKED * stored + SPARE_BYTES:
-        raise UnfitFile(f"{called} swells {stored} bytes to {size}")
+        raise UnfitFile(f"{name} swells {stored} bytes to {size}")
     return stored
 
 
 def size_without_holes(file: BinaryIO) -> int:
-    """Return the size of an open file without its holes, which take no room; its size if the system does not tell."""
+    """Return the size of an open file without its holes, which take no space; its size if the system cannot say."""
     size = os.fstat(file.fileno()).st_size
     if not hasattr(os, "SEEK_DATA"):
         return size
@@ -137,27 +136,27 @@ def size_without_holes(file: BinaryIO) -> int:
 class Reading:
     """A file that another process reads by a `reader` ("module:function"), called with its path and `arguments`.
 
-    The arguments are such as JSON has. The process has begun: what its parts need may be imported meanwhile. On the way
-    out it is ended. Raises Refused `temporary_folder_full`.
+    The arguments are values of JSON. The process has begun, so the caller may import meanwhile; leaving the context
+    ends it. Raise Refused `temporary_folder_full`.
     """
 
     def __init__(self, reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> None:
         request = {"reader": reader, "path": str(path), "arguments": arguments, "limits": asdict(limits)}
-        # Not from the working folder, where any file could pass for a module, but by what this one finds modules by.
+        # Not from the working folder, where any file could pass for a module, but by this process' own search path.
         command = [sys.executable, "-P", "-m", "rig.data.processes.reading_child"]
         self._path, self._limits = path, limits
         with ExitStack() as stack:
             try:
-                told, self._out = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
+                request_file, self._out = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
                 room = stack.enter_context(tempfile.TemporaryDirectory(prefix="rig-reads-", ignore_cleanup_errors=True))
-                told.write(json.dumps(request).encode())
-                told.seek(0)
+                request_file.write(json.dumps(request).encode())
+                request_file.seek(0)
             except OSError as error:
                 raise _no_room(path, str(error)) from error
             environment = {**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
             environment |= dict.fromkeys(("TMPDIR", "SQLITE_TMPDIR"), room)
             self._process = subprocess.Popen(
-                command, stdin=told, stdout=self._out, stderr=subprocess.PIPE, env=environment
+                command, stdin=request_file, stdout=self._out, stderr=subprocess.PIPE, env=environment
             )
             stack.callback(_end, self._process)
             self._ending = stack.pop_all()
@@ -173,11 +172,11 @@ class Reading:
     def parts(self) -> list[Part]:
         """Return the parts that the reader yields, once it has ended.
 
-        Raise `UnreadableFile` for what cannot be read, `CostlyFile` for what goes beyond the limits; Refused
+        Raise `UnreadableFile` for a file that cannot be read, `CostlyFile` for one beyond the limits; Refused
         `temporary_folder_full`, and as the reader does.
         """
         try:
-            complaint = _awaited(self._process, self._limits.idle_s)
+            complaint = _wait_for(self._process, self._limits.idle_s)
         except TimeoutError:
             raise CostlyFile(f"no end of it was found in {self._limits.idle_s:.0f} s") from None
         finally:
@@ -195,11 +194,11 @@ def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: Re
         return reading.parts()
 
 
-def _awaited(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
-    """Return what the process wrote to stderr, once it has ended. Raise TimeoutError.
+def _wait_for(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
+    """Return the process' output on stderr, once it has ended. Raise TimeoutError.
 
-    What a library does not come back from it may sleep in, so its time on a processor alone would not tell; a process
-    that waits for a processor, or for the disk, does not sleep.
+    A library that does not return may sleep, so time on a processor alone does not show it; a process that waits for a
+    processor, or for the disk, does not sleep.
     """
     silent = Silence(reading.pid, spared=SPARED)
     while not silent.lasts_over(idle_s / TICK_S):
@@ -211,7 +210,7 @@ def _awaited(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
 
 
 def _end(reading: "subprocess.Popen[bytes]") -> None:
-    """End the process, and wait until it is gone: for one that a dead disk holds no longer than a signal may take."""
+    """End the process and wait for its end, if a dead disk delays it no longer than a signal may take."""
     reading.kill()
     with suppress(subprocess.TimeoutExpired):
         reading.wait(GONE_S)
@@ -245,7 +244,7 @@ def _no_room(path: Path, why: str) -> Refused:
 
 
 def _parts(out: Any) -> Iterator[Part]:
-    """Yield what the process wrote: a line of JSON, or an array in NumPy's format, one after the other."""
+    """Yield the process' output: a line of JSON, or an array in NumPy's format, one after the other."""
     import numpy as np
 
     while start := out.read(1):

@@ -1,10 +1,10 @@
-"""How long another process has been silent, counted so that a busy machine does not look like a process that hangs."""
+"""The silence of another process, counted so that a busy machine does not look like a process that hangs."""
 
 import os
 import time
 from pathlib import Path
 
-CROWDED = 5.0  # times a limit is given at most, once for each program a processor that wants to run
+CROWDED = 5.0  # largest factor on a limit: the number of runnable programs per processor
 STARVED = 0.5  # of a tick spent waiting for a processor: more, and a silence in it says nothing about the process
 STANDS = 0.05  # … or without having run for more than this, and still ready to run
 HELD_UP = ("R", "D")  # states of a thread: ready to run, or waiting for memory that the system has put away
@@ -14,13 +14,12 @@ _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, se
 
 
 class Silence:
-    """Counts the ticks without a sign of life from the process `pid`.
+    """A counter of the ticks without a sign of life from the process `pid`.
 
-    Ticks and not seconds, because the one who counts may be held up itself; and no ticks in which the thread whose
-    signs of life are waited for (`thread`, any where it is None) spent most of the time waiting for a processor. Where
-    the system does not tell (proc(5) of Linux does) all ticks count. Of a process that somebody has stopped every tick
-    counts. However busy the machine, a silence lasts at most `spared` times CROWDED times its limit: the arm is not to
-    be left alone.
+    Ticks and not seconds, because the counting process may be delayed itself; and no ticks in which the thread that is
+    expected to answer (`thread`, any if None) spent most of the time waiting for a processor. If the system does not
+    show that (proc(5) of Linux does) all ticks count. Every tick counts of a process that was stopped. However busy the
+    machine, a silence lasts at most `spared` times CROWDED times its limit: the arm must not be left alone.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:
@@ -34,42 +33,42 @@ class Silence:
         self._looked_s = 0.0
 
     def heard(self) -> None:
-        """A sign of life."""
+        """Reset the count after a sign of life."""
         self.ticks = self._all_ticks = 0
 
     def tick(self, unheard: bool = False) -> None:
-        """Count that once more nothing was heard, or not yet: call this at even intervals.
+        """Count one more interval without a sign of life: call this at even intervals.
 
-        `unheard`: what it has said lies there, and whoever is to hear it has not come to it; that is not its silence.
+        `unheard`: an answer has arrived and was not read yet; that is not the process' silence.
         """
         self._all_ticks += 1
-        # The first tick of a silence is nothing yet; only then is it worth a look at what the process does.
-        starved = self._all_ticks > 1 and self._starved(known=self._all_ticks > 2)
+        # The first tick of a silence means nothing yet; from the second on the process' threads are examined.
+        starved = self._all_ticks > 1 and self._is_starved(has_previous=self._all_ticks > 2)
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Whether there were more than `limit` silent ticks, or far more when the machine was too busy to tell.
+        """Return whether there were more than `limit` silent ticks, or far more on a machine too busy to judge.
 
-        The limit is that of a machine with a processor for everybody; it is stretched by the machine's `crowding`.
+        The limit is for a machine with a processor for every program; the machine's `crowding` stretches it.
         """
         if max(self.ticks, self._all_ticks / self._spared) <= limit:
             return False
-        stretched = limit * (1.0 if self._stopped() else crowding())
+        stretched = limit * (1.0 if self._is_stopped() else crowding())
         return self.ticks > stretched or self._all_ticks > self._spared * stretched
 
-    def _stopped(self) -> bool:
-        """Whether somebody has stopped the process: then it is not the machine that keeps it silent."""
+    def _is_stopped(self) -> bool:
+        """Return whether the process was stopped by a signal: then the machine is not the cause of its silence."""
         return _state(self._tasks / self._main) == "T"
 
-    def _starved(self, known: bool) -> bool:
-        """Whether the process waited for a processor since the last call; False when that is not `known`.
+    def _is_starved(self, has_previous: bool) -> bool:
+        """Return whether the process waited for a processor since the last call; False if there was none before.
 
         A thread that still waits is not counted as waiting by the system, but as ready to run without having run.
         """
         now_s = time.monotonic()
         elapsed_s, before = now_s - self._looked_s, self._times
         self._looked_s, self._times = now_s, _times(self._tasks)
-        return known and any(
+        return has_previous and any(
             waited_s - before[thread][1] > STARVED * elapsed_s
             or (ran_s - before[thread][0] < STANDS * elapsed_s and _state(self._tasks / thread) in HELD_UP)
             for thread, (ran_s, waited_s) in self._times.items()
@@ -78,9 +77,9 @@ class Silence:
 
 
 def crowding() -> float:
-    """How many programs a processor of this machine has to serve, 1 to CROWDED: what is late may be late by that.
+    """Return the number of programs per processor of this machine, 1 to CROWDED, by which a delay may be stretched.
 
-    In the mean of the last minute, or now: after a quarter of a minute the mean tells of a quarter of a crowd.
+    In the mean of the last minute, or now: after a quarter of a minute the mean shows only a quarter of a crowd.
     """
     if not hasattr(os, "getloadavg"):  # Windows
         return 1.0
@@ -88,7 +87,7 @@ def crowding() -> float:
 
 
 def _runnable() -> int:
-    """How many threads of the machine run or wait for a processor now; 0 where proc(5) does not tell."""
+    """Return the number of threads of the machine that run or wait for a processor now; 0 without proc(5)."""
     try:
         return int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0])
     except (OSError, ValueError, IndexError):

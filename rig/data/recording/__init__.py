@@ -1,1 +1,1 @@
-"""The run file: its layout, its events, its settings, the sensors and turners that it describes."""
+"""The run file: its layout, its events, its settings, and its descriptions of sensors and turners."""

@@ -1,6 +1,6 @@
-"""What happens in a run, as its recording keeps it: one type for each kind of event, written and read here alone.
+"""The events of a run as its recording keeps them: one type for each kind, written and read here alone.
 
-In the file an event is a line of JSON: its kind's name, when it happened, and the fields of its type.
+In the file an event is a line of JSON: its kind's name, its times, and the fields of its type.
 """
 
 import json
@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from firmware_host.answers import BoardObservation, BoardSolution
-from rig.data.checked import Finite, checked, parsed
+from rig.data.checked import Finite, parse_json, validate
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
@@ -29,14 +29,14 @@ LARGEST = 1e6  # of a sweep or a dwell in rad, rad/s, rad/s² or s: ten days, an
 
 @dataclass(frozen=True, slots=True)
 class SweepStarted:
-    """The arm is told to make a sweep."""
+    """The arm was commanded to make a sweep."""
 
     sweep: Sweep
 
 
 @dataclass(frozen=True, slots=True)
 class SweepFinished:
-    """The arm has made it."""
+    """The arm has made the sweep."""
 
     sweep: Sweep
 
@@ -53,7 +53,7 @@ class RestFinished:
 
 @dataclass(frozen=True, slots=True)
 class DwellStarted:
-    """The arm stands in an attitude, and the sensors have settled: from now on it is measured."""
+    """The arm stands in an attitude, and the sensors have settled: the dwell's measurement begins."""
 
     dwell: Dwell
 
@@ -67,7 +67,7 @@ class DwellFinished:
 
 @dataclass(frozen=True, slots=True)
 class BoardObserved:
-    """The board has averaged a sensor's readings over the revolution of sweep `sweep`, told its mean speed."""
+    """The board's average of a sensor's readings over the revolution of sweep `sweep`, with its mean speed."""
 
     sensor: str
     sweep: int
@@ -77,7 +77,7 @@ class BoardObserved:
 
 @dataclass(frozen=True, slots=True)
 class BoardNotObserved:
-    """The board has no average of that sweep, for `reason`."""
+    """The board has no average of the sweep, for `reason`."""
 
     sensor: str
     sweep: int
@@ -86,7 +86,7 @@ class BoardNotObserved:
 
 @dataclass(frozen=True, slots=True)
 class BoardRecalled:
-    """The board was given back what it had observed of that sweep before the run was interrupted."""
+    """The board was given its average of the sweep from before the run was interrupted."""
 
     sensor: str
     sweep: int
@@ -129,15 +129,15 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """An event and when it was: on the host's monotonic clock, and on the controller's if that was heard by then."""
+    """An event and its time: on the host's monotonic clock, and on the controller's if that was received by then."""
 
     event: Event
     host_time_s: float
     controller_time_s: float | None
 
 
-def to_line(recorded: Recorded) -> bytes:
-    """A line of a run file's events, with its end."""
+def encode_event(recorded: Recorded) -> bytes:
+    """Return a line of a run file's events, with its end."""
     document = {
         "name": _NAMES[type(recorded.event)],
         "host_time_s": recorded.host_time_s,
@@ -147,38 +147,38 @@ def to_line(recorded: Recorded) -> bytes:
     return json.dumps(document).encode() + b"\n"
 
 
-def from_lines(stream: bytes) -> Iterator[Recorded]:
-    """The events of a run file. What follows the last line's end was cut off by a kill and is left out.
+def decode_events(stream: bytes) -> Iterator[Recorded]:
+    """Yield the events of a run file. A last line without an end was cut off by a kill and is left out.
 
-    Raises ValueError naming the first line that is no event, or not of the shape its kind has.
+    Raise ValueError naming the first line that is no event, or not of the shape of its kind.
     """
     for number, line in enumerate(stream.split(b"\n")[:-1], start=1):
         if line.strip(b"\0"):
             try:
-                yield _from_document(parsed(line))
+                yield _decode_document(parse_json(line))
             except (ValueError, RecursionError) as error:
                 raise ValueError(f"event {number} cannot be understood: {' '.join(str(error).split())}") from None
 
 
-def _from_document(document: Any) -> Recorded:
+def _decode_document(document: Any) -> Recorded:
     if not isinstance(document, dict) or not isinstance(document.get("detail"), dict):
         raise ValueError("it has no name and no details")
     name, detail = document.get("name"), document["detail"]
     if not isinstance(name, str) or name not in _KINDS:
         raise ValueError(f"there is no event {quote(name)}")
-    event = checked(_KINDS[name], _nested(name, detail), name)
+    event = validate(_KINDS[name], _nest_answer(name, detail), name)
     if isinstance(event, SweepStarted | SweepFinished):
         _check_sweep(event.sweep)
     if isinstance(event, DwellStarted | DwellFinished):
         _check_dwell(event.dwell)
     if isinstance(event, BoardObserved):
         _check_observation(event.observation)
-    times = checked(_Times, document, name)
+    times = validate(_Times, document, name)
     return Recorded(event, times.host_time_s, times.controller_time_s)
 
 
-def _nested(name: str, detail: dict[str, Any]) -> dict[str, Any]:
-    """Schema "rig.run/1" kept what the board answered beside the rest, and not as a value of its own."""
+def _nest_answer(name: str, detail: dict[str, Any]) -> dict[str, Any]:
+    """Return the details with the board's answer nested: schema "rig.run/1" has its fields among the others."""
     answer = {"board_observed": "observation", "board_solved": "solution"}.get(name)
     return {**detail, answer: detail} if answer is not None and answer not in detail else detail
 
@@ -190,7 +190,7 @@ class _Times:
 
 
 def _check_sweep(sweep: Sweep) -> None:
-    """A sweep that could be planned: what reads it relies on its numbers."""
+    """Raise ValueError for a sweep that could not be planned: readers rely on its numbers."""
     low, high = sweep.revolution_rad
     rates = sweep.speed_rad_s, sweep.acceleration_rad_s2, sweep.duration_s
     numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, *rates)
@@ -202,8 +202,8 @@ def _check_sweep(sweep: Sweep) -> None:
 
 
 def _check_dwell(dwell: Dwell) -> None:
-    """Raises ValueError for a dwell that cannot be."""
-    if not (0 <= dwell.index <= LARGEST and all(abs(each) <= LARGEST for each in (*dwell.q_rad, dwell.duration_s))):
+    """Raise ValueError for a dwell that could not be planned."""
+    if not (0 <= dwell.index <= LARGEST and all(abs(number) <= LARGEST for number in (*dwell.q_rad, dwell.duration_s))):
         raise ValueError(f"there is no such dwell as {quote(dwell)}")
 
 

@@ -1,9 +1,8 @@
-"""Takes a run file apart, in a process of its own (`rig.data.processes.reading_process`).
+"""Extraction of a run file, in a process of its own (`rig.data.processes.reading_process`).
 
-What it yields: a header (schema, texts, descriptions of the sensors), then the arrays: each sensor's samples, the
-turner's states, events, and the tables of readings from elsewhere.
-Rows are of plain numbers; whether of those that the texts describe is for whoever reads them to judge, for here only
-what this takes is imported.
+Yields a header (schema, texts, descriptions of the sensors), then the arrays: each sensor's samples, the turner's
+states, events, and the tables of external readings. Rows hold plain numbers; the reader judges whether they agree with
+the texts, because only the imports of this module are loaded here.
 """
 
 import re
@@ -22,24 +21,24 @@ OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 MAX_SENSORS = 64
 MAX_COLUMNS = 40  # of states: times, joints, and 32 fields
 LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000  # characters: configurations have 65,536 at most; numbers
-MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
+MAX_UNWRITTEN_ROWS = 100_000  # announced and missing: more than a kill leaves of one flush
 
 
 def contents(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
     """Yield the contents of a run file, header first. Raise ValueError with the reason, whatever h5py raises."""
     try:
         yield from extract(path)
-    except Exception as error:  # of whatever kind: what it is damaged into is up to chance
+    except Exception as error:  # of any kind: a damaged file may raise anything
         raise ValueError(reason(error)) from error
 
 
 def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
-    """The contents of a run file, header first. Raises OSError, ValueError and whatever else h5py does."""
+    """Yield the contents of a run file, header first. Raise OSError, ValueError and whatever else h5py does."""
     import h5py
 
     # A plain open refuses a file whose writer was killed; an SWMR reader trusts one that is cut short, and waits for
-    # torn metadata to become whole. So each where it belongs.
-    mode = {"libver": "latest", "swmr": True} if _left_open(path) else {}
+    # torn metadata to be completed. So each mode is used for its own kind of file.
+    mode = {"libver": "latest", "swmr": True} if _is_left_open(path) else {}
     with h5py.File(path, "r", **mode) as file:
         schema = _text(file, "schema")
         if schema not in TEXTS:
@@ -50,9 +49,11 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         if len(group) > MAX_SENSORS:
             raise ValueError(f"it announces {len(group)} sensors")
         samples = {name: _member(group, name, h5py.Dataset) for name in group}
-        described = {name: {key: _plain(value) for key, value in each.attrs.items()} for name, each in samples.items()}
+        described = {
+            name: {key: _plain(value) for key, value in dataset.attrs.items()} for name, dataset in samples.items()
+        }
         named = ("states", "events", *(TABLES if elsewhere else ()))
-        rows = {f"samples/{name}": each for name, each in samples.items()}
+        rows = {f"samples/{name}": dataset for name, dataset in samples.items()}
         rows |= {name: _member(file, name, h5py.Dataset) for name in named}
         for name, dataset in rows.items():
             _check(dataset, name)
@@ -67,7 +68,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
 
 
 def reason(error: Exception) -> str:
-    """Why a file cannot be read, in one line; HDF5 buries the system's words in several lines of its own."""
+    """Return why a file cannot be read, in one line; HDF5 buries the system's words in several lines of its own."""
     if isinstance(error, OSError) and error.filename is not None:
         error = OSError(error.strerror)  # whoever tells it names the file
     text = " ".join(str(error).split())
@@ -85,15 +86,15 @@ def reason(error: Exception) -> str:
     return system[1] if system else text or type(error).__name__
 
 
-def _left_open(path: Path) -> bool:
-    """Whether somebody writes the file, or was killed while he did."""
+def _is_left_open(path: Path) -> bool:
+    """Return whether a file is being written, or its writer was killed."""
     with path.open("rb") as file:
         start = file.read(12)
     return len(start) == 12 and start[8] >= 3 and bool(start[11] & OPEN_FOR_WRITING)
 
 
 def _member(group: Any, name: str, kind: type) -> Any:
-    """A group or dataset that lies in this very file."""
+    """Return a group or dataset that lies in this very file. Raise ValueError."""
     import h5py
 
     if (link := group.get(name, getlink=True)) is None:
@@ -107,19 +108,19 @@ def _member(group: Any, name: str, kind: type) -> Any:
 
 
 def _check(dataset: Any, name: str) -> None:
-    """Raises ValueError unless it holds rows of numbers, for which there is room in the file."""
+    """Raise ValueError unless the dataset holds rows of numbers, for which the file has space."""
     if dataset.is_virtual or dataset.external:  # first: to tell the shape of the former, the library opens the others
         raise ValueError(f"the rows of {name} lie somewhere else")
-    columns = [dataset.dtype[each] for each in dataset.dtype.names or ()] or [dataset.dtype]
-    if dataset.ndim != 1 or len(columns) > MAX_COLUMNS or any(each.base.kind not in "iuf" for each in columns):
+    columns = [dataset.dtype[column] for column in dataset.dtype.names or ()] or [dataset.dtype]
+    if dataset.ndim != 1 or len(columns) > MAX_COLUMNS or any(column.base.kind not in "iuf" for column in columns):
         raise ValueError(f"{name} holds {dataset.dtype!s:.200} in {dataset.ndim} dimensions, not rows of numbers")
-    stored = _stored_rows(dataset)
+    stored = _count_stored_rows(dataset)
     if len(dataset) > stored + MAX_UNWRITTEN_ROWS:
         raise ValueError(f"{name} announces {len(dataset)} rows and holds {stored}")
 
 
 def _refuse_endless(path: Path, unpacked: int) -> None:
-    """Raises ValueError for what would not fit a computer, though it fits an e-mail: packed, or full of holes."""
+    """Raise ValueError for contents too large for a computer in a small file: packed, or full of holes."""
     with path.open("rb") as file:
         stored = size_without_holes(file)
     for what, size in (("its rows unpack", unpacked), ("it swells", path.stat().st_size)):
@@ -127,8 +128,8 @@ def _refuse_endless(path: Path, unpacked: int) -> None:
             raise ValueError(f"{what} {stored} bytes to {size}")
 
 
-def _stored_rows(dataset: Any) -> int:
-    """Number of rows that the file has room for, at most."""
+def _count_stored_rows(dataset: Any) -> int:
+    """Return the largest number of rows for which the file has space."""
     if dataset.chunks is None:
         return int(dataset.id.get_storage_size() // dataset.dtype.itemsize)
     return int(dataset.id.get_num_chunks() * dataset.chunks[0])
@@ -138,15 +139,15 @@ def _text(file: Any, name: str) -> str:
     value = _plain(file.attrs.get(name))
     if not isinstance(value, str):
         raise ValueError(f"its {name} is not a text")
-    if not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
+    if not value.isascii() and any("\ud800" <= character <= "\udfff" for character in value):
         raise ValueError(f"its {name} is not UTF-8")
     return value
 
 
 def _plain(value: Any) -> Any:
-    """An attribute in Python's own types; one that JSON does not have ends in the TypeError of `_encoded`.
+    """Return an attribute in Python's own types; one that JSON does not have ends in the TypeError of `_encode`.
 
-    Raises ValueError for one that no run file has.
+    Raise ValueError for one that no run file has.
     """
     size = getattr(value, "size", 1) or 0  # an attribute of nothing has None
     if size > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):

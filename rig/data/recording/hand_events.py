@@ -1,4 +1,4 @@
-"""What happens in a calibration by hand, as its recording keeps it. Times are the board's, in microseconds."""
+"""The events of a calibration by hand as its recording keeps them. Times are the board's, in microseconds."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -13,7 +13,7 @@ Reason = Annotated[str, Field(pattern=r"^[a-z_0-9]+$", max_length=40)]
 
 @dataclass(frozen=True, slots=True)
 class HandAsked:
-    """The operator is asked for something; `again` names what was wrong with the last move, `why` says it in words."""
+    """A request to the operator; `again` names the error of the last move, `why` gives it in words."""
 
     instruction: Instruction
     again: Reason | None = None
@@ -52,7 +52,7 @@ class HandMoveRefused:
 
 @dataclass(frozen=True, slots=True)
 class HandRestRefused:
-    """The item lay still and does not count as at rest, by the error's name `again`: it is a pause of a move."""
+    """A rest that does not count, by the error's name `again`: it is a pause of a move."""
 
     begin_us: Microseconds
     end_us: Microseconds
@@ -61,7 +61,7 @@ class HandRestRefused:
 
 @dataclass(frozen=True, slots=True)
 class HandBegunAnew:
-    """The session begins anew: nothing before `begin_us` counts any more.
+    """A new beginning of the session: nothing before `begin_us` counts any more.
 
     `again` is the error's name: the table, or the sensor, is another.
     """

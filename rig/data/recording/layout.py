@@ -1,13 +1,13 @@
-"""How a run lies in HDF5 (schema "rig.run/1").
+"""The layout of a run in HDF5 (schema "rig.run/1").
 
 `/samples/<sensor>` (its stamps and a column for each of its channels; the sensor's description as attributes, with the
 `channels` in JSON), `/states` (of the turner, of the type that `turner` describes:
 `rig.data.recording.recorded_turner`), `/events` (bytes: SWMR forbids data of variable length, so an event is a line of
 JSON); `schema`, `config` (YAML), `settings`, `provenance` and `turner` (JSON) as attributes of the file.
 
-Readings from elsewhere (schema "rig.files/1") have no `/samples` and no rows in `/states`, but the tables `/readings`
-and `/motion` (a float column each, by name; `rig.data.recording.motion_file`) and `elsewhere` (JSON: whose readings,
-and what the motion tells).
+External readings (schema "rig.files/1") have no `/samples` and no rows in `/states`, but the tables `/readings` and
+`/motion` (a float column each, by name; `rig.data.recording.motion_file`) and `elsewhere` (JSON: the item, and the kind
+of the motion).
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.files.written_file import write_new
-from rig.data.checked import parsed, seen
+from rig.data.checked import parse_json, sanitize
 from rig.data.recording.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.recording.recorded_turner import RecordedTurner, turner_of
 from rig.data.recording.schema import EVENTS_DTYPE, SCHEMA
@@ -32,11 +32,11 @@ CHUNK_BYTES = 65536
 
 @dataclass(frozen=True)
 class Contents:
-    """What a run file holds, as it stands there: nothing of it is judged yet.
+    """The contents of a run file, not yet validated.
 
     `texts` are the attributes named in `TEXTS`, `described` the attributes of each sensor; `samples` (n,) by sensor, of
     its type, `states` (n,) of the turner, of theirs, `events` (n,) bytes; `tables` (n,) by the names of `TABLES`, of
-    readings from elsewhere alone.
+    external readings alone.
     """
 
     schema: str
@@ -49,12 +49,12 @@ class Contents:
 
     @cached_property
     def sensors(self) -> dict[str, RecordedSensor]:
-        """The sensors that the attributes of their samples describe, by name. Raises ValueError."""
-        return {name: recorded_sensor(name, each) for name, each in self.described.items()}
+        """Sensors by name, from the attributes of their samples. Raise ValueError."""
+        return {name: parse_sensor(name, attributes) for name, attributes in self.described.items()}
 
     @cached_property
     def turner(self) -> RecordedTurner | None:
-        """The turner that its text describes, None of readings from elsewhere. Raises ValueError."""
+        """The turner by its text, None of external readings. Raise ValueError."""
         return turner_of(self.texts["turner"]) if self.schema == SCHEMA else None
 
 
@@ -64,34 +64,36 @@ def empty(
     sensors: Mapping[str, RecordedSensor],
     states_dtype: np.dtype[Any] = ARM_STATE_DTYPE,
 ) -> Contents:
-    """The contents of a recording of these sensors that begins, with states of that type."""
+    """Return the contents of a new recording of these sensors, with states of that type."""
     described = {name: sensor.attributes() for name, sensor in sensors.items()}
     samples = {name: np.empty(0, sensor.sample_dtype) for name, sensor in sensors.items()}
     return Contents(schema, texts, described, samples, np.empty(0, states_dtype), np.empty(0, EVENTS_DTYPE))
 
 
-def recorded_sensor(name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
+def parse_sensor(name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
     """Return the sensor that the attributes of its samples describe. Raise ValueError naming what is wrong."""
-    attributes = seen(dict(attributes))
+    attributes = sanitize(dict(attributes))
     channels = attributes.get("channels")
     if not isinstance(channels, str):
         raise ValueError(f"the channels of {name} are not a text")
-    return sensor_of({**attributes, "channels": parsed(channels)})
+    return sensor_of({**attributes, "channels": parse_json(channels)})
 
 
 def check_rows(contents: Contents) -> None:
-    """Raises ValueError where rows are not of the type that the texts and descriptions beside them say."""
+    """Raise ValueError if rows are not of the type that the texts and descriptions of the file give."""
     states_dtype = contents.turner.dtype if contents.turner else ARM_STATE_DTYPE
-    rows = {f"samples/{name}": (contents.samples[name], each.sample_dtype) for name, each in contents.sensors.items()}
+    rows = {
+        f"samples/{name}": (contents.samples[name], sensor.sample_dtype) for name, sensor in contents.sensors.items()
+    }
     rows |= {"states": (contents.states, states_dtype), "events": (contents.events, EVENTS_DTYPE)}
     rows |= {name: (table, table_dtype(table.dtype.names or ())) for name, table in contents.tables.items()}
-    for name, (found, meant) in rows.items():
-        if found.dtype != meant:
-            raise ValueError(f"{name} holds {found.dtype!s:.200}, not rows of {meant}")
+    for name, (rows_found, meant) in rows.items():
+        if rows_found.dtype != meant:
+            raise ValueError(f"{name} holds {rows_found.dtype!s:.200}, not rows of {meant}")
 
 
 def table_of(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[Any]:
-    """(n,) rows of float columns."""
+    """Return rows (n,) of float columns."""
     table = np.empty(len(next(iter(columns.values()))), table_dtype(tuple(columns)))
     for name, column in columns.items():
         table[name] = column
@@ -99,22 +101,22 @@ def table_of(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[Any]:
 
 
 def table_dtype(names: Sequence[str]) -> np.dtype[Any]:
-    """The type of the rows of a table with these columns."""
+    """Return the type of the rows of a table with these columns."""
     return np.dtype([(name, "<f8") for name in names])
 
 
 def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
-    """Write a whole run file beside its place and move it there, so that a kill or a full disk leaves all or nothing.
+    """Write a run file next to its path and move it there, so that a kill or a full disk leaves all or nothing.
 
-    With `swmr` it can be opened for appending in that mode; without, any HDF5 tool opens it. Raises OSError.
+    With `swmr` it can be opened for appending in that mode; without, any HDF5 tool opens it. Raise OSError.
     """
     write_new(path, _image(contents, "latest" if swmr else None))
 
 
 def _image(contents: Contents, libver: str | None) -> bytes:
-    """The bytes of a whole run file.
+    """Return the bytes of a complete run file.
 
-    The library makes them in memory: where it cannot write, it tries again at the end and breaks down the process.
+    The library makes them in memory: after a failed write to a file it tries again at the end and crashes the process.
     """
     import h5py
 

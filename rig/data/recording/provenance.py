@@ -1,4 +1,4 @@
-"""What was measured with what: recorded beside the measurement, and part of every result."""
+"""The provenance of a measurement: recorded with it, and part of every result."""
 
 import hashlib
 import platform
@@ -12,7 +12,7 @@ from pydantic import Field
 
 from firmware_host.answers import BoardIdentity, StoredCalibration
 from rig.data.absent import NO_ARM, NO_BOARD
-from rig.data.checked import Finite, checked
+from rig.data.checked import Finite, validate
 from rig.data.entries.result_types import Utc
 from rig.data.recording.motion_file import Item
 from rig.data.result_file import FileEntry, StoredCalibrationEntry
@@ -68,13 +68,13 @@ class Provenance:
 
     @property
     def script_identity(self) -> ScriptIdentity:
-        """Which script the recording was made by; one that no file is where it does not say."""
+        """The script by which the recording was made; an empty identity if it does not say."""
         return ScriptIdentity(self.script or "", self.script_sha256 or "")
 
     def document(self) -> dict[str, Any]:
-        """The provenance as it fits into JSON; nothing of what is not known."""
+        """Return the provenance as plain values of JSON, without what is unknown."""
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
-        files = {name: each.model_dump() for name in OF_FILES if (each := getattr(self, name)) is not None}
+        files = {name: value.model_dump() for name in OF_FILES if (value := getattr(self, name)) is not None}
         document = {**asdict(self), "stored_calibrations": stored, **files}
         unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
         unknown |= {name for name in (*OPTIONAL, *OF_FILES) if document[name] is None}
@@ -82,14 +82,14 @@ class Provenance:
 
 
 def calls_itself_simulated(software: str) -> bool:
-    """Whether a controller that says its version so drives no arm: its seconds are as long as it likes."""
+    """Return whether a controller of this version drives no arm: its seconds may have any length."""
     return software.endswith(SIMULATED)
 
 
-def provenance_of_files(readings: FileEntry, motion: FileEntry | None, item: Item, began: datetime) -> Provenance:
-    """Provenance of an item's readings recorded elsewhere, which `began` then: no arm and no board is known."""
+def provenance_of_files(readings: FileEntry, motion: FileEntry | None, item: Item, start: datetime) -> Provenance:
+    """Return the provenance of an item's external readings from `start` on: without arm and board."""
     return Provenance(
-        started_utc=began.astimezone(UTC).isoformat(timespec="seconds"),
+        started_utc=start.astimezone(UTC).isoformat(timespec="seconds"),
         **_program(),
         configuration_sha256=hashlib.sha256(b"").hexdigest(),
         arm_serial_number=NO_ARM,
@@ -103,7 +103,7 @@ def provenance_of_files(readings: FileEntry, motion: FileEntry | None, item: Ite
 
 
 def _program() -> dict[str, Any]:
-    """What reckons."""
+    """Return the versions of the program."""
     return {
         "rig_version": VERSION,
         "python_version": platform.python_version(),
@@ -115,7 +115,7 @@ def provenance_of(
     loaded: "Loaded",
     board: BoardIdentity | None,
     turner: Report,
-    made: TurnerIdentity,
+    model: TurnerIdentity,
     *,
     stored: Mapping[str, StoredCalibration],
     script: ScriptIdentity,
@@ -123,7 +123,7 @@ def provenance_of(
     follows_crystal: bool | None,
     kind: str,
 ) -> Provenance:
-    """Provenance of a recording that begins now with a turner of that `kind`, `made` so; `stored` as above."""
+    """Return the provenance of a recording that begins now, with a turner of that `kind` and `model`."""
     return Provenance(
         started_utc=datetime.now(UTC).isoformat(timespec="seconds"),
         **_program(),
@@ -132,17 +132,17 @@ def provenance_of(
         arm_software=turner.software,
         board_unique_id=NO_BOARD if board is None else board.unique_id,
         firmware_version=NO_BOARD if board is None else board.firmware,
-        sensor_serial_numbers={name: each.serial_number for name, each in loaded.config.all_sensors.items()},
+        sensor_serial_numbers={name: sensor.serial_number for name, sensor in loaded.config.all_sensors.items()},
         stored_calibrations={
-            name: checked(StoredCalibrationEntry, calibration.document(), name) for name, calibration in stored.items()
+            name: validate(StoredCalibrationEntry, calibration.document(), name) for name, calibration in stored.items()
         },
         script=script.name,
         script_sha256=script.sha256,
         script_installed=script_installed,
-        arm_kinematics=made.kinematics,
-        tcp_offset=made.tcp_offset,
-        arm_maker=made.maker,
-        arm_model=made.model,
+        arm_kinematics=model.kinematics,
+        tcp_offset=model.tcp_offset,
+        arm_maker=model.maker,
+        arm_model=model.model,
         turner_kind=kind,
         board_follows_crystal=follows_crystal,
     )

@@ -1,4 +1,4 @@
-"""What a reader of a recording must know about one sensor: what it is, how it sits, and what its samples hold."""
+"""The description of one sensor in a recording: its part, its mounting, and the contents of its samples."""
 
 import json
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.sensors.sensor_sections import AccelerationSection, ConfiguredSensor, mounting_matrix
-from rig.data.checked import Finite, Positive, checked
+from rig.data.checked import Finite, Positive, validate
 from rig.data.installed_kinds import measured
 from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar
 from rig.data.recording.channel import MAX_CHANNELS, Channel, sample_dtype
@@ -18,8 +18,8 @@ from rig.errors.quoting import quote
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
 MOUNTING_TOLERANCE = 1e-6
-# K by which a sensor's temperature may change in a run if nothing tells it: a flight controller in its case warms by so
-# much after it gets power. Assumed.
+# K by which a sensor's unknown temperature may change in a run: a flight controller in its case warms by as much after
+# it gets power. Assumed.
 UNKNOWN_CHANGE_K = 20.0
 
 Axis = Annotated[tuple[Finite, ...], Field(min_length=3, max_length=3)]
@@ -29,12 +29,12 @@ AS_THE_FLANGE: Mounting = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True, slots=True)
 class RecordedSensor:
-    """A sensor and its `channels`, whose columns stand in its samples in their order.
+    """A sensor and its `channels`, in the order of their columns in its samples.
 
-    `mounting` (3 rows of 3) is the nominal rotation from the flange frame to the sensor's; what has no axes leaves it.
-    `mode` is "calibrated" when the rates were corrected before they were recorded. `clock` names the sensor whose clock
-    stamps the samples: itself, or the one it is in; None where the board's does. `stamp_std_s` is the standard
-    uncertainty of a time stamp, None where it is nothing beside the interval between samples.
+    `mounting` (3 rows of 3) is the nominal rotation from the flange frame to the sensor's; a sensor without axes has
+    the default. `mode` is "calibrated" if the rates were corrected before they were recorded. `clock` names the sensor
+    whose clock stamps the samples: itself, or its device; None for the board's. `stamp_std_s` is the standard
+    uncertainty of a time stamp, None if it is negligible against the interval between samples.
     """
 
     part: str
@@ -53,22 +53,22 @@ class RecordedSensor:
 
     @property
     def has_axes(self) -> bool:
-        """Whether it can be calibrated: of the pressure of the air, nothing is."""
-        return any(each.measures.shape for each in self.channels)
+        """Whether it can be calibrated: a quantity without axes, as air pressure, is not."""
+        return any(channel.measures.shape for channel in self.channels)
 
     @property
     def temperature_stated(self) -> bool:
-        """Whether somebody stated how warm it was: it has no thermometer."""
-        return any(each.quantity == TEMPERATURE.name and each.stated is not None for each in self.channels)
+        """Whether its temperature was stated, for want of a thermometer."""
+        return any(channel.quantity == TEMPERATURE.name and channel.stated is not None for channel in self.channels)
 
     @property
     def unseen_change_k(self) -> float:
-        """Temperature, K, by which it may change while the recorded one does not."""
+        """Possible change of its temperature, K, while the recorded one stays the same."""
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property
     def temperature_words(self) -> str:
-        """What a budget says of how its temperature is known; nothing where a thermometer tells it."""
+        """The source of its temperature, for a budget; empty with a thermometer."""
         if not self.measures(TEMPERATURE):
             return f"no temperature was provided or stated, a change of {UNKNOWN_CHANGE_K:g} K is assumed"
         return f"temperature stated within {self.unseen_change_k:g} K" if self.temperature_stated else ""
@@ -80,63 +80,65 @@ class RecordedSensor:
 
     @property
     def range_rad_s(self) -> float:
-        """The nominal end of scale of its rates, which every gyroscope states."""
-        known = self.channel(RATE).range
-        assert known is not None, "a gyroscope that does not state it is not read"
-        return known
+        """Nominal end of scale of its rates, which every gyroscope states."""
+        range_rad_s = self.channel(RATE).range
+        assert range_rad_s is not None, "a gyroscope that does not state it is not read"
+        return range_rad_s
 
     def measures(self, quantity: Quantity | Scalar) -> bool:
-        """Whether its samples hold that quantity."""
-        return any(each.quantity == quantity.name for each in self.channels)
+        """Return whether its samples hold that quantity."""
+        return any(channel.quantity == quantity.name for channel in self.channels)
 
     def channel(self, quantity: Quantity | Scalar) -> Channel:
-        """The channel of a quantity it measures. Raises KeyError of another."""
-        for each in self.channels:
-            if each.quantity == quantity.name:
-                return each
+        """Return the channel of a quantity that it measures. Raise KeyError for another."""
+        for channel in self.channels:
+            if channel.quantity == quantity.name:
+                return channel
         raise KeyError(quantity.name)
 
     def means(self, samples: NDArray[Any]) -> dict[str, tuple[float, ...]]:
-        """The mean reading of each channel in samples (n,), by the name of the quantity."""
-        return {each.quantity: each.mean(samples) for each in self.channels}
+        """Return the mean reading of each channel in samples (n,), by the name of the quantity."""
+        return {channel.quantity: channel.mean(samples) for channel in self.channels}
 
     def attributes(self) -> dict[str, Any]:
-        """The attributes as they stand in a run file: the channels as a list in JSON, without what there is none of."""
+        """Return the attributes as in a run file: the channels as a list in JSON, without keys that are None."""
         document = {name: value for name, value in asdict(self).items() if value is not None}
-        channels = [{name: value for name, value in each.items() if value is not None} for each in document["channels"]]
+        channels = [
+            {name: value for name, value in channel.items() if value is not None} for channel in document["channels"]
+        ]
         return {**document, "channels": json.dumps(channels)}
 
 
-def recorded_as(
+def build_sensor(
     section: ConfiguredSensor,
     *channels: Channel,
     part: str | None = None,
     rate_hz: float | None = None,
     clock: str | None = None,
 ) -> RecordedSensor:
-    """The sensor of a section, whose samples hold these channels; `part` and rate are the section's where left out."""
+    """Return the sensor of a section, whose samples hold these channels; `part` and rate by default the section's."""
     mounting = tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist())
     rate_hz = section.rate_hz if rate_hz is None else rate_hz
     return RecordedSensor(part or section.part, section.serial_number, rate_hz, channels, mounting, clock=clock)
 
 
 def range_m_s2(section: AccelerationSection) -> float:
-    """The full scale of an accelerometer."""
+    """Return the full scale of an accelerometer."""
     return section.range_g * STANDARD_GRAVITY_M_S2
 
 
 def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
-    """The sensor of a description in plain values.
+    """Return the sensor of a description in plain values.
 
-    Raises ValueError naming what is wrong: a value, a quantity nobody knows or that comes twice, columns of one name, a
-    mounting that is no rotation, a gyroscope without range.
+    Raise ValueError naming the error: a value, a quantity that is unknown or duplicate, columns of one name, a mounting
+    that is no rotation, a gyroscope without range.
     """
-    sensor = checked(RecordedSensor, document, "sensor")
-    quantities = [each.quantity for each in sensor.channels]
-    known = ", ".join(measured())
+    sensor = validate(RecordedSensor, document, "sensor")
+    quantities = [channel.quantity for channel in sensor.channels]
+    names = ", ".join(measured())
     for quantity in quantities:
         if quantity not in measured() or quantities.count(quantity) > 1:
-            raise ValueError(f"the {sensor.part} measures {quote(quantity)}, which is not one of {known}")
+            raise ValueError(f"the {sensor.part} measures {quote(quantity)}, which is not one of {names}")
     _ = sensor.sample_dtype
     if sensor.measures(RATE) and sensor.channel(RATE).range is None:
         raise ValueError(f"the gyroscope {sensor.part} states no range")
@@ -145,7 +147,7 @@ def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
 
 
 def check_rotation(mounting: Mounting, what: str) -> None:
-    """Raise ValueError where the rows of a mounting are not of length one and at right angles."""
+    """Raise ValueError if the rows of a mounting are not of length one and at right angles."""
     rows = np.array(mounting)
     # No element of a rotation exceeds one; the squares of much larger ones would overflow.
     small = np.abs(rows).max() < 2

@@ -1,4 +1,4 @@
-"""What turned the sensors of a recording, as its run file describes it, and the rows its states are recorded in."""
+"""The turner of a recording, as its run file describes it, and the rows of its states."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from rig.data.checked import checked, parsed
+from rig.data.checked import parse_json, validate
 from rig.data.recording.events import DwellFinished, DwellStarted, Recorded, SweepFinished, SweepStarted
 from rig.data.recording.settings import RunSettings
 from rig.motion.geometry import MAX_JOINTS, DenavitHartenberg
@@ -18,34 +18,33 @@ from rig.motion.state import Joints, StateField, TurnerIdentity, state_dtype
 MAX_FIELDS = 32
 ALWAYS = ("time_s", "host_time_s", "q_rad", "qd_rad_s")
 Kind = Annotated[str, Field(pattern=r"^\w[\w.-]*$", max_length=40)]
-Told = Annotated[str, Field(max_length=200)]
+Word = Annotated[str, Field(max_length=200)]
 JointName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]  # becomes that of a column
 
 
 @dataclass(frozen=True)
 class RecordedTurner:
-    """A turner: its `kind`, by which it is registered, who made it, and which model it is (None where not told).
+    """A turner: its `kind`, by which it is registered, its maker and its model (None if unknown).
 
-    `joints` are the names of its n joints, 0 to `MAX_JOINTS`, the one on the ground first; `geometry` is what their
-    angles are to be read with; `fields` are what its states tell beyond times and joints; `reading_std_rad` as of
-    `TurnerIdentity`.
+    `joints` are the names of its n joints, 0 to `MAX_JOINTS`, the one on the ground first; `geometry` is the one for
+    their angles; `fields` are those of its states beyond times and joints; `reading_std_rad` as in `TurnerIdentity`.
     """
 
     kind: Kind
-    maker: Told
-    model: Told | None
+    maker: Word
+    model: Word | None
     joints: Annotated[tuple[JointName, ...], Field(max_length=MAX_JOINTS)]
     geometry: DenavitHartenberg
     fields: Annotated[tuple[StateField, ...], Field(max_length=MAX_FIELDS)] = ()
     reading_std_rad: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
 
     @classmethod
-    def of(
-        cls, kind: str, made: TurnerIdentity, joints: Sequence[str], fields: Sequence[StateField]
+    def build(
+        cls, kind: str, model: TurnerIdentity, joints: Sequence[str], fields: Sequence[StateField]
     ) -> "RecordedTurner":
-        """A turner of that kind, made so, whose states tell these fields. Raises ValueError as `described`."""
-        turned = tuple(joints), made.kinematics, tuple(fields), made.reading_std_rad
-        return described(asdict(cls(kind, made.maker, made.model, *turned)))
+        """Return a turner of that kind and model, whose states have these fields. Raise ValueError."""
+        motion = tuple(joints), model.kinematics, tuple(fields), model.reading_std_rad
+        return parse_turner(asdict(cls(kind, model.maker, model.model, *motion)))
 
     @cached_property
     def dtype(self) -> np.dtype[Any]:
@@ -53,14 +52,14 @@ class RecordedTurner:
         return state_dtype(len(self.joints), self.fields)
 
     def to_json(self) -> str:
-        """The description as it stands in a run file."""
+        """Return the description as in a run file."""
         return json.dumps(asdict(self), allow_nan=False)
 
 
-def described(document: Any) -> RecordedTurner:
-    """The turner that a document describes. Raises ValueError naming what cannot be."""
-    turner = checked(RecordedTurner, document, "turner")
-    names = [each.name for each in turner.fields]
+def parse_turner(document: Any) -> RecordedTurner:
+    """Return the turner that a document describes. Raise ValueError naming what is impossible."""
+    turner = validate(RecordedTurner, document, "turner")
+    names = [field.name for field in turner.fields]
     if len({*turner.joints}) < len(turner.joints) or len({*names, *ALWAYS}) < len(names) + len(ALWAYS):
         raise ValueError("two joints of its turner, or two fields of its states, have one name")
     if not all(name.isascii() and name.isidentifier() and len(name) <= 40 for name in names):
@@ -71,13 +70,13 @@ def described(document: Any) -> RecordedTurner:
 
 
 def turner_of(text: str) -> RecordedTurner:
-    """What `RecordedTurner.to_json` wrote. Raises ValueError naming what is wrong."""
-    return described(parsed(text))
+    """Return the turner that `RecordedTurner.to_json` wrote. Raise ValueError naming the error."""
+    return parse_turner(parse_json(text))
 
 
 def check_joints(turner: RecordedTurner, settings: RunSettings, events: Iterable[Recorded]) -> None:
-    """Raises ValueError where a pose of a recording has other joints than its turner."""
-    poses: list[Joints] = [settings.home_q_rad, *(each.q_rad for each in settings.planned_dwells)]
+    """Raise ValueError if a pose of a recording has another number of joints than its turner."""
+    poses: list[Joints] = [settings.home_q_rad, *(dwell.q_rad for dwell in settings.planned_dwells)]
     for event in (recorded.event for recorded in events):
         if isinstance(event, SweepStarted | SweepFinished):
             poses += [event.sweep.start_q_rad, event.sweep.end_q_rad]

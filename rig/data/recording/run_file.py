@@ -1,8 +1,8 @@
-"""The run file: everything a run saw, as it arrived, in HDF5.
+"""The run file: all data of a run, as received, in HDF5.
 
 The file survives `kill -9` because it is written in HDF5's single-writer/multiple-reader (SWMR) mode: all datasets and
-attributes exist before that mode begins, afterwards rows are only appended, and the library writes every piece before
-anything that points to it. What lies where is said in `rig.data.recording.layout`.
+attributes exist before that mode begins, afterwards rows are only appended, and the library writes every block before
+anything that points to it. See `rig.data.recording.layout` for the layout.
 """
 
 import json
@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.section import SensorName
-from rig.data.checked import LARGEST_NUMBER, checked, parsed
+from rig.data.checked import LARGEST_NUMBER, parse_json, validate
 from rig.data.processes.reading_process import Reading, UnreadableFile
 from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
-from rig.data.recording.events import Event, Recorded, from_lines, to_line
+from rig.data.recording.events import Event, Recorded, decode_events, encode_event
 from rig.data.recording.extract import reason
 from rig.data.recording.layout import Contents, append, check_rows, empty, lay_out, table_of
-from rig.data.recording.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
+from rig.data.recording.motion_file import MOTIONS, ExternalHeader, ReadElsewhere, samples_header
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner, check_joints
@@ -36,7 +36,7 @@ from rig.errors import Fault, Refused
 from rig.errors.quoting import quote
 from rig.motion.state import State
 
-FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
+FLUSH_PERIOD_S = 0.25  # half of the promised time, so that a slow flush still keeps the promise
 LARGEST_STATE = 1e12  # of a turner's states, in SI units; times are among them
 
 
@@ -44,8 +44,8 @@ LARGEST_STATE = 1e12  # of a turner's states, in SI units; times are among them
 class RunData:
     """A run file in memory: `samples` (n,) by name of a sensor, `states` (n,) of its turner, events in order.
 
-    `settings` say what it is judged by; `config` is the configuration's text, for people. Readings from `elsewhere`
-    have no turner (None); their samples are those of a sensor on a clock of its own.
+    `settings` are those for the judgement; `config` is the configuration's text, for people. External readings
+    (`elsewhere`) have no turner (None); their samples are those of a sensor on a clock of its own.
     """
 
     config: str
@@ -59,21 +59,21 @@ class RunData:
     elsewhere: ReadElsewhere | None = None
 
     def measuring(self, quantity: Quantity | Scalar) -> dict[str, RecordedSensor]:
-        """The sensors whose samples hold that quantity, by name."""
+        """Return the sensors whose samples hold that quantity, by name."""
         return {name: sensor for name, sensor in self.sensors.items() if sensor.measures(quantity)}
 
     def judged_by(self, overrides: Sequence[str]) -> "RunData":
-        """The recording under other settings: see `RunSettings.with_overrides`."""
+        """Return the recording under other settings: see `RunSettings.with_overrides`."""
         return replace(self, settings=self.settings.with_overrides(overrides)) if overrides else self
 
 
 class RunRecorder:
-    """Writes a run file from any number of threads; what they hand over is on its way to the disk within 0.5 s.
+    """The writer of a run file, from any number of threads; data are on their way to the disk within 0.5 s.
 
     `config` is the configuration's text without its `world:` section. The folder of `path` must exist and the file must
-    not. Raises Fault `recording_failed` from the constructor, `check` and `close`.
-    The adding calls never wait for the disk and do not report its failures, so that a full disk stalls neither the
-    board's link nor the turner's: watch `check`.
+    not. Raise Fault `recording_failed` from the constructor, `check` and `close`. The adding calls never wait for the
+    disk and do not report its failures, so that a full disk stalls neither the board's link nor the turner's: watch
+    `check`.
     """
 
     def __init__(
@@ -132,8 +132,8 @@ class RunRecorder:
     def add(self, event: Event, *, controller_time_s: float | None = None) -> None:
         """Append an event, now; its controller time is the newest state's unless given."""
         with self._lock:
-            known = self._controller_time_s if controller_time_s is None else controller_time_s
-            self._pending.events.append(to_line(Recorded(event, time.monotonic(), known)))
+            time_s = self._controller_time_s if controller_time_s is None else controller_time_s
+            self._pending.events.append(encode_event(Recorded(event, time.monotonic(), time_s)))
 
     def check(self) -> None:
         """Raise Fault `recording_failed` if the file could not be written."""
@@ -147,7 +147,7 @@ class RunRecorder:
         self.check()
 
     def _write(self) -> None:
-        """The writer thread: flush what has come, several times a second, until closed or broken."""
+        """Flush new data several times a second, until closed or failed: the writer thread."""
         try:
             closing = False
             while not closing:
@@ -155,7 +155,7 @@ class RunRecorder:
                 self._flush()
                 self.removed = not self.path.exists()  # asked here: a disk that hangs may hold up this thread, no other
             self._file.close()
-        except Exception as error:  # whatever it is, the run must hear of it
+        except Exception as error:  # of any kind: the run must be informed
             self._failure = error
             self._abandon()
 
@@ -193,22 +193,22 @@ class RunRecorder:
 def read_run(path: Path, timeout_s: float | None = None, *, begun: Reading | None = None) -> RunData:
     """Read a run file: finished, still being written, or left behind by a killed process.
 
-    `begun` is its `begin_reading`, if that has been called already.
-    Rows that the kill left unwritten or torn at the end are dropped. Raises Refused: `no_run_file` when there is none,
-    `not_a_run_file` when it is something else, damaged, of another schema, or cannot be read within `timeout_s` (None:
-    by its size), not counting the time in which the machine is too busy to read; `temporary_folder_full`.
+    `begun` is its `begin_reading`, if that has been called already. Rows that the kill left unwritten or torn at the
+    end are dropped. Raise Refused: `no_run_file` without a file, `not_a_run_file` if it is something else, damaged, of
+    another schema, or cannot be read within `timeout_s` (None: by its size), not counting the time in which the machine
+    is too busy to read; `temporary_folder_full`.
     """
     contents = _contents(path, timeout_s, begun)
     try:
-        checked(_Named, {"sensors": [*contents.described]}, "samples")
+        validate(_Named, {"sensors": [*contents.described]}, "samples")
         elsewhere = _elsewhere(contents) if contents.tables else None
         sensors = contents.sensors
         samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
         if elsewhere is not None:
             sensors, samples = {elsewhere.item.name: elsewhere.sensor}, {elsewhere.item.name: elsewhere.samples}
         settings = _settings(contents, sensors)
-        provenance = checked(Provenance, parsed(contents.texts["provenance"]), "provenance")
-        events = tuple(from_lines(contents.events.tobytes()))
+        provenance = validate(Provenance, parse_json(contents.texts["provenance"]), "provenance")
+        events = tuple(decode_events(contents.events.tobytes()))
         turner = None
         if elsewhere is None:
             turner = _turner(contents, provenance)
@@ -233,12 +233,12 @@ def read_run(path: Path, timeout_s: float | None = None, *, begun: Reading | Non
 
 
 def write_elsewhere(path: Path, run: RunData) -> None:
-    """A new run file of readings from elsewhere. Raises OSError."""
+    """Write a new run file of external readings. Raise OSError."""
     read = run.elsewhere
     assert read is not None, "of readings from elsewhere"
     provenance = json.dumps(run.provenance.document())
     texts = {"config": run.config, "settings": run.settings.to_json(), "provenance": provenance}
-    texts["elsewhere"] = json.dumps(asdict(ToldElsewhere(read.item, read.tells, read.origin_s, read.other_rows)))
+    texts["elsewhere"] = json.dumps(asdict(ExternalHeader(read.item, read.tells, read.origin_s, read.other_rows)))
     tables = {"readings": table_of(read.readings), "motion": table_of(read.motion)}
     lay_out(path, replace(empty(SCHEMA_ELSEWHERE, texts, {}), tables=tables), swmr=False)
 
@@ -246,7 +246,7 @@ def write_elsewhere(path: Path, run: RunData) -> None:
 def make_plain(path: Path) -> None:
     """Rewrite the file of a killed run, which only SWMR readers open, so that any HDF5 tool does. The content stays.
 
-    Call it only when nobody writes the file any more. Raises Refused as `read_run` does; OSError.
+    Call it only if the file is no longer being written. Raise Refused as `read_run` does; OSError.
     """
     contents = _contents(path, None)
     samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
@@ -254,19 +254,19 @@ def make_plain(path: Path) -> None:
 
 
 def _contents(path: Path, timeout_s: float | None, begun: Reading | None = None) -> Contents:
-    """What the file holds, read by a process that can be ended: see `rig.data.recording.extract`."""
+    """Return the file's contents, read by a process that can be ended: see `rig.data.recording.extract`."""
     try:
         with begun or begin_reading(path, timeout_s) as reading:
             header, *arrays = reading.parts()
     except UnreadableFile as error:
         raise _not_a_run_file(path, str(error)) from error
-    told, rows = cast("dict[str, Any]", header), iter(cast("list[NDArray[Any]]", arrays))
+    fields, rows = cast("dict[str, Any]", header), iter(cast("list[NDArray[Any]]", arrays))
     contents = Contents(
-        **told,
-        samples={name: next(rows) for name in told["described"]},
+        **fields,
+        samples={name: next(rows) for name in fields["described"]},
         states=next(rows),
         events=next(rows),
-        tables={name: next(rows) for name in (TABLES if told["schema"] == SCHEMA_ELSEWHERE else ())},
+        tables={name: next(rows) for name in (TABLES if fields["schema"] == SCHEMA_ELSEWHERE else ())},
     )
     try:
         check_rows(contents)
@@ -308,25 +308,25 @@ def _turner(contents: Contents, provenance: Provenance) -> RecordedTurner:
 
 
 def _elsewhere(contents: Contents) -> ReadElsewhere:
-    tables = [contents.tables[each] for each in TABLES]
+    tables = [contents.tables[name] for name in TABLES]
     readings, motion = ({name: rows[name] for name in rows.dtype.names or ()} for rows in tables)
-    told = checked(ToldElsewhere, parsed(contents.texts["elsewhere"]), "elsewhere")
+    header = validate(ExternalHeader, parse_json(contents.texts["elsewhere"]), "elsewhere")
     samples_header().check(readings)
-    MOTIONS[told.tells].check(motion)
-    return ReadElsewhere(told.item, readings, told.tells, motion, told.origin_s, told.other_rows)
+    MOTIONS[header.tells].check(motion)
+    return ReadElsewhere(header.item, readings, header.tells, motion, header.origin_s, header.other_rows)
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
-    """The rows without the end that never reached the disk: such are zeros, and a host time is never zero."""
+    """Return the rows without the unwritten end: it holds zeros, and a host time is never zero."""
     written = np.flatnonzero(rows["host_time_s"])
     count = int(written[-1]) + 1 if len(written) else 0
     return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last one may be torn
 
 
 def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
-    """Raises ValueError for numbers that overflow where they are reckoned with, and for a host time that is none.
+    """Raise ValueError for numbers that overflow in calculations, and for a host time that is not finite.
 
-    Readings and angles that are no numbers are found where they are read, for some may never be.
+    Readings and angles that are not finite are found where they are used, for some may never be.
     """
     if not np.isfinite(rows["host_time_s"]).all():
         raise ValueError(f"a host time of {name} is not a number")
@@ -338,14 +338,14 @@ def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """The names of the sensors: they become those of files, so what a configuration does not take is none."""
+    """The names of the sensors: they become those of files, so the rules of a configuration apply."""
 
     sensors: tuple[SensorName, ...]
 
 
 @dataclass(slots=True)
 class _Pending:
-    """What waits for the writer thread."""
+    """Data that wait for the writer thread."""
 
     samples: dict[str, list[NDArray[Any]]]
     states: list[State]

@@ -1,6 +1,6 @@
-"""The names and types in a run file that say how the rest of it is to be read: see `rig.data.recording.layout`.
+"""The names and types in a run file that determine how to read the rest of it: see `rig.data.recording.layout`.
 
-Whoever reads a file as it stands there imports nothing else of the rig, for he is a process of a moment.
+The process that extracts a file imports nothing else of the rig, because it lives only for a moment.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
-"""What a recording is judged by: recorded beside it, typed, and with a version of its own.
+"""The settings by which a recording is judged: recorded with it, typed, and with a version of their own.
 
-The configuration a run was made with is kept as text, for people. Its keys may change from one version of the rig to
-the next; these do not, so that a recording is judged as it was, or by what `rig solve --set` says instead.
+The configuration of a run is kept as text, for people. Its keys may change from one version of the rig to the next;
+these do not, so that a recording is judged as it was, or by the options of `rig solve --set` instead.
 """
 
 import json
@@ -24,7 +24,7 @@ from rig.config.judging.judged_by import (
 )
 from rig.config.judging.limits import LIMITS, Limits
 from rig.config.sensors.sensor_catalogue import PARTS
-from rig.data.checked import Finite, OfJoints, Positive, checked, parsed
+from rig.data.checked import Finite, OfJoints, Positive, parse_json, validate
 from rig.data.recording.recorded_sensor import AS_THE_FLANGE, Mounting, check_rotation
 from rig.errors import Refused
 from rig.errors.quoting import quote
@@ -42,7 +42,7 @@ Vector3 = tuple[Finite, Finite, Finite]
 
 
 class ObservationThresholds(ObservationKeys):
-    """What an averaged revolution must satisfy to be used.
+    """Conditions on an averaged revolution.
 
     Of its samples `max_lost_fraction` may be missing; the joint's rate, smoothed, may stray from its mean by the
     fraction `max_speed_deviation`; the reading may point `max_axis_deviation_deg` away from the turn.
@@ -51,13 +51,13 @@ class ObservationThresholds(ObservationKeys):
     @model_validator(mode="before")
     @classmethod
     def complete(cls, document: Any) -> Any:
-        """Return the keys of a recording. Raise ValueError where one is missing."""
+        """Return the keys of a recording. Raise ValueError for a missing one."""
         return refuse_missing_keys(cls, document)
 
 
 @dataclass(frozen=True, slots=True)
 class KnownReference:
-    """The sensor `name` whose calibration is known, from a turntable: rate = scale · (reading + bias_rad_s)."""
+    """The sensor `name` with a known calibration, from a turntable: rate = scale · (reading + bias_rad_s)."""
 
     name: str
     scale: tuple[Positive, Positive, Positive]
@@ -66,11 +66,10 @@ class KnownReference:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """Where the arm stands, in its base frame: `up` (unit vector), gravity, the Earth's rate where it is known.
+    """The site of the arm, in its base frame: `up` (unit vector), gravity, and the Earth's rate if it is known.
 
-    Of the magnetic field its size is known or nothing, and whether it rises from the ground. The latitude may be known
-    where the Earth's rate is not, for want of a heading. `…_expanded_…` are expanded uncertainties (k = 2), None where
-    nobody stated any.
+    Of the magnetic field at most the size is known, and whether it points upwards. The latitude may be known without
+    the Earth's rate, for want of a heading. `…_expanded_…` are expanded uncertainties (k = 2), None if none was stated.
     """
 
     up: Vector3
@@ -89,20 +88,17 @@ class Site:
 
 
 class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
-    """Half-widths of what no recording shows: all values between, either way, are equally likely.
+    """Half-widths of quantities that no recording shows: all values between, either way, are equally likely.
 
-    But `angle_std_deg`, which is a standard deviation, None where nobody stated it: of a joint's angle about what its
-    encoder tells.
-
-    Those of sensors stand by name.
-    `decision_rule` says whether a limit is held against the value alone ("simple") or against the value with its
-    expanded uncertainty ("guard_band").
+    Except `angle_std_deg`, a standard deviation, None if it was not stated: that of a joint's angle about its
+    encoder's. Those of sensors are keyed by name. `decision_rule` compares a limit with the value alone ("simple") or
+    with the value and its expanded uncertainty ("guard_band").
     """
 
     @model_validator(mode="before")
     @classmethod
     def complete(cls, document: Any) -> Any:
-        """Return the keys of a recording. Raise ValueError where one is missing."""
+        """Return the keys of a recording. Raise ValueError for a missing one."""
         return refuse_missing_keys(cls, document)
 
     @property
@@ -118,10 +114,10 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
         return float(np.radians(self.repeatability_deg) / np.sqrt(3))
 
     def knows(self, name: str) -> bool:
-        """Return whether `of` has an answer for the sensor `name`."""
+        """Return whether sizes are stated for the sensor `name`."""
         return all(name in getattr(self, what) for what in OF_SENSORS)
 
-    def of(self, what: OfSensor, name: str) -> float:
+    def stated_size(self, what: OfSensor, name: str) -> float:
         """Return the size that is stated for the sensor `name`."""
         sizes: dict[str, float] = getattr(self, what)
         return sizes[name]
@@ -129,13 +125,13 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
 
 @dataclass(frozen=True, slots=True)
 class Elsewhere:
-    """How readings are solved that were recorded elsewhere, whose motion a file tells (`motion_file`).
+    """The settings of a solution of external readings, with a file of their motion (`motion_file`).
 
     - `any_mounting`: the sensor's axes need not lie along those of the body whose attitudes are given.
     - `find_clock`: the attitudes are on a clock of their own; `exact_rates`: their rates are exact, as a rate table's
-      are; `window_s`: over which attitudes are averaged for a gyroscope's increments, None for what suits.
-    - `estimator`: the one that was asked for, None for the one that suits each quantity.
-    - `only`: the sensors to calibrate, as their quantities call them, all that were recorded where there are none.
+      are; `window_s`: for averages of attitudes in a gyroscope's increments, None for a suitable one.
+    - `estimator`: the requested one, None for the one that suits each quantity.
+    - `only`: the sensors to calibrate, by the kind of sensor; all that were recorded if it is empty.
     """
 
     any_mounting: bool = False
@@ -148,7 +144,7 @@ class Elsewhere:
 
 @dataclass(frozen=True, slots=True)
 class ByHand:
-    """How a session by hand is solved, and what it was to have: so many `flips` and whole `turns`.
+    """The settings of a session by hand, and its planned numbers of `flips` and whole `turns`.
 
     The next move is asked for `rest_s` after the item came to rest. `box_rad` and `closure_rad` are standard
     deviations: of the item's faces from right angles, and of a whole turn's end from its beginning.
@@ -164,7 +160,7 @@ class ByHand:
 
 @dataclass(frozen=True, slots=True)
 class PlannedSweep:
-    """A sweep the whole procedure has: its place in the plan, its joint, "cw" or "ccw", its speed, how far it turns."""
+    """A sweep of the whole procedure: its index in the plan, its joint, "cw" or "ccw", its speed and its angle."""
 
     index: int
     joint_name: str
@@ -175,8 +171,7 @@ class PlannedSweep:
 
 @dataclass(frozen=True, slots=True)
 class PlannedDwell:
-    """A dwell the whole procedure has: its place in the plan, the joint angles, which time the attitudes are gone
-    through, from 0."""
+    """A dwell of the whole procedure: its index in the plan, the joint angles, and the repeat, from 0."""
 
     index: int
     q_rad: OfJoints
@@ -232,7 +227,7 @@ class RunSettings:
 
     @property
     def stated_uncertainty(self) -> Uncertainty:
-        """The uncertainty that a run states. Raise ValueError of readings of others, which state none."""
+        """The uncertainty that a run states. Raise ValueError for external readings, which state none."""
         if self.uncertainty is None:
             raise ValueError("its settings state no uncertainty, but those of a run do")
         return self.uncertainty
@@ -259,26 +254,28 @@ class RunSettings:
         """
         changed = self
         for item in overrides:
-            changed = _overridden(changed, item)
+            changed = _override(changed, item)
         return changed
 
     def document(self) -> dict[str, Any]:
-        """The settings as plain values, by key."""
+        """Return the settings as plain values, by key."""
         judging = {"observation": self.observation, "limits": self.limits, "uncertainty": self.uncertainty}
-        return asdict(self) | {key: None if each is None else each.model_dump() for key, each in judging.items()}
+        return asdict(self) | {
+            key: None if section is None else section.model_dump() for key, section in judging.items()
+        }
 
     def to_json(self) -> str:
-        """The settings as they stand in a run file."""
+        """Return the settings as in a run file."""
         return json.dumps({"schema": SCHEMA, **self.document()}, allow_nan=False)
 
 
 def settings_from_json(text: str) -> RunSettings:
-    """What `to_json` wrote. Raises ValueError naming what is wrong."""
-    document = parsed(text)
+    """Return the settings that `to_json` wrote. Raise ValueError naming the error."""
+    document = parse_json(text)
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:
         raise ValueError(f"the schema of its settings is {quote(schema)}; this version of the rig reads {SCHEMA!r}")
-    settings = checked(RunSettings, document, "settings")
+    settings = validate(RunSettings, document, "settings")
     if settings.elsewhere is None and (settings.limits is None or settings.uncertainty is None):
         raise ValueError("its settings have no limits or no uncertainty, but those of a run have both")
     if settings.mounts and settings.stage >= len(settings.mounts):
@@ -289,9 +286,9 @@ def settings_from_json(text: str) -> RunSettings:
 
 
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
-    """The settings of a new run; `plan` is that of the whole procedure.
+    """Return the settings of a new run; `plan` is that of the whole procedure.
 
-    Raises Refused `angle_std_not_stated` where it has arcs that nobody says how well the encoders tell.
+    Raise Refused `angle_std_not_stated` if it has arcs and the error of the encoders is not stated.
     """
     from rig.config.procedures.hand_sections import ByHandSection
 
@@ -313,15 +310,15 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         reference=reference,
         home_q_rad=plan.home_q_rad,
         planned_sweeps=planned,
-        matrix_corrected=tuple(name for name, each in config.to_calibrate.items() if each.correction == "matrix"),
+        matrix_corrected=tuple(name for name, sensor in config.to_calibrate.items() if sensor.correction == "matrix"),
         site=site_of(config.site),
         uncertainty=uncertainty,
-        planned_dwells=_planned(plan.dwells),
+        planned_dwells=_plan_dwells(plan.dwells),
         second_order=config.procedure.accelerometer_order == 2,
         finds_earth_rate=config.procedure.finds_earth_rate,
         extension_m=config.turner.extension_m,
         mounts=tuple(stage.mount for stage in plan.stages),
-        by_hand=by_hand_of(config.procedure) if isinstance(config.procedure, ByHandSection) else None,
+        by_hand=hand_settings(config.procedure) if isinstance(config.procedure, ByHandSection) else None,
         reference_c=getattr(config.procedure, "reference_c", None),
     )
     if settings.has_arcs and uncertainty.angle_std_deg is None:
@@ -330,18 +327,18 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
 
 
 def _limits(config: "RigConfig") -> Limits:
-    """The limits of the file, and what its procedure repeats for."""
+    """Return the limits of the file, with the targets for which its procedure repeats."""
     from rig.config.procedures.procedure_sections import SixObservationSection
 
-    said, section = config.limits.model_dump(), config.procedure
+    limits, section = config.limits.model_dump(), config.procedure
     if isinstance(section, SixObservationSection):
         wanted = {"scale_u": section.target_scale_u, "bias_u_rad_s": section.target_bias_u_rad_s}
-        said |= {key: value for key, value in wanted.items() if said[key] is None}
-    return Limits(**said)
+        limits |= {key: value for key, value in wanted.items() if limits[key] is None}
+    return Limits(**limits)
 
 
-def by_hand_of(section: "ByHandSection") -> ByHand:
-    """How a session by hand will be solved, and what it is to have."""
+def hand_settings(section: "ByHandSection") -> ByHand:
+    """Return the settings of a session by hand."""
     return ByHand(
         flips=section.flips,
         turns=section.turns,
@@ -360,18 +357,18 @@ def _angle_std_not_stated() -> Refused:
     )
 
 
-def _planned(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:
-    """The planned dwells, each with how often its attitude was there before."""
-    seen: Counter[tuple[float, ...]] = Counter()
+def _plan_dwells(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:
+    """Return the planned dwells, each with the number of earlier dwells in its attitude."""
+    repeats: Counter[tuple[float, ...]] = Counter()
     planned = []
     for dwell in dwells:
-        planned.append(PlannedDwell(dwell.index, dwell.q_rad, seen[dwell.q_rad]))
-        seen[dwell.q_rad] += 1
+        planned.append(PlannedDwell(dwell.index, dwell.q_rad, repeats[dwell.q_rad]))
+        repeats[dwell.q_rad] += 1
     return tuple(planned)
 
 
 def site_of(section: "SiteSection") -> Site:
-    """The site, with the Earth's rate in the frame of the base, where latitude and heading are known."""
+    """Return the site, with the Earth's rate in the frame of the base if latitude and heading are known."""
     earth_rate: Vector3 | None = None
     if section.latitude_deg is not None and section.heading_deg is not None:
         up = np.array(section.up)
@@ -398,20 +395,20 @@ def _tesla(microtesla: float | None) -> float | None:
 
 
 def uncertainty_of(config: "RigConfig") -> Uncertainty:
-    """The uncertainties that the file states; what it does not say of a sensor is its part's."""
-    said: dict[str, Any] = config.uncertainty.model_dump()
+    """Return the uncertainties that the file states; for a sensor without one, that of its part."""
+    stated: dict[str, Any] = config.uncertainty.model_dump()
     of_sensors: dict[str, Any] = {
         what: {
-            name: getattr(PARTS[sensor.part], what) if said[what] is None else said[what]
+            name: getattr(PARTS[sensor.part], what) if stated[what] is None else stated[what]
             for name, sensor in config.sensors.items()
         }
         for what in OF_SENSORS
     }
-    return Uncertainty(**{**said, **of_sensors})
+    return Uncertainty(**{**stated, **of_sensors})
 
 
-def known_setting(item: str) -> str:
-    """The path of what `section.key=value` sets. Raises Refused `unknown_setting` where no recording has that."""
+def find_setting(item: str) -> str:
+    """Return the path that `section.key=value` sets. Raise Refused `unknown_setting` if no recording has it."""
     path = item.partition("=")[0].strip()
     if path not in _settable():
         raise Refused(
@@ -422,9 +419,9 @@ def known_setting(item: str) -> str:
     return path
 
 
-def _overridden(settings: RunSettings, item: str) -> RunSettings:
-    """The settings with one `section.key=value` laid over them."""
-    path, value = known_setting(item), item.partition("=")[2]
+def _override(settings: RunSettings, item: str) -> RunSettings:
+    """Return the settings with one `section.key=value` replaced."""
+    path, value = find_setting(item), item.partition("=")[2]
     section, _, key = path.partition(".")
     if settings.elsewhere is not None:
         raise Refused(
@@ -433,13 +430,13 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
     document = settings.document()
     document[section][key] = value.strip()
     try:
-        return checked(RunSettings, document, "settings")
+        return validate(RunSettings, document, "settings")
     except ValueError as error:
         raise Refused("wrong_setting", str(error), f"Give a number, as in {path}=0.001") from None
 
 
 def setting(key: str) -> str:
-    """The full path of a threshold or limit: `max_lost_fraction` is `observation.max_lost_fraction`."""
+    """Return the full path of a threshold or limit: `observation.max_lost_fraction` for `max_lost_fraction`."""
     return next((path for path in _settable() if path.rpartition(".")[2] == key), key)
 
 

@@ -1,4 +1,4 @@
-"""What happens in a calibration over temperature beside its sweeps and dwells, as its recording keeps it."""
+"""The events of a calibration over temperature, in addition to its sweeps and dwells, as its recording keeps them."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -13,9 +13,9 @@ Celsius = dict[str, Finite]
 
 @dataclass(frozen=True, slots=True)
 class TemperatureWanted:
-    """The sensors are to become warmer, or else colder, until the first of them is at `next_c`.
+    """A request to warm or cool the sensors until the first of them is at `next_c`.
 
-    They are `now_c`. The operator sees to it unless the board's heater does, which is `heated`.
+    They are `now_c`. The operator does it, or the board's heater, if `heated`.
     """
 
     warming: bool
@@ -26,7 +26,8 @@ class TemperatureWanted:
 
 @dataclass(frozen=True, slots=True)
 class SetMeasured:
-    """The sweeps and dwells with the indices from `first` up to, not including, `end` are made, on the way up or down.
+    """The sweeps and dwells with the indices from `first` up to, not including, `end` are finished, on the way up or
+    down.
 
     `temperatures_c` are the means of the sensors' own thermometers meanwhile, by the sensor's name.
     """

@@ -13,7 +13,7 @@ from typing import Final
 
 from rig.config.files.regular_file import UnfitFile, open_regular_file
 from rig.config.files.written_file import open_to_append
-from rig.data.checked import checked
+from rig.data.checked import validate
 from rig.errors import Refused
 from rig.history.again.answer import Answer, Given
 
@@ -87,7 +87,7 @@ def _read(path: Path, question: Question) -> tuple[Mapping[str, Answer], int]:
                 continue
             try:
                 document = json.loads(line)
-                solved[str(document["key"])] = checked(Given, document["given"], "given")
+                solved[str(document["key"])] = validate(Given, document["given"], "given")
             except (ValueError, KeyError, TypeError, RecursionError):
                 continue  # a line that is none is a recording that is solved once more
     return solved, whole_bytes

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file, read_regular_file
-from rig.data.checked import each_key_once
+from rig.data.checked import refuse_duplicate_keys
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused
 from rig.history.entered.issued import Issued, issued_certificate
@@ -141,7 +141,7 @@ def content_sha256(text: str) -> str:
 
     Raises ValueError if it is no JSON or a key stands twice, and what else a result of another form leads to.
     """
-    document = json.loads(text, object_pairs_hook=each_key_once)
+    document = json.loads(text, object_pairs_hook=refuse_duplicate_keys)
     document["provenance"].pop("solved_utc", None)
     said = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(said.encode()).hexdigest()

@@ -1,1 +1,1 @@
-"""A body that a hand moves: when it lay still, and the moves in between."""
+"""A body that is moved by hand: its rests, and the moves in between."""

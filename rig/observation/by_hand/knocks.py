@@ -1,4 +1,4 @@
-"""Single readings of a body at rest that a knock against the table made: they tell nothing of gravity or a field."""
+"""Single readings at rest that are due to a knock against the table: they show neither gravity nor a field."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,26 +7,26 @@ from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
 from rig.observation.by_hand.steadiness import NORMAL
 
-KNOCK = 8.0  # standard deviations, from which on a reading is none of the noise's
-COARSE = 2.0  # steps of the readings, which noise below the resolution takes too
-COUNTS = 0.05  # of what is steady: no knock is smaller that matters
-MOST = 0.1  # of the readings: more are no knocks, but noise of another kind
-FEWEST = 5  # readings, of which most feel nothing
+KNOCK = 8.0  # standard deviations: a larger deviation is not noise
+COARSE = 2.0  # steps of the readings: noise below the resolution deviates as far
+COUNTS = 0.05  # of a quantity's steadiness: a smaller knock does not matter
+MOST = 0.1  # of the readings: more outliers are noise of another kind
+FEWEST = 5  # readings, most of which are undisturbed
 
 
-def without_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:
-    """Return which of the readings (n, 3) at rest no knock has made."""
+def mask_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:
+    """Return a mask (n,) of the readings (n, 3) at rest that are not due to a knock."""
     kept: NDArray[np.bool_] = np.ones(len(readings), dtype=np.bool_)
     if len(readings) < FEWEST:
         return kept
-    off = np.abs(readings - np.median(readings, axis=0))
-    deviation = NORMAL * np.median(off, axis=0)
-    farthest = np.maximum(KNOCK * deviation, COUNTS * quantity.steady)
-    farthest = np.maximum(farthest, COARSE * smallest_steps(readings))
-    kept = ~np.any(off > farthest, axis=1)
+    deviations = np.abs(readings - np.median(readings, axis=0))
+    typical = NORMAL * np.median(deviations, axis=0)
+    limit = np.maximum(KNOCK * typical, COUNTS * quantity.steady)
+    limit = np.maximum(limit, COARSE * smallest_steps(readings))
+    kept = ~np.any(deviations > limit, axis=1)
     return kept if np.count_nonzero(~kept) <= MOST * len(kept) else np.ones(len(kept), dtype=np.bool_)
 
 
 def smallest_steps(readings: Array) -> Array:
-    """Return the smallest step between readings (n, 3) that differ, by axis: their resolution, if it shows."""
+    """Return the smallest step between different readings (n, 3), by axis: their resolution, if it shows."""
     return np.array([np.diff(np.unique(axis)).min() if np.ptp(axis) > 0 else 0.0 for axis in readings.T])

@@ -1,13 +1,13 @@
-"""When a body lay still, as its sensors' readings alone tell.
+"""The rests of a body, by its sensors' readings alone.
 
-A recording is cut into blocks of a quarter of a second. A block is at rest where the readings scatter no more than a
-few times as much as in the quietest tenth of all blocks, and where a gyroscope reads what it reads at rest. This is the
+A recording is divided into blocks of a quarter of a second. A block is at rest if its readings scatter no more than a
+few times as much as in the quietest tenth of all blocks, and if a gyroscope reads its value at rest. This is the
 reading that most of the quiet blocks have in common, whatever the bias; a steady turn is as quiet as a rest, so of
-readings that are nearly as frequent the smallest counts. Blocks that follow each other and read the same are one rest.
-A few missing readings do not end it.
+nearly equally frequent readings the smallest counts. Adjacent blocks with equal readings form one rest. A few missing
+readings do not end it.
 
-A gyroscope alone decides where there is one: it feels every turn, and no knock against the table. Where there is none,
-a few readings that a knock has made do not count.
+If there is a gyroscope, it decides alone: it measures every turn, and hardly a knock against the table. Without one, a
+few readings that are due to a knock do not count.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,10 +24,10 @@ from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window
 
 BLOCK_S, FEWEST = 0.25, 5  # samples of a block
-ROUNDING = 1e-6  # of a number of intervals that may be whole but for the arithmetic
-QUIETEST, AS_QUIET = 0.1, 3.0  # share of the blocks that tell the noise; times as much is at rest as well
-COUNTS = 0.2  # of what is steady: so much may always scatter, where the noise is below the resolution
-TOGGLES = 0.5  # of a step of the readings: so much they scatter between two values
+ROUNDING = 1e-6  # tolerance of a whole number of intervals
+QUIETEST, AS_QUIET = 0.1, 3.0  # fraction of the blocks that show the noise; factor up to which others are at rest
+COUNTS = 0.2  # of a quantity's steadiness: scatter that is always allowed, if the noise is below the resolution
+TOGGLES = 0.5  # of a step of the readings: their scatter between two values
 FIRST = 4  # blocks of the first second
 GAP = 2.5  # intervals: no reading is missing, or one
 NEARLY = 0.5  # of the blocks of the most frequent reading
@@ -41,12 +41,12 @@ def find_rests(
     still_at_first: bool = False,
     lying: Sequence[Window] = (),
 ) -> tuple[Window, ...]:
-    """Return the rests of two blocks and longer, by readings (n, 3) of one quantity or several at rising times (n,).
+    """Return the rests of two blocks and longer, by readings (n, 3) of one or several quantities at rising times (n,).
 
-    `still_at_first`: the body was as still in the first second as it ever is meant to be. `lying`: windows in which it
-    is said to lie still at least part of the time, if anything is said of it.
+    `still_at_first`: the body was as still in the first second as it is ever meant to be. `lying`: windows in which it
+    is declared to lie still at least part of the time, if anything is declared.
     """
-    quantity = next(each for each in quantities().values() if each in readings)
+    quantity = next(quantity for quantity in quantities().values() if quantity in readings)
     if len(time_s) < 2 * FEWEST:
         return ()
     interval_s = find_sampling(time_s).interval_s
@@ -62,56 +62,60 @@ def find_rests(
     if still_at_first:
         noise = np.maximum(noise, np.median(scatter[:FIRST], axis=0))
     if quantity != RATE:
-        means, scatter = _unknocked(blocks, noise)
-    apart = quantity.steady + BEYOND * noise * np.sqrt(2 / width)
+        means, scatter = _average_unknocked(blocks, noise)
+    tolerance = quantity.steady + BEYOND * noise * np.sqrt(2 / width)
     gap_s = max(GAP * interval_s, BLOCK_S)  # a body is not moved away and back in a shorter one
     still = (scatter <= AS_QUIET * noise).all(axis=1) & (np.diff(times, axis=1).max(axis=1) <= gap_s)
-    follows = (times[1:, 0] - times[:-1, -1] <= gap_s) & (np.abs(np.diff(means, axis=0)) <= apart).all(axis=1)
+    follows = (times[1:, 0] - times[:-1, -1] <= gap_s) & (np.abs(np.diff(means, axis=0)) <= tolerance).all(axis=1)
     pairs = still[:-1] & still[1:] & follows
     if quantity == RATE and still.any():
-        still &= _unturned(means, _steady(still, pairs), apart, _within(times, lying))
+        still &= _find_unturned(means, _steady(still, pairs), tolerance, _within(times, lying))
         pairs &= still[:-1] & still[1:]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], pairs, [False]]).astype(np.int8))).reshape(-1, 2)
     return tuple(Window(float(times[first, 0]), float(times[last, -1])) for first, last in edges.tolist())
 
 
-def _unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
-    """Means and scatter (count, 3) of blocks (count, width, 3) without a few readings that a knock made.
+def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
+    """Return means and scatter (count, 3) of blocks (count, width, 3) without a few readings that are due to a knock.
 
-    Before and after these it reads the same. Not of a gyroscope, for a knock may have turned the body.
+    The readings before and after it are equal. Not for a gyroscope: a knock may have turned the body.
     """
     before, after = np.concatenate([blocks[:1, 0], blocks[:-1, -1]]), np.concatenate([blocks[1:, 0], blocks[-1:, -1]])
     widened = np.concatenate([before[:, None], blocks, after[:, None]], axis=1)
-    off = np.abs(widened - np.median(blocks, axis=1, keepdims=True))
-    knocked: NDArray[np.bool_] = np.any(off > KNOCK * noise, axis=2)
+    deviations = np.abs(widened - np.median(blocks, axis=1, keepdims=True))
+    knocked: NDArray[np.bool_] = np.any(deviations > KNOCK * noise, axis=2)
     few = (knocked.sum(axis=1) <= blocks.shape[1] // 4) & ~knocked[:, 0] & ~knocked[:, -1]
-    left = np.where((knocked[:, 1:-1] & few[:, None])[..., None], np.nan, blocks)
-    return np.nanmean(left, axis=1), np.nanstd(left, axis=1)
+    masked = np.where((knocked[:, 1:-1] & few[:, None])[..., None], np.nan, blocks)
+    return np.nanmean(masked, axis=1), np.nanstd(masked, axis=1)
 
 
 def _steady(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(count,) the blocks that read what a neighbour reads, if any does: one that turns ever faster does not."""
+    """Return the blocks (count,) that agree with a neighbour, if any does: one that turns ever faster does not."""
     steady = np.append(pairs, False) | np.append(False, pairs)
     return steady if steady.any() else still
 
 
 def _within(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
-    """(count,) the blocks, of times (count, width), that lie in one of the windows."""
-    found = np.zeros(len(times), dtype=np.bool_)
+    """Return the blocks (count,), by their times (count, width), that lie in one of the windows."""
+    mask = np.zeros(len(times), dtype=np.bool_)
     for window in windows:
         first, last = np.searchsorted(times[:, 0], window.start_s), np.searchsorted(times[:, -1], window.end_s, "right")
-        found[first:last] = True
-    return found
+        mask[first:last] = True
+    return mask
 
 
-def _unturned(means: Array, steady: NDArray[np.bool_], apart: Array, lying: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(count,) blocks that read what a gyroscope reads at rest: the most frequent reading of those where it lies."""
-    told = steady & lying
-    pool = means[told if told.any() else steady]
+def _find_unturned(
+    means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return the blocks (count,) at a gyroscope's rest reading: the most frequent one, of those declared at rest."""
+    declared = steady & lying
+    pool = means[declared if declared.any() else steady]
     candidates = pool[:: -(-len(pool) // CANDIDATES)]
-    often = np.array([np.count_nonzero((np.abs(pool - each) <= apart).all(axis=1)) for each in candidates])
-    frequent = candidates[often == often.max() if told.any() else often >= NEARLY * often.max()]
+    often = np.array(
+        [np.count_nonzero((np.abs(pool - candidate) <= tolerance).all(axis=1)) for candidate in candidates]
+    )
+    frequent = candidates[often == often.max() if declared.any() else often >= NEARLY * often.max()]
     middle = frequent[np.argmin(np.linalg.norm(frequent, axis=1))]
-    at_rest = np.median(pool[(np.abs(pool - middle) <= apart).all(axis=1)], axis=0)
-    agreeing: NDArray[np.bool_] = (np.abs(means - at_rest) <= apart).all(axis=1)
+    at_rest = np.median(pool[(np.abs(pool - middle) <= tolerance).all(axis=1)], axis=0)
+    agreeing: NDArray[np.bool_] = (np.abs(means - at_rest) <= tolerance).all(axis=1)
     return agreeing

@@ -1,4 +1,4 @@
-"""Whether a log of readings was made at rest, as far as the readings themselves tell."""
+"""A check that a log of readings was made at rest, by the readings themselves."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -15,26 +15,23 @@ BEYOND = 6.0  # standard deviations of the noise of a difference
 NORMAL = 1.4826  # standard deviation over median deviation
 
 
-def whole_stretches(time_s: Array) -> Iterator[slice]:
-    """The rows between the gaps of a log with increasing times (n,)."""
+def contiguous_slices(time_s: Array) -> Iterator[slice]:
+    """Yield the rows between the gaps of a log with increasing times (n,)."""
     gaps = 1 + np.flatnonzero(find_sampling(time_s).gaps(time_s))
     yield from (slice(start, end) for start, end in pairwise([0, *gaps.tolist(), len(time_s)]))
 
 
 def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:
-    """Readings (n, 3) at times (n,) must be as steady from second to second as their own noise lets them be.
-
-    Raises Fault `not_at_rest`.
-    """
+    """Raise Fault `not_at_rest` if readings (n, 3) at times (n,) change more than by noise from second to second."""
     block = np.floor((time_s - time_s[0]) / BLOCK_S).astype(np.intp)
     block = np.unique(block, return_inverse=True)[1]  # none is empty
     count = np.bincount(block)
-    means = np.column_stack([np.bincount(block, weights=each) / count for each in readings.T])
+    means = np.column_stack([np.bincount(block, weights=axis) / count for axis in readings.T])
     noise = NORMAL * np.median(np.abs(np.diff(readings, axis=0)), axis=0) / np.sqrt(2)
     fewest = np.minimum(count[1:], count[:-1])[:, None]
-    off = np.abs(np.diff(means, axis=0)) - BEYOND * noise * np.sqrt(2 / fewest)
-    if len(off) and (worst := float(off.max())) > quantity.steady:
-        at_s = float(time_s[np.searchsorted(block, int(off.max(axis=1).argmax()) + 1)])
+    excess = np.abs(np.diff(means, axis=0)) - BEYOND * noise * np.sqrt(2 / fewest)
+    if len(excess) and (worst := float(excess.max())) > quantity.steady:
+        at_s = float(time_s[np.searchsorted(block, int(excess.max(axis=1).argmax()) + 1)])
         raise Fault(
             "not_at_rest",
             f"about {at_s:.1f} s the {quantity} changes by {worst:.2g} {quantity.unit} within a second or two, "

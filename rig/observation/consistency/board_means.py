@@ -51,7 +51,7 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
     first, last = int(min(edges[0], boards[0])), int(max(edges[1], boards[1]))
     of_turn, of_board = slice(*(edges - first).tolist()), slice(*(boards - first).tolist())
     time_s = stream.time_s[first:last]
-    rates = recording.motion.sampled_rates(time_s)
+    rates = recording.motion.rates_at_samples(time_s)
     passing = _passing(time_s, turn, rates @ axis)
     residuals = (stream.readings_rad_s[first:last] - zero - rates @ by_rate.T)[of_turn]
     columns = np.column_stack([np.ones(len(residuals)), passing[of_turn]])

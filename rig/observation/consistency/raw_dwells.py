@@ -12,7 +12,7 @@ from rig.observation.average import between
 from rig.observation.consistency.raw_readings import REST, RawReadings, counts_of
 from rig.observation.field import read_field_in_dwells
 from rig.observation.observed_run import ObservedRun
-from rig.observation.reference.acceleration import DwellReading, gravity_beside
+from rig.observation.reference.acceleration import DwellReading, gravity_difference
 from rig.observation.windows import Window
 
 
@@ -52,7 +52,7 @@ def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) ->
         inside = between(stream, dwell.window.start_s, dwell.window.end_s)
         counts = counts_of(stream, ACCELERATION, inside)
         attitudes = recording.motion.attitudes(stream.time_s[inside])
-        swing = gravity_beside(attitudes, attitudes.mean(axis=0), stream.sensor, site) @ per_count.T
+        swing = gravity_difference(attitudes, attitudes.mean(axis=0), stream.sensor, site) @ per_count.T
         dwells.append(replace(_raw_dwell(dwell, counts, stream.time_s[inside], recording), swing_counts=swing))
     return dwells
 

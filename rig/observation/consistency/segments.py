@@ -156,7 +156,7 @@ def _segment_revolution(
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[between(stream, average.start_s, average.end_s)]
     division = _divide(stream, average, motion.covered(times_s), count)
-    rates = motion.sampled_rates(times_s)[division.used]
+    rates = motion.rates_at_samples(times_s)[division.used]
     fraction = (division.time_s - average.start_s) / average.duration_s
     lines = waves(average.lines_hz * average.duration_s, fraction, turn.beats)
     vibration = np.column_stack([rates @ axis, motion.rate(division.time_s, 1) @ axis])

@@ -129,7 +129,7 @@ def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array
     noise, at low frequencies too.
     """
     step_s = float(np.median(np.diff(time_s)))
-    rates = [motion.sampled_rates(time_s + shift * step_s) for shift in FILTERED]
+    rates = [motion.rates_at_samples(time_s + shift * step_s) for shift in FILTERED]
     gravity = flange_attitude(motion.angles(time_s), motion.kinematics) @ down_m_s2
     columns = unit_columns(np.column_stack([np.ones(len(time_s)), *rates, gravity]))
     residuals = readings - columns @ np.linalg.lstsq(columns, readings, rcond=None)[0]
@@ -167,7 +167,7 @@ def _whole_transfer(start_s: float, end_s: float, stream: Stream, motion: ArmMot
     complete = len(time_s) >= (1 - LOST) * (transfer.end_s - transfer.start_s) * stream.sensor.rate_hz
     complete &= bool(np.diff(time_s).max() < GAP * step_s)
     ends = np.linalg.norm(motion.rate(np.array([transfer.start_s, transfer.end_s])), axis=1)
-    in_range = not stream.sensor.channel(RATE).saturated(stream.raw[samples]).any()
+    in_range = not stream.sensor.channel(RATE).is_saturated(stream.raw[samples]).any()
     stands = ends.max() < 2 * MIN_RATE_RAD_S
     if is_by_wrists(transfer) and complete and in_range and stands and motion.covered(time_s).all():
         yield transfer

@@ -1,1 +1,1 @@
-"""Recordings made elsewhere: from columns of samples, sweeps and attitudes to observations."""
+"""External recordings: from columns of samples, sweeps and attitudes to observations."""

@@ -1,18 +1,18 @@
-"""Data recorded elsewhere in known attitudes: a CSV file of samples and one of attitudes, as TRIAX uses them.
+"""External data in known attitudes: a CSV file of samples and one of attitudes, in TRIAX's format.
 
-samples: as `rig.observation.external.csv_samples` says.
+samples: see `rig.observation.external.csv_samples`.
 
 attitudes: `start_s`, `end_s` on the same clock and `qw qx qy qz`, the unit quaternion that takes body to table
-coordinates; where the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates; where it is
-known how good the attitude is, `attitude_std_rad` about each axis. While the table turns, a row holds for its middle
-and should be short: down to one sample, whose noise is then taken from how all rows scatter about the model. Only a
-gyroscope is solved from rows in which the body moves; accelerometers and magnetometers use those at rest
+coordinates; while the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates; and
+`attitude_std_rad` about each axis, if it is known. While the table turns, a row holds for its middle and should be
+short: down to one sample, whose noise is then estimated from the scatter of all rows about the model. Only a gyroscope
+is solved from rows in which the body moves; accelerometers and magnetometers use those at rest
 (`rig.observation.external.placements`).
 
-Columns may stand in any order; the first row holds their names.
+Columns may have any order; the first row holds their names.
 
-Where the table wrote its attitudes by a clock of its own, the samples' is found by the turning that both saw, as a
-board's is on the arm (`rig.observation.timebase`).
+If the table has a clock of its own, its offset is found from the rotation that both files show, like a board's on the
+arm (`rig.observation.timebase`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -34,8 +34,8 @@ from rig.observation.external.csv_windows import (
     check_overlap,
     check_scattered,
     clocks_apart,
+    find_overlap,
     is_complete,
-    overlapping,
     scatter_of,
 )
 from rig.observation.external.fixes import Turning
@@ -57,10 +57,10 @@ NORM_TOLERANCE = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """What a gyroscope read in N rows: `means` (N, 3), the `variances` (N, 3) of these, known with `freedom` (N, 3).
+    """A gyroscope's averages in N rows: `means` (N, 3), their `variances` (N, 3) and the `freedom` (N, 3) of these.
 
-    No variances where rows hold too few samples to show their noise. `samples` (N,); `attitudes` (N, 3, 3), body to
-    table; `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if they were given.
+    No variances if rows hold too few samples to show their noise. `samples` (N,); `attitudes` (N, 3, 3), body to table;
+    `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if they were given.
     """
 
     means: Array
@@ -74,12 +74,12 @@ class Rows:
 
 @dataclass(frozen=True, slots=True)
 class PlacedReadings:
-    """What the two files tell of the `quantities` that were recorded.
+    """The contents of the two files, for the `quantities` that were recorded.
 
-    A gyroscope's `rows`, and in `turning` its own readings and all rows, for what is solved from how far the body
-    turned; for the other sensors `placements`, or why there are none. `clock` where it had to be found. `omitted` are
-    rows that the recording does not cover, `incomplete` those that tell no mean rate, `unsampled` those that tell no
-    placement, for samples are missing in them.
+    A gyroscope's `rows`, and in `turning` its own readings and all rows, for a solution by rotation angles; for the
+    other sensors `placements`, or the fault. `clock` if it had to be found. Left out are the `omitted` rows, which the
+    recording does not cover, and for missing samples the `incomplete` rows, without a mean rate, and the `unsampled`
+    ones, without a placement.
     """
 
     quantities: tuple[Quantity, ...]
@@ -93,63 +93,69 @@ class PlacedReadings:
 
 
 def read_attitudes(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
-    """The columns (N,) of a file of attitudes, in whichever format it is; `mapped` where its columns are others'.
+    """Return the columns (N,) of a file of attitudes in any format; `mapped` if its columns have other names.
 
-    Times of a table of text count from `origin_s`.
-    Raises as `attitudes_in`; Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    Times of a text table count from `origin_s`. Raise as `attitudes_in`; Refused `no_file`, `wrong_columns`,
+    `wrong_unit`, `not_a_number`.
     """
-    found = attitudes_in(path)
-    return read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB, mapped, origin_s) if found is None else dict(found)
+    columns = attitudes_in(path)
+    return (
+        read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB, mapped, origin_s) if columns is None else dict(columns)
+    )
 
 
 def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
-    """Samples averaged in attitudes, given by the columns of their file.
+    """Average samples in attitudes, given by the columns of their file.
 
-    With `find_clock` each has its own clock; rows that no sample covers are left out. Raises Refused `bad_quaternion`,
-    `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`, `too_few_observations`, and with
-    `find_clock` as `TableMotion` and `estimate_time_base`.
+    With `find_clock` each file has its own clock; rows that no sample covers are left out. Raise Refused
+    `bad_quaternion`, `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`,
+    `too_few_observations`, and with `find_clock` as `TableMotion` and `estimate_time_base`.
     """
     time_s, readings = samples.time_s, samples.readings
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
     windows = _windows(table)
-    given = said = _Said(windows, _rotations(table), rates, _stated(table), np.arange(1, len(windows) + 1))
+    all_rows = rows_found = _ReferenceRows(
+        windows, _rotations(table), rates, _attitude_std(table), np.arange(1, len(windows) + 1)
+    )
     clock = None
     if find_clock:
         _check_has_rates(readings)
-        clock = estimate_time_base(time_s, readings[RATE], TableMotion(said.rows_s.mean(axis=1), said.attitudes, rates))
+        clock = estimate_time_base(
+            time_s, readings[RATE], TableMotion(rows_found.rows_s.mean(axis=1), rows_found.attitudes, rates)
+        )
         time_s = clock.controller_time_s(time_s)
-        said = said.of(np.flatnonzero(_within(said.rows_s, time_s)))
-    if not said.windows:
+        rows_found = rows_found.select(np.flatnonzero(_within(rows_found.rows_s, time_s)))
+    if not rows_found.windows:
         raise clocks_apart(time_s, windows)
-    check_overlap(time_s, said.windows)
+    check_overlap(time_s, rows_found.windows)
     sampling = find_sampling(time_s)
     check_scattered(sampling)
-    expected = sampling.count_expected(time_s, said.rows_s)
-    counts = np.diff(np.searchsorted(time_s, said.rows_s), axis=1)[:, 0]
+    expected = sampling.count_expected(time_s, rows_found.rows_s)
+    counts = np.diff(np.searchsorted(time_s, rows_found.rows_s), axis=1)[:, 0]
     mostly = (counts > 0) & (counts >= MOSTLY * expected - 1)
-    sampled = said.of(np.flatnonzero(mostly))
-    covered = said.of(np.flatnonzero(mostly | _within(said.rows_s, time_s)))
-    whole = said.of(_whole(said, counts, expected))
+    sampled = rows_found.select(np.flatnonzero(mostly))
+    covered = rows_found.select(np.flatnonzero(mostly | _within(rows_found.rows_s, time_s)))
+    whole = rows_found.select(_find_complete(rows_found, counts, expected))
     rate = readings.get(RATE)
-    rows = AttitudeRows(sampled.windows, sampled.attitudes, sampled.numbers, sampled.std_rad)
-    place = partial(find_placements, time_s, readings, rows)
+    placement_rows = AttitudeRows(sampled.windows, sampled.attitudes, sampled.numbers, sampled.std_rad)
+    find = partial(find_placements, time_s, readings, placement_rows)
     return PlacedReadings(
         tuple(readings),
         None if rate is None else _rows(time_s, rate, whole),
-        None if rate is None else Turning(time_s, rate, said.rows_s, said.attitudes, said.std_rad),
-        None if set(readings) == {RATE} else or_fault(place),  # a gyroscope needs none
+        None if rate is None else Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad),
+        None if set(readings) == {RATE} else or_fault(find),  # a gyroscope needs none
         clock,
-        tuple(_omitted(given, covered, "not covered by the recording")),
-        tuple(_omitted(covered, whole, "lost_samples: samples are missing in them")),
-        tuple(_omitted(covered, sampled, "lost_samples: half of their samples or more are missing")),
+        tuple(_list_omitted(all_rows, covered, "not covered by the recording")),
+        tuple(_list_omitted(covered, whole, "lost_samples: samples are missing in them")),
+        tuple(_list_omitted(covered, sampled, "lost_samples: half of their samples or more are missing")),
     )
 
 
 @dataclass(frozen=True, slots=True)
-class _Said:
+class _ReferenceRows:
     """The rows of a reference: `attitudes` (N, 3, 3), `rates_rad_s` (N, 3) and `std_rad` (N,), if they were given.
 
-    `numbers` (N,) are theirs in the file, from 1.
+    `numbers` (N,) are those of the rows in the file, from 1.
     """
 
     windows: list[Window]
@@ -162,9 +168,9 @@ class _Said:
     def rows_s(self) -> Array:
         return np.array([(window.start_s, window.end_s) for window in self.windows])
 
-    def of(self, rows: NDArray[np.intp]) -> "_Said":
-        rates, std = (None if each is None else each[rows] for each in (self.rates_rad_s, self.std_rad))
-        return _Said([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
+    def select(self, rows: NDArray[np.intp]) -> "_ReferenceRows":
+        rates, std = (None if values is None else values[rows] for values in (self.rates_rad_s, self.std_rad))
+        return _ReferenceRows([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
 
 
 def _within(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
@@ -173,21 +179,21 @@ def _within(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
     return within
 
 
-def _omitted(given: _Said, kept: _Said, reason: str) -> Iterator[Omitted]:
-    """The rows that were given and not kept, if there are any."""
-    if lost := np.setdiff1d(given.numbers, kept.numbers).tolist():
-        window = given.windows[given.numbers.tolist().index(lost[0])]
-        yield Omitted("rows", len(lost), len(given.windows), reason, f"row {lost[0]}, from {window.start_s:.10g} s")
+def _list_omitted(rows: _ReferenceRows, kept: _ReferenceRows, reason: str) -> Iterator[Omitted]:
+    """Yield the rows that were given and not kept, if there are any."""
+    if lost := np.setdiff1d(rows.numbers, kept.numbers).tolist():
+        window = rows.windows[rows.numbers.tolist().index(lost[0])]
+        yield Omitted("rows", len(lost), len(rows.windows), reason, f"row {lost[0]}, from {window.start_s:.10g} s")
 
 
-def _rows(time_s: Array, rate: Array, fixes: _Said) -> Rows:
+def _rows(time_s: Array, rate: Array, fixes: _ReferenceRows) -> Rows:
     cuts = [rate[inside(time_s, window)] for window in fixes.windows]
     counts = np.array([len(cut) for cut in cuts])
-    told = np.array([scatter_of(cut)[:2] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None
+    noise = np.array([scatter_of(cut)[:2] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None
     return Rows(
         np.array([cut.mean(axis=0) for cut in cuts]),
-        None if told is None else told[:, 0],
-        None if told is None else told[:, 1],
+        None if noise is None else noise[:, 0],
+        None if noise is None else noise[:, 1],
         counts.astype(np.float64),
         fixes.attitudes,
         fixes.rates_rad_s,
@@ -195,13 +201,13 @@ def _rows(time_s: Array, rate: Array, fixes: _Said) -> Rows:
     )
 
 
-def _whole(rows: _Said, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
-    """The rows whose samples are there.
+def _find_complete(rows: _ReferenceRows, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
+    """Return the rows whose samples are complete.
 
-    Raises Fault `lost_samples` where there is none, or where more of the long ones lack samples than have them all: a
-    short row among many may fall into a gap.
+    Raise Fault `lost_samples` if none is, or if more of the long ones lack samples than are complete: a short row among
+    many may fall into a gap.
     """
-    whole = np.array([is_complete(*each, least=1) for each in zip(counts.tolist(), expected.tolist(), strict=True)])
+    whole = np.array([is_complete(*pair, least=1) for pair in zip(counts.tolist(), expected.tolist(), strict=True)])
     long = expected >= MIN_SAMPLES
     if not whole.any() or 2 * int((long & ~whole).sum()) > int(long.sum()):
         row = int(np.argmin(whole))
@@ -230,7 +236,7 @@ def _windows(rows: Mapping[str, Array]) -> list[Window]:
                 f"attitude {row} ends before it starts",
                 "Give start_s before end_s, on the samples' clock",
             )
-    if shared := overlapping(windows):
+    if shared := find_overlap(windows):
         raise Refused(
             "overlapping_attitudes",
             f"attitudes {shared[0]} and {shared[1]} share samples",
@@ -254,12 +260,12 @@ def _rotations(rows: Mapping[str, Array]) -> Array:
     return np.asarray(Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]).as_matrix(), dtype=np.float64)
 
 
-def _stated(rows: Mapping[str, Array]) -> Array | None:
-    stated = rows.get(STD_COLUMN)
-    if stated is not None and (stated < 0).any():
+def _attitude_std(rows: Mapping[str, Array]) -> Array | None:
+    std_rad = rows.get(STD_COLUMN)
+    if std_rad is not None and (std_rad < 0).any():
         raise Refused(
             "bad_attitude_row",
-            f"attitude {int(np.argmin(stated)) + 1} has a negative {STD_COLUMN}",
+            f"attitude {int(np.argmin(std_rad)) + 1} has a negative {STD_COLUMN}",
             "Give the standard deviation of the attitude about each axis in rad, 0 if it is exact",
         )
-    return stated
+    return std_rad

@@ -1,17 +1,17 @@
-"""Data recorded elsewhere: a CSV file of samples and one of sweeps, solved as the rig solves its own recordings.
+"""External data: a CSV file of samples and one of sweeps, solved like the rig's own recordings.
 
-samples: as `rig.observation.external.csv_samples` says, a gyroscope's among them; other sensors' are left alone.
+samples: see `rig.observation.external.csv_samples`, with a gyroscope's; those of other sensors are not used.
 
 sweeps: `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a frame fixed to
 the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned from start to
-end). A row of speed or angle 0 is a rest; its axis means nothing. Where the table or servo vibrates, let the sweep be a
-whole turn: over that its mean speed is 2π/T all the same. It may say how well it is known: `angle_std_rad`, how far the
-body may have ended off where it was said to, and `axis_std_rad`, how far the axis may have leaned.
+end). A row of speed or angle 0 is a rest, without an axis. If the table or servo vibrates, the sweep should be a whole
+turn: over that its mean speed is 2π/T in any case. Standard deviations may be given: `angle_std_rad` of the angle
+reached, and `axis_std_rad` of the direction of the axis.
 
-A row with an angle at both ends of which the body lay still is solved by how far the gyroscope turned meanwhile
+A row with an angle and with the body at rest at both ends is solved by the angle that the gyroscope measured
 (`rig.estimation.gyroscope.known_turns`): that is how a hand turns, or a servo that starts and stops.
 
-Columns may stand in any order; the first row holds their names.
+Columns may have any order; the first row holds their names.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -33,10 +33,10 @@ from rig.observation.external.csv_windows import (
     check_overlap,
     check_scattered,
     check_times,
-    overlapping,
+    find_overlap,
 )
 from rig.observation.external.omitted import Omitted
-from rig.observation.external.turns import Known, TurnedData, turned
+from rig.observation.external.turns import DeclaredTurns, TurnedData, find_turns
 from rig.observation.formats.csv_table import Mapped, read_columns
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.sampling import Sampling, find_sampling
@@ -45,18 +45,18 @@ from rig.observation.windows import Window, inside
 
 AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
 STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
-MIN_DURATION_S = 1e-3  # so many samples need longer at any rate
+MIN_DURATION_S = 1e-3  # the fewest samples take longer at any data rate
 LEAST_MOTION = 1e-9  # rad or rad/s: no sweep, and its square might be 0
 SWEEPS_MB = 1  # some ten thousand sweeps
 
 
 @dataclass(frozen=True, slots=True)
 class ExternalData:
-    """What the two files tell: averaged sweeps and rests, in the order of the rows; `turned` where a body was.
+    """The contents of the two files: averaged sweeps and rests, in the order of the rows; `turned` if a body was.
 
-    `at_reference`: taken to one temperature by polynomials, which count what repeats contradict each other by.
-    `by_mean`: the numbers of the rows with an angle whose mean speed is all that counts, for the body did not lie still
-    before or after. `omitted`: the readings that are missing in the rows.
+    `at_reference`: corrected to one temperature by polynomials that include the contradictions of repeats. `by_mean`:
+    numbers of the rows with an angle of which only the mean speed counts, for the body did not lie still before or
+    after. `omitted`: readings that are missing in the rows.
     """
 
     sweeps: tuple[Observation, ...]
@@ -68,47 +68,46 @@ class ExternalData:
 
 
 def read_sweeps(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
-    """The columns (k,) of a file of sweeps, times from `origin_s` on.
+    """Return the columns (k,) of a file of sweeps, times from `origin_s` on.
 
-    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     return read_columns(path, MOTIONS["sweeps"], SWEEPS_MB, mapped, origin_s)
 
 
-def averaged(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
-    """Samples, a gyroscope's among them, averaged over sweeps, given by the columns of their file.
+def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
+    """Average samples, a gyroscope's among them, over sweeps given by the columns of their file.
 
-    Raises Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault as `average` does, `stuck_sensor`.
+    Raise Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault as `average` does, `stuck_sensor`.
     """
     check_reads(samples.readings[RATE], RATE)
-    found = average(
+    data = average(
         np.column_stack([samples.time_s, samples.readings[RATE]]),
         np.column_stack([sweeps["start_s"], sweeps["end_s"], _speeds(sweeps)]),
         np.column_stack([sweeps[name] for name in AXIS_COLUMNS]),
         samples.temperature_c,
     )
     if "angle_rad" not in sweeps:
-        return found
-    known = Known(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
-    by_angle = turned(samples.time_s, samples.readings[RATE], known, found.sweeps, found.rests)
+        return data
+    declared = DeclaredTurns(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
+    by_angle = find_turns(samples.time_s, samples.readings[RATE], declared, data.sweeps, data.rests)
     solved = () if by_angle is None else by_angle.rows
-    by_mean = tuple(each.sweep for each in found.sweeps if each.sweep not in solved)
-    return replace(found, turned=by_angle, by_mean=by_mean)
+    by_mean = tuple(sweep.sweep for sweep in data.sweeps if sweep.sweep not in solved)
+    return replace(data, turned=by_angle, by_mean=by_mean)
 
 
 def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | None = None) -> ExternalData:
-    """Samples (n, 4) = [time_s, x, y, z] averaged over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
+    """Average samples (n, 4) = [time_s, x, y, z] over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
 
-    `temperature_c` (n,) is how warm it was at each sample, None where nothing tells that.
-    Raises Refused `time_not_increasing`, `overlapping_sweeps`; Fault `too_few_observations`, `clocks_apart`,
-    `lost_samples`, `wrong_unit`.
+    `temperature_c` (n,) is that of each sample, None without a thermometer. Raise Refused `time_not_increasing`,
+    `overlapping_sweeps`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`, `wrong_unit`.
     """
     time_s, readings = samples[:, 0], samples[:, 1:]
     check_times(time_s)
     if not len(sweeps):
         raise Fault("too_few_observations", "there is no sweep", "Give a row for every sweep and every rest")
     windows = [Window(start_s, end_s) for start_s, end_s in sweeps[:, :2].tolist()]
-    if shared := overlapping(windows):
+    if shared := find_overlap(windows):
         raise Refused(
             "overlapping_sweeps",
             f"sweeps {shared[0]} and {shared[1]} share samples",
@@ -135,18 +134,18 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
 
 
 def _missing(time_s: Array, sampling: Sampling, windows: Sequence[Window]) -> Iterator[Omitted]:
-    """The readings that are missing between those of the rows, if there are any."""
+    """Yield the number of readings that are missing within the rows, if there are any."""
     cuts = [inside(time_s, window) for window in windows]
     gaps = [cut.start + np.flatnonzero(sampling.missing[cut.start : max(cut.stop - 1, cut.start)]) for cut in cuts]
-    if lost := int(sum(sampling.missing[each].sum() for each in gaps)):
-        row = next(row for row, each in enumerate(gaps) if len(each))
+    if lost := int(sum(sampling.missing[gap].sum() for gap in gaps)):
+        row = next(row for row, gap in enumerate(gaps) if len(gap))
         where = f"after {time_s[gaps[row][0]]:.10g} s, in row {row + 1}"
         total = lost + sum(cut.stop - cut.start for cut in cuts)
         yield Omitted("readings", lost, total, "lost_samples: they are missing", where)
 
 
 def _speeds(sweeps: Mapping[str, Array]) -> Array:
-    """Mean speeds (k,), from whichever of the two columns there is. Raises Refused `bad_sweep`."""
+    """Return mean speeds (k,), from whichever of the two columns there is. Raise Refused `bad_sweep`."""
     durations = sweeps["end_s"] - sweeps["start_s"]
     by_angle = "angle_rad" in sweeps
     motion = sweeps["angle_rad" if by_angle else "speed_rad_s"]
@@ -192,9 +191,9 @@ def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Ob
 
 
 def _check_unit(turns: Sequence[Observation]) -> None:
-    """Readings counted from their mean, which takes the bias out, must be about as large as the speeds."""
+    """Raise Fault `wrong_unit` if readings less their mean, which removes the bias, differ in size from the speeds."""
     if len(turns) < 2:
         return
     means = np.array([turn.average.mean_rad_s for turn in turns])
-    turned = np.sqrt(np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=1)))
-    check_reading_ratio(float(turned / np.sqrt(np.mean([turn.speed_rad_s**2 for turn in turns]))), "the sweeps")
+    rms_rad_s = np.sqrt(np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=1)))
+    check_reading_ratio(float(rms_rad_s / np.sqrt(np.mean([turn.speed_rad_s**2 for turn in turns]))), "the sweeps")

@@ -1,12 +1,11 @@
-"""A file of samples that somebody else recorded: a column for each axis of what was read, in SI units.
+"""An external file of samples: a column for each axis of each quantity, in SI units.
 
-`time_s`, which must increase, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (what an
-accelerometer feels: at rest the opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla). `temperature_c` may
-stand there too, as `rig export` writes it: a calibration over temperature needs it, nothing else does. Columns may
-stand in any order; the first row holds their names. One recording serves every command: each uses the quantities it
-knows what to do with.
+`time_s`, which must increase, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (specific force: at
+rest the opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla). `temperature_c` may be there too, as `rig
+export` writes it, for a calibration over temperature. Columns may have any order; the first row holds their names. One
+recording serves every command: each uses the quantities that it needs.
 
-Loggers of several sensors leave cells blank where a row belongs to another one. Such rows are left out, and counted.
+Loggers of several sensors leave cells blank if a row belongs to another one. Such rows are left out, and counted.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -33,7 +32,7 @@ SAMPLES_MB = 256  # an hour at 1 kHz
 class SampleTable:
     """The `columns` (n,) of a file of readings by name, without a blank; times count from `origin_s`.
 
-    `others` more rows of the file held none of the readings that were wanted.
+    `others`: number of further rows of the file without the readings that were wanted.
     """
 
     columns: Columns
@@ -45,8 +44,8 @@ class SampleTable:
 class Samples:
     """A file's readings: `time_s` (n,), increasing, and (n, 3) of every quantity it holds, in SI units.
 
-    `temperature_c` (n,) is None where there is no such column. Times are evened where readings were stamped on arrival;
-    `sampling` is that of the stamps.
+    `temperature_c` (n,) is None without such a column. Times are evened if readings were stamped on arrival; `sampling`
+    is that of the stamps.
     """
 
     time_s: Array
@@ -56,23 +55,23 @@ class Samples:
 
 
 def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None) -> Samples:
-    """Return the readings of a file as `samples_in`. Raises Refused as this, and as `read_sample_table`."""
-    only = [each.sensor for each in needed]
+    """Return the readings of a file as `samples_in`. Raise Refused as that, and as `read_sample_table`."""
+    only = [quantity.sensor for quantity in needed]
     return samples_in(read_sample_table(path, needed, mapped, only).columns, str(path))
 
 
 def read_sample_table(
     path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None, only: Collection[str] = ()
 ) -> SampleTable:
-    """Return the columns of a file, in whichever format it is: the quantities `needed` and whatever others it holds.
+    """Return the columns of a file in any format: the quantities `needed` and all others it holds.
 
-    `mapped` is for a table whose columns are others'. Of rows with blank cells those count that hold all quantities of
-    the sensors that are `only` wanted, or all that the file has.
-    Raises Refused as `readings_in`, `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `blank_cells`.
+    `mapped` is for a table whose columns have other names. Rows with blank cells count if they hold all quantities of
+    the sensors in `only`, or all that the file has. Raise Refused as `readings_in`, `no_file`, `wrong_columns`,
+    `wrong_unit`, `not_a_number`, `blank_cells`.
     """
-    found = readings_in(path)
-    if found is not None:
-        columns, others = found
+    readings = readings_in(path)
+    if readings is not None:
+        columns, others = readings
         for quantity in needed:
             if quantity.columns[0] not in columns:
                 raise Refused(
@@ -80,14 +79,14 @@ def read_sample_table(
                 )
         return SampleTable(columns, others=others)
     table = read_table(path, samples_header(needed), SAMPLES_MB, mapped)
-    there = [each for each in quantities().values() if each.columns[0] in table.columns]
-    read = {quantity: _read(path, table, quantity) for quantity in there}
-    wanted = [each for each in there if each.sensor in only] or there
-    return _without_blanks(path, table, read, wanted)
+    present = [quantity for quantity in quantities().values() if quantity.columns[0] in table.columns]
+    read = {quantity: _read(path, table, quantity) for quantity in present}
+    wanted = [quantity for quantity in present if quantity.sensor in only] or present
+    return _drop_blanks(path, table, read, wanted)
 
 
 def _read(path: Path, table: Table, quantity: Quantity) -> NDArray[np.bool_]:
-    """(n,) the rows that hold a quantity. Raises Refused `not_a_number` where one of its axes is blank alone."""
+    """Return the rows (n,) that hold a quantity. Raise Refused `not_a_number` if some of its axes are blank."""
     blank = np.isnan([table.columns[name] for name in quantity.columns])
     if len(partly := np.flatnonzero(blank.any(axis=0) & ~blank.all(axis=0))):
         row = int(partly[0])
@@ -97,12 +96,12 @@ def _read(path: Path, table: Table, quantity: Quantity) -> NDArray[np.bool_]:
     return read
 
 
-def _without_blanks(
+def _drop_blanks(
     path: Path, table: Table, read: Mapping[Quantity, NDArray[np.bool_]], wanted: Sequence[Quantity]
 ) -> SampleTable:
-    """The rows that hold all that is wanted. Raises Refused `blank_cells` where no row does, or only some do."""
+    """Return the rows that hold all that is wanted. Raise Refused `blank_cells` if no row does, or only some do."""
     columns, time_s = dict(table.columns), table.columns[TIME]
-    if not wanted or all(read[each].all() for each in read):
+    if not wanted or all(read[quantity].all() for quantity in read):
         kept = np.ones(len(time_s), dtype=np.bool_)
     else:
         kept = read[wanted[0]]
@@ -110,18 +109,18 @@ def _without_blanks(
         if (read[quantity] != kept).any():
             raise _apart(path, quantity, wanted, read)
     for quantity in read:
-        if not read[quantity][kept].all():  # it was read in other rows, and nobody asked for it
+        if not read[quantity][kept].all():  # it was read in other rows, and is not wanted
             for name in quantity.columns:
                 del columns[name]
     if len(blank := np.flatnonzero(np.isnan(time_s) & kept)):
         raise blank_cell(path, TIME, int(table.lines[blank[0]]))
     temperature = TEMPERATURE.columns[0]
     if temperature in columns:
-        known = ~np.isnan(columns[temperature]) & ~np.isnan(time_s)
-        if not known.any():
+        valid = ~np.isnan(columns[temperature]) & ~np.isnan(time_s)
+        if not valid.any():
             del columns[temperature]
-        elif not known[kept].all():  # nothing is as slow as a temperature
-            columns[temperature] = np.interp(time_s, time_s[known], columns[temperature][known])
+        elif not valid[kept].all():  # nothing is as slow as a temperature
+            columns[temperature] = np.interp(time_s, time_s[valid], columns[temperature][valid])
     return SampleTable({name: column[kept] for name, column in columns.items()}, table.origin_s, int((~kept).sum()))
 
 
@@ -139,14 +138,14 @@ def _apart(
 
 
 def samples_in(table: Columns, where: str) -> Samples:
-    """Return the readings of columns (n,), said to stand `where`; stamped on arrival, at even times.
+    """Return the readings in columns (n,), called `where` in messages; if stamped on arrival, at even times.
 
-    Raises Refused `wrong_columns`, `not_a_number`, `time_not_increasing`.
+    Raise Refused `wrong_columns`, `not_a_number`, `time_not_increasing`.
     """
-    given = [each for each in quantities().values() if each.columns[0] in table]
-    if not given:
-        known = ", or ".join(" ".join(each.columns) for each in quantities().values())
-        raise Refused("wrong_columns", f"{where} holds no readings", f"Its first row must name time_s and {known}")
+    present = [quantity for quantity in quantities().values() if quantity.columns[0] in table]
+    if not present:
+        names = ", or ".join(" ".join(quantity.columns) for quantity in quantities().values())
+        raise Refused("wrong_columns", f"{where} holds no readings", f"Its first row must name time_s and {names}")
     for name, column in table.items():
         if len(wrong := np.flatnonzero(~np.isfinite(column))):
             raise Refused(
@@ -155,7 +154,7 @@ def samples_in(table: Columns, where: str) -> Samples:
                 "Leave out what was not measured, or record again",
             )
     check_times(table[TIME], where)
-    readings = {quantity: np.column_stack([table[name] for name in quantity.columns]) for quantity in given}
+    readings = {quantity: np.column_stack([table[name] for name in quantity.columns]) for quantity in present}
     sampling = find_sampling(table[TIME])
     time_s = even_times(table[TIME], sampling)
     return Samples(time_s, readings, table.get(TEMPERATURE.columns[0]), sampling)

@@ -1,4 +1,4 @@
-"""What CSV files recorded elsewhere have in common: samples in the order of time, rows from one moment to another."""
+"""Functions for all external files: samples in the order of time, and rows from one time to another."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -17,14 +17,14 @@ MAX_LOST_FRACTION = 0.01
 
 
 def check_times(time_s: Array, where: str = "the samples") -> None:
-    """Raises Refused `time_not_increasing`, which says `where`."""
+    """Raise Refused `time_not_increasing`, which names `where`, if samples are too few or their times do not rise."""
     what = f"{where} has {len(time_s)} samples, {MIN_SAMPLES} are the least" if len(time_s) < MIN_SAMPLES else None
-    back = np.flatnonzero(~(np.diff(time_s) > 0))
-    if len(back):
-        first = int(back[0])
+    steps_back = np.flatnonzero(~(np.diff(time_s) > 0))
+    if len(steps_back):
+        first = int(steps_back[0])
         what = (
             f"{where} has time_s {time_s[first + 1]:.9g} after {time_s[first]:.9g}, in sample {first + 2}, and "
-            f"{len(back)} such steps in all: time_s must increase from row to row"
+            f"{len(steps_back)} such steps in all: time_s must increase from row to row"
         )
     if what is not None:
         raise Refused(
@@ -34,8 +34,8 @@ def check_times(time_s: Array, where: str = "the samples") -> None:
         )
 
 
-def overlapping(windows: Sequence[Window]) -> tuple[int, int] | None:
-    """Numbers, from 1, of two windows that share samples."""
+def find_overlap(windows: Sequence[Window]) -> tuple[int, int] | None:
+    """Return the numbers, from 1, of two windows that share samples; None without such a pair."""
     order = np.argsort([window.start_s for window in windows]).tolist()
     for first, second in pairwise(order):
         if windows[second].start_s < windows[first].end_s:
@@ -44,9 +44,9 @@ def overlapping(windows: Sequence[Window]) -> tuple[int, int] | None:
 
 
 def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
-    """Variance of the mean of readings (n, 3), its degrees of freedom, and the standard deviation of one, (3,) each.
+    """Return the variance of the mean of readings (n, 3), its degrees of freedom, and one reading's std, (3,) each.
 
-    From the scatter about the mean; vibration counts as noise here, for no arm reports it.
+    From the scatter about the mean; a vibration counts as noise, for no arm reports it.
     """
     variance = readings.var(axis=0, ddof=1)
     residuals = (readings - readings.mean(axis=0)).T
@@ -56,7 +56,7 @@ def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
 
 
 def average_of(readings: Array, window: Window) -> Average:
-    """The average of the readings (n, 3) that a window has; nothing tells their temperature."""
+    """Return the average of a window's readings (n, 3); their temperature is unknown."""
     variance, freedom, noise = scatter_of(readings)
     return Average(
         mean_rad_s=readings.mean(axis=0),
@@ -74,7 +74,7 @@ ONE_CLOCK = "Check that both files use one clock in seconds, and that no samples
 
 
 def check_complete(count: int, expected: float, window: Window, where: str, least: int = MIN_SAMPLES) -> None:
-    """Raises Fault `lost_samples` where fewer samples are in a window than are `expected` there."""
+    """Raise Fault `lost_samples` if a window holds fewer samples than `expected`."""
     if is_complete(count, expected, least):
         return
     lasts_s = window.end_s - window.start_s
@@ -90,7 +90,7 @@ def is_complete(count: int, expected: float, least: int = MIN_SAMPLES) -> bool:
 
 
 def check_scattered(sampling: Sampling) -> None:
-    """Raises Fault `lost_samples` where many readings are missing, and stamps are too bad to say which."""
+    """Raise Fault `lost_samples` if many readings are missing at positions that bad stamps do not show."""
     if sampling.scattered > MAX_LOST_FRACTION:
         raise Fault(
             "lost_samples",
@@ -101,14 +101,14 @@ def check_scattered(sampling: Sampling) -> None:
 
 
 def check_overlap(time_s: Array, windows: Sequence[Window]) -> None:
-    """Raises Fault `clocks_apart` where no window holds any of the samples at times (n,)."""
-    if all(each.end_s < time_s[0] or each.start_s > time_s[-1] for each in windows):
+    """Raise Fault `clocks_apart` if no window holds any of the samples at times (n,)."""
+    if all(window.end_s < time_s[0] or window.start_s > time_s[-1] for window in windows):
         raise clocks_apart(time_s, windows)
 
 
 def clocks_apart(time_s: Array, windows: Sequence[Window]) -> Fault:
-    """The error for windows of which none holds a sample."""
-    start_s, end_s = min(each.start_s for each in windows), max(each.end_s for each in windows)
+    """Return the error for windows none of which holds a sample."""
+    start_s, end_s = min(window.start_s for window in windows), max(window.end_s for window in windows)
     return Fault(
         "clocks_apart",
         f"the rows reach from {start_s:.10g} to {end_s:.10g} s, the samples from {time_s[0]:.10g} to "

@@ -1,4 +1,4 @@
-"""What a gyroscope reads while readings and a reference's attitudes both say that the body lies still."""
+"""A gyroscope's mean readings in rests that its readings and a reference's attitudes both show."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ from rig.observation.external.fixes import Turning
 from rig.observation.external.still_attitudes import STILL_RAD_S, still_windows
 from rig.observation.windows import Window, inside
 
-FEWEST, FEWEST_S = 2, 1.0  # rests, which tell by their scatter how well each is known, and seconds of them in all
+FEWEST, FEWEST_S = 2, 1.0  # rests, for a scatter between them, and their duration in all
 
 
 @dataclass(frozen=True, slots=True)
 class MeansAtRest:
-    """The gyroscope's mean `readings_rad_s` (k, 3) of k rests, and how fast the body turned by the reference (k, 3)."""
+    """The gyroscope's mean `readings_rad_s` (k, 3) in k rests, and the body's rate by the reference (k, 3)."""
 
     readings_rad_s: Array
     rates_rad_s: Array
 
 
 def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
-    """Return what both say of the rests, in the body's coordinates; None if the rests are too short in all.
+    """Return the means in the rests, in the body's coordinates; None if the rests are too short in all.
 
     `clock_s` takes the times of the rows to the clock of the readings.
     """
@@ -47,7 +47,7 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
 
 
 def _several(windows: Sequence[Window]) -> Sequence[Window]:
-    """The windows, of a single one its halves."""
+    """Return the windows; of a single one its halves."""
     if len(windows) != 1:
         return windows
     window = windows[0]
@@ -56,7 +56,7 @@ def _several(windows: Sequence[Window]) -> Sequence[Window]:
 
 
 def _rate_rad_s(times_s: Array, attitudes: Array) -> Array:
-    """How fast the body turned (3,) by rows in the order of time: none by a single one, which says that it lay still.
+    """Return the body's rate (3,) by rows in the order of time; zero by a single one, which declares that it lay still.
 
     The median of the rates from each row to the one half of them later (Theil's incomplete method, 1950): rows at an
     end in which it moved already do not count.
@@ -64,5 +64,5 @@ def _rate_rad_s(times_s: Array, attitudes: Array) -> Array:
     half = len(times_s) // 2
     if not half:
         return np.zeros(3)
-    turned = rotation_vectors(np.swapaxes(attitudes[:half], -1, -2) @ attitudes[-half:])
-    return np.asarray(np.median(turned / (times_s[-half:] - times_s[:half])[:, None], axis=0), dtype=np.float64)
+    angles_rad = rotation_vectors(np.swapaxes(attitudes[:half], -1, -2) @ attitudes[-half:])
+    return np.asarray(np.median(angles_rad / (times_s[-half:] - times_s[:half])[:, None], axis=0), dtype=np.float64)

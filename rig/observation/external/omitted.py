@@ -1,13 +1,13 @@
-"""What a solution leaves out of a recording: counted, with the reason and the first of it."""
+"""Parts of a recording that a solution leaves out: counted, with the reason and the first of them."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Omitted:
-    """So many of a `total` of `what` (rows, increments, readings) that were left out, for a `reason` in words.
+    """The number, out of a `total`, of `what` (rows, increments, readings) was left out, for a `reason` in words.
 
-    `first` says where the first of them is: its row, its time.
+    `first` locates the first of them: its row, its time.
     """
 
     what: str

@@ -1,4 +1,4 @@
-"""What of a reference's rows and of their readings is no placement: counted, with reason, row and time."""
+"""The rows of a reference and the readings in them that are no placement: counted, with reason, row and time."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from rig.observation.windows import Window, inside
 class AttitudeRows:
     """Rows (N,) of a reference: their `windows`, `attitudes` (N, 3, 3), body to table, and `numbers` (N,) in its file.
 
-    `std_rad` (N,) of the attitudes as stated, None where nothing is.
+    `std_rad` (N,) of the attitudes as stated, or None.
     """
 
     windows: Sequence[Window]
@@ -29,10 +29,10 @@ class AttitudeRows:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Which `rows` (N,) of a reference are placements of readings at `time_s` (n,): in which `rest` (N,), −1 in none.
+    """The placements among `rows` (N,) of a reference, for readings at `time_s` (n,): the `rest` of each, or −1.
 
-    `cuts` (N,) are the samples of each that are at rest. `dwells` (N,) are the rows that are long enough to say that
-    the body lay still in them; in the others it may move.
+    `cuts` (N,) are the samples of each row that are at rest. `dwells` (N,) are the rows that are long enough to declare
+    that the body lay still; in the others it may move.
     """
 
     time_s: Array
@@ -42,7 +42,7 @@ class Account:
     dwells: NDArray[np.bool_]
 
     def check_mostly_at_rest(self) -> None:
-        """Raises Fault `not_at_rest` where the body moves in every row, or in more of the dwells than it lies in."""
+        """Raise Fault `not_at_rest` if the body moves in every row, or in more dwells than it lies still in."""
         left_out, windows = int((self.rest[self.dwells] < 0).sum()), self.rows.windows
         if (self.rest >= 0).any() and 2 * left_out <= int(self.dwells.sum()):
             return
@@ -55,32 +55,36 @@ class Account:
             "Add attitudes in which it lies still for half a second or longer; begin a row when it lies still",
         )
 
-    def omitted(self, knocked: NDArray[np.intp]) -> Iterator[Omitted]:
+    def list_omitted(self, knocked: NDArray[np.intp]) -> Iterator[Omitted]:
         """Yield the rows that are left out, and of other dwells the readings: those `knocked` (k,), moved, missing."""
         yield from self._moving(np.ones_like(self.dwells))
         kept = [self._inside(row) for row in self._kept]
         total = sum(map(len, kept))
-        knocks = [np.intersect1d(knocked, each) for each in kept]
-        moved = [self._moved(row) for row in self._kept]
-        for found, reason in (
+        knocks = [np.intersect1d(knocked, samples) for samples in kept]
+        moved = [self._find_moved(row) for row in self._kept]
+        for samples_by_row, reason in (
             (knocks, "knocks that the others did not feel"),
             (moved, "not_at_rest: the body was knocked or moved"),
         ):
-            if count := sum(map(len, found)):
-                row, samples = next((row, each) for row, each in zip(self._kept, found, strict=True) if len(each))
+            if count := sum(map(len, samples_by_row)):
+                row, samples = next(
+                    (row, samples) for row, samples in zip(self._kept, samples_by_row, strict=True) if len(samples)
+                )
                 yield Omitted(
                     "readings at rest", count, total, reason, self._where(row, float(self.time_s[samples[0]]))
                 )
         yield from self._missing(kept)
 
     def _missing(self, kept: Sequence[NDArray[np.intp]]) -> Iterator[Omitted]:
-        """The readings that are missing in dwells with the samples `kept`, if there are any."""
+        """Yield the readings that are missing in dwells with the samples `kept`, if there are any."""
         sampling = find_sampling(self.time_s)
-        windows_s = np.array([(each.start_s, each.end_s) for each in self.rows.windows]).reshape(-1, 2)
+        windows_s = np.array([(samples.start_s, samples.end_s) for samples in self.rows.windows]).reshape(-1, 2)
         expected = np.floor(sampling.count_expected(self.time_s, windows_s[self._kept])).astype(int)
-        gaps = [each[:-1][sampling.missing[each[:-1]] > 0] for each in kept]
-        inside = [int(sampling.missing[each].sum()) for each in gaps]
-        lost = [max(within, wanted - len(each)) for within, wanted, each in zip(inside, expected, kept, strict=True)]
+        gaps = [samples[:-1][sampling.missing[samples[:-1]] > 0] for samples in kept]
+        inside = [int(sampling.missing[samples].sum()) for samples in gaps]
+        lost = [
+            max(within, wanted - len(samples)) for within, wanted, samples in zip(inside, expected, kept, strict=True)
+        ]
         if not any(lost):
             return
         first = next(number for number, count in enumerate(lost) if count)
@@ -109,8 +113,8 @@ class Account:
     def _inside(self, row: int) -> NDArray[np.intp]:
         return np.arange(*inside(self.time_s, self.rows.windows[row]).indices(len(self.time_s)))
 
-    def _moved(self, row: int) -> NDArray[np.intp]:
-        """The samples of a dwell that are not at rest; a rest is known to a block at either end."""
+    def _find_moved(self, row: int) -> NDArray[np.intp]:
+        """Return the samples of a dwell that are not at rest; a rest is located to a block at either end."""
         window, left_out = self.rows.windows[row], np.setdiff1d(self._inside(row), self.cuts[row])
         near = (self.time_s[left_out] < window.start_s + BLOCK_S) | (self.time_s[left_out] > window.end_s - BLOCK_S)
         return left_out[~near]

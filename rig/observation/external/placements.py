@@ -1,10 +1,10 @@
-"""What sensors read in the attitudes in which a body was laid down: only rests tell gravity, or a field.
+"""Sensor readings in the attitudes in which a body was laid down: only rests show gravity, or a field.
 
 A placement is a rest of the recording (`rig.observation.by_hand.rests`) and the rows of a reference that fall into it:
-rows that follow each other without a movement in between are one placement, however many they are. Rests of which the
-reference says nothing tell the size of what is felt all the same.
+rows that follow each other without a movement in between are one placement. Rests without a row of the reference still
+show the size of the quantity.
 
-A knock costs the readings that felt it, and no more: where the body reads the same before and after, it lay still.
+A knock costs only the readings during it: if the readings before and after are equal, the body lay still.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ from rig.data.installed_kinds import quantities
 from rig.data.quantity import RATE, Quantity
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import nearest_rotation
-from rig.observation.by_hand.knocks import without_knocks
+from rig.observation.by_hand.knocks import mask_knocks
 from rig.observation.by_hand.rests import BLOCK_S, COUNTS, find_rests
 from rig.observation.by_hand.steadiness import BEYOND
 from rig.observation.external.csv_windows import MIN_SAMPLES, scatter_of
@@ -27,16 +27,16 @@ from rig.observation.external.still_attitudes import DWELL_S, still_windows
 from rig.observation.statistics.mean import Mean
 from rig.observation.windows import Window, inside
 
-TURNED_RAD = 0.02  # rows of one rest that are farther apart: it was turned about what it feels
-INTERRUPTED_S = 1.0  # a body that reads the same before and after lay still, for as long at most
-MOSTLY = 0.5  # of a dwell, in which the body lies still: then the rest of it is left out, and not the dwell
+TURNED_RAD = 0.02  # rows of one rest that are farther apart: the body was turned about the measured vector
+INTERRUPTED_S = 1.0  # longest knock after which equal readings show that the body lay still
+MOSTLY = 0.5  # of a dwell: if the body lies still for as long, only the remainder is left out
 
 
 @dataclass(frozen=True, slots=True)
 class Rested:
-    """What N rests tell: `means` (N, 3) of every quantity, their `variances` (N, 3), the `freedom` (N, 3) of these.
+    """Averages in N rests: `means` (N, 3) of every quantity, their `variances` (N, 3), the `freedom` (N, 3) of these.
 
-    `windows` from the first to the last of the `samples` (N,) that each has.
+    `windows` reach from the first to the last of the `samples` (N,) of each rest.
     """
 
     means: Mapping[Quantity, Array]
@@ -46,7 +46,7 @@ class Rested:
     samples: tuple[int, ...]
 
     def mean(self, quantity: Quantity, rest: int) -> Mean:
-        """What was read in one of them."""
+        """Return the mean reading in one of them."""
         variance, samples = self.variances[quantity][rest], self.samples[rest]
         noise = np.sqrt(variance * samples)
         return Mean(self.means[quantity][rest], variance, noise, samples, self.freedom[quantity][rest])
@@ -54,10 +54,10 @@ class Rested:
 
 @dataclass(frozen=True, slots=True)
 class Placements:
-    """N placements: what was `read`, `attitudes` (N, 3, 3), body to table, and `attitude_std_rad` (N,) as stated.
+    """N placements: the averages `read`, `attitudes` (N, 3, 3), body to table, and `attitude_std_rad` (N,) as stated.
 
-    `elsewhere` are rests without an attitude; `left_out` how many rows were none, for the body moved. `omitted` says
-    what else is left out, and of dwells which.
+    `elsewhere` are rests without an attitude; `left_out` is the number of rows without a placement, in which the body
+    moved. `omitted` holds what else is left out.
     """
 
     read: Rested
@@ -70,65 +70,65 @@ class Placements:
 
 @dataclass(frozen=True, slots=True)
 class _Rest:
-    """A rest in `pieces`, which knocks have cut, and the numbers of its `samples`."""
+    """A rest in `windows` between knocks, and the indices of its `samples`."""
 
     number: int
-    pieces: tuple[Window, ...]
+    windows: tuple[Window, ...]
     samples: NDArray[np.intp]
 
     @property
     def start_s(self) -> float:
-        return self.pieces[0].start_s
+        return self.windows[0].start_s
 
     @property
     def end_s(self) -> float:
-        return self.pieces[-1].end_s
+        return self.windows[-1].end_s
 
 
 def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: AttitudeRows) -> Placements:
-    """Return the placements found in readings (n, 3) at rising times (n,) by a reference's rows.
+    """Return the placements in readings (n, 3) at rising times (n,) by a reference's rows.
 
-    Raises Fault `not_at_rest` where the body moves in every row, or in more of the dwells than it lies still in.
+    Raise Fault `not_at_rest` if the body moves in every row, or in more of the dwells than it lies still in.
     """
     dwells = np.array([window.end_s - window.start_s >= DWELL_S for window in rows.windows])
     windows_s = np.array([(window.start_s, window.end_s) for window in rows.windows])
     lying = still_windows(windows_s, rows.attitudes)
-    pieces = _rejoined(time_s, readings, find_rests(time_s, readings, lying=lying))
+    joined = _join_rests(time_s, readings, find_rests(time_s, readings, lying=lying))
     rests = [
-        _Rest(number, each, np.concatenate([_closed(time_s, piece) for piece in each]))
-        for number, each in enumerate(pieces)
+        _Rest(number, windows, np.concatenate([_closed_slice(time_s, window) for window in windows]))
+        for number, windows in enumerate(joined)
     ]
-    starts, ends = np.array([each.start_s for each in rests]), np.array([each.end_s for each in rests])
-    found = []
+    starts, ends = np.array([windows.start_s for windows in rests]), np.array([windows.end_s for windows in rests])
+    matches = []
     for window in rows.windows:
-        near = slice(*(int(np.searchsorted(*each)) for each in ((ends, window.start_s), (starts, window.end_s))))
-        found.append(_placed(time_s, window, rests[near]))
-    rest, cuts = np.array([number for number, _ in found]), [cut for _, cut in found]
+        near = slice(*(int(np.searchsorted(*windows)) for windows in ((ends, window.start_s), (starts, window.end_s))))
+        matches.append(_find_rest(time_s, window, rests[near]))
+    rest, cuts = np.array([number for number, _ in matches]), [cut for _, cut in matches]
     groups = _groups(rest, rows.attitudes)
     account = Account(time_s, rows, rest, cuts, dwells)
     account.check_mostly_at_rest()
     covered = [np.unique(np.concatenate([cuts[row] for row in group])) for group in groups]
-    named = {int(each) for each in rest}
+    named = {int(windows) for windows in rest}
     read, knocked = _read(time_s, readings, covered)
     return Placements(
         read,
         np.array([nearest_rotation(rows.attitudes[group].mean(axis=0)) for group in groups]),
         None if rows.std_rad is None else np.array([np.sqrt(np.mean(rows.std_rad[group] ** 2)) for group in groups]),
-        _read(time_s, readings, [each.samples for each in rests if each.number not in named])[0],
+        _read(time_s, readings, [windows.samples for windows in rests if windows.number not in named])[0],
         int((rest < 0).sum()),
-        tuple(account.omitted(knocked)),
+        tuple(account.list_omitted(knocked)),
     )
 
 
-def _closed(time_s: Array, window: Window) -> NDArray[np.intp]:
-    """The samples of a window, those at either end too."""
+def _closed_slice(time_s: Array, window: Window) -> NDArray[np.intp]:
+    """Return the samples of a window, including those at either end."""
     first, last = np.searchsorted(time_s, window.start_s), np.searchsorted(time_s, window.end_s, side="right")
     return np.arange(first, last)
 
 
-def _rejoined(time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window]) -> list[tuple[Window, ...]]:
-    """Rests in pieces, which knocks have cut: it reads the same before and after, and has not turned in between."""
-    quantity = next(each for each in quantities().values() if each in readings)
+def _join_rests(time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window]) -> list[tuple[Window, ...]]:
+    """Return rests joined across knocks: readings are equal before and after, and the body has not turned between."""
+    quantity = next(quantity for quantity in quantities().values() if quantity in readings)
     joined: list[tuple[Window, ...]] = []
     for rest in rests:
         if joined and _same_rest(time_s, readings[quantity], quantity, joined[-1][-1], rest):
@@ -141,22 +141,22 @@ def _rejoined(time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence
 def _same_rest(time_s: Array, read: Array, quantity: Quantity, before: Window, after: Window) -> bool:
     if after.start_s - before.end_s > INTERRUPTED_S:
         return False
-    one, other = (read[_closed(time_s, each)] for each in (before, after))
+    one, other = (read[_closed_slice(time_s, window)] for window in (before, after))
     noise = np.maximum(np.minimum(one.std(axis=0), other.std(axis=0)), COUNTS * quantity.steady)
-    apart = quantity.steady + BEYOND * noise * np.sqrt(1 / len(one) + 1 / len(other))
-    if (np.abs(one.mean(axis=0) - other.mean(axis=0)) > apart).any():
+    tolerance = quantity.steady + BEYOND * noise * np.sqrt(1 / len(one) + 1 / len(other))
+    if (np.abs(one.mean(axis=0) - other.mean(axis=0)) > tolerance).any():
         return False
-    between = _closed(time_s, Window(before.end_s, after.start_s))
-    if np.diff(time_s[between]).max() > BLOCK_S:
+    knock = _closed_slice(time_s, Window(before.end_s, after.start_s))
+    if np.diff(time_s[knock]).max() > BLOCK_S:
         return False
     if quantity != RATE:
         return True
-    turned = np.trapezoid(read[between] - one.mean(axis=0), time_s[between], axis=0)
-    return bool(np.linalg.norm(turned) <= TURNED_RAD)
+    turned_rad = np.trapezoid(read[knock] - one.mean(axis=0), time_s[knock], axis=0)
+    return bool(np.linalg.norm(turned_rad) <= TURNED_RAD)
 
 
-def _placed(time_s: Array, window: Window, rests: Sequence[_Rest]) -> tuple[int, NDArray[np.intp]]:
-    """The number of the rest that a row lies in, −1 of none, and its samples at rest.
+def _find_rest(time_s: Array, window: Window, rests: Sequence[_Rest]) -> tuple[int, NDArray[np.intp]]:
+    """Return the number of the rest that a row lies in, −1 of none, and its samples at rest.
 
     All of a row lies in it, to a block at either end; of a dwell most, if the body lies nowhere else in it.
     """
@@ -164,7 +164,7 @@ def _placed(time_s: Array, window: Window, rests: Sequence[_Rest]) -> tuple[int,
     met: list[tuple[int, float, NDArray[np.intp]]] = []
     for rest in rests:
         overlap_s = sum(
-            max(min(window.end_s, each.end_s) - max(window.start_s, each.start_s), 0) for each in rest.pieces
+            max(min(window.end_s, match.end_s) - max(window.start_s, match.start_s), 0) for match in rest.windows
         )
         cut = rest.samples[slice(*np.searchsorted(rest.samples, [row.start, row.stop]).tolist())]
         if overlap_s <= 0 or not len(cut):
@@ -175,12 +175,12 @@ def _placed(time_s: Array, window: Window, rests: Sequence[_Rest]) -> tuple[int,
     lasts_s = window.end_s - window.start_s
     if lasts_s < DWELL_S or sum(overlap_s > BLOCK_S for _, overlap_s, _ in met) != 1:
         return -1, nothing
-    number, overlap_s, cut = max(met, key=lambda each: each[1])
+    number, overlap_s, cut = max(met, key=lambda match: match[1])
     return (number, cut) if overlap_s >= MOSTLY * lasts_s else (-1, nothing)
 
 
 def _groups(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
-    """The rows of each placement."""
+    """Return the rows of each placement."""
     groups: list[list[int]] = []
     last: dict[int, list[int]] = {}
     for row in np.flatnonzero(rest >= 0).tolist():
@@ -194,39 +194,39 @@ def _groups(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
 
 
 def _apart(one: Array, other: Array) -> float:
-    """The angle by which two rotations (3, 3) differ, rad."""
+    """Return the angle between two rotations (3, 3), rad."""
     return float(np.arccos(np.clip((np.trace(one.T @ other) - 1) / 2, -1, 1)))
 
 
 def _read(
     time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]
 ) -> tuple[Rested, NDArray[np.intp]]:
-    """The means of the rests, of few samples with the noise of all long enough; and the samples that were knocked."""
+    """Return the means of the rests, and the samples that were knocked; rests of few samples take the others' noise."""
     means, variances, freedom = {}, {}, {}
     knocked = np.zeros(0, dtype=np.intp)
-    for quantity, each in readings.items():
-        axes = each.shape[1]
-        untold = (np.full(axes, np.nan), np.full(axes, np.nan))  # variances and their freedom, of too few samples
-        kept = [cut[without_knocks(each[cut], quantity)] for cut in cuts]
+    for quantity, values in readings.items():
+        axes = values.shape[1]
+        unknown = (np.full(axes, np.nan), np.full(axes, np.nan))  # variances and their freedom, of too few samples
+        kept = [cut[mask_knocks(values[cut], quantity)] for cut in cuts]
         knocked = np.unique(np.concatenate([knocked, *map(np.setdiff1d, cuts, kept)]))
-        means[quantity] = np.array([each[cut].mean(axis=0) for cut in kept]).reshape(-1, axes)
-        found = [scatter_of(each[cut])[:2] if len(cut) >= MIN_SAMPLES else untold for cut in kept]
-        told, counted = np.array(found).reshape(-1, 2, axes).swapaxes(0, 1)
-        variances[quantity] = _filled(told, np.array([len(cut) for cut in kept]), each, quantity)
-        fewest = len(each) - 1.0 if np.isnan(counted).all() else np.nanmin(counted)
-        freedom[quantity] = np.where(np.isnan(counted), fewest, counted)
+        means[quantity] = np.array([values[cut].mean(axis=0) for cut in kept]).reshape(-1, axes)
+        estimates = [scatter_of(values[cut])[:2] if len(cut) >= MIN_SAMPLES else unknown for cut in kept]
+        noise, dofs = np.array(estimates).reshape(-1, 2, axes).swapaxes(0, 1)
+        variances[quantity] = _fill_variances(noise, np.array([len(cut) for cut in kept]), values, quantity)
+        fewest = len(values) - 1.0 if np.isnan(dofs).all() else np.nanmin(dofs)
+        freedom[quantity] = np.where(np.isnan(dofs), fewest, dofs)
     windows = tuple(Window(float(time_s[cut[0]]), float(time_s[cut[-1]])) for cut in cuts)
     return Rested(means, variances, freedom, windows, tuple(map(len, cuts))), knocked
 
 
-def _filled(variances: Array, counts: NDArray[np.intp], readings: Array, quantity: Quantity) -> Array:
-    """(N, 3) variances with what too few samples do not tell, from the others or from how readings (n, 3) jump."""
+def _fill_variances(variances: Array, counts: NDArray[np.intp], readings: Array, quantity: Quantity) -> Array:
+    """Return variances (N, 3) with missing ones taken from the others or from the jumps of readings (n, 3)."""
     unknown = np.isnan(variances[:, 0])
     if not unknown.any():
         return variances
     if unknown.all():
         jumps = np.diff(readings, axis=0)
-        of_one = jumps[without_knocks(jumps, quantity)].var(axis=0) / 2
+        of_one = jumps[mask_knocks(jumps, quantity)].var(axis=0) / 2
     else:
         of_one = np.median((variances * counts[:, None])[~unknown], axis=0)
     return np.where(unknown[:, None], of_one / np.maximum(counts, 1)[:, None], variances)

@@ -1,4 +1,4 @@
-"""The motion of a table that wrote its attitudes into a file: for the clock of whatever was recorded on it."""
+"""The motion of a table with a file of attitudes, for the clock of what was recorded on it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ class TableMotion:
     """A `KnownMotion` from rows that follow each other closely, each of which holds for its middle.
 
     `middles_s` (n,) in any order, on the table's clock; `attitudes` (n, 3, 3) take body to table coordinates;
-    `rates_rad_s` (n, 3) in body coordinates, None where the attitudes are all that is known.
-    Raises Fault `time_base_not_found`.
+    `rates_rad_s` (n, 3) in body coordinates, None if only the attitudes are known. Raise Fault `time_base_not_found`.
     """
 
     def __init__(self, middles_s: Array, attitudes: Array, rates_rad_s: Array | None) -> None:
@@ -31,7 +30,7 @@ class TableMotion:
             )
         self._close = close
         if rates_rad_s is None:
-            between_s, rates = _turned(self.time_s, attitudes[order])
+            between_s, rates = _differentiate(self.time_s, attitudes[order])
             self._rate = CubicSpline(between_s, rates)
         else:
             rates = rates_rad_s[order]
@@ -40,17 +39,17 @@ class TableMotion:
             raise _not_found("the table stands still in the whole file")
 
     def rate(self, time_s: Array, derivative: int = 0, /) -> Array:
-        """The table's rate (n, 3), or its derivative, as of `KnownMotion`."""
+        """Return the table's rate (n, 3), or its derivative, as `KnownMotion` defines it."""
         rate: Array = self._rate(time_s, derivative)
         return rate
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Whether the table's motion is known at times (n,), as of `KnownMotion`."""
+        """Return whether the table's motion is recorded at times (n,), as `KnownMotion` defines it."""
         return closely_followed(self.time_s, self._close, time_s)
 
 
-def _turned(time_s: Array, attitudes: Array) -> tuple[Array, Array]:
-    """Mean rates (n − 1, 3) in body coordinates from each row to the next, and the times (n − 1,) in the middle."""
+def _differentiate(time_s: Array, attitudes: Array) -> tuple[Array, Array]:
+    """Return mean rates (n − 1, 3) in body coordinates from each row to the next, and the times (n − 1,) between."""
     from scipy.spatial.transform import Rotation
 
     rotations = Rotation.from_matrix(attitudes)

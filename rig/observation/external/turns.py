@@ -1,6 +1,6 @@
-"""Which rows of a table of sweeps are turns from rest to rest, and which sweeps at a speed that had been reached.
+"""Turns from rest to rest among the rows of a table of sweeps; the other rows are sweeps at a constant speed.
 
-The first are solved by how far the gyroscope turned, whatever its speed on the way was; the others by their mean.
+A turn is solved by the angle that the gyroscope measured, whatever its speed; a sweep by its mean.
 """
 
 from collections.abc import Sequence
@@ -19,19 +19,18 @@ from rig.observation.observe import Observation
 from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window, inside
 
-REACH_S = 0.5  # between a turn's end, as somebody marked it, and the rest that it belongs to
+REACH_S = 0.5  # between the marked end of a turn and the rest that it belongs to
 EDGE_SAMPLES = 2  # either side of an end
-STANDING = 0.25  # of the mean speed: what turns slower at both ends had stood still
-BY_HAND_ANGLE_RAD = float(np.radians(0.3))  # how well a hand brings a body back against its stop, where nobody says
-BY_HAND_AXIS_RAD = 0.02  # how far it leans on the way
+STANDING = 0.25  # of the mean speed: a body slower at both ends started and stopped there
+BY_HAND_ANGLE_RAD = float(np.radians(0.3))  # default repeatability of a body turned by hand against its stop
+BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 
 
 @dataclass(frozen=True, slots=True)
 class TurnedData:
-    """What is solved by increments: the gyroscope, the turns, by the rows' numbers, and the means beside them.
+    """The input of a solution by increments: the gyroscope, the turns, the numbers of their rows, and the means.
 
-    `noise_freedom`, `bias_freedom`: with how many degrees of freedom the rests tell its noise, and how its bias
-    differs between them.
+    `noise_freedom`, `bias_freedom`: degrees of freedom of its noise, and of its bias' change between rests.
     """
 
     gyroscope: Gyroscope
@@ -43,19 +42,19 @@ class TurnedData:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """What the table says of row after row (k,): `angle_rad`, and how well angle and axis are known, or None."""
+class DeclaredTurns:
+    """The table's rows (k,): `angle_rad`, and standard deviations of angle and axis, or None."""
 
     angle_rad: Array
     angle_std_rad: Array | None
     axis_std_rad: Array | None
 
 
-def turned(
-    time_s: Array, readings: Array, known: Known, sweeps: Sequence[Observation], rests: Sequence[Average]
+def find_turns(
+    time_s: Array, readings: Array, declared: DeclaredTurns, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
-    """The turns from rest to rest among sweeps; None where there are none. `readings` (n, 3) in rad/s at `time_s`."""
-    lying = find_rests(time_s, {RATE: readings}, lying=_between_all(time_s, sweeps))
+    """Return the turns from rest to rest among sweeps, or None without any. `readings` (n, 3) in rad/s at `time_s`."""
+    lying = find_rests(time_s, {RATE: readings}, lying=_find_pauses(time_s, sweeps))
     if not lying:
         return None
     resting = rests or [average_of(readings[inside(time_s, window)], window) for window in lying]
@@ -64,14 +63,14 @@ def turned(
     turns, rows, means = [], [], [Mean(rest.mean_rad_s, rest.variance_rad2_s2, np.zeros(3)) for rest in resting]
     for sweep in sweeps:
         row = sweep.sweep - 1
-        window = _between(sweep, lying)
-        if window is None or not _stood(time_s, rates, sweep):
+        window = _enclosing_window(sweep, lying)
+        if window is None or not _starts_and_stops(time_s, rates, sweep):
             average = sweep.average
             means.append(Mean(average.mean_rad_s, average.variance_rad2_s2, sweep.speed_rad_s * sweep.axis_flange))
             continue
-        angle_std = BY_HAND_ANGLE_RAD if known.angle_std_rad is None else float(known.angle_std_rad[row])
-        axis_std = BY_HAND_AXIS_RAD if known.axis_std_rad is None else float(known.axis_std_rad[row])
-        angle = float(known.angle_rad[row])
+        angle_std = BY_HAND_ANGLE_RAD if declared.angle_std_rad is None else float(declared.angle_std_rad[row])
+        axis_std = BY_HAND_AXIS_RAD if declared.axis_std_rad is None else float(declared.axis_std_rad[row])
+        angle = float(declared.angle_rad[row])
         turns.append(Turn(window.start_s, window.end_s, sweep.axis_flange, angle, angle_std, axis_std))
         rows.append(sweep.sweep)
     if not turns:
@@ -83,16 +82,16 @@ def turned(
     return TurnedData(gyroscope, tuple(turns), tuple(rows), tuple(means), samples, max(len(resting) - 1, 1))
 
 
-def _between_all(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:
-    """The time that no sweep takes: nowhere else is the body said to lie still."""
-    taken = sorted((each.average.start_s, each.average.end_s) for each in sweeps)
-    starts = [float(time_s[0]), *(end_s for _, end_s in taken)]
-    ends = [*(start_s for start_s, _ in taken), float(time_s[-1])]
+def _find_pauses(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:
+    """Return the time that no sweep takes, in which alone the body is declared to lie still."""
+    intervals = sorted((sweep.average.start_s, sweep.average.end_s) for sweep in sweeps)
+    starts = [float(time_s[0]), *(end_s for _, end_s in intervals)]
+    ends = [*(start_s for start_s, _ in intervals), float(time_s[-1])]
     return [Window(start_s, end_s) for start_s, end_s in zip(starts, ends, strict=True) if end_s > start_s]
 
 
-def _between(sweep: Observation, lying: Sequence[Window]) -> Window | None:
-    """The time from the end of the rest before a sweep to the beginning of the one after, where both are near."""
+def _enclosing_window(sweep: Observation, lying: Sequence[Window]) -> Window | None:
+    """Return the window from the rest before a sweep to the rest after it, or None if either is far."""
     start_s, end_s = sweep.average.start_s, sweep.average.end_s
     before = [rest for rest in lying if rest.start_s < start_s and rest.end_s >= start_s - REACH_S]
     after = [rest for rest in lying if rest.end_s > end_s and rest.start_s <= end_s + REACH_S]
@@ -101,11 +100,11 @@ def _between(sweep: Observation, lying: Sequence[Window]) -> Window | None:
     return Window(min(before[-1].end_s, start_s), max(after[0].start_s, end_s))
 
 
-def _stood(time_s: Array, rates: Array, sweep: Observation) -> bool:
-    """Whether it hardly turned at either end of a row: there, nobody had cut it out of a longer turn."""
+def _starts_and_stops(time_s: Array, rates: Array, sweep: Observation) -> bool:
+    """Return whether a sweep hardly turns at either end: then it was not cut out of a longer turn."""
     for at_s in (sweep.average.start_s, sweep.average.end_s):
-        there = int(np.searchsorted(time_s, at_s))
-        around = rates[max(there - EDGE_SAMPLES, 0) : there + EDGE_SAMPLES]
+        index = int(np.searchsorted(time_s, at_s))
+        around = rates[max(index - EDGE_SAMPLES, 0) : index + EDGE_SAMPLES]
         if np.linalg.norm(around.mean(axis=0)) > STANDING * sweep.speed_rad_s:
             return False
     return True

@@ -1,8 +1,8 @@
 """Readings and attitudes from a ROS 2 bag, without ROS: `sensor_msgs/Imu` and `MagneticField`, and poses.
 
-A reading has the time of its message's header, so readings and poses stand on the clock of whoever stamped them. A pose
-(`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in the room. What reads a bag runs in a process of its
-own (`rig.observation.formats.sample_files`) and keeps no more of the bag than a piece.
+A reading has the time in its message's header, so readings and poses are on the clock that stamped them. A pose
+(`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in the room. The reader runs in a process of its own
+(`rig.observation.formats.sample_files`) and keeps one block of the bag at a time.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,58 +26,58 @@ POSES = (
     "geometry_msgs/msg/TransformStamped",
 )
 QUATERNION = ("qw", "qx", "qy", "qz")
-NOT_PROVIDED = -1.0  # sensor_msgs/Imu: first element of a covariance of what a message does not hold
+NOT_PROVIDED = -1.0  # sensor_msgs/Imu: first element of the covariance of a quantity that a message does not hold
 SUFFIXES = (".mcap", ".db3")
 METADATA = "metadata.yaml"
-METADATA_BYTES = 4_000_000  # of two thousand topics, with all that is said of how each was sent
-METADATA_VALUES = 50_000  # of a thousand topics; rosbags takes 50 µs for each, whatever becomes of it
+METADATA_BYTES = 4_000_000  # of two thousand topics with all their settings of quality of service
+METADATA_VALUES = 50_000  # of a thousand topics; rosbags takes 50 µs for each
 DEFINITION_CHARACTERS = 100_000  # ten times what ROS 2 writes of a message, with all comments
 NANO = 10**9
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is a bag, a folder with its metadata or one of its files."""
+    """Return whether a path is a bag: a folder with its metadata, or one of its files."""
     return (path / METADATA).exists() if path.is_dir() else path.suffix in SUFFIXES
 
 
 def bag_of(path: Path) -> Path:
-    """Return the folder of a bag, of which `path` may be one of the files; a file without metadata beside it is one."""
+    """Return the folder of a bag, of which `path` may be a file; a file without metadata next to it is a bag itself."""
     return path if path.is_dir() or not (path.parent / METADATA).exists() else path.parent
 
 
 def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
-    """Yield, `in_blocks`, the readings of the topic `inside` a bag, or of the only one with an Imu.
+    """Yield, in blocks, the readings of the topic `inside` a bag, or of the only topic with an Imu.
 
-    The columns are those of a CSV file, times are from the beginning of the bag on, and rows in the order of the bag.
-    Messages that hold no rate are left out and counted, and accelerations are left out if some of the others hold none.
-    Raise Refused `missing_extra`, `bag_topic`, and of a damaged bag whatever its parser ends in.
+    The columns are those of a CSV file, times count from the beginning of the bag, and rows have the order of the bag.
+    Messages without a rate are left out and counted; accelerations are left out if some of the other messages hold
+    none. Raise Refused `missing_extra` or `bag_topic`, and for a damaged bag whatever its parser raises.
     """
-    with _opened(path) as reader:
-        chosen = _chosen(reader, (IMU,) if inside is None else (IMU, MAGNETIC), inside, "readings")
+    with _open_bag(path) as reader:
+        chosen = _select_topic(reader, (IMU,) if inside is None else (IMU, MAGNETIC), inside, "readings")
         if chosen[0].msgtype == MAGNETIC:
-            fields = ((time_s, *_xyz(message.magnetic_field)) for time_s, message in _stamped(reader, chosen))
+            fields = ((time_s, *_xyz(message.magnetic_field)) for time_s, message in _read_messages(reader, chosen))
             yield from in_blocks(fields, [TIME, *FIELD.columns])
             return
         columns: list[str | None] = [TIME, *RATE.columns, *ACCELERATION.columns]
         counts = {LEFT_OUT: 0}
-        yield from in_blocks(_inertial(_stamped(reader, chosen), columns, counts), columns, counts)
+        yield from in_blocks(_inertial(_read_messages(reader, chosen), columns, counts), columns, counts)
 
 
 def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
-    """Yield, `in_blocks`, the poses in a bag: a time and a quaternion each. Raise as `bag_readings`."""
-    with _opened(path) as reader:
-        poses = _stamped(reader, _chosen(reader, POSES, inside, "attitudes"))
-        turned = ((time_s, _orientation(message)) for time_s, message in poses)
-        yield from in_blocks(((time_s, q.w, q.x, q.y, q.z) for time_s, q in turned), [TIME, *QUATERNION])
+    """Yield, in blocks, the poses in a bag: a time and a quaternion each. Raise as `bag_readings`."""
+    with _open_bag(path) as reader:
+        poses = _read_messages(reader, _select_topic(reader, POSES, inside, "attitudes"))
+        orientations = ((time_s, _orientation(message)) for time_s, message in poses)
+        yield from in_blocks(((time_s, q.w, q.x, q.y, q.z) for time_s, q in orientations), [TIME, *QUATERNION])
 
 
 def _inertial(
     messages: Iterator[tuple[float, Any]], columns: list[str | None], counts: dict[str, int]
 ) -> Iterator[tuple[float, ...]]:
-    """Yield the time, rate and acceleration of `sensor_msgs/Imu`; name None in `columns` what they do not hold.
+    """Yield the time, rate and acceleration of `sensor_msgs/Imu`; set columns that the messages do not hold to None.
 
     Count in `counts` the messages that are left out. Those without a rate are kept until one with a rate comes. Raise
-    Refused `bag_topic` if none holds anything.
+    Refused `bag_topic` if no message holds a rate or an acceleration.
     """
     forces: list[tuple[float, ...]] = []
     has_rates, all_forces = False, True
@@ -107,7 +107,7 @@ def _inertial(
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
+def _open_bag(path: Path) -> Iterator[Any]:
     """Open the bag's reader. Raise Refused `missing_extra`."""
     try:
         from rosbags.rosbag2 import Reader
@@ -131,33 +131,33 @@ def _check_metadata(path: Path) -> None:
             raise ValueError(f"its {METADATA} holds more than {METADATA_VALUES} values")
 
 
-def _chosen(reader: Any, types: Sequence[str], topic: str | None, what: str) -> Any:
-    """Return the connections of a topic; without a name, of the only one there is."""
-    there = [each for each in reader.connections if each.msgtype in types]
+def _select_topic(reader: Any, types: Sequence[str], topic: str | None, what: str) -> Any:
+    """Return the connections of a topic; without a name, of the only one with messages of these types."""
+    connections = [connection for connection in reader.connections if connection.msgtype in types]
     if topic is not None:
-        there = [each for each in there if each.topic == topic]
-    names = {each.topic for each in there}
+        connections = [connection for connection in connections if connection.topic == topic]
+    names = {connection.topic for connection in connections}
     if len(names) != 1:
-        known = listing(f"{shorten(topic)} ({shorten(of)})" for topic, of in _offered(reader, types))
-        asked = "" if topic is None else f" called {quote(topic)}"
+        topics = listing(f"{shorten(topic)} ({shorten(kind)})" for topic, kind in _list_topics(reader, types))
+        name = "" if topic is None else f" called {quote(topic)}"
         raise Refused(
             "bag_topic",
-            f"the bag has {len(names)} topics{asked} with {what} ({', '.join(types)}); its topics are {known}",
+            f"the bag has {len(names)} topics{name} with {what} ({', '.join(types)}); its topics are {topics}",
             "Name one behind the bag: BAG::/topic",
         )
-    return there
+    return connections
 
 
-def _offered(reader: Any, types: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the topics and their types, first those that could have been meant."""
-    there = {(each.topic, each.msgtype) for each in reader.connections}
-    return sorted(there, key=lambda each: (each[1] not in types, each))
+def _list_topics(reader: Any, types: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the topics and their types, those with messages of the requested types first."""
+    topics = {(connection.topic, connection.msgtype) for connection in reader.connections}
+    return sorted(topics, key=lambda topic: (topic[1] not in types, topic))
 
 
-def _stamped(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
-    """Yield the messages with the seconds from the beginning of the bag to the stamps in their headers.
+def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
+    """Yield each message with the time in its header, in seconds from the beginning of the bag.
 
-    One beginning for every topic: seconds since 1970 leave a float no microseconds to spare.
+    One beginning serves all topics: seconds since 1970 would leave a float without microseconds.
     """
     from rosbags.typesys import Stores, get_typestore
 
@@ -176,25 +176,27 @@ def _stamped(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
 
 
 def _check_layout(store: Any, connections: Any) -> None:
-    """Raise ValueError if messages are laid out otherwise than ROS 2 does, by the definition that comes with them.
+    """Raise ValueError if the definition that comes with the messages differs from that of ROS 2.
 
-    The definition is compared and nothing more: rosbags would write a program by it and run that.
+    The definition is only compared: rosbags would write a program from it and run that.
     """
     from rosbags.interfaces import MessageDefinitionFormat
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
-    for kind, definition in {(each.msgtype, each.msgdef) for each in connections}:
+    for kind, definition in {(connection.msgtype, connection.msgdef) for connection in connections}:
         if len(definition.data) > DEFINITION_CHARACTERS:
             raise ValueError(f"its definition of {kind} is {len(definition.data)} characters long")
         if definition.format == MessageDefinitionFormat.MSG:
-            found = get_types_from_msg(definition.data, kind)
+            fields = get_types_from_msg(definition.data, kind)
         elif definition.format == MessageDefinitionFormat.IDL:
-            found = {}
+            fields = {}
             for text in definition.data.split("=" * 80 + "\n"):
-                found |= get_types_from_idl(text.partition("\n")[2] if text.startswith("IDL: ") else text)
+                fields |= get_types_from_idl(text.partition("\n")[2] if text.startswith("IDL: ") else text)
         else:
             continue
-        if other := sorted(name for name in found if name in store.fielddefs and found[name] != store.fielddefs[name]):
+        if other := sorted(
+            name for name in fields if name in store.fielddefs and fields[name] != store.fielddefs[name]
+        ):
             raise ValueError(f"its {listing(map(shorten, other))} is none of ROS 2")
 
 

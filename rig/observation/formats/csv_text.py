@@ -1,4 +1,4 @@
-"""The rows of cells in a text file that somebody else wrote: packed or not, in whichever encoding, within bounds."""
+"""The rows of cells in another program's text file: packed or not, in any encoding, within bounds."""
 
 import codecs
 import csv
@@ -15,15 +15,15 @@ from typing import BinaryIO
 from rig.config.files.regular_file import UnfitFile, open_regular_file
 from rig.errors import Refused
 
-HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which come to four times that in memory
-LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at most twenty
+HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which take four times that in memory
+LONGEST_LINE = 10_000  # characters: a hundred columns, while there are at most twenty
 GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 MARKS = ";\t"
 
 
 def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
-    """Yield the rows of a regular file that is not too large, after so many lines of it. Raises Refused `no_file`."""
-    with _refused(path), open_regular_file(path, largest_mb * 1_000_000) as file, _text(file) as text:
+    """Yield the rows of a regular file that is not too large, after `skipped` lines of it. Raise Refused `no_file`."""
+    with _raise_no_file(path), open_regular_file(path, largest_mb * 1_000_000) as file, _text(file) as text:
         lines = _lines(text, largest_mb * 1_000_000)
         first = next(islice(lines, skipped, None), "")
         second = next(lines, "")
@@ -35,17 +35,17 @@ def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[st
 
 
 def is_harmless(path: Path, largest_mb: int) -> bool:
-    """Return whether a file is short, and not packed: then it cannot come to much.
+    """Return whether a file is short and not packed, so that it cannot grow in memory.
 
-    Raises Refused `no_file`, also for one that is too large.
+    Raise Refused `no_file`, also for a file that is too large.
     """
-    with _refused(path), open_regular_file(path, largest_mb * 1_000_000) as file:
+    with _raise_no_file(path), open_regular_file(path, largest_mb * 1_000_000) as file:
         return os.fstat(file.fileno()).st_size <= HARMLESS_BYTES and not _beginning(file).startswith(GZIP)
 
 
 @contextmanager
-def _refused(path: Path) -> Iterator[None]:
-    """Raise Refused `no_file` for a file that cannot be read, whatever its reader ends in."""
+def _raise_no_file(path: Path) -> Iterator[None]:
+    """Raise Refused `no_file` for a file that cannot be read, whatever its reader raises."""
     try:
         yield
     except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
@@ -53,9 +53,9 @@ def _refused(path: Path) -> Iterator[None]:
 
 
 def _text(file: BinaryIO) -> TextIOWrapper:
-    """What stands in a file, packed or not, in the encoding its beginning shows. Raises UnfitFile where it is no text.
+    """Return a file's text, unpacked, in the encoding that its beginning shows. Raise UnfitFile if it is not text.
 
-    Windows' own encoding is that of most loggers' headings that are not in UTF-8: "°/s", "µT".
+    Headings of loggers that are not in UTF-8 ("°/s", "µT") are mostly in the encoding of Windows.
     """
     if _beginning(file).startswith(GZIP):
         file = GzipFile(fileobj=file)  # type: ignore[assignment]
@@ -78,7 +78,7 @@ def _beginning(file: BinaryIO) -> bytes:
 
 
 def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
-    """The lines, none of which is endless, nor all of them: a packed file may hold a thousand times its size."""
+    """Yield the lines; bound each of them and their sum, since a packed file may hold a thousand times its size."""
     while line := text.readline(LONGEST_LINE):
         most -= len(line)
         if len(line) == LONGEST_LINE:

@@ -1,6 +1,6 @@
-"""Files of readings and attitudes that are no CSV: what reads each, by what it looks like. One entry a format.
+"""Files of readings and attitudes that are not CSV, each with its reader, recognized by their look. One entry a format.
 
-A path may name what inside is meant, behind two colons: `session::/imu/data` is a topic of a bag, `flight.ulg::1` an
+A path may select a part of the file behind two colons: `session::/imu/data` is a topic of a bag, `flight.ulg::1` an
 instance in PX4's log.
 """
 
@@ -17,7 +17,7 @@ from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.observation.formats.bag_samples import bag_of, is_bag
-from rig.observation.formats.table_parts import columns_of, left_out_of, parts_read_apart
+from rig.observation.formats.table_parts import columns_of, count_omitted_rows, parts_read_apart
 from rig.observation.formats.ulog_samples import is_ulog
 
 INSIDE = "::"
@@ -25,15 +25,15 @@ INSIDE = "::"
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A kind of file that is `called` so, and what reads it in a process of its own.
+    """A kind of file, its `name` in messages, and its readers, which run in a process of their own.
 
-    `readings` and `attitudes` are readers ("module:function", as `rig.data.processes.reading_process` has them), None
-    where it can hold none. They get the path that `reads` makes of the given one, and what inside is meant, and yield
-    columns `in_blocks` (`rig.observation.formats.table_parts`), named as those of a CSV file; of attitudes times and
-    quaternions. `remedy` is for what cannot be read.
+    `readings` and `attitudes` are readers ("module:function", as in `rig.data.processes.reading_process`), None if a
+    file cannot hold them. They take the path that `reads` makes of the user's, and the part `inside`, and yield columns
+    `in_blocks` (`rig.observation.formats.table_parts`), named as those of a CSV file; attitudes are times and
+    quaternions. `remedy` is for a file that cannot be read.
     """
 
-    called: str
+    name: str
     is_one: Callable[[Path], bool]
     remedy: str
     readings: str
@@ -55,29 +55,29 @@ FORMATS = (
 
 
 def whole(path: Path) -> Path:
-    """The file or folder itself."""
+    """Return the file or folder itself, without the part inside that a path may select."""
     return Path(str(path).partition(INSIDE)[0])
 
 
 def readings_in(path: Path) -> tuple[Columns, int] | None:
-    """The readings of a file that is no CSV, in the order of time, how many rows hold none; None of one that may be.
+    """Return the readings of a file that is not CSV, ordered by time, and the number of rows without any; None for CSV.
 
-    Raises Refused as its reader does, `no_file`, `file_too_costly`, `temporary_folder_full`.
+    Raise Refused as its reader does, and `no_file`, `file_too_costly`, `temporary_folder_full`.
     """
-    found = _format(path)
-    return None if found is None else _read(found, found.readings, path)
+    form = _format(path)
+    return None if form is None else _read(form, form.readings, path)
 
 
 def attitudes_in(path: Path) -> Columns | None:
-    """The attitudes in a file that is no CSV; None of one that may be.
+    """Return the attitudes in a file that is not CSV; None for CSV.
 
-    An attitude holds from half-way to the one before until half-way to the next. Raises Refused as `readings_in`, and
-    `no_attitudes` where there are none in it.
+    An attitude holds from half-way to the one before until half-way to the next. Raise Refused as `readings_in`, and
+    `no_attitudes` if the file holds none.
     """
-    found = _format(path)
-    if found is None:
+    form = _format(path)
+    if form is None:
         return None
-    columns = {} if found.attitudes is None else _read(found, found.attitudes, path)[0]
+    columns = {} if form.attitudes is None else _read(form, form.attitudes, path)[0]
     if not columns:
         raise Refused(
             "no_attitudes",
@@ -87,40 +87,40 @@ def attitudes_in(path: Path) -> Columns | None:
     time_s = columns.pop(TIME)
     if len(time_s) < 2:
         raise Refused("no_attitudes", f"{path} holds one pose", "Record the poses while the sensor is turned")
-    between = (time_s[1:] + time_s[:-1]) / 2
-    first, last = time_s[0] - (between[0] - time_s[0]), time_s[-1] + (time_s[-1] - between[-1])
-    return {"start_s": np.append(first, between), "end_s": np.append(between, last), **columns}
+    middles_s = (time_s[1:] + time_s[:-1]) / 2
+    first, last = time_s[0] - (middles_s[0] - time_s[0]), time_s[-1] + (time_s[-1] - middles_s[-1])
+    return {"start_s": np.append(first, middles_s), "end_s": np.append(middles_s, last), **columns}
 
 
 def entry_of(path: Path) -> FileEntry:
-    """A file by its name and its sum; of a folder, the sum of the files in it in the order of their names."""
-    there = whole(path)
-    files = sorted(each for each in there.iterdir() if each.is_file()) if there.is_dir() else [there]
-    found = hashlib.sha256()
-    for each in files:
-        with each.open("rb") as file:
-            while piece := file.read(1 << 20):
-                found.update(piece)
-    name = path.name if INSIDE not in str(path) else there.name
-    return FileEntry(name=printable(name), sha256=found.hexdigest())  # a name may be no UTF-8, which no document takes
+    """Return a file's name and checksum; of a folder, the checksum of its files in the order of their names."""
+    source = whole(path)
+    files = sorted(file for file in source.iterdir() if file.is_file()) if source.is_dir() else [source]
+    digest = hashlib.sha256()
+    for file in files:
+        with file.open("rb") as stream:
+            while block := stream.read(1 << 20):
+                digest.update(block)
+    name = path.name if INSIDE not in str(path) else source.name
+    return FileEntry(name=printable(name), sha256=digest.hexdigest())  # a name may be no UTF-8, which no document takes
 
 
 def _read(form: Format, reader: str, path: Path) -> tuple[dict[str, Array], int]:
-    """Return the columns, in the order of time, and how many rows hold none. Raise Refused as `readings_in`."""
+    """Return the columns, ordered by time, and the number of rows without any. Raise Refused as `readings_in`."""
     source = form.reads(whole(path))
     parts = parts_read_apart(
-        reader, source, {"inside": _inside(path)}, else_=f"is no {form.called} that can be read", remedy=form.remedy
+        reader, source, {"inside": _inside(path)}, else_=f"is no {form.name} that can be read", remedy=form.remedy
     )
     columns = columns_of(parts)
     time_s = columns[TIME]
     if (np.diff(time_s) < 0).any():
         order = np.argsort(time_s, kind="stable")
         columns = {name: column[order] for name, column in columns.items()}
-    return columns, left_out_of(parts)
+    return columns, count_omitted_rows(parts)
 
 
 def _format(path: Path) -> Format | None:
-    return next((each for each in FORMATS if each.is_one(whole(path))), None)
+    return next((form for form in FORMATS if form.is_one(whole(path))), None)
 
 
 def _inside(path: Path) -> str | None:

@@ -1,4 +1,4 @@
-"""Columns of numbers on their way out of a reading process: rows in blocks, and in the end what the columns are."""
+"""Columns of numbers on their way out of a reading process: rows in blocks, then the names of the columns."""
 
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ from rig.estimation.arrays import Array
 BLOCK_ROWS = 16_384
 
 
-LEFT_OUT = "left_out"  # how many more rows of the file hold none of the columns
+LEFT_OUT = "left_out"  # the number of rows of the file that hold none of the columns
 
 
 def in_blocks(
@@ -23,8 +23,8 @@ def in_blocks(
 ) -> Iterator[Part]:
     """Yield the rows, a number for each of the columns, in blocks (n, columns), then the names of the columns.
 
-    The names are looked at when all rows are through: None is a column that is left out. So are `counts`, which may
-    say how many rows were `LEFT_OUT`.
+    The names are read after the last row: None marks a column that is left out. So are `counts`, which may hold the
+    number of rows that were `LEFT_OUT`.
     """
     values, width = array("d"), len(columns)
     for row in rows:
@@ -41,22 +41,21 @@ def columns_of(parts: Iterable[Part]) -> dict[str, Array]:
     *blocks, last = parts
     arrays, names = cast("list[Array]", blocks), cast("dict[str, Any]", last)["columns"]
     return {
-        name: np.concatenate([block[:, place] for block in arrays])
-        for place, name in enumerate(names)
+        name: np.concatenate([block[:, index] for block in arrays])
+        for index, name in enumerate(names)
         if name is not None
     }
 
 
-def left_out_of(parts: Sequence[Part]) -> int:
-    """Return how many rows of the file such parts leave out."""
+def count_omitted_rows(parts: Sequence[Part]) -> int:
+    """Return the number of rows of the file that such parts leave out."""
     return int(cast("dict[str, Any]", parts[-1]).get(LEFT_OUT, 0))
 
 
 def parts_read_apart(reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str) -> list[Part]:
-    """Return what a `reader` ("module:function") yields of a file, in a process of its own.
+    """Return the parts that a `reader` ("module:function") yields of a file, in a process of its own.
 
-    Raise Refused as the reader does, `temporary_folder_full`, and where the file "`else_`: why" `no_file` and
-    `file_too_costly`.
+    Raise Refused as the reader does, `temporary_folder_full`, and "`else_`: why" as `no_file` or `file_too_costly`.
     """
     try:
         return read_apart(reader, path, arguments, limits_for(stored_bytes(path)))

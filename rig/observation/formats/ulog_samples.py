@@ -1,8 +1,8 @@
-"""Readings from PX4's log (`.ulg`), by `pyulog`: of the sensors as they are, before the autopilot corrects them.
+"""Readings from PX4's log (`.ulg`), by `pyulog`: those of the sensors, before the autopilot corrects them.
 
 `sensor_gyro` and `sensor_accel` of one instance each, in rad/s and m/s²; `timestamp_sample` is the autopilot's time of
-the sample in µs. An accelerometer that samples at other times is interpolated to the gyroscope's: both come from one
-part as a rule, and then the times are the same. What reads a log runs in a process of its own
+the sample in µs. An accelerometer that samples at other times is interpolated to the gyroscope's: both usually belong
+to one part, and then the times are the same. The reader runs in a process of its own
 (`rig.observation.formats.sample_files`).
 """
 
@@ -26,14 +26,14 @@ MICRO = 1e-6
 
 
 def is_ulog(path: Path) -> bool:
-    """Whether a path is such a log."""
+    """Return whether a path is such a log."""
     return path.suffix == SUFFIX
 
 
 def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
-    """Yield, `in_blocks`, the readings in a log of the sensors whose instance stands `inside`.
+    """Yield, in blocks, the readings in a log of the sensors of the instance `inside`.
 
-    Raise Refused `missing_extra`, `ulog_topic`, and of a damaged log whatever its parser ends in.
+    Raise Refused `missing_extra` or `ulog_topic`, and for a damaged log whatever its parser raises.
     """
     try:
         from pyulog import ULog
@@ -41,28 +41,28 @@ def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
         raise missing_extra(error, "ulog") from error
     with path.open("rb") as file:
         log = ULog(file, list(TOPICS))
-    there = {(each.name, each.multi_id): each.data for each in log.data_list}
+    topics = {(topic.name, topic.multi_id): topic.data for topic in log.data_list}
     number = inside or "0"
-    if not number.isdecimal() or ("sensor_gyro", int(number)) not in there:
-        known = listing(f"{name} {instance}" for name, instance in sorted(there))
+    if not number.isdecimal() or ("sensor_gyro", int(number)) not in topics:
+        instances = listing(f"{name} {instance}" for name, instance in sorted(topics))
         raise Refused(
             "ulog_topic",
-            f"{path} holds no sensor_gyro {shorten(number)}; of sensor_gyro and sensor_accel it holds {known}",
+            f"{path} holds no sensor_gyro {shorten(number)}; of sensor_gyro and sensor_accel it holds {instances}",
             "Let SDLOG_PROFILE log the sensors at full rate, or name another instance behind the file: LOG.ulg::1",
         )
     instance = int(number)
-    time_us, rates = _sampled("sensor_gyro", there["sensor_gyro", instance])
+    time_us, rates = _read_topic("sensor_gyro", topics["sensor_gyro", instance])
     columns = {TIME: (time_us - time_us[0]) * MICRO, **dict(zip(RATE.columns, rates.T, strict=True))}
-    if ("sensor_accel", instance) in there:
-        other_us, forces = _sampled("sensor_accel", there["sensor_accel", instance])
-        felt = [np.interp(time_us, other_us, each) for each in forces.T]
-        columns |= dict(zip(ACCELERATION.columns, felt, strict=True))
+    if ("sensor_accel", instance) in topics:
+        other_us, forces = _read_topic("sensor_accel", topics["sensor_accel", instance])
+        accelerations = [np.interp(time_us, other_us, topic) for topic in forces.T]
+        columns |= dict(zip(ACCELERATION.columns, accelerations, strict=True))
     yield np.column_stack(list(columns.values()))
     yield {"columns": list(columns)}
 
 
-def _sampled(topic: str, data: Any) -> tuple[Array, Array]:
-    """Times (n,) in µs, increasing, and readings (n, 3). Raise ValueError if the topic has other fields."""
+def _read_topic(topic: str, data: Any) -> tuple[Array, Array]:
+    """Return times (n,) in µs, increasing, and readings (n, 3). Raise ValueError if the topic has other fields."""
     stamp = "timestamp_sample" if "timestamp_sample" in data else "timestamp"
     if missing := [name for name in (stamp, *"xyz") if name not in data]:
         raise ValueError(f"its {topic} has no {' and no '.join(missing)}")

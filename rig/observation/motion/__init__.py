@@ -1,1 +1,1 @@
-"""What turned, as a function of time: joints, revolutions, speeds."""
+"""The turner's motion as a function of time: joints, revolutions, speeds."""

@@ -1,4 +1,4 @@
-"""What turned, a chain of joints, as a function of time: all that is read of its states is read here."""
+"""The motion of a chain of joints as a function of time, from all the states that were recorded."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -23,29 +23,29 @@ from rig.motion.geometry import (
 )
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Sweep
-from rig.observation.motion.even_turn import SMOOTHED_S, find_even_turn, smoothed, well_timed
+from rig.observation.motion.even_turn import SMOOTHED_S, find_even_turn, fit_lines, well_timed
 from rig.observation.motion.known_motion import MIN_RATE_RAD_S, check_span, closely_followed, not_finite
 from rig.observation.motion.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
 from rig.observation.swing import FEWEST_OF_SWING, MAX_TRAVEL_AT_REST_RAD, remove_oscillation
 from rig.observation.windows import Window
 
-RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
-KNOT_S = 0.004  # between the knots of the rate: a faster ripple than it can follow would look like a slower one
-SPARSE_S = 0.025  # samples that are farther apart meet a ripple of the servo anywhere
-PARTS = 5  # of a rest, whose means tell whether a joint moved where single readings scatter
-SWINGS = 8.0  # times what neighbouring readings of an angle differ by: ten thousand that are noise range by less
-ATTITUDES = 72  # of which a mean is made: over whole turns what is perpendicular to the axis averages out
+RATE_STEP_S = 0.008  # the difference of joint angles closer in time shows their encoders' noise more than a rate
+KNOT_S = 0.004  # between the knots of the rate: a ripple too fast for them would alias to a slower one
+SPARSE_S = 0.025  # samples that are farther apart alias a ripple of the servo
+PARTS = 5  # of a rest: their means show whether a joint moved, if single readings scatter
+SWINGS = 8.0  # times the difference of neighbouring angles: a noise of ten thousand readings has a smaller range
+ATTITUDES = 72  # in a mean: over whole turns the part perpendicular to the axis averages out
 
 
 class ArmMotion:
     """The `KnownMotion` of a chain of k joints: `angles(t)` (n, k) rad of them, `rate(t)` (n, 3) rad/s of the flange.
 
     Rates come from the recorded joint angles rather than from the controller's velocity signal, which is filtered: what
-    counts is when the joint was where. `states` (m,) are rows as `state_dtype` has them, of joints of that `kinematics`
-    and of those `names`. All that stands in the flange's frame is given in the item's, to which `mount` (3, 3) takes
-    it: they are one where the item is not mounted anew. Where one reading of an angle scatters (`reading_std_rad`),
-    angles and rates are those of a window, and a turn is known by the same reading one turn later.
-    Raises Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
+    counts is when the joint was where. `states` (m,) are rows of `state_dtype`, for joints of that `kinematics` and
+    those `names`. All vectors in the flange's frame are given in the item's, to which `mount` (3, 3) takes them: the
+    identity unless the item was mounted in another way. If single readings of an angle scatter (`reading_std_rad`),
+    angles and rates are fitted over a window, and a turn ends at the same reading one turn later. Raise Fault
+    `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ArmMotion:
             raise not_finite("an arm state")
         check_span(self.time_s, "the arm's states")
         if self._scatters:
-            times_s, angles, joint_rates = smoothed(self.time_s, self._states["q_rad"])
+            times_s, angles, joint_rates = fit_lines(self.time_s, self._states["q_rad"])
             self.angles = CubicSpline(times_s, angles)
             rates = flange_rate(angles, joint_rates, kinematics) @ self.mount.T
         else:
@@ -85,96 +85,100 @@ class ArmMotion:
 
     @property
     def host_time_s(self) -> Array:
-        """The times (m,) of this computer at which the states of `time_s` came."""
+        """Times (m,) of this computer at which the states of `time_s` arrived."""
         times_s: Array = self._states["host_time_s"]
         return times_s
 
     def attitude(self, start_s: float, end_s: float) -> Array:
-        """The mean rotation (3, 3) from the base frame into the flange's between two controller times."""
+        """Return the mean rotation (3, 3) from the base frame into the flange's between two controller times."""
         times_s = np.linspace(start_s, end_s, ATTITUDES, endpoint=False) + (end_s - start_s) / (2 * ATTITUDES)
         mean: Array = self.attitudes(times_s).mean(axis=0)
         return mean
 
     def attitudes(self, time_s: Array) -> Array:
-        """The rotations (n, 3, 3) from the base frame into the flange's at controller times (n,)."""
-        found: Array = self.mount @ flange_attitude(self.angles(time_s), self.kinematics)
-        return found
+        """Return the rotations (n, 3, 3) from the base frame into the flange's at controller times (n,)."""
+        rotations: Array = self.mount @ flange_attitude(self.angles(time_s), self.kinematics)
+        return rotations
 
     def axes(self, q_rad: Array) -> Array:
-        """(…, 3, 6) the joints' axes of growing angles at joint angles (…, 6)."""
+        """Return the joints' axes (…, 3, 6) of growing angles at joint angles (…, 6)."""
         axes: Array = self.mount @ flange_axes(q_rad, self.kinematics)
         return axes
 
     def axis_errors(self, q_rad: Array, joint: int) -> Array:
-        """(…, 13, 3) how the arm's own errors turn a joint's axis, per radian (`rig.motion.geometry.AXIS_ERRORS`)."""
+        """Return the rotation (…, 13, 3) of a joint's axis per radian of each arm error
+        (`rig.motion.geometry.AXIS_ERRORS`).
+        """
         errors: Array = axis_errors(q_rad, joint, self.kinematics) @ self.mount.T
         return errors
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Which of these times (n,) lie where states follow each other closely enough for `rate` to be true."""
+        """Return which of these times (n,) lie between states that are close enough together for `rate` to hold."""
         return closely_followed(self.time_s, self._covered, time_s)
 
     @property
     def tells_parts_of_turns(self) -> bool:
-        """Whether an angle is where its reading says, so that not only whole turns are known."""
+        """Whether a single reading of an angle is right, and not only the angle between equal readings a turn apart."""
         return not self._scatters
 
-    def moved_rad(self, window: Window) -> float | None:
-        """How far the joint that moved most was moved in a window; None where no two states tell.
+    def travel_rad(self, window: Window) -> float | None:
+        """Return the travel of the joint that moved most in a window; None if it holds fewer than two states.
 
-        A standing arm that swings about where it stands is not moved: its angles tell the swing, and so do means.
+        The oscillation of a standing arm about its position is not counted: its angles show it, and so do means.
         """
         q_rad = self._q_rad(window)
         if self._scatters and len(q_rad) >= PARTS:
             q_rad = np.array([part.mean(axis=0) for part in np.array_split(q_rad, PARTS)])
         if len(q_rad) < 2:
             return None
-        moved_rad = float(np.ptp(q_rad, axis=0).max())
-        if moved_rad > MAX_TRAVEL_AT_REST_RAD and len(q_rad) >= FEWEST_OF_SWING:
-            moved_rad = float(np.ptp(remove_oscillation(q_rad), axis=0).max())
-        return moved_rad
+        travel_rad = float(np.ptp(q_rad, axis=0).max())
+        if travel_rad > MAX_TRAVEL_AT_REST_RAD and len(q_rad) >= FEWEST_OF_SWING:
+            travel_rad = float(np.ptp(remove_oscillation(q_rad), axis=0).max())
+        return travel_rad
 
     def swing_rates(self, time_s: Array) -> Array:
-        """(n, 3) rad/s as `sampled_rates`, at rising times (n,), of an arm that stands and swings; else zero.
+        """Return rates (n, 3) as `sampled_rates`, at rising times (n,), of a standing arm that oscillates; else zero.
 
-        An arm that stands as still as its encoders tell has no rate, and their noise makes none.
+        An arm whose encoders show only noise has no rate, and the noise adds none.
         """
         still = np.zeros((len(time_s), 3))
         q_rad = self._q_rad(Window(float(time_s[0]), float(time_s[-1])))
         if len(q_rad) < 2 or not self.tells_parts_of_turns:
             return still
         noise_rad = np.sqrt(np.mean(np.diff(q_rad, axis=0) ** 2, axis=0))
-        return self.sampled_rates(time_s) if (np.ptp(q_rad, axis=0) > SWINGS * noise_rad).any() else still
+        return self.rates_at_samples(time_s) if (np.ptp(q_rad, axis=0) > SWINGS * noise_rad).any() else still
 
-    def away_rad(self, window: Window, q_rad: Sequence[float]) -> float | None:
-        """How far any joint ever was from the pose `q_rad` (k,) in a window; None where no state tells."""
-        seen_rad = self._q_rad(window)
-        return float(np.abs(seen_rad - np.array(q_rad)).max()) if len(seen_rad) else None
+    def max_distance_rad(self, window: Window, q_rad: Sequence[float]) -> float | None:
+        """Return the largest distance of any joint from the pose `q_rad` (k,) in a window, or None without a state."""
+        recorded_rad = self._q_rad(window)
+        return float(np.abs(recorded_rad - np.array(q_rad)).max()) if len(recorded_rad) else None
 
     def angle(self, sweep: Sweep, time_s: Array | float, derivative: int = 0) -> Array:
-        """The angle (n,) rad of the joint that a sweep turns, at times (n,); with `derivative` 1 its rate in rad/s."""
+        """Return the angle (n,) rad of the joint that a sweep turns, at times (n,); its rate in rad/s with `derivative`
+        1.
+        """
         angle: Array = self.angles(time_s, derivative)[..., sweep.joint]
         return angle
 
     def mean_rates(self, time_s: Array, lasting_s: float) -> Array:
-        """(n, 3) rad/s: the flange's mean rate over so long around each of the times (n,).
+        """Return the flange's mean rate (n, 3), rad/s, over `lasting_s` around each of the times (n,).
 
-        By how far its joints came: what one angle errs, the rates before and after take back, and of samples that
-        follow each other the mean is that between the ends.
+        By differences of the joints' angles: the error of one angle cancels between neighbouring rates, and the mean
+        over samples that follow each other is that between their ends.
         """
-        came = self.angles(time_s + lasting_s / 2) - self.angles(time_s - lasting_s / 2)
-        rates: Array = flange_rate(self.angles(time_s), came / lasting_s, self.kinematics) @ self.mount.T
+        travel_rad = self.angles(time_s + lasting_s / 2) - self.angles(time_s - lasting_s / 2)
+        rates: Array = flange_rate(self.angles(time_s), travel_rad / lasting_s, self.kinematics) @ self.mount.T
         return rates
 
-    def sampled_rates(self, time_s: Array) -> Array:
-        """(n, 3) rad/s: the flange's rate as it is around samples at times (n,) that follow each other evenly.
+    def rates_at_samples(self, time_s: Array) -> Array:
+        """Return the flange's rate (n, 3), rad/s, around samples at times (n,) that follow each other evenly.
 
-        The mean from half-way to the sample before to half-way to the next; of samples far apart the rate there.
+        The mean from half-way to the sample before to half-way to the next; of samples far apart the momentary rate.
         """
         return self.rate(time_s) if is_sparse(time_s) else self.mean_rates(time_s, float(np.median(np.diff(time_s))))
 
     def mean_rate(self, start_s: float, end_s: float) -> Array:
-        """(3,) rad/s: the flange's mean rate from one time to another."""
+        """Return the flange's mean rate (3,), rad/s, from one time to another."""
         count = max(round((end_s - start_s) / RATE_STEP_S), 1)
         lasting_s = (end_s - start_s) / count
         middles_s = np.linspace(start_s + lasting_s / 2, end_s - lasting_s / 2, count)
@@ -182,31 +186,31 @@ class ArmMotion:
         return rate
 
     def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
-        """The whole turn, or the arc, of a sweep that was made in a window.
+        """Return the whole turn, or the arc, of a sweep that was made in a window.
 
-        Raises Fault `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_limited`,
-        `speed_not_constant`, `other_joint_moved`.
+        Raise Fault `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_limited`, `speed_not_constant`,
+        `other_joint_moved`.
         """
         begin, end = np.searchsorted(self.time_s, [window.start_s, window.end_s])
         find = find_even_turn if self._scatters else find_revolution
-        found = find(self._states[max(begin - 1, 0) : end + 1], sweep, thresholds)
-        began = self.angles(found.start_s)
-        rate = self.rate(found.time_s).mean(axis=0)
+        ends = find(self._states[max(begin - 1, 0) : end + 1], sweep, thresholds)
+        start_q_rad = self.angles(ends.start_s)
+        rate = self.rate(ends.time_s).mean(axis=0)
         return Revolution(
-            found.start_s,
-            found.end_s,
-            found.duration_std_s,
+            ends.start_s,
+            ends.end_s,
+            ends.duration_std_s,
             axis_flange=rate / np.linalg.norm(rate),
-            attitude=self.mount @ flange_attitude(began, self.kinematics),
-            axis_errors=sweep.growing * self.axis_errors(began, sweep.joint),
-            arm_m=self.mount @ flange_arm(began, sweep.joint, self.kinematics),
-            station=(sweep.joint, *np.round(np.delete(began, sweep.joint), 2).tolist()),
+            attitude=self.mount @ flange_attitude(start_q_rad, self.kinematics),
+            axis_errors=sweep.growing * self.axis_errors(start_q_rad, sweep.joint),
+            arm_m=self.mount @ flange_arm(start_q_rad, sweep.joint, self.kinematics),
+            station=(sweep.joint, *np.round(np.delete(start_q_rad, sweep.joint), 2).tolist()),
             angle_rad=sweep.angle_rad,
             uneven=self._scatters,
         )
 
     def table(self) -> dict[str, Array]:
-        """The states as columns (m,) by name: times, and the joints' angles and rates as the controller tells them."""
+        """Return the states as columns (m,) by name: times, and the controller's angles and rates of the joints."""
         angles = {f"{joint}_rad": self._states["q_rad"][:, i] for i, joint in enumerate(self._names)}
         rates = {f"{joint}_rad_s": self._states["qd_rad_s"][:, i] for i, joint in enumerate(self._names)}
         return {"time_s": self.time_s, **angles, **rates}
@@ -221,22 +225,22 @@ def is_sparse(time_s: Array) -> bool:
     return float(np.median(np.diff(time_s))) > SPARSE_S
 
 
-def motion_of(run: RunData, turned: Array | None = None) -> ArmMotion:
-    """What turned in a recording, as it moves the item; `turned` (3, 3) is by how that sits off its nominal mount.
+def motion_of(run: RunData, correction: Array | None = None) -> ArmMotion:
+    """Return the turner's motion in a recording, in the item's frame; `correction` (3, 3): from its nominal mount.
 
-    Raises as `turner_of`; Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
+    Raise as `turner_of`; Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
     turner = turner_of(run)
     mount = np.array(run.settings.mount)
-    mount = mount if turned is None else turned @ mount
+    mount = mount if correction is None else correction @ mount
     return ArmMotion(run.states, turner.geometry, turner.joints, mount, turner.reading_std_rad)
 
 
 def _check_order(time_s: Array) -> None:
-    """States stand in the order in which they came: one that is older than the one before it was stamped anew."""
-    back = np.flatnonzero(np.diff(time_s) < 0)
-    if len(back):
-        before_s, after_s = time_s[back[0] : back[0] + 2]
+    """Raise Fault `arm_clock_stepped` if a state is older than the one before it: states are in order of arrival."""
+    steps_back = np.flatnonzero(np.diff(time_s) < 0)
+    if len(steps_back):
+        before_s, after_s = time_s[steps_back[0] : steps_back[0] + 2]
         raise Fault(
             "arm_clock_stepped",
             f"the time of the arm's states goes back from {before_s:.3f} s to {after_s:.3f} s: the controller's clock "
@@ -246,7 +250,7 @@ def _check_order(time_s: Array) -> None:
 
 
 def turner_of(run: RunData) -> RecordedTurner:
-    """What turned in a recording. Raises Refused `recorded_elsewhere`: nobody asks files what an arm did."""
+    """Return the turner of a recording. Raise Refused `recorded_elsewhere` for one from files, which has none."""
     if run.turner is None:
         raise Refused(
             "recorded_elsewhere",
@@ -257,7 +261,7 @@ def turner_of(run: RunData) -> RecordedTurner:
 
 
 def check_arms_times(states: NDArray[Any]) -> None:
-    """A recording's times are looked at that nobody could follow. Raises Fault `not_finite`, `impossible_times`."""
+    """Raise Fault `not_finite` or `impossible_times` if the times of the states cannot be used."""
     time_s = np.unique(states["time_s"])
     if not np.isfinite(time_s).all():
         raise not_finite("an arm state")

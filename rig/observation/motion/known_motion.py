@@ -1,4 +1,4 @@
-"""What turned the sensors, as far as observations are made by it: an arm's states, or a table's own file."""
+"""The motion of the turner that observations need: an arm's states, or a table's own file."""
 
 from typing import Protocol
 
@@ -8,40 +8,40 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 
-MIN_RATE_RAD_S = 0.01  # slower all the time, nothing has turned
-MAX_SPAN_S = 48 * 3600.0  # of a recording; what lies farther apart is damage, and would fill the memory
+MIN_RATE_RAD_S = 0.01  # a turner that never exceeds it stood still
+MAX_SPAN_S = 48 * 3600.0  # of a recording; times farther apart are damage, and would fill the memory
 
 
 class KnownMotion(Protocol):
-    """A body's turning as a function of the time of whoever turned it, in axes fixed to the body.
+    """A body's rotation as a function of its turner's time, in axes fixed to the body.
 
-    Which way the sensors sit on the body is not asked: the clock is found whatever their mounting.
+    The mounting of the sensors on the body does not matter: the clock is found in any case.
     """
 
     @property
     def time_s(self) -> Array:
-        """(m,) rising: when it was looked at."""
+        """(m,) rising: times of the recorded states."""
         ...
 
     def rate(self, time_s: Array, derivative: int = 0, /) -> Array:
-        """(n, 3) rad/s at times (n,) between the first and the last of `time_s`; with `derivative` 1 its change."""
+        """Return rates (n, 3), rad/s, at times (n,) within `time_s`; with `derivative` 1 their change."""
         ...
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """(n,) where looks follow each other closely enough for `rate` to be true."""
+        """Return which times (n,) lie between states that are close enough together for `rate` to hold."""
         ...
 
 
-def closely_followed(looks_s: Array, close: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
-    """Which of the times (n,) lie between two of the looks (m,) that are `close` (m − 1,)."""
-    interval = np.searchsorted(looks_s, time_s, side="right") - 1
+def closely_followed(states_s: Array, close: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
+    """Return which of the times (n,) lie between two of the states (m,) that are `close` (m − 1,)."""
+    interval = np.searchsorted(states_s, time_s, side="right") - 1
     inside = (interval >= 0) & (interval < len(close))
-    known: NDArray[np.bool_] = inside & close[np.clip(interval, 0, len(close) - 1)]
-    return known
+    covered: NDArray[np.bool_] = inside & close[np.clip(interval, 0, len(close) - 1)]
+    return covered
 
 
 def check_span(time_s: Array, what: str) -> None:
-    """Times (n,) that rise are refused where they reach too far. Raises Fault `impossible_times`."""
+    """Raise Fault `impossible_times` if rising times (n,) reach too far."""
     span_s = time_s[-1] - time_s[0]
     if span_s > MAX_SPAN_S:
         raise Fault(
@@ -52,5 +52,5 @@ def check_span(time_s: Array, what: str) -> None:
 
 
 def not_finite(what: str) -> Fault:
-    """The error for a recording that holds what is no number."""
+    """Return the error for a recording with a value that is not a finite number."""
     return Fault("not_finite", f"{what} in the recording is not a number", "Do not use this recording; make a new one")

@@ -1,4 +1,4 @@
-"""The arm's side of an observation: when a joint turned through exactly its revolution or arc, and whether properly."""
+"""A joint's exact revolution or arc: its ends in time, and checks that it was turned properly."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,21 +14,22 @@ from rig.observation.statistics.lines import BEATS
 
 MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
 SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
-MAX_STATE_GAP_S = 1.0  # over less, a halt shows in the angle that is missing afterwards
+MAX_STATE_GAP_S = 1.0  # in a shorter gap, a halt shows in the angle that is missing afterwards
 MAX_OTHER_TRAVEL_RAD = 0.01
 MIN_SPEED_FRACTION = 0.995
 
 
 @dataclass(frozen=True, slots=True)
 class Revolution:
-    """A turn of `angle_rad` between two controller times: exactly 2π, or an arc as far as the encoders tell.
+    """A turn of `angle_rad` between two controller times: exactly 2π, or an arc by the encoders.
 
-    `duration_std_s` is what interpolating between arm states leaves uncertain; `axis_flange` (3,) is the unit vector of
-    the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change it, per
-    radian (`rig.motion.geometry.AXIS_ERRORS`). Where it began, `attitude` (3, 3) takes a vector of the arm's base frame
-    into the flange's; `arm_m` (3,) is a way from the joint's axis to the flange's origin, in the flange's frame;
-    `station` names the joint, from 0 at the base, and the pose it turned in. A turn is `uneven` where its readings are
-    even: an encoder that errs by a degree closes the loop. So the shaft is known over whole turns alone.
+    - `duration_std_s`: uncertainty by interpolation between arm states.
+    - `axis_flange` (3,): unit vector of the turn in the flange frame, by the measured joints.
+    - `axis_errors` (13, 3): its change per radian of each arm error (`rig.motion.geometry.AXIS_ERRORS`).
+    - `attitude` (3, 3): takes a vector of the arm's base frame into the flange's, at the start.
+    - `arm_m` (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.
+    - `station`: the joint, from 0 at the base, and the pose it turned in.
+    - `uneven`: the encoder errs by a degree, so the shaft's angle is known over whole turns alone.
     """
 
     start_s: float
@@ -44,15 +45,15 @@ class Revolution:
 
     @property
     def beats(self) -> int:
-        """How often in a turn, at most, the shaft is ahead and behind: each of its lines has others as far beside it.
+        """Number of sidebands of each spectral line: cycles per turn at which the shaft runs ahead and behind.
 
-        Such an encoder errs once and twice a turn; what that makes of itself comes up to four times.
+        An encoder with a large error errs once and twice a turn; products of these come up to four times.
         """
         return 2 if self.uneven else BEATS
 
     @property
     def closed(self) -> bool:
-        """Whether it is whole turns: over these an encoder errs by nothing, and gravity's share averages out."""
+        """Whether it consists of whole turns, over which an encoder's error cancels and gravity's part averages out."""
         return closes(self.angle_rad)
 
     @property
@@ -62,7 +63,7 @@ class Revolution:
 
     @property
     def speed_rad_s(self) -> float:
-        """Δθ/T, of a revolution 2π/T: the mean speed, whatever the vibration."""
+        """Mean speed Δθ/T, of a revolution 2π/T, whatever the vibration."""
         return float(self.angle_rad / self.duration_s)
 
     @property
@@ -73,7 +74,7 @@ class Revolution:
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """When a revolution began and ended, how uncertain the time between is, and the times (k,) of the states in it."""
+    """Start and end of a revolution, the uncertainty of its duration, and the times (k,) of the states in it."""
 
     start_s: float
     end_s: float
@@ -82,9 +83,9 @@ class Ends:
 
 
 def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThresholds) -> Ends:
-    """The revolution of one sweep, of which `states` (n,) of the turner tell, in the order of their times.
+    """Return the revolution of one sweep from the turner's `states` (n,), in the order of their times.
 
-    Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raises Fault
+    Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raise Fault
     `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_limited`, `speed_not_constant`,
     `other_joint_moved`.
     """
@@ -103,12 +104,12 @@ def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThr
 
 
 def describe(sweep: Sweep) -> str:
-    """How messages name a sweep."""
+    """Return a sweep's name in messages."""
     return f"sweep {sweep.index} ({sweep.joint_name} {sweep.direction})"
 
 
 def arm_states_lost(where: str, extent: str) -> Fault:
-    """The error for a sweep whose motion is not known well enough."""
+    """Return the error for a sweep with too many states missing."""
     return Fault(
         "arm_states_lost",
         f"in {where} the arm's states are missing {extent}",
@@ -117,15 +118,15 @@ def arm_states_lost(where: str, extent: str) -> Fault:
 
 
 def _inside(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
-    """Indices of the first and the last state within the revolution, which has states before and after it."""
+    """Return the indices of the first and last state within the revolution, which has states before and after it."""
     entries = np.flatnonzero((travelled[:-1] < 0) & (travelled[1:] >= 0)) + 1
     exits = np.flatnonzero((travelled[:-1] < turn_rad) & (travelled[1:] >= turn_rad))
     if len(entries) and len(exits) and exits[0] > entries[0]:
         return int(entries[0]), int(exits[0])
-    turned = float(np.ptp(travelled)) if len(travelled) else 0.0
+    angle_rad = float(np.ptp(travelled)) if len(travelled) else 0.0
     raise Fault(
         "incomplete_revolution",
-        f"in {describe(sweep)} the joint turned {np.degrees(turned):.0f}° and not {_extent(sweep)}",
+        f"in {describe(sweep)} the joint turned {np.degrees(angle_rad):.0f}° and not {_extent(sweep)}",
         "Repeat the sweep; resume the run if it was interrupted",
     )
 
@@ -135,10 +136,10 @@ def _extent(sweep: Sweep) -> str:
 
 
 def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
-    """When the revolution begins and ends, and the standard deviation of the time between, s.
+    """Return the start and end of the revolution, and the standard deviation of the time between, s.
 
-    Between two neighbouring states the angle is interpolated. Where states are missing it might already be in a ramp,
-    so there the straight line through the whole revolution says when, but for the ripple about it.
+    Between two neighbouring states the angle is interpolated. If states are missing, the joint might already be in a
+    ramp: there the straight line through the whole revolution gives the time, to within the ripple about it.
     """
     t, angle = time_s[first : last + 1], travelled[first : last + 1]
     speed, offset = np.polyfit(t - t[0], angle, 1)
@@ -148,8 +149,8 @@ def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: floa
     for before, level in ((first - 1, 0.0), (last, turn_rad)):
         step_s = time_s[before + 1] - time_s[before]
         if step_s <= MAX_STATE_STEP_S:
-            share = (level - travelled[before]) / (travelled[before + 1] - travelled[before])
-            ends.append(time_s[before] + share * step_s)
+            fraction = (level - travelled[before]) / (travelled[before + 1] - travelled[before])
+            ends.append(time_s[before] + fraction * step_s)
             # A ripple of RMS r whose rate has RMS v accelerates by about v²/r; a chord misses h²/8 times that.
             missed.append(min(ripple, step_s**2 / 8 * unsteady**2 / ripple) if ripple > 0 else 0.0)
         else:
@@ -159,7 +160,7 @@ def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: floa
 
 
 def _check_slider(turning: NDArray[Any], where: str) -> None:
-    """An arm tells of its speed slider, and of how much slower its controller goes; other turners have none."""
+    """Raise Fault `speed_slider` or `speed_limited` if the arm slowed down; other turners record neither."""
     if not {"target_speed_fraction", "speed_scaling"} <= {*(turning.dtype.names or ())}:
         return
     slider, scaling = (float(turning[name].min()) for name in ("target_speed_fraction", "speed_scaling"))
@@ -179,7 +180,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """The joint's rate, smoothed, must stay near its mean: vibration passes, a halt on the way does not."""
+    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: vibration passes, a halt does not."""
     middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
     behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)
@@ -190,7 +191,7 @@ def _check_speed(time_s: Array, travelled: Array, where: str, settings: Observat
 
 
 def not_constant(where: str, deviation: float, settings: ObservationThresholds) -> Fault:
-    """The error for a sweep whose speed strayed by a fraction from its mean."""
+    """Return the error for a sweep whose speed strayed by a fraction from its mean."""
     return Fault(
         "speed_not_constant",
         f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean, "

@@ -1,8 +1,8 @@
-"""The mean speed of a shaft over a whole turn, from nothing but its own encoder and a clock.
+"""The mean speed of a shaft over a whole turn, from its own encoder and a clock alone.
 
-The same encoder reading one turn later is the same place of the shaft, whatever the encoder's nonlinearity: over a
-whole turn it cancels, and so does every unevenness that comes back with the turn (a gear's ripple, a backlash taken
-up, a load that pulls). What is left is the noise of the readings, their steps, and the clock's jitter. Pure.
+The same encoder reading one turn later is the same angle of the shaft, whatever the encoder's nonlinearity: over a
+whole turn it cancels, and so does every unevenness that comes back with the turn (a gear's ripple, backlash, a load
+that pulls). The noise and the steps of the readings remain, and the clock's jitter. Pure.
 """
 
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 
 TURN_RAD = 2 * np.pi
-FEWEST_PLACES = 20
-STEPS = 50  # of the search for the period; each is a step of a secant's, three or four do
+FEWEST_PAIRS = 20
+STEPS = 50  # of the search for the period by secants; three or four are enough
 CLOSE = 1e-12  # of the period, between two steps
 
 
@@ -31,62 +31,62 @@ class TurnSpeed:
 
 
 def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnSpeed:
-    """The speed 2π/T of a shaft that turns evenly through more than a whole turn.
+    """Return the speed 2π/T of a shaft that turns evenly through more than a whole turn.
 
     `time_s` (n,) rising, `q_rad` (n,) the encoder's readings, turns counted; all of them between the ramps. T is the
     time after which the readings are a turn farther, in the mean over every reading that has one a turn later: how far
-    the recording goes beyond the turn decides how well T is known. A quarter of a turn more, read at 100 Hz at 60°/s
-    by a 12-bit encoder with a noise of 0.06°, gives 2e-5 (one standard deviation).
+    the recording goes beyond the turn decides how well T is known. A quarter of a turn more, read at 100 Hz at 60°/s by
+    a 12-bit encoder with a noise of 0.06°, gives 2e-5 (one standard deviation).
 
-    The standard deviation comes from the scatter of these differences, taken for white noise of the single readings.
-    Each reading of the second turn stands in two differences, which makes neighbours alike; that is reckoned with.
+    The standard deviation comes from the scatter of these differences, with white noise of the single readings. Each
+    reading of the second turn enters two differences, which correlates neighbours; that is allowed for.
 
-    Raises Fault `turn_too_short` for less than a turn and `FEWEST_PLACES` readings more, or a shaft that stands.
+    Raise Fault `turn_too_short` for less than a turn and `FEWEST_PAIRS` readings more, or a shaft that stands.
     """
-    far_rad = abs(float(q_rad[-1] - q_rad[0])) if len(q_rad) > FEWEST_PLACES else 0.0
+    far_rad = abs(float(q_rad[-1] - q_rad[0])) if len(q_rad) > FEWEST_PAIRS else 0.0
     if far_rad <= TURN_RAD:
         raise _too_short(far_rad)
-    way = float(np.sign(q_rad[-1] - q_rad[0]))
-    turned_rad = way * (q_rad - q_rad[0])
-    rate_rad_s = float(np.polyfit(time_s - time_s[0], turned_rad, 1)[0])
+    direction = float(np.sign(q_rad[-1] - q_rad[0]))
+    angle_rad = direction * (q_rad - q_rad[0])
+    rate_rad_s = float(np.polyfit(time_s - time_s[0], angle_rad, 1)[0])
     period_s = TURN_RAD / rate_rad_s
-    places = int(np.searchsorted(time_s, time_s[-1] - period_s, side="right"))
-    if places < FEWEST_PLACES:
+    pairs = int(np.searchsorted(time_s, time_s[-1] - period_s, side="right"))
+    if pairs < FEWEST_PAIRS:
         raise _too_short(far_rad)
-    first_s, first_rad = time_s[:places], turned_rad[:places]
+    first_s, first_rad = time_s[:pairs], angle_rad[:pairs]
 
-    def beyond(period_s: float) -> NDArray[np.float64]:
-        """Angles (places,) by which the places have gone beyond the turn after that time, rad."""
-        ahead: NDArray[np.float64] = np.interp(first_s + period_s, time_s, turned_rad) - first_rad - TURN_RAD
+    def excess_rad(period_s: float) -> NDArray[np.float64]:
+        """Return the angles (pairs,), rad, by which the shaft has turned more than one turn after that time."""
+        ahead: NDArray[np.float64] = np.interp(first_s + period_s, time_s, angle_rad) - first_rad - TURN_RAD
         return ahead
 
     for _ in range(STEPS):
-        step_s = float(beyond(period_s).mean()) / rate_rad_s
+        step_s = float(excess_rad(period_s).mean()) / rate_rad_s
         period_s -= step_s
         if abs(step_s) < CLOSE * period_s:
             break
-    std_s = _std_of_mean(first_s + period_s, time_s, beyond(period_s)) / rate_rad_s
+    std_s = _std_of_mean(first_s + period_s, time_s, excess_rad(period_s)) / rate_rad_s
     speed_rad_s = TURN_RAD / period_s
-    return TurnSpeed(way * speed_rad_s, speed_rad_s * std_s / period_s, period_s)
+    return TurnSpeed(direction * speed_rad_s, speed_rad_s * std_s / period_s, period_s)
 
 
 def _std_of_mean(later_s: NDArray[np.float64], time_s: NDArray[np.float64], beyond_rad: NDArray[np.float64]) -> float:
-    """The standard deviation of the mean of differences between interpolated and single readings.
+    """Return the standard deviation of the mean of differences between interpolated and single readings.
 
     Difference i is (1 − w) e_j + w e_{j+1} − e_i of the readings' white errors e: the variance of the single reading
-    follows from the differences' scatter, and that of their mean from how often each reading stands in them.
+    follows from the differences' scatter, and that of their mean from the number of differences each reading enters.
     """
-    places, number = len(beyond_rad), len(time_s)
-    after = np.searchsorted(time_s, later_s, side="right").clip(1, number - 1)
-    share = (later_s - time_s[after - 1]) / (time_s[after] - time_s[after - 1])
-    share = share.clip(0.0, 1.0)
-    weights = np.zeros(number)
-    np.add.at(weights, after, share)
-    np.add.at(weights, after - 1, 1.0 - share)
-    weights[:places] -= 1.0
-    each = 1.0 + share**2 + (1.0 - share) ** 2
-    single = float(np.sum((beyond_rad - beyond_rad.mean()) ** 2)) / float(each.sum()) * places / (places - 1)
-    return float(np.sqrt(single * np.sum(weights**2))) / places
+    pairs, count = len(beyond_rad), len(time_s)
+    after = np.searchsorted(time_s, later_s, side="right").clip(1, count - 1)
+    weight = (later_s - time_s[after - 1]) / (time_s[after] - time_s[after - 1])
+    weight = weight.clip(0.0, 1.0)
+    weights = np.zeros(count)
+    np.add.at(weights, after, weight)
+    np.add.at(weights, after - 1, 1.0 - weight)
+    weights[:pairs] -= 1.0
+    variances = 1.0 + weight**2 + (1.0 - weight) ** 2
+    single = float(np.sum((beyond_rad - beyond_rad.mean()) ** 2)) / float(variances.sum()) * pairs / (pairs - 1)
+    return float(np.sqrt(single * np.sum(weights**2))) / pairs
 
 
 def _too_short(far_rad: float) -> Fault:

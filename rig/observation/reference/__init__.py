@@ -1,1 +1,1 @@
-"""What accelerometers read of gravity, in dwells and in sweeps."""
+"""Accelerometer readings of gravity, in dwells and in sweeps."""

@@ -1,4 +1,4 @@
-"""What an accelerometer read in dwells: mean readings at rest, each with the attitude the arm stood in."""
+"""Mean readings of an accelerometer in dwells, each with the arm's attitude."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
@@ -24,15 +24,15 @@ from rig.observation.statistics.mean import Mean
 from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.windows import Dwelt, Window, dwelt
 
-LEAVING_S = 0.05  # before a dwell's end: the board's times are those of the gyroscope, whose filter is the later one
+LEAVING_S = 0.05  # before a dwell's end: the board's times include the gyroscope's delay, the longer of the two
 
 
 @dataclass(frozen=True, slots=True)
 class DwellReading:
     """A dwell of the procedure, by its `index`: the mean reading in m/s².
 
-    `attitude` (3, 3) is the mean rotation from the arm's base frame into the flange's by the weights of the readings'
-    mean, `window` the controller's times.
+    `attitude` (3, 3) is the mean rotation from the arm's base frame into the flange's, weighted like the readings;
+    `window` is in controller times.
     """
 
     index: int
@@ -46,21 +46,21 @@ class DwellReading:
 def dwell_readings(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> Iterator[DwellReading]:
-    """Every finished dwell of a recording whose index is not in `superseded`, of a sensor with accelerations.
+    """Yield the average of each finished dwell whose index is not in `superseded`, of a sensor with accelerations.
 
-    Raises Fault `arm_moved_in_dwell`, `arm_states_lost`, `lost_samples`, `saturation`, `stuck_sensor`.
+    Raise Fault `arm_moved_in_dwell`, `arm_states_lost`, `lost_samples`, `saturation` or `stuck_sensor`.
     """
-    for each in dwelt(run):
-        if each.dwell.index not in superseded:
-            yield _dwell_reading(run, stream, motion, each, settings)
+    for finished in dwelt(run):
+        if finished.dwell.index not in superseded:
+            yield _dwell_reading(run, stream, motion, finished, settings)
 
 
 def read_each_dwell(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> Attempts[int, DwellReading]:
-    """Read every finished dwell by itself; return the readings, and why there is none, by the dwell's index.
+    """Average every finished dwell by itself; return the averages, and the faults, by the dwell's index.
 
-    There is nothing of a sensor without accelerations.
+    Both are empty for a sensor without accelerations.
     """
     if not stream.sensor.measures(ACCELERATION):
         return Attempts()
@@ -69,19 +69,19 @@ def read_each_dwell(
 
 
 def accelerations(stream: Stream, inside: slice) -> Array:
-    """(n, 3) m/s² of the samples inside."""
+    """Return accelerations (n, 3), m/s², of the samples `inside`."""
     return stream.correct_temperature(
         ACCELERATION, stream.sensor.channel(ACCELERATION).values(stream.raw[inside]), inside
     )
 
 
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
-    """Raises Fault `saturation`, `stuck_sensor` of what the accelerometer read there.
+    """Raise Fault `saturation` or `stuck_sensor` for the accelerometer's samples `inside`.
 
-    While it is `turning` one axis alone that repeats one reading is stuck, too.
+    While the sensor is `turning` a single axis that repeats one reading is stuck too.
     """
     channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
-    counts, saturated = channel.counts(samples), channel.saturated(samples)
+    counts, saturated = channel.counts(samples), channel.is_saturated(samples)
     if saturated.any():
         raise Fault(
             "saturation",
@@ -98,7 +98,7 @@ def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bo
 
 
 def _is_noisy(stream: Stream) -> bool:
-    """Whether neighbouring samples differ as a rule: without noise they may well be alike."""
+    """Return whether neighbouring samples mostly differ: without noise they may well be equal."""
     steps = np.abs(np.diff(stream.sensor.channel(ACCELERATION).counts(stream.raw), axis=0))
     return bool(len(steps)) and np.median(steps, axis=0).min() >= 1
 
@@ -106,16 +106,16 @@ def _is_noisy(stream: Stream) -> bool:
 def _dwell_reading(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Dwelt, settings: ObservationThresholds
 ) -> DwellReading:
-    dwell, window = finished.dwell, without_leaving(run, finished).window
+    dwell, window = finished.dwell, trim_dwell(run, finished).window
     where = f"dwell {dwell.index} ({dwell.name})"
     inside = between(stream, window.start_s, window.end_s)
-    _check_standing(motion, window, where)
+    _check_standstill(motion, window, where)
     check_complete(stream.sensor, stream.raw[inside], where, settings)
     check_acceleration(stream, inside, where)
     readings, time_s = accelerations(stream, inside), stream.time_s[inside]
     steps = steps_of(stream.raw, stream.sensor, ACCELERATION)
     attitudes = motion.attitudes(time_s)
-    swing = gravity_beside(attitudes, attitudes.mean(axis=0), stream.sensor, run.settings.site)  # no noise
+    swing = gravity_difference(attitudes, attitudes.mean(axis=0), stream.sensor, run.settings.site)  # no noise
     reading, _ = average_standstill(readings - swing, time_s, window, steps)
     return DwellReading(
         index=dwell.index,
@@ -127,23 +127,23 @@ def _dwell_reading(
     )
 
 
-def gravity_beside(attitudes: Array, expected: Array, sensor: RecordedSensor, site: Site) -> Array:
-    """Return (n, 3) m/s² by which gravity differs from what is expected, to a sensor as it is nominally mounted.
+def gravity_difference(attitudes: Array, expected: Array, sensor: RecordedSensor, site: Site) -> Array:
+    """Return the difference (n, 3), m/s², of gravity at attitudes and at expected ones, in the sensor's nominal axes.
 
-    attitudes (n, 3, 3) are those that the arm's encoders tell, expected those that the readings are held against.
+    attitudes (n, 3, 3) are those of the arm's encoders, expected the ones to which the readings are compared.
     """
-    found: Array = (attitudes - expected) @ -site.down_m_s2 @ np.array(sensor.mounting).T
-    return found
+    difference: Array = (attitudes - expected) @ -site.down_m_s2 @ np.array(sensor.mounting).T
+    return difference
 
 
-def without_leaving(run: RunData, finished: Dwelt) -> Dwelt:
-    """Return the dwell without its last readings, which may have felt the arm leave."""
+def trim_dwell(run: RunData, finished: Dwelt) -> Dwelt:
+    """Return the dwell without its last readings, which may include the start of the arm's next motion."""
     start_s, end_s = finished.window.start_s, finished.window.end_s
     return Dwelt(finished.dwell, Window(start_s, max(end_s - LEAVING_S, start_s)))
 
 
-def _check_standing(motion: ArmMotion, window: Window, where: str) -> None:
-    moved_rad = motion.moved_rad(window)
+def _check_standstill(motion: ArmMotion, window: Window, where: str) -> None:
+    moved_rad = motion.travel_rad(window)
     if moved_rad is None:
         raise Fault(
             "arm_states_lost",
@@ -159,7 +159,7 @@ def _check_standing(motion: ArmMotion, window: Window, where: str) -> None:
 
 
 def check_complete(sensor: RecordedSensor, samples: NDArray[Any], where: str, settings: ObservationThresholds) -> None:
-    """Raises Fault `lost_samples` where too few were recorded in a dwell, or too many of them are missing."""
+    """Raise Fault `lost_samples` if too few samples were recorded in a dwell, or too many of them are missing."""
     count, lost = len(samples), 0
     if count:
         sequence = samples["sequence"].astype(np.int64)

@@ -1,4 +1,4 @@
-"""What an accelerometer read in sweeps: the first harmonic of each revolution over the measured joint angle."""
+"""The first harmonic of an accelerometer's readings in sweeps, over the measured joint angle."""
 
 from dataclasses import dataclass, replace
 
@@ -12,17 +12,17 @@ from rig.motion.steps import Sweep
 from rig.observation.average import Stream, between
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.motion.revolution import Revolution, describe
-from rig.observation.reference.acceleration import accelerations, check_acceleration, gravity_beside
+from rig.observation.reference.acceleration import accelerations, check_acceleration, gravity_difference
 from rig.observation.statistics.beside_lines import fit_inflation, line_columns
 
 
 @dataclass(frozen=True, slots=True)
 class SweptAcceleration:
-    """Sweep `sweep` of the plan. The joint's angle is counted from where the revolution began.
+    """An accelerometer's first harmonic in sweep `sweep` of the plan; the joint's angle counts from the start.
 
     There `attitude` (3, 3) takes a vector of the arm's base frame into the flange's. `axis_flange` (3,) is the unit
-    vector of a growing angle, `arm_m` (3,) a way from the axis to the flange's origin, in the flange's frame.
-    `station` names the `joint`, from 0 at the base, and the pose it turned in.
+    vector of a growing angle, `arm_m` (3,) a vector from the axis to the flange's origin, in the flange's frame.
+    `station` holds the `joint`, from 0 at the base, and the pose it turned in.
     """
 
     sweep: int
@@ -37,23 +37,23 @@ class SweptAcceleration:
 def swept_acceleration(
     stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, site: Site
 ) -> SweptAcceleration:
-    """What one sweep's revolution tells, beside what swings in it.
+    """Fit the first harmonic of one sweep's revolution, together with its vibrations.
 
-    The joints that stand may swing meanwhile, which is known: readings are held against one attitude, which the joint
-    alone turns, so that by which the arm's attitude differs from that is taken out of them.
-    Raises Fault `saturation`, `stuck_sensor`, `incomplete_revolution`, `not_finite`.
+    The joints at rest may oscillate, as the encoders measure: readings are compared with one attitude that the joint
+    alone turns, and gravity's difference between that and the arm's attitude is subtracted. Raise Fault `saturation`,
+    `stuck_sensor`, `incomplete_revolution` or `not_finite`.
     """
     inside = between(stream, turn.start_s, turn.end_s)
     check_acceleration(stream, inside, describe(sweep), turning=True)
     time_s = stream.time_s[inside]
-    known = motion.covered(time_s)
-    time_s = time_s[known]
+    covered = motion.covered(time_s)
+    time_s = time_s[covered]
     angle_rad = motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s)
     attitudes, rotations = motion.attitudes(time_s), _rotations(-sweep.growing * turn.axis_flange, angle_rad)
     began = nearest_rotation((rotations.swapaxes(1, 2) @ attitudes).mean(axis=0))
     harmonic = first_harmonic(
         time_s,
-        accelerations(stream, inside)[known] - gravity_beside(attitudes, rotations @ began, stream.sensor, site),
+        accelerations(stream, inside)[covered] - gravity_difference(attitudes, rotations @ began, stream.sensor, site),
         angle_rad,
         motion.angle(sweep, time_s, 1),
         coloured=fit_inflation,
@@ -63,15 +63,15 @@ def swept_acceleration(
 
 
 def _rotations(axis: Array, angle_rad: Array) -> Array:
-    """Return (n, 3, 3) rotations by angles (n,) about a unit vector (3,): Rodrigues' formula."""
+    """Return the rotations (n, 3, 3) by angles (n,) about a unit vector (3,): Rodrigues' formula."""
     across = np.cross(np.eye(3), axis)
     sine, versine = np.sin(angle_rad)[:, None, None], (1 - np.cos(angle_rad))[:, None, None]
-    found: Array = np.eye(3) + sine * across + versine * (across @ across)
-    return found
+    rotations: Array = np.eye(3) + sine * across + versine * (across @ across)
+    return rotations
 
 
 def of_turn(sweep: Sweep, turn: Revolution, harmonic: FirstHarmonic) -> SweptAcceleration:
-    """The first harmonic of a sweep, and how the arm turned meanwhile."""
+    """Return the first harmonic of a sweep together with the arm's turn."""
     return SweptAcceleration(
         sweep=sweep.index,
         joint=sweep.joint,

@@ -362,10 +362,10 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
         yield from (f"{name}: {warning}" for warning in getattr(sensor.vector_model, "warnings", ()))
     for _, _, finding in outlets(result, lambda kind: kind.standard):
         said = getattr(finding.entry, "warnings", ())
-        yield from (f"{finding.quantity.of(finding.sensor)}: {warning}" for warning in said)
+        yield from (f"{finding.quantity.label(finding.sensor)}: {warning}" for warning in said)
     for name, magnetometer in result.magnetometers.items():
         if isinstance(magnetometer, ErrorEntry):
-            yield f"{FIELD.of(name)}, was recorded and not calibrated: {magnetometer.error}"
+            yield f"{FIELD.label(name)}, was recorded and not calibrated: {magnetometer.error}"
     for name, faults in result.unsolved.items():
         yield from (f"{name}, {what}, was recorded and not calibrated: {each.error}" for what, each in faults.items())
     yield from (f"{line[:1].upper()}{line[1:]}." for line in omitted_lines(result))

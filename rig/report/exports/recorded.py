@@ -11,7 +11,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.recording.motion_file import Told
+from rig.data.recording.motion_file import MotionKind
 from rig.data.recording.run_file import RunData
 from rig.errors import Refused
 from rig.estimation.arrays import Array
@@ -24,7 +24,7 @@ LOST = "Not here: counts, the board's and the computer's times, events, settings
 LOST_OF_FILES = "Not here: what was said beside the files; it is in run.h5."
 UPWARDS = "Accelerations are upwards at rest. "
 TURNED = "Turns by an angle about a unit vector in the flange's frame; those of angle 0 are rests."
-TOLD: Final[Mapping[Told, str]] = {
+TOLD: Final[Mapping[MotionKind, str]] = {
     "sweeps": "Turns about a unit vector in a frame fixed to the carrier; those of no speed or no angle are rests.",
     "attitudes": "Unit quaternions that take body to table coordinates, and what was told beside, in body coordinates.",
 }

@@ -99,7 +99,7 @@ class Term:
     @property
     def whose(self) -> str:
         """How the sensor is called beside the others of its name."""
-        return self.finding.quantity.of(self.finding.sensor)
+        return self.finding.quantity.label(self.finding.sensor)
 
     @property
     def units(self) -> Units:

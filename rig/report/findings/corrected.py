@@ -60,7 +60,7 @@ class Corrected:
     @property
     def name(self) -> str:
         """How the sensor is called beside the others of its name."""
-        return self.quantity.of(self.sensor)
+        return self.quantity.label(self.sensor)
 
     @property
     def gains(self) -> Array:

@@ -104,13 +104,13 @@ def scale_and_bias(
     sensor: str, quantity: "Quantity", entry: Calibrated, bias: Sequence[float], document: "ResultDocument"
 ) -> Iterator[Parameter]:
     """Scale and bias of each axis, and the mean scale factor by their covariance, with the largest k of theirs."""
-    from rig.data.meaning import HELD, limit_held
+    from rig.data.meaning import JUDGED_PARAMETERS, limit_held
 
     axes, each_alone = len(entry.scale), np.eye(2 * len(entry.scale))
     mean = each_alone[:axes].mean(axis=0)
     values, combined = np.array([*entry.scale, *bias]), entry.covariance_combined
     factors = np.full(2 * axes, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.coverage_factors)
-    scale_limit, bias_limit = (limit_held(document.checks, sensor, quantity.name, of) for of in HELD)
+    scale_limit, bias_limit = (limit_held(document.checks, sensor, quantity.name, of) for of in JUDGED_PARAMETERS)
     rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
     rows += [(f"k{axis}", each_alone[i], "1", scale_limit) for i, axis in enumerate(quantity.axes)]
     rows += [(f"b{axis}", each_alone[axes + i], quantity.unit, bias_limit) for i, axis in enumerate(quantity.axes)]

@@ -111,7 +111,7 @@ def _printed(finding: Finding[DriftEntry]) -> Iterator[Table | str]:
 
 def _shown(finding: Finding[DriftEntry]) -> Shown:
     """The largest change that there was."""
-    return row_of(LARGEST_CHANGE.of(finding), finding.quantity.beside(finding.sensor))
+    return row_of(LARGEST_CHANGE.of(finding), finding.quantity.full_label(finding.sensor))
 
 
 def _followed(finding: Finding[DriftEntry], document: ResultDocument) -> Followed:

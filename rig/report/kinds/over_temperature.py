@@ -46,7 +46,7 @@ def _found(document: ResultDocument) -> Iterator[Finding[OverTemperatureEntry]]:
 
 def _printed(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
     entry, unit = finding.entry, finding.quantity.bias
-    title = f"{finding.quantity.beside(finding.sensor)}: over temperature, ± U"
+    title = f"{finding.quantity.full_label(finding.sensor)}: over temperature, ± U"
     table = Table(title=plain(title, "table.title"))
     table.title_justify = "left"
     for heading in ("°C", *(f"k{axis}" for axis in "xyz"), *(f"b{axis} {unit.name}" for axis in "xyz")):
@@ -62,7 +62,7 @@ def _printed(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
 def _shown(finding: Finding[OverTemperatureEntry]) -> Shown:
     """The slopes of the bias at the reference."""
     noun = f"change per kelvin at {finding.entry.reference_c:g} °C"
-    return row_of(BIAS_SLOPE_AT_REFERENCE.of(finding), finding.quantity.beside(finding.sensor), noun)
+    return row_of(BIAS_SLOPE_AT_REFERENCE.of(finding), finding.quantity.full_label(finding.sensor), noun)
 
 
 def _followed(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> Followed | None:
@@ -81,7 +81,7 @@ def _followed(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> Foll
 
 def _measured(finding: Finding[OverTemperatureEntry], _: object) -> Measured:
     entry, of = finding.entry, finding.quantity
-    name, results = f"{of.beside(finding.sensor)}, over temperature", dcc_results.over_temperature(entry, of)
+    name, results = f"{of.full_label(finding.sensor)}, over temperature", dcc_results.over_temperature(entry, of)
     return Measured(of.sensor, finding.sensor, entry.part, entry.serial_number, name, results)
 
 

@@ -54,7 +54,7 @@ def shown_of(finding: Finding[Any]) -> Shown:
     axes = len(entry.scale)
     bias = Three([each / size for each in bias_of(quantity, entry)], [each / size for each in expanded[axes:]])
     scale, combined = Three(entry.scale, expanded[:axes]), entry.budget is not None
-    name, unit = quantity.of(finding.sensor), quantity.bias
+    name, unit = quantity.label(finding.sensor), quantity.bias
     return Shown(finding.sensor, quantity, name, unit, bias, combined, scale, labels=quantity.axes)
 
 
@@ -163,12 +163,12 @@ def triad_kind(
         of_all: Mapping[str, Any] = getattr(document, key)
         for name, each in of_all.items():
             if isinstance(each, ErrorEntry):
-                yield f"{quantity.of(name)}, not calibrated: {each.error}"
+                yield f"{quantity.label(name)}, not calibrated: {each.error}"
         yield from unsolved_lines(document, quantity)
 
     def printed(finding: Finding[Any]) -> Iterator[Table | str]:
         entry = finding.entry
-        title = f"{quantity.of(finding.sensor)}{words.title}: {item_words(entry)}"
+        title = f"{quantity.label(finding.sensor)}{words.title}: {item_words(entry)}"
         yield from tables(f"{title}, {words.model(entry)}, {entry.estimator}", quantity, entry)
         yield from words.lines(finding)
 

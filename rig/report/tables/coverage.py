@@ -31,7 +31,7 @@ def coverage_sentence(budget: BudgetEntry) -> str:
             f"{begins}, which for a t-distribution with ν_eff effective degrees of freedom corresponds to a coverage "
             f"probability of approximately {_percent(covers)}: {'; '.join(groups)}."
         )
-    k, fewest = _short(factors[0]), min(budget.known)
+    k, fewest = _short(factors[0]), min(budget.effective_dof)
     if k == "2" and round(100 * covers) == round(100 * PROBABILITY):
         return (
             f"{begins}\u00a0=\u00a0{k}, which for a normal distribution corresponds to a coverage probability of "
@@ -46,7 +46,7 @@ def coverage_sentence(budget: BudgetEntry) -> str:
 
 def _group(budget: BudgetEntry, factors: Sequence[str], first: int, name: str) -> str:
     """k of the three axes, once where it is the same."""
-    own, known = factors[first : first + 3], budget.known[first : first + 3]
+    own, known = factors[first : first + 3], budget.effective_dof[first : first + 3]
     if len(set(own)) == 1:
         return f"{name} k\u00a0=\u00a0{own[0]} (ν_eff\u00a0≥\u00a0{freedom_text(min(known))})"
     each = (f"{axis} {k} ({freedom_text(freedom)})" for axis, k, freedom in zip(AXES, own, known, strict=True))

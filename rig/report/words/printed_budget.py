@@ -104,7 +104,7 @@ def _column(budget: BudgetEntry, place: int, size: _Size) -> Column:
         place,
         size.unit,
         size.text(budget.std[place]),
-        freedom_text(budget.known[place]),
+        freedom_text(budget.effective_dof[place]),
         f"{budget.coverage_factors[place]:.2f}",
         size.text(budget.expanded[place]),
     )

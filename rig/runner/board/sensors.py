@@ -13,8 +13,8 @@ from rig.board.identify import configured_board, find_sensor, refuse_other_firmw
 from rig.config.models import SensorsConfig
 from rig.config.sensors.sensor_sections import MagnetometerSection, SensorSection
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
-from rig.data.recording.channel import of_thermometer, of_three_axes
-from rig.data.recording.recorded_sensor import RecordedSensor, recorded_as
+from rig.data.recording.channel import thermometer_channel, triad_channel
+from rig.data.recording.recorded_sensor import RecordedSensor, build_sensor
 from rig.sensors.source import OnSamples
 
 
@@ -92,8 +92,8 @@ def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> 
 def _magnetometer(board: Board, name: str, section: MagnetometerSection) -> BoardSensor:
     info = find_sensor(board.identity, name, section)
     setup = board.configure_magnetometer(info.index, section.rate_hz, section.range_gauss)
-    field = of_three_axes(FIELD, setup.sensitivity_t, FULL_SCALE_COUNTS, setup.range_t)
-    return BoardSensor(info.index, recorded_as(section, field, rate_hz=setup.rate_hz))
+    field = triad_channel(FIELD, setup.sensitivity_t, FULL_SCALE_COUNTS, setup.range_t)
+    return BoardSensor(info.index, build_sensor(section, field, rate_hz=setup.rate_hz))
 
 
 def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
@@ -101,12 +101,12 @@ def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
     range_g = 0.0 if section.acceleration is None else section.acceleration.range_g
     setup = board.configure(info.index, section.rate_hz, section.range_deg_s, range_g)
     channels = [
-        of_three_axes(RATE, setup.sensitivity_rad_s, FULL_SCALE_COUNTS, radians(setup.range_deg_s)),
-        of_thermometer(setup.temperature_scale_c, setup.temperature_offset_c),
+        triad_channel(RATE, setup.sensitivity_rad_s, FULL_SCALE_COUNTS, radians(setup.range_deg_s)),
+        thermometer_channel(setup.temperature_scale_c, setup.temperature_offset_c),
     ]
     if setup.sensitivity_m_s2:
-        channels.append(of_three_axes(ACCELERATION, setup.sensitivity_m_s2, FULL_SCALE_COUNTS, setup.range_m_s2))
-    return BoardSensor(info.index, recorded_as(section, *channels, rate_hz=setup.rate_hz))
+        channels.append(triad_channel(ACCELERATION, setup.sensitivity_m_s2, FULL_SCALE_COUNTS, setup.range_m_s2))
+    return BoardSensor(info.index, build_sensor(section, *channels, rate_hz=setup.rate_hz))
 
 
 def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:

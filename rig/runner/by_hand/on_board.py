@@ -25,7 +25,7 @@ from rig.data.recording.hand_events import HandAsked, HandMoveRefused, HandMoveT
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove
-from rig.observation.by_hand.runs import MICROSECOND_S, turned_face
+from rig.observation.by_hand.runs import MICROSECOND_S, rotate_face
 from rig.plans.by_hand import ROUND, Wanted, asked_next, still_open
 from rig.runner.board.sensors import BoardSource, board_source
 from rig.runner.by_hand.session import drained
@@ -110,7 +110,7 @@ class FollowedSession:
         self._asked = True
 
     def _face(self, of_sensor: str) -> Face:
-        return turned_face(of_sensor, np.array(self.sensor.mounting).T)
+        return rotate_face(of_sensor, np.array(self.sensor.mounting).T)
 
 
 @contextmanager

@@ -36,8 +36,8 @@ from rig.observation.by_hand.runs import (
     microsecond_of,
     range_of,
     readings_of,
-    segmented,
-    turned_face,
+    replay_runs,
+    rotate_face,
 )
 from rig.plans.by_hand import Open, Wanted, asked_next, still_open
 from rig.runner.acquisition import Acquisition
@@ -89,7 +89,7 @@ class HandSession:
             self._segmenter = Segmenter(range_of(self.sensor))
             self._not_counted = NotCounted(microsecond_s=microsecond_of(self.sensor))
             return
-        self._segmenter, self._not_counted, ends_s = segmented(self.earlier, self.name)
+        self._segmenter, self._not_counted, ends_s = replay_runs(self.earlier, self.name)
         self._not_counted.seams.append(ends_s + BETWEEN_S / 2)
         self._begins_s = self._judged_s = ends_s + BETWEEN_S
         for event in (recorded.event for run in self.earlier for recorded in run.events):
@@ -141,7 +141,7 @@ class HandSession:
         if move is not None and self._begins_s is not None and move.start_s < self._begins_s:
             move = None  # it was somewhere while nobody listened
         self._pauses_before(rest)
-        session = self._not_counted.without(self._segmenter.handled)
+        session = self._not_counted.filter_session(self._segmenter.handled)
         now = self._progress = assess_progress(session, self.told)
         wrong = now.fault_of_last or self._not_closed(now)
         read = now.faces[-1] if now.faces else None
@@ -246,7 +246,7 @@ class HandSession:
 
     def _face(self, of_sensor: str) -> Face:
         """The face of the item that has the sensor's axis `of_sensor` upwards."""
-        return turned_face(of_sensor, np.array(self.sensor.mounting).T)
+        return rotate_face(of_sensor, np.array(self.sensor.mounting).T)
 
     def _board_us(self, part: Rest | Move) -> tuple[int, int]:
         """From when to when, by the board's clock."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.samples import FIELD_SAMPLE_DTYPE
-from rig.data.recording.channel import stamped
+from rig.data.recording.channel import stamp_samples
 
 READING_MESSAGES = 4  # temperature, x, y, z by the sequence number, whose modulus 128 is a multiple
 GAUSS_T = 1e-4
@@ -34,7 +34,7 @@ class MagneticFieldReader:
         is_axis = (slot > 0) & np.isfinite(gauss)
         # Numbers do not wrap as the sequence does: all four messages of a reading give the same.
         readings = (numbers[is_axis] - slot[is_axis]) // READING_MESSAGES + 1
-        rows = stamped(FIELD_SAMPLE_DTYPE, readings, times_us[is_axis], host_time_s)
+        rows = stamp_samples(FIELD_SAMPLE_DTYPE, readings, times_us[is_axis], host_time_s)
         counts = np.rint(gauss[is_axis] / self._gauss_per_count)
         rows["field_counts"] = np.clip(counts, -self._limit, self._limit)[:, None]
         rows, axes = (np.concatenate([self._rows, rows]), np.concatenate([self._axes, slot[is_axis] - 1]))

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rig.config.sensors.sensor_sections import OwnPortSection, SensorSection, field_name
 from rig.data.not_provided import POSSIBLE_C, Absent
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
-from rig.data.recording.channel import of_thermometer, stamped
-from rig.data.recording.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
+from rig.data.recording.channel import stamp_samples, thermometer_channel
+from rig.data.recording.recorded_sensor import RecordedSensor, build_sensor, range_m_s2
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
@@ -92,16 +92,16 @@ class Kvh1775Source:
             if len(fields):
                 self._on_samples(self._field_name, fields)
         temperatures_c, description = self._thermometer.read(self._temperatures_c(messages)), self._description
-        valid = NOT_PROVIDED["rate"].provided(messages["rotation"], messages["status"])
+        valid = NOT_PROVIDED["rate"].mask_provided(messages["rotation"], messages["status"])
         if description.measures(ACCELERATION):
-            valid &= NOT_PROVIDED["force"].provided(messages["acceleration_g"], messages["status"])
+            valid &= NOT_PROVIDED["force"].mask_provided(messages["acceleration_g"], messages["status"])
         self._watch(messages, valid)
         valid &= np.isfinite(temperatures_c)
         if not valid.any():
             return
         if self._first is None:
             self._first = int(numbers[valid][0])
-        samples = stamped(description.sample_dtype, numbers[valid] - self._first, times_us[valid], host_time_s)
+        samples = stamp_samples(description.sample_dtype, numbers[valid] - self._first, times_us[valid], host_time_s)
         description.channel(TEMPERATURE).fill(samples, temperatures_c[valid])
         rate_rad_s = messages["rotation"][valid].astype(np.float64)
         if self._required.rotation == "delta":
@@ -129,7 +129,7 @@ class Kvh1775Source:
             celsius = np.where(messages["sequence"] % 4 == 0, messages["fourth"].astype(np.float64), np.nan)
         else:
             celsius = messages["temperature"] * DEGREES_PER_COUNT
-        return np.where(NOT_PROVIDED["temperature"].provided(celsius), celsius, np.nan)
+        return np.where(NOT_PROVIDED["temperature"].mask_provided(celsius), celsius, np.nan)
 
 
 def make_settings(section: SensorSection) -> Kvh1775Settings:
@@ -152,10 +152,10 @@ def judge(driver: Kvh1775, name: str, section: SensorSection) -> Iterator[Sensor
 
 def describe(name: str, section: SensorSection) -> RecordedSensor:
     """Return the description of its samples for a recording."""
-    channels = [fine_axes(RATE, radians(section.range_deg_s)), of_thermometer(DEGREES_PER_COUNT, 0.0)]
+    channels = [fine_axes(RATE, radians(section.range_deg_s)), thermometer_channel(DEGREES_PER_COUNT, 0.0)]
     if section.acceleration is not None:
         channels.append(fine_axes(ACCELERATION, range_m_s2(section.acceleration)))
-    return recorded_as(section, *channels, clock=name)
+    return build_sensor(section, *channels, clock=name)
 
 
 def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
@@ -164,7 +164,7 @@ def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
         return None
     field = fine_axes(FIELD, FIELD_FULL_SCALE_T)  # the ICD does not state its range
     part, rate_hz = "kvh1775_magnetometer", section.rate_hz / READING_MESSAGES
-    return recorded_as(section, field, part=part, rate_hz=rate_hz, clock=name)
+    return build_sensor(section, field, part=part, rate_hz=rate_hz, clock=name)
 
 
 def kvh1775(

@@ -20,8 +20,8 @@ from rig.config.sensors.lines_section import (
 from rig.config.sensors.sensor_sections import OwnPortSection, SensorSection, field_name, scalar_name
 from rig.config.units import UNITS
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE, Quantity
-from rig.data.recording.channel import Channel, of_thermometer, of_three_axes, stamped
-from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, range_m_s2, recorded_as
+from rig.data.recording.channel import Channel, stamp_samples, thermometer_channel, triad_channel
+from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, build_sensor, range_m_s2
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.driver import LinesDevice
@@ -105,7 +105,7 @@ class LinesSource:
                 self._not_provided[name] += int(np.count_nonzero(~complete))
             if not complete.any():
                 continue
-            samples = stamped(sensor.sample_dtype, sample_numbers[complete], times_us[complete], host_time_s)
+            samples = stamp_samples(sensor.sample_dtype, sample_numbers[complete], times_us[complete], host_time_s)
             for channel, reading in zip(sensor.channels, readings, strict=True):
                 channel.fill(samples, reading[complete])
             self._on_samples(name, samples)
@@ -146,7 +146,7 @@ def _make_readers(
 
     def make_sensor(part: str, *channels: tuple[Channel, _Printed]) -> tuple[RecordedSensor, tuple[_Printed, ...]]:
         channels_only, printed = zip(*channels, strict=True)
-        return recorded_as(section, *channels_only, part=part, clock=name), printed
+        return build_sensor(section, *channels_only, part=part, clock=name), printed
 
     gyroscope, printed = make_sensor(section.part, *own_channels)
     std_s = stamp_std_s(lines, section.rate_hz, first_lines.time_step_s)
@@ -233,7 +233,7 @@ def _make_triad(
     unit = section.scale * UNITS[section.unit].size
     step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals
     step = max(step, full_scale / FULL_SCALE_COUNTS)
-    channel = of_three_axes(quantity, step, max(int(AT_THE_END * full_scale / step), 1), full_scale)
+    channel = triad_channel(quantity, step, max(int(AT_THE_END * full_scale / step), 1), full_scale)
     return channel, _Printed(tuple(map(lines.columns.index, AXES[quantity])), unit)
 
 
@@ -243,7 +243,7 @@ def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[
     if provides and "temperature" in lines.columns:
         temperature = lines.temperature
         step = 0.0 if temperature.decimals is None else temperature.scale * 10.0**-temperature.decimals
-        printed = of_thermometer(max(step, DEGREES_PER_COUNT), 0.0)
+        printed = thermometer_channel(max(step, DEGREES_PER_COUNT), 0.0)
         printed_channel = _Printed((lines.columns.index("temperature"),), temperature.scale, temperature.offset_c)
     yield from ((channel, printed_channel) for channel in thermometer_channels(printed, lines.temperature.stated))
 
@@ -252,7 +252,7 @@ def _temperatures_c(lines: LinesSection, values: Array) -> Array:
     """Return (n,) °C of printed `values` (n, columns), NaN if the device provides none."""
     temperature = lines.temperature
     celsius = values[:, lines.columns.index("temperature")] * temperature.scale + temperature.offset_c
-    return np.where(NOT_PROVIDED["temperature"].provided(celsius), celsius, np.nan)
+    return np.where(NOT_PROVIDED["temperature"].mask_provided(celsius), celsius, np.nan)
 
 
 def _split_section(section: SensorSection) -> tuple[OwnPortSection, LinesSection]:

@@ -67,7 +67,7 @@ def decode_reading(message: Any) -> Reading:
     }
     flags = getattr(message, "fields_updated", -1)
     provided = frozenset(
-        name for name, absent in NOT_PROVIDED[kind].items() if absent.provided(sent[name][None], flags).all()
+        name for name, absent in NOT_PROVIDED[kind].items() if absent.mask_provided(sent[name][None], flags).all()
     )
     integer = is_integer(kind)
     time = message.time_boot_ms if kind.startswith("SCALED_IMU") else message.time_usec

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rig.config.sensors.mavlink_section import MavlinkSection
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
-from rig.data.recording.channel import Channel, of_thermometer, stamped
-from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, range_m_s2, recorded_as
+from rig.data.recording.channel import Channel, stamp_samples, thermometer_channel
+from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, build_sensor, range_m_s2
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.corrections import OnboardCorrection, delay_s, parameter_names, read_correction, refusals
@@ -90,7 +90,9 @@ class _ImuStream:
     def samples(self, numbered: list[tuple[int, int, Reading]], first: int, host_time_s: float) -> NDArray[Any]:
         """Return the samples of the readings, numbered from `first`."""
         numbers, times_us, readings = zip(*numbered, strict=True)
-        samples = stamped(self.description.sample_dtype, np.array(numbers) - first, np.array(times_us), host_time_s)
+        samples = stamp_samples(
+            self.description.sample_dtype, np.array(numbers) - first, np.array(times_us), host_time_s
+        )
         if self.thermometer.provides and self.description.measures(TEMPERATURE):
             temperatures_c = self.thermometer.read(np.array([reading.temperature_c for reading in readings]))
             self.description.channel(TEMPERATURE).fill(samples, temperatures_c)
@@ -229,12 +231,12 @@ def describe(name: str, section: SensorSection, *, provides_temperature: bool = 
     stated = mavlink_section(section).temperature
     channels = [
         _channel(RATE, radians(section.range_deg_s), MILLI if integer else None),
-        *thermometer_channels(of_thermometer(DEGREES_PER_COUNT, 0.0) if provides_temperature else None, stated),
+        *thermometer_channels(thermometer_channel(DEGREES_PER_COUNT, 0.0) if provides_temperature else None, stated),
     ]
     if section.acceleration is not None:
         step = MILLI * STANDARD_GRAVITY_M_S2 if integer else None
         channels.append(_channel(ACCELERATION, range_m_s2(section.acceleration), step))
-    return recorded_as(section, *channels, clock=name)
+    return build_sensor(section, *channels, clock=name)
 
 
 def mavlink(

@@ -12,7 +12,7 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Fault, Refused
 from rig.observation.external.attitude_import import placed_by, read_attitudes
-from rig.observation.external.csv_import import ExternalData, average, averaged, read_sweeps
+from rig.observation.external.csv_import import ExternalData, average, average_sweeps, read_sweeps
 from rig.observation.external.csv_samples import Samples, read_samples
 from support.external.loggers import MATRIX
 from support.external.loggers import SCALE as OF_MATRIX
@@ -28,7 +28,7 @@ def swept(row: int, factor: float) -> ExternalData:
     """The example's sweeps, one of whose rows states another angle."""
     sweeps = read_sweeps(EXAMPLES / "sweeps.csv")
     sweeps["angle_rad"][row - 1] *= factor
-    return averaged(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps)
+    return average_sweeps(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps)
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
@@ -47,7 +47,7 @@ def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row_where_others_tel
     sweeps["end_s"][0] = sweeps["start_s"][1] = 4.0  # row 1 in two halves
     sweeps["angle_rad"][:2] = [2 * np.pi, np.pi]
     with pytest.raises(Refused, match="bad_sweep: sweep 1 contradicts the others by "):
-        solve_swept(averaged(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps), None)
+        solve_swept(average_sweeps(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps), None)
 
 
 def test_what_sweeps_contradict_each_other_by_is_in_the_uncertainty() -> None:
@@ -121,7 +121,7 @@ def constant(samples: Samples, quantity: object, value: float) -> Samples:
 
 
 def by_sweeps(samples: Samples) -> object:
-    return averaged(samples, read_sweeps(EXAMPLES / "sweeps.csv"))
+    return average_sweeps(samples, read_sweeps(EXAMPLES / "sweeps.csv"))
 
 
 def by_attitudes(samples: Samples) -> object:

@@ -21,7 +21,7 @@ from firmware_host.protocol import FIRMWARE_VERSION
 from rig.board.identify import find_sensor, refuse_other_firmware, stored_calibration
 from rig.board.store import calibration_of, store
 from rig.config.sensors.sensor_sections import SensorSection
-from rig.data.result_file import passed_result, read_result, write_result
+from rig.data.result_file import read_passed_result, read_result, write_result
 from rig.errors import Refused
 from support.documents.certified import over_temperature
 from support.documents.results import SENSOR, VERIFIED, result_document
@@ -197,7 +197,7 @@ def test_what_is_no_calibration_that_passed_is_refused(
     make: Callable[[Path], Path], name: str, words: str, tmp_path: Path
 ) -> None:
     with pytest.raises(Refused) as refusal:
-        passed_result(make(tmp_path))
+        read_passed_result(make(tmp_path))
     assert refusal.value.name == name and words in refusal.value.what
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rig.cli import main
-from rig.data.recording.events import to_line
+from rig.data.recording.events import encode_event
 from rig.data.recording.layout import Contents, lay_out
 from rig.data.recording.run_file import RunData
 from rig.data.recording.schema import EVENTS_DTYPE, SCHEMA
@@ -33,7 +33,7 @@ def write(run: RunData, path: Path) -> None:
         "provenance": json.dumps(run.provenance.document()),
         "turner": UR.to_json(),
     }
-    events = np.frombuffer(b"".join(map(to_line, run.events)), EVENTS_DTYPE)
+    events = np.frombuffer(b"".join(map(encode_event, run.events)), EVENTS_DTYPE)
     described = {name: sensor.attributes() for name, sensor in run.sensors.items()}
     lay_out(path, Contents(SCHEMA, texts, described, run.samples, run.states, events), swmr=False)
 

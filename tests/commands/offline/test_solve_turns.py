@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rig.cli import main
-from rig.observation.by_hand.handled import handled
+from rig.observation.by_hand.handled import segment_session
 from support.external.handled_body import TWELVE, creeping, handle, write
 from support.external.real import unpacked
 
@@ -54,7 +54,7 @@ def test_a_recording_by_hand_reaches_every_outlet(tmp_path: Path, capsys: pytest
 @pytest.mark.slow
 def test_a_rest_that_creeps_is_counted_with_its_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recorded = handle(TWELVE, 1)
-    rest = handled(recorded.time_s, recorded.rates, recorded.acceleration).rests[5]
+    rest = segment_session(recorded.time_s, recorded.rates, recorded.acceleration).rests[5]
     crept = creeping(recorded, rest.start_s - 0.1, rest.end_s + 0.1, np.radians([0.1, -0.1, 0.05]))
     assert main(["solve", str(write(tmp_path / "samples.csv", crept)), *CLOCK]) == 0
     words = " ".join(capsys.readouterr().out.split())

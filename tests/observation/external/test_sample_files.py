@@ -15,7 +15,7 @@ from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Refused
 from rig.observation.external.attitude_import import read_attitudes
 from rig.observation.external.csv_samples import read_sample_table, read_samples
-from rig.observation.external.from_files import Files, recorded_in_files
+from rig.observation.external.from_files import Files, build_recording
 from rig.observation.formats.csv_table import read_columns
 from rig.observation.formats.sample_files import entry_of
 from rig.report.document import document_of
@@ -72,7 +72,7 @@ def write_bag(path: Path, table: dict[str, Any], poses: dict[str, Any] | None = 
 def solved(samples: Path, sweeps: Path) -> np.ndarray:
     """Scale, bias and their covariance, as a gyroscope's readings and their sweeps give them."""
     item = Item("imu", "any", "1")
-    found = calibrate([recorded_in_files(Files(samples, sweeps, "sweeps", item), STANDARD, Elsewhere())])
+    found = calibrate([build_recording(Files(samples, sweeps, "sweeps", item), STANDARD, Elsewhere())])
     (entry,) = document_of(found).gyroscopes.values()
     return np.concatenate([entry.scale, entry.bias_rad_s, np.ravel(entry.covariance)])
 

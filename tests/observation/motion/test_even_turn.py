@@ -8,7 +8,7 @@ import pytest
 from rig.errors import Fault
 from rig.observation.arm_rests import trim_rest
 from rig.observation.motion.arm_motion import motion_of
-from rig.observation.motion.even_turn import smoothed
+from rig.observation.motion.even_turn import fit_lines
 from rig.observation.windows import rested, swept
 from support.motions.drawn_servo import Drawn, drawn_servo
 
@@ -63,5 +63,5 @@ def test_a_turn_that_was_not_ended_is_refused(drawn: Drawn) -> None:
 
 def test_smoothed_rates_are_those_of_a_line() -> None:
     time_s = np.sort(np.random.default_rng(1).uniform(0, 4, 500))
-    middles, angles, rates = smoothed(time_s, (2.0 + 0.7 * time_s)[:, None])
+    middles, angles, rates = fit_lines(time_s, (2.0 + 0.7 * time_s)[:, None])
     assert np.allclose(angles[:, 0], 2.0 + 0.7 * middles) and np.allclose(rates, 0.7)

@@ -114,7 +114,7 @@ def check_adds_up(rows: list[list[str]], budget: BudgetEntry) -> None:
         factor, rounding = float(k.removeprefix("× ")), 0.005 * float(u) + 0.5 * step
         assert float(big_u) == pytest.approx(factor * float(u), abs=rounding + 0.5 * factor * step)
         axis = "xyz".index(re.findall(r"[kb]([xyz])", heading[column])[0])
-        known = " ".join(freedom_text(budget.known[quantity][axis]).split())
+        known = " ".join(freedom_text(budget.effective_dof[quantity][axis]).split())
         assert combined[column - 3] == f"ν {known}"
 
 
@@ -180,7 +180,7 @@ def test_a_budget_of_readings_made_elsewhere_adds_up_and_every_scatter_is_counte
     assert len(tables) == len(stated) > 0
     for rows, budget in zip(tables, stated, strict=True):
         check_adds_up(rows, budget)
-        np.testing.assert_allclose(budget.coverage_factors, coverage_factors(budget.known))
+        np.testing.assert_allclose(budget.coverage_factors, coverage_factors(budget.effective_dof))
         freedom = {line[0]: (line[1], line[4]) for line in rows[1:-2]}
         assert all(number == "∞" for kind, number in freedom.values() if kind == "B")
         assert all(number == "in u" or float(number) >= 1 for kind, number in freedom.values() if kind == "A")
@@ -256,7 +256,7 @@ def test_each_value_has_the_coverage_factor_of_its_degrees_of_freedom() -> None:
     by_freedom = document.gyroscopes["kvh"].budget
     assert by_freedom is not None
     np.testing.assert_allclose(by_freedom.expanded, np.multiply(by_freedom.coverage_factors, by_freedom.std), rtol=1e-9)
-    assert by_freedom.coverage_factors == pytest.approx(coverage_factors(by_freedom.known))
+    assert by_freedom.coverage_factors == pytest.approx(coverage_factors(by_freedom.effective_dof))
     assert 2.0 < by_freedom.coverage_factors[0] < 2.01 and by_freedom.coverage_factors[4] > 2.1
     noise = {each.name: each.degrees_of_freedom for each in by_freedom.contributors}["noise"]
     assert noise is not None and 20 < noise < 1e6

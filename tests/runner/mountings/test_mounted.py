@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from rig.data.quantity import FIELD
-from rig.data.recording.channel import of_three_axes
+from rig.data.recording.channel import triad_channel
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Refused
 from rig.runner.mounted import CalibratedBefore, Memory, Mounted, ask_of_other_boards, mounted
@@ -15,7 +15,7 @@ HERE, THERE = "0123456789abcdef01234567", "f" * 24
 
 
 def sensor(serial_number: str, clock: str | None = None) -> RecordedSensor:
-    return RecordedSensor("lsm9ds1", serial_number, 100.0, (of_three_axes(FIELD, 1e-8, 32767, None),), clock=clock)
+    return RecordedSensor("lsm9ds1", serial_number, 100.0, (triad_channel(FIELD, 1e-8, 32767, None),), clock=clock)
 
 
 def before(board: str | None, day: str = "2026-11-20", *, simulated: bool = False) -> CalibratedBefore:

@@ -7,7 +7,7 @@ from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.config.procedures.stage_section import StageMountSection, mount_matrix
 from rig.data.quantity import ACCELERATION
-from rig.data.recording.channel import of_three_axes
+from rig.data.recording.channel import triad_channel
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
@@ -80,7 +80,7 @@ def test_another_axis_another_sign_and_hardly_a_turn_are_told(about: int, angle_
 
 
 def hanging(force_m_s2: list[float]) -> Felt:
-    channels = (*SENSOR.channels, of_three_axes(ACCELERATION, UNIT_M_S2, 32767, 2 * 9.80665))
+    channels = (*SENSOR.channels, triad_channel(ACCELERATION, UNIT_M_S2, 32767, 2 * 9.80665))
     sensor = RecordedSensor(SENSOR.part, SENSOR.serial_number, SENSOR.rate_hz, channels)
     samples = np.zeros(COUNT, sensor.sample_dtype)
     samples[sensor.channel(ACCELERATION).column] = np.round(np.array(force_m_s2) / UNIT_M_S2)

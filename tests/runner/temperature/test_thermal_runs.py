@@ -114,7 +114,7 @@ def test_its_result_has_what_the_world_makes_of_the_sensor(heated: Path) -> None
         bias = BIAS_RAD_S + BIAS_PER_K * warmer_k
         assert (np.abs(np.array(row.scale) - scale) <= 2 * np.array(row.expanded_scale)).all(), row
         assert (np.abs(np.array(row.bias) - bias) <= 2 * np.array(row.expanded_bias)).all(), row
-    cold, warm = (np.array(entry.at(entry.table[k].temperature_c)).ravel() for k in (4, 12))
+    cold, warm = (np.array(entry.evaluate(entry.table[k].temperature_c)).ravel() for k in (4, 12))
     apart_k = entry.table[12].temperature_c - entry.table[4].temperature_c
     true = np.concatenate([SCALE * SCALE_PER_K, BIAS_PER_K]) * apart_k
     powers = [(entry.table[12].temperature_c - 30) ** n - (entry.table[4].temperature_c - 30) ** n for n in range(4)]

@@ -8,7 +8,7 @@ import pytest
 
 from rig.config.procedures.procedure_sections import ThermalSection
 from rig.data.quantity import RATE
-from rig.data.recording.channel import of_thermometer, of_three_axes
+from rig.data.recording.channel import thermometer_channel, triad_channel
 from rig.data.recording.events import Event
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault
@@ -18,7 +18,7 @@ from rig.runner.warming import Warming
 
 C_PER_COUNT = 1 / 16  # an LSM9DS1's
 SENSOR = RecordedSensor(
-    "lsm9ds1", "1", 59.5, (of_three_axes(RATE, 1e-4, 32767, 4.0), of_thermometer(C_PER_COUNT, 25.0))
+    "lsm9ds1", "1", 59.5, (triad_channel(RATE, 1e-4, 32767, 4.0), thermometer_channel(C_PER_COUNT, 25.0))
 )
 LIMIT_K_PER_MIN = 2.0
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.data.recording.channel import Channel
-from rig.data.recording.events import to_line
+from rig.data.recording.events import encode_event
 from rig.data.recording.layout import Contents, lay_out
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.schema import EVENTS_DTYPE, SCHEMA
@@ -42,7 +42,7 @@ def write(folder: Path) -> None:
     texts["provenance"] = json.dumps(run.provenance.document())
     assert run.turner is not None
     texts["turner"] = run.turner.to_json()
-    events = np.frombuffer(b"".join(map(to_line, run.events)), EVENTS_DTYPE)
+    events = np.frombuffer(b"".join(map(encode_event, run.events)), EVENTS_DTYPE)
     described = {name: sensor.attributes() for name, sensor in sensors.items()}
     lay_out(folder / "run.h5", Contents(SCHEMA, texts, described, recorded.samples, run.states, events), swmr=False)
 

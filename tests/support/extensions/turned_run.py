@@ -51,7 +51,7 @@ def write(folder: Path) -> None:
             follows_crystal=None,
             kind=kind.name,
         ),
-        turner=RecordedTurner.of(kind.name, made, report.joints, kind.fields),
+        turner=RecordedTurner.build(kind.name, made, report.joints, kind.fields),
         sensors={"gyro": SENSOR},
     )
     states: list[State] = []

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from rig.data.quantity import RATE
-from rig.observation.external.csv_import import ExternalData, averaged, read_sweeps
+from rig.observation.external.csv_import import ExternalData, average_sweeps, read_sweeps
 from rig.observation.external.csv_samples import read_samples
 
 
 def averaged_files(samples: Path, sweeps: Path) -> ExternalData:
     """What the two files tell. Raises Refused and Fault as `rig solve --sweeps` does."""
-    return averaged(read_samples(samples, [RATE]), read_sweeps(sweeps))
+    return average_sweeps(read_samples(samples, [RATE]), read_sweeps(sweeps))

@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.config.world.laboratory import WorldSection
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.recording.channel import of_three_axes
+from rig.data.recording.channel import triad_channel
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
@@ -31,8 +31,8 @@ from rig.world.operator import Operator
 RATE_HZ, LOOK_S, LONGEST_S = 119.0, 0.2, 400.0
 PER_COUNT, PER_COUNT_M_S2 = float(np.radians(0.0175)), 5.98e-4
 CHANNELS = (
-    of_three_axes(RATE, PER_COUNT, 32767, np.radians(500)),
-    of_three_axes(ACCELERATION, PER_COUNT_M_S2, 32767, 19.6),
+    triad_channel(RATE, PER_COUNT, 32767, np.radians(500)),
+    triad_channel(ACCELERATION, PER_COUNT_M_S2, 32767, 19.6),
 )
 SENSOR = RecordedSensor("lsm9ds1", "LSM9DS1-HAND", RATE_HZ, CHANNELS)
 MATRIX = np.array([[0.85, 0.003, -0.002], [0.001, 0.865, 0.004], [0.002, -0.001, 0.874]])  # F of m = F ω + c
@@ -79,7 +79,7 @@ class Table:
         segmenter.feed(*readings_of(SENSOR, np.concatenate(self.samples)))
         for event in self.events:
             not_counted.take(event, 0.0)
-        return not_counted.without(segmenter.handled)
+        return not_counted.filter_session(segmenter.handled)
 
     @property
     def solution(self) -> HandSolution:

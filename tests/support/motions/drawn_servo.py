@@ -135,7 +135,7 @@ def drawn_servo(
                 configuration.rig_text,
                 replace(settings, stage=stage),
                 replace(PROVENANCE, turner_kind="servo", board_follows_crystal=False),
-                RecordedTurner.of("servo", SERVO.describe_configured(config.turner), JOINTS, SERVO.fields),
+                RecordedTurner.build("servo", SERVO.describe_configured(config.turner), JOINTS, SERVO.fields),
                 {"gyro": sensor if source else replace(sensor, part=config.sensors["gyro"].part)},
                 {"gyro": samples},
                 states,

@@ -11,7 +11,7 @@ from rig.analysis.gyroscope.calibration import observe_recordings, solve_observe
 from rig.analysis.surroundings import surroundings_of
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.quantity import RATE
-from rig.data.recording.channel import Channel, of_thermometer, of_three_axes
+from rig.data.recording.channel import Channel, thermometer_channel, triad_channel
 from rig.estimation.arrays import Array
 from rig.sensors.scales import fine_axes
 from support.recordings.drawn_recording import Drawn, Kind, drawn
@@ -55,7 +55,7 @@ def _printed(digit: float, of_a_converter: float = 0.0) -> Callable[[Array], Arr
 
 def _lines(digit: float, *, stated: bool = True, of_a_converter: float = 0.0) -> Source:
     full = FULL_RAD_S["lines"]
-    channel = of_three_axes(RATE, digit, int(full / digit), full) if stated else fine_axes(RATE, full)
+    channel = triad_channel(RATE, digit, int(full / digit), full) if stated else fine_axes(RATE, full)
     return Source("lines", channel, _printed(digit, of_a_converter))
 
 
@@ -84,7 +84,7 @@ class Stated:
 
 def recorded(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -> Drawn:
     """A recording of a source, drawn as its part's data sheet and the arm's limits let it be."""
-    channels = (source.channel, of_thermometer(0.01, 0.0))
+    channels = (source.channel, thermometer_channel(0.01, 0.0))
     sensor = replace(SENSOR, part=source.part, rate_hz=100.0, channels=channels, clock="gyro")
     flicker_rad_s = float(np.radians(PARTS[source.part].bias_instability_deg_h / 3600))
     kind = Kind(sensor, noise_rad_s, flicker_rad_s, 1e-6, source.sent)

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.quantity import RATE
-from rig.data.recording.channel import of_thermometer, of_three_axes
+from rig.data.recording.channel import thermometer_channel, triad_channel
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import Uncertainty
@@ -51,8 +51,8 @@ ADIS16465 = replace(
     serial_number="ADIS16465-001",
     rate_hz=200.0,
     channels=(  # of its 32 bits, but for the last six
-        of_three_axes(RATE, float(np.radians(0.025)) / 2**10, 500 * 40 * 2**10, float(np.radians(500))),
-        of_thermometer(1 / 16, 25.0),
+        triad_channel(RATE, float(np.radians(0.025)) / 2**10, 500 * 40 * 2**10, float(np.radians(500))),
+        thermometer_channel(1 / 16, 25.0),
     ),
 )
 MPU9250 = replace(
@@ -61,8 +61,8 @@ MPU9250 = replace(
     serial_number="MPU9250-001",
     rate_hz=200.0,
     channels=(
-        of_three_axes(RATE, float(np.radians(250)) / 2**15, 32767, float(np.radians(250))),
-        of_thermometer(1 / 333.87, 21.0),
+        triad_channel(RATE, float(np.radians(250)) / 2**15, 32767, float(np.radians(250))),
+        thermometer_channel(1 / 333.87, 21.0),
     ),
 )
 KVH1775 = replace(
@@ -71,8 +71,8 @@ KVH1775 = replace(
     serial_number="1775-0042",
     rate_hz=250.0,
     channels=(
-        of_three_axes(RATE, float(np.radians(490)) / 2**30, 2**30, float(np.radians(490))),
-        of_thermometer(0.01, 0.0),
+        triad_channel(RATE, float(np.radians(490)) / 2**30, 2**30, float(np.radians(490))),
+        thermometer_channel(0.01, 0.0),
     ),
     clock="gyro",
 )

@@ -16,7 +16,7 @@ from rig.config.load import parse
 from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.quantity import RATE
-from rig.data.recording.channel import of_thermometer, of_three_axes
+from rig.data.recording.channel import thermometer_channel, triad_channel
 from rig.data.recording.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_sensor import RecordedSensor
@@ -250,7 +250,7 @@ SENSOR = RecordedSensor(
     part="lsm9ds1",
     serial_number="LSM9DS1-001",
     rate_hz=238.0,
-    channels=(of_three_axes(RATE, SENSITIVITY, 32767, float(np.radians(245))), of_thermometer(1 / 16, 25.0)),
+    channels=(triad_channel(RATE, SENSITIVITY, 32767, float(np.radians(245))), thermometer_channel(1 / 16, 25.0)),
     mounting=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
 )
 
