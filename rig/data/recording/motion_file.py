@@ -101,7 +101,7 @@ class Item:
 
     @property
     def range_rad_s(self) -> None:
-        """Its range, which the files do not state."""
+        """Range of the sensor, which the files do not state."""
         return
 
     @property
