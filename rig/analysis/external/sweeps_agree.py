@@ -149,7 +149,7 @@ def _gain(design: Array, means: Array, variances: Array) -> Array:
 
 
 def _beyond_chance(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:
-    """(N, 3) by how much each sweep contradicts the others, where that is farther than errors of these sizes explain.
+    """Return the contradiction (N, 3) of each sweep with the others, beyond errors of these sizes.
 
     One wrong row among many makes the sizes little larger, and is all that two sweeps about an axis tell.
     """
