@@ -1,1 +1,1 @@
-"""A series of parts, one after the other: what has become of each, what is asked between two, and what it leaves."""
+"""A series of parts, one after the other: their states, the questions in between, and the documents."""

@@ -1,4 +1,4 @@
-"""The state of a batch, and what may be done next: made of the entries of its journal alone. Pure."""
+"""The state of a batch and its possible continuations, from the entries of its journal alone. Pure."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -11,12 +11,12 @@ from rig.config.judging.station_section import StationSection
 from rig.config.sensors.sensor_sections import check_serial_number
 
 Outcome = Literal["pass", "fail", "refused", "fault"]
-Folder = Annotated[str, Field(pattern=r"^\d{2,}-[A-Za-z0-9._-]*$")]  # a name, which leads nowhere else
+Folder = Annotated[str, Field(pattern=r"^\d{2,}-[A-Za-z0-9._-]*$")]  # a plain name, not a path
 
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """A batch was begun: by whom and for which work order (empty: nobody said), in a simulated laboratory or not."""
+    """The beginning of a batch: operator and work order (empty if not stated), simulated laboratory or not."""
 
     operator: str
     work_order: str
@@ -26,7 +26,7 @@ class Begun:
 
 @dataclass(frozen=True, slots=True)
 class PartBegun:
-    """The part of that `serial` number is to be run, in `folder` beside the journal."""
+    """The beginning of a part with a `serial` number, run in `folder` next to the journal."""
 
     serial: str
     folder: Folder
@@ -35,28 +35,28 @@ class PartBegun:
 
 @dataclass(frozen=True, slots=True)
 class Chip:
-    """What a part is known by beside its number: the board's own, and what its sensors say they are (WHO_AM_I)."""
+    """The hardware of a part: the board's unique number, and the identities of its sensors (WHO_AM_I)."""
 
     board: str
     who_am_i: tuple[int, ...] = ()
 
     def is_that(self, other: "Chip") -> bool:
-        """Whether it is the same; sensors that nobody asked tell no difference."""
-        asked = self.who_am_i and other.who_am_i
-        return self.board == other.board and (not asked or self.who_am_i == other.who_am_i)
+        """Return whether both are the same; sensors that were not read do not count."""
+        both_read = self.who_am_i and other.who_am_i
+        return self.board == other.board and (not both_read or self.who_am_i == other.who_am_i)
 
     def __str__(self) -> str:
-        """The chip as people are told of it."""
-        identities = ", ".join(f"0x{each:02x}" for each in self.who_am_i)
+        """Return the chip's identity in words."""
+        identities = ", ".join(f"0x{identity:02x}" for identity in self.who_am_i)
         return f"board {self.board}" + (f", WHO_AM_I {identities}" if identities else "")
 
 
 @dataclass(frozen=True, slots=True)
 class PartEnded:
-    """What came of the part in hand.
+    """The outcome of the present part.
 
-    `why` is empty for one that passed; `certificate` the number of its certificate, empty where there is none;
-    `repeated` how often refused sweeps were repeated; `chip` None where none was seen; `took_s` from "go" to the end.
+    `why` is empty for a passed part; `certificate` is its number, empty without one; `repeated` counts repetitions of
+    refused sweeps; `chip` is None if unknown; `took_s` is the time from "go" to the end.
     """
 
     outcome: Outcome
@@ -70,7 +70,7 @@ class PartEnded:
 
 @dataclass(frozen=True, slots=True)
 class BatchEnded:
-    """No part follows."""
+    """The end of the batch."""
 
     at_utc: str
 
@@ -80,7 +80,7 @@ Entry = Begun | PartBegun | PartEnded | BatchEnded
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part of the batch: its serial number, where its run lies, what became of it (None: nothing yet)."""
+    """A part of the batch: its serial number, its run's folder, its outcome (None: not yet)."""
 
     number: int
     serial: str
@@ -90,13 +90,13 @@ class Part:
 
     @property
     def state(self) -> str:
-        """The outcome in a word; a part that nothing has become of yet is open."""
+        """The outcome in a word; "open" without one."""
         return "open" if self.ended is None else self.ended.outcome
 
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """All parts so far, in their order; the last may be in hand."""
+    """All parts so far, in their order; the last may be in work."""
 
     begun: Begun
     parts: tuple[Part, ...] = ()
@@ -118,24 +118,24 @@ class Batch:
         return all(part is not None and part.state == "pass" for part in newest)
 
     def done(self, serial: str) -> Part | None:
-        """The newest run of that number that came to a verdict."""
-        return next((each for each in reversed(self.parts) if each.serial == serial and _judged(each)), None)
+        """Return the newest run of that number with a verdict."""
+        return next((part for part in reversed(self.parts) if part.serial == serial and _has_verdict(part)), None)
 
     def same_chip(self, chip: Chip, serial: str) -> Part | None:
-        """The part of another number, with a verdict, that had this chip."""
-        for each in reversed(self.parts):
-            seen = each.ended.chip if each.ended is not None and _judged(each) else None
-            if each.serial != serial and seen is not None and seen.is_that(chip):
-                return each
+        """Return the part with a verdict and another number that had this chip."""
+        for part in reversed(self.parts):
+            earlier = part.ended.chip if part.ended is not None and _has_verdict(part) else None
+            if part.serial != serial and earlier is not None and earlier.is_that(chip):
+                return part
         return None
 
     def folder_of(self, serial: str) -> str:
-        """A folder's name for the next part: its place and what of its number a file system takes."""
+        """Return a folder's name for the next part: its number, and its serial number as a file system permits it."""
         return f"{len(self.parts) + 1:02d}-{re.sub(r'[^A-Za-z0-9._-]', '_', serial)}"
 
 
 def state_of(entries: Iterable[Entry]) -> Batch:
-    """The batch that a journal's entries tell of. Raises ValueError where they tell of none."""
+    """Return the batch of a journal's entries. Raise ValueError if they form none."""
     batch: Batch | None = None
     for entry in entries:
         batch = after(batch, entry)
@@ -145,7 +145,7 @@ def state_of(entries: Iterable[Entry]) -> Batch:
 
 
 def after(batch: Batch | None, entry: Entry) -> Batch:
-    """The batch after one more entry. Raises ValueError for one that cannot follow."""
+    """Return the batch after one more entry. Raise ValueError for an entry that cannot follow."""
     match entry:
         case Begun() if batch is None:
             return Batch(entry)
@@ -162,18 +162,18 @@ def after(batch: Batch | None, entry: Entry) -> Batch:
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """Why a serial number is not simply taken; `final` where nobody can say that it is right all the same."""
+    """An objection to a serial number; `final` if the operator may not override it."""
 
     why: str
     final: bool = False
 
 
 def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable[[str], str | None]) -> Doubt | None:
-    """What speaks against running that number now; `today` tells of a run of today that the history knows."""
+    """Return the objection to running that number now; `today` describes a run of today in the history."""
     try:
         check_serial_number(serial)
     except ValueError as error:
-        return Doubt(f"{serial} is no serial number: {error}", final=True)
+        return Doubt(f"{serial} is not a serial number: {error}", final=True)
     if re.fullmatch(section.serial_pattern, serial, re.ASCII) is None:
         return Doubt(f"{serial} does not match the pattern {section.serial_pattern}", final=True)
     if section.parts and serial not in section.parts:
@@ -185,5 +185,5 @@ def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable
     return None
 
 
-def _judged(part: Part) -> bool:
+def _has_verdict(part: Part) -> bool:
     return part.state in ("pass", "fail")

@@ -1,6 +1,6 @@
-"""The journal of a batch: a line for each entry, on the disk before anything follows it.
+"""The journal of a batch: a line for each entry, on the disk before anything follows.
 
-What a kill cut off in the middle of a line was never entered.
+A line that was interrupted was not entered.
 """
 
 import json
@@ -29,7 +29,7 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 @dataclass(slots=True)
 class Journal:
-    """The journal in a batch's folder, and the batch as it tells it."""
+    """The journal in a batch's folder, and the batch by its entries."""
 
     folder: Path
     batch: Batch
@@ -39,63 +39,63 @@ class Journal:
         self._path = self.folder / JOURNAL
 
     def enter(self, entry: Entry) -> None:
-        """Write an entry, whole and on the disk when this returns. Raises ValueError for one that cannot follow."""
+        """Write an entry; it is completely on the disk on return. Raise ValueError for one that cannot follow."""
         self.batch = after(self.batch, entry)
         _append(self._path, entry)
 
 
-def opened(out: Path | None, parent: Path, entry: Begun) -> Journal:
-    """The batch in the folder `out`, gone on with or begun there; without `out` a new one in a folder below `parent`.
+def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
+    """Continue or begin the batch in the folder `out`; without `out` begin one in a new folder below `parent`.
 
-    Raises Refused `run_folder` and as `resumed`; `no_batch` where one was measured and the other is simulated.
+    Raise Refused `run_folder` and as `resume_journal`; `no_batch` if one is measured and the other simulated.
     """
     if out is not None and (out / JOURNAL).exists():
-        journal = resumed(out)
+        journal = resume_journal(out)
         if journal.batch.begun.simulated != entry.simulated:
             begun = "in a simulated laboratory" if journal.batch.begun.simulated else "on a real rig"
-            raise _not_gone_on_with(out, f"it was begun {begun}")
+            raise _unusable(out, f"it was begun {begun}")
         return journal
     folder = empty_folder(out) if out is not None else folder_of_its_own(parent, "batch")
     try:
         _append(folder / JOURNAL, entry)
     except OSError as error:
-        (folder / JOURNAL).unlink(missing_ok=True)  # half an entry begins no batch, and would be in the way of one
+        (folder / JOURNAL).unlink(missing_ok=True)  # an incomplete entry begins no batch, and would prevent one
         raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     return Journal(folder, state_of([entry]))
 
 
-def resumed(folder: Path) -> Journal:
-    """The journal that lies in `folder`; half a line at its end is cut off.
+def resume_journal(folder: Path) -> Journal:
+    """Return the journal in `folder`; an incomplete line at its end is cut off.
 
-    Raises Refused `no_batch`, and as `refuse_links`.
+    Raise Refused `no_batch`, and as `refuse_links`.
     """
     path = folder / JOURNAL
     try:
         text = read_regular_file(path, LARGEST_BYTES, follow_links=False)
-        whole = text[: text.rfind(b"\n") + 1]
-        batch = state_of(_entries(whole))
-        if len(whole) < len(text):
-            os.truncate(path, len(whole))
+        complete = text[: text.rfind(b"\n") + 1]
+        batch = state_of(_entries(complete))
+        if len(complete) < len(text):
+            os.truncate(path, len(complete))
     except (OSError, UnfitFile, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        raise _not_gone_on_with(folder, str(error)) from error
+        raise _unusable(folder, str(error)) from error
     part = folder if batch.in_hand is None else folder / batch.in_hand.folder
     refuse_links(*folder.iterdir(), *(part.iterdir() if part.is_dir() else ()))
     return Journal(folder, batch)
 
 
-def _not_gone_on_with(folder: Path, why: str) -> Refused:
+def _unusable(folder: Path, why: str) -> Refused:
     return Refused(
         "no_batch",
-        f"{folder / JOURNAL} cannot be gone on with: {why}",
+        f"{folder / JOURNAL} cannot be continued: {why}",
         "Begin a new batch in another folder: rig station CONFIG --out DIR",
     )
 
 
 def _entries(text: bytes) -> Iterator[Entry]:
     for line in text.splitlines():
-        said = parse_json(line)
-        kind = _KINDS[said.pop("entry")]
-        yield validate(kind, said, "entry")
+        fields = parse_json(line)
+        kind = _KINDS[fields.pop("entry")]
+        yield validate(kind, fields, "entry")
 
 
 def _append(path: Path, entry: Entry) -> None:
@@ -106,5 +106,5 @@ def _append(path: Path, entry: Entry) -> None:
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
-        error.filename = error.filename or str(path)  # a full disk does not say of which file
+        error.filename = error.filename or str(path)  # an error of a full disk does not name the file
         raise

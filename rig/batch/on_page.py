@@ -1,4 +1,4 @@
-"""The operator of a station on its page: the question of the moment, and what a browser types as its answer."""
+"""The operator of a station on its page: the open question, and the answer from a browser."""
 
 import json
 import threading
@@ -19,59 +19,59 @@ from rig.page.server.sections import Sections
 from rig.page.server.serving import Address, Page, serving
 
 LONGEST = 200  # characters of an answer
-LOOK_S = 0.5  # between two looks whether the page is still there
+LOOK_S = 0.5  # between two tests whether the page still exists
 
 
 class OnPage:
-    """A voice whose questions a page shows, and which is answered there; it shows what the station does as well."""
+    """A voice with questions and answers on a page, which also shows the station's state."""
 
     def __init__(self, sections: Sections, control: Control) -> None:
         self._sections, self._control = sections, control
         self._changed = threading.Condition()
         self._number = 0
         self._open = False
-        self._said = ""
+        self._text = ""
         sections.put(asked=None)
 
     def hear(self, now: Now) -> None:
-        """What the station does has changed."""
+        """Show a change of the station."""
         self._sections.put(now=asdict(now))
 
     def answer(self, question: Question) -> str:
-        """What a browser types; where the page has ended no number, and no to everything else."""
+        """Return a browser's answer; if the page has ended, an empty number, and no to every other question."""
         with self._changed:
-            self._number, self._open, self._said = self._number + 1, True, ""
+            self._number, self._open, self._text = self._number + 1, True, ""
             self._sections.put(asked={"number": self._number, **asdict(question)})
             try:
                 while self._open and not self._control.gone:
                     self._changed.wait(LOOK_S)
-                return "no" if self._open and question.kind != "number" else self._said
+                return "no" if self._open and question.kind != "number" else self._text
             finally:
                 self._open = False
                 self._sections.put(asked=None)
 
     def takes(self, number: int, text: str) -> bool:
-        """Take the answer to the question of that number; False where that is not asked any more."""
+        """Take the answer to the question of that number; return False if it is not open any more."""
         with self._changed:
             if not self._open or number != self._number:
                 return False
-            self._said, self._open = text.strip(), False
+            self._text, self._open = text.strip(), False
             self._changed.notify_all()
             return True
 
     def routes(self, door: Door) -> list[Route]:
-        """The addresses that act: an answer, and the stop."""
+        """Return the addresses that act: an answer, and the stop."""
 
         async def say(request: Request) -> Response:
-            said = await body_of(request)
+            content = await body_of(request)
             try:
-                number, text = json.loads(said)["number"], json.loads(said)["text"]
+                number, text = json.loads(content)["number"], json.loads(content)["text"]
             except (ValueError, TypeError, KeyError):
                 number, text = None, None
             if type(number) is not int or not isinstance(text, str) or len(text) > LONGEST or not text.isprintable():
-                return PlainTextResponse('wanted: {"number": 1, "text": "what was typed"}\n', 400)
+                return PlainTextResponse('expected: {"number": 1, "text": "the answer"}\n', 400)
             if not self.takes(number, text):
-                return PlainTextResponse("that is not asked any more\n", 409)
+                return PlainTextResponse("this question is not open any more\n", 409)
             return Response(status_code=202)
 
         async def stop(request: Request) -> Response:
@@ -87,9 +87,9 @@ class OnPage:
 
 @contextmanager
 def on_page(present: Present, address: Address) -> Iterator[tuple[OnPage, str]]:
-    """The page of what is `present`, for the length of the `with` block, and its URL; its last word says how it ended.
+    """Open the page of what is `present`, for the length of the `with` block; yield it and its URL.
 
-    Raises Refused `page_address`.
+    Its last state shows how the station ended. Raise Refused `page_address`.
     """
     sections, control = Sections(), Control(may_answer=False)
     voice = OnPage(sections, control)

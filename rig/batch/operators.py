@@ -1,4 +1,4 @@
-"""Who names the parts and is asked: an operator at the terminal or elsewhere, or a list that is asked nothing."""
+"""The operator who names the parts and answers questions, at a terminal or elsewhere; or a list without questions."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ Kind = Literal["number", "mount", "go", "doubt", "again"]
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question of a `kind`: what is told before it in `lines`, and the `text` that asks."""
+    """A question of a `kind`: the `lines` before it, and its `text`."""
 
     kind: Kind
     text: str
@@ -31,7 +31,7 @@ class Question:
 
 
 class Voice(Protocol):
-    """How an operator is asked; what is typed comes back without blanks around it, empty where nobody is left."""
+    """The way to ask an operator; an answer has no white space around it, and is empty if the operator has left."""
 
     def answer(self, question: Question) -> str: ...
 
@@ -40,7 +40,7 @@ class Terminal:
     """The keyboard of the terminal. A scanner is a keyboard that ends each number with Enter."""
 
     def answer(self, question: Question) -> str:
-        """What is typed after the question: what was typed before is no answer to what nobody had read."""
+        """Return the text typed after the question: earlier input does not answer it."""
         forget_what_was_typed()
         for line in question.lines:
             print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
@@ -49,12 +49,12 @@ class Terminal:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """The operator, by a `voice`; an empty number ends the batch. Nobody is asked where there is no voice.
+class Operator:
+    """The operator, asked by a `voice`, or a list of `numbers`; an empty number ends the batch.
 
-    Not `attended`, nobody can say that a doubt is none. The numbers of a list are taken one after the other where there
-    is one: one that is not run stands in the table, one that was typed is typed again. `asking` is held while something
-    is asked between two runs, and told what, as "to mount the part".
+    Without a voice no questions are asked, so a doubt cannot be overridden. Numbers of a list are taken one after the
+    other: a refused one is entered in the table, whereas a typed one is typed again. `asking` is open during a question
+    between two runs, with its subject, such as "to mount the part".
     """
 
     voice: Voice | None
@@ -63,7 +63,7 @@ class Asked:
 
     @property
     def attended(self) -> bool:
-        """Whether somebody is there who can answer."""
+        """Whether an operator can answer."""
         return self.voice is not None
 
     @property
@@ -72,37 +72,37 @@ class Asked:
         return self.numbers is not None
 
     def next_part(self, done: Sequence[Part], why: str = "") -> str | None:
-        """The next number of the list, or the one that is typed or scanned after `why` the last one was not taken."""
+        """Return the next number of the list, or a typed one; `why` explains the refusal of the last one."""
         if self.numbers is not None:
-            return following(self.numbers, [each.serial for each in done])
+            return following(self.numbers, [part.serial for part in done])
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"
         return self._answer("number", text, *([f"{why}."] if why else [])) or None
 
-    def mounted(self, part: Part) -> bool:
-        """Whether the part is mounted; "no" puts it aside."""
+    def is_mounted(self, part: Part) -> bool:
+        """Ask whether the part is mounted; "no" puts it aside."""
         text = f"{part.serial}: mount it, plug in its board, step back; then Enter (no: put it aside):"
         with self._asking("to mount the part"):
-            while (said := self._answer("mount", text).lower()) not in ("", *YES, *NO):
-                pass  # a number that is scanned twice says nothing of what is mounted
-        return said not in NO
+            while (answer := self._answer("mount", text).lower()) not in ("", *YES, *NO):
+                pass  # a number that is scanned twice is not an answer
+        return answer not in NO
 
     def goes_on(self, doubt: Doubt) -> bool:
-        """Whether it is right all the same."""
-        with self._asking("whether to go on all the same"):
-            return self._agrees("doubt", "Go on all the same? yes or no:", f"{doubt.why}.")
+        """Ask whether to continue despite a doubt."""
+        with self._asking("whether to continue anyway"):
+            return self._agrees("doubt", "Continue anyway? yes or no:", f"{doubt.why}.")
 
     def tries_again(self, part: Part, error: RigError) -> bool:
-        """Whether a part that was refused, or ended in a fault, is tried again; "no" puts it aside."""
+        """Ask whether a part that was refused, or ended in a fault, is tried again; "no" puts it aside."""
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Whether what a run announces may be done: the operator says so, or was not to be asked, and agreed before."""
+        """Ask whether a run may do what it announces; without a voice the agreement was given in advance."""
         if to_do == Prompt(()).to_do:
             return self.voice is None or self._agrees("go", f"Type go to {to_do}:", *announcement)
         return self.voice is None or self._agrees("doubt", f"Type yes to {to_do}, or no:", *announcement)
 
     def hears(self, part: Part) -> None:
-        """What became of a part is told on stdout, a line for each."""
+        """Print a part's outcome on stdout, one line each."""
         ended = part.ended
         if ended is None:
             return
@@ -122,7 +122,7 @@ class Asked:
 
 
 def refuse_without_terminal() -> None:
-    """Raise Refused `not_confirmed` where nobody can be asked."""
+    """Raise Refused `not_confirmed` if there is no one to ask."""
     if not sys.stdin.isatty():
         raise Refused(
             "not_confirmed",

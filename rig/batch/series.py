@@ -1,4 +1,4 @@
-"""A list of parts that are run without questions, and the numbers in it."""
+"""A list of parts that are run without questions, and its numbers."""
 
 import csv
 from collections.abc import Sequence
@@ -12,9 +12,9 @@ HEADING = "serial_number"
 
 
 def numbers_in(path: Path) -> tuple[str, ...]:
-    """The serial numbers in a CSV file: its column `serial_number`, else the first of each line.
+    """Return the serial numbers in a CSV file: its column `serial_number`, else the first cell of each line.
 
-    Raises Refused `parts_file`.
+    Raise Refused `parts_file`.
     """
     try:
         text = read_regular_file(path, LARGEST_BYTES).decode("utf-8-sig")
@@ -24,26 +24,26 @@ def numbers_in(path: Path) -> tuple[str, ...]:
     column = 0
     if rows and HEADING in (titles := [cell.strip() for cell in rows[0]]):
         column, rows = titles.index(HEADING), rows[1:]
-    found = tuple(row[column].strip() for row in rows if len(row) > column)
-    if not found or not all(found) or len(found) < len(rows):
+    numbers = tuple(row[column].strip() for row in rows if len(row) > column)
+    if not numbers or not all(numbers) or len(numbers) < len(rows):
         raise _unfit(path, "a line has no serial number" if rows else "it has no line")
-    return found
+    return numbers
 
 
 def _unfit(path: Path, why: str) -> Refused:
     return Refused(
         "parts_file",
-        f"the parts cannot be taken from {path}: {why}",
+        f"the parts cannot be read from {path}: {why}",
         f"Write a CSV file with one serial number a line, or with a column {HEADING}",
     )
 
 
 def following(numbers: Sequence[str], done: Sequence[str]) -> str | None:
-    """The number after those that are done, None after the last. Raises Refused `another_series`."""
+    """Return the number after those that are done, None after the last. Raise Refused `another_series`."""
     if tuple(done) != tuple(numbers[: len(done)]):
         raise Refused(
             "another_series",
-            f"the batch has run {', '.join(done)}, which is not how the list begins",
+            f"the batch has run {', '.join(done)}, and the list begins differently",
             "Give the list with which the batch was begun, or another folder with --out",
         )
     return numbers[len(done)] if len(done) < len(numbers) else None

@@ -1,4 +1,4 @@
-"""What a station is doing at this moment, made of its batch and of the events of its runs."""
+"""The present state of a station, from its batch and the events of its runs."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -22,16 +22,19 @@ from rig.station.events import (
 )
 
 State = Literal["waiting", "checking", "asking", "running", "solving", "refused", "fault", "stopped", "ended"]
-NEWEST = 60  # parts that are told of: a tray has fewer
-ENDINGS = ("fault", "stopped", "ended")  # states that say how a station ended
+NEWEST = 60  # parts in the state: a tray has fewer
+ENDINGS = ("fault", "stopped", "ended")  # final states of a station
 
 
 @dataclass(frozen=True, slots=True)
 class Now:
-    """What is told of a station: its `state`, the present `part`, what it is `doing` in words, the seconds left.
+    """The present state of a station.
 
-    `parts` are the batch's newest, serial number and state of each; `counts` how many of all became what. `rig` is the
-    rig's name in a history, empty until it is known. `over` is the last word: nothing comes after it.
+    - `state`, `part`, `doing` (in words), `left_s`: the present activity and its remaining time.
+    - `operator`, `work_order`, `simulated`: of the batch.
+    - `counts`: the numbers of parts by state. `parts`: the newest parts, serial number and state of each.
+    - `rig`: the rig's name in a history, empty if unknown.
+    - `over`: whether this is the last state.
     """
 
     state: State = "waiting"
@@ -47,15 +50,15 @@ class Now:
     over: bool = False
 
     def json(self) -> str:
-        """The text that goes into the history."""
+        """Return the text for the history."""
         return json.dumps(asdict(self), separators=(",", ":"), ensure_ascii=False)
 
 
 @dataclass(slots=True)
 class Present:
-    """What a station is doing, kept up to date: a listener of its runs, and told of its batch.
+    """The present state of a station: a listener of its runs and of its batch.
 
-    `hears` are told of every change, and must not block.
+    Each of `hears` is called after every change and must not block.
     """
 
     now: Now
@@ -66,12 +69,12 @@ class Present:
         self._becomes(after(self.now, event))
 
     def batch(self, batch: Batch) -> None:
-        """The batch has changed."""
-        self._becomes(of_batch(self.now, batch))
+        """Take a change of the batch."""
+        self._becomes(update_by_batch(self.now, batch))
 
     @contextmanager
     def asking(self, what: str) -> Iterator[None]:
-        """The operator is asked something between two runs, for the length of the `with` block."""
+        """Show that the operator is asked between two runs, for the length of the `with` block."""
         self._becomes(replace(self.now, state="asking", doing=what, left_s=None))
         yield
         self._becomes(replace(self.now, state="checking" if self.now.part else "waiting", doing=""))
@@ -83,8 +86,8 @@ class Present:
                 hear(now)
 
 
-def of_batch(now: Now, batch: Batch) -> Now:
-    """What is told once something of the batch has changed."""
+def update_by_batch(now: Now, batch: Batch) -> Now:
+    """Return the state after a change of the batch."""
     in_hand = batch.in_hand
     counts: dict[str, int] = {}
     for part in batch.parts:
@@ -103,12 +106,12 @@ def of_batch(now: Now, batch: Batch) -> Now:
 
 
 def last(now: Now) -> Now:
-    """What is told when nothing comes after it: a batch that has not ended, and that no fault ended, has stopped."""
+    """Return the last state: a batch that has not ended, by itself or by a fault, has stopped."""
     return replace(now, state=now.state if now.state in ENDINGS else "stopped", left_s=None, over=True)
 
 
 def after(now: Now, event: RunEvent) -> Now:
-    """What is told after an event of a run."""
+    """Return the state after an event of a run."""
     changed: dict[str, Any] | None = None
     match event:
         case ArmConnected(report):

@@ -1,4 +1,4 @@
-"""The table of a batch: what passed, failed, was repeated or refused; as CSV, as a page, in a line."""
+"""The table of a batch with all outcomes: as CSV, as a page, in a line."""
 
 import csv
 from collections.abc import Iterator
@@ -41,17 +41,17 @@ td.refused { background: #f6ecc8; } .wide { overflow-x: auto; }
 
 
 def summary(batch: Batch) -> str:
-    """How many parts became what, in a line."""
+    """Return the numbers of parts by outcome, in a line."""
     counts = {"passed": "pass", "failed": "fail", "refused": "refused", "ended in a fault": "fault", "open": "open"}
-    found = [f"{count} {words}" for words, state in counts.items() if (count := batch.count(state))]
+    phrases = [f"{count} {words}" for words, state in counts.items() if (count := batch.count(state))]
     repeated = sum(part.ended is not None and part.ended.repeated > 0 for part in batch.parts)
     more = [f"sweeps repeated in {repeated}"] if repeated else []
     parts = "1 part" if len(batch.parts) == 1 else f"{len(batch.parts)} parts"
-    return f"{parts}: {', '.join([*found, *more])}" if batch.parts else "no parts"
+    return f"{parts}: {', '.join([*phrases, *more])}" if batch.parts else "no parts"
 
 
 def csv_of(batch: Batch) -> str:
-    """The table as CSV; a text that a spreadsheet would take for a formula gets an apostrophe before it."""
+    """Return the table as CSV; a text that a spreadsheet would read as a formula gets an apostrophe."""
     file = StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -61,7 +61,7 @@ def csv_of(batch: Batch) -> str:
 
 
 def page_of(batch: Batch, *, simulated: bool) -> str:
-    """The table as a page that needs nothing beside it."""
+    """Return the table as a self-contained page."""
     from jinja2 import Environment, StrictUndefined
 
     template = Environment(autoescape=True, undefined=StrictUndefined).from_string(_PAGE)
@@ -76,6 +76,6 @@ def _cells(part: Part) -> Iterator[str]:
         yield from ("", "", "", "", "", part.begun_utc, "", "", part.folder)
         return
     board = "" if ended.chip is None else ended.chip.board
-    identities = "" if ended.chip is None else " ".join(f"0x{each:02x}" for each in ended.chip.who_am_i)
+    identities = "" if ended.chip is None else " ".join(f"0x{identity:02x}" for identity in ended.chip.who_am_i)
     yield from (str(ended.repeated), ended.why, ended.certificate, board, identities)
     yield from (part.begun_utc, ended.at_utc, f"{ended.took_s:.1f}", part.folder)

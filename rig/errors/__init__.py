@@ -1,4 +1,4 @@
-"""How the rig says no: every error has a name, says what and where, and says what to do.
+"""Errors of the rig: each has a name, says what happened and where, and what to do.
 
 `catalogue` has every name in one table, from which docs/errors.md is made.
 """
@@ -14,29 +14,29 @@ Result = TypeVar("Result")
 
 
 class RigError(ProblemError):
-    """Something the rig will not or cannot do. `exit_status` is what the command line returns for it."""
+    """An action that the rig refuses or cannot do. `exit_status` is that of the command line."""
 
     exit_status = 3
 
 
 class Refused(RigError):
-    """The configuration or the pre-flight check says no; nothing has moved (exit status 2)."""
+    """A refusal of the configuration or the pre-flight tests; nothing has moved (exit status 2)."""
 
     exit_status = 2
 
 
 class Fault(RigError):
-    """Something failed during the run; the arm is stopped and the data kept (exit status 3)."""
+    """A failure during the run; the arm is stopped and the data are kept (exit status 3)."""
 
 
 class Unprinted(RigError):
-    """All was done, and what was to be printed of it is lost (exit status 5)."""
+    """The loss of output of a finished action (exit status 5)."""
 
     exit_status = 5
 
 
 def or_fault(solve: Callable[[], Result]) -> Result | Fault:
-    """What `solve` returns, or the Fault it ends in: for a result that stands beside others."""
+    """Return the result of `solve`, or the Fault in which it ends: for a result among others."""
     try:
         return solve()
     except Fault as fault:
@@ -45,7 +45,7 @@ def or_fault(solve: Callable[[], Result]) -> Result | Fault:
 
 @contextmanager
 def raised_as(kind: type[RigError]) -> Iterator[None]:
-    """Raise a problem found inside, by board or recording, as `kind`; a refusal stays one."""
+    """Raise problems inside the block, of board or recording, as `kind`; a refusal stays one."""
     try:
         yield
     except ProblemError as error:
@@ -55,7 +55,7 @@ def raised_as(kind: type[RigError]) -> Iterator[None]:
 
 
 def refuse(problems: Sequence[Problem]) -> None:
-    """Raise `Refused` when there are problems: named after the first, with all of them and their remedies."""
+    """Raise `Refused` if there are problems, under the name of the first, with all of them and their remedies."""
     if not problems:
         return
     *others, last = problems

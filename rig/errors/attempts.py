@@ -1,7 +1,7 @@
-"""Attempts that stand side by side, of which some succeed: the one form that a Fault has as a value.
+"""Independent attempts of which some succeed: the only form in which a Fault is a value.
 
-What cannot go on raises its Fault. Where others go on beside it, `attempt_each` and `attempt` make a value of it: it is
-among the `faults`, by the name of what was attempted, and never in the place of a result.
+A Fault is raised if nothing can continue. If others can, `attempt_each` and `attempt` store it in `faults`, by the name
+of the attempt, and never in place of a result.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -12,36 +12,36 @@ from rig.errors import Fault
 
 Key = TypeVar("Key")
 Result = TypeVar("Result")
-Made = TypeVar("Made")
-MadeOfFault = TypeVar("MadeOfFault")
+Converted = TypeVar("Converted")
+ConvertedFault = TypeVar("ConvertedFault")
 
 
 @dataclass(frozen=True, slots=True)
 class Attempts(Generic[Key, Result]):
-    """The `results` of attempts that succeeded, and the `faults` of those that did not, by what was attempted."""
+    """The `results` of successful attempts, and the `faults` of the others, by key."""
 
     results: Mapping[Key, Result] = field(default_factory=dict)
     faults: Mapping[Key, Fault] = field(default_factory=dict)
 
     def updated(self, later: "Attempts[Key, Result]") -> "Attempts[Key, Result]":
-        """Return all attempts; what was attempted again counts as it was `later`."""
-        again = later.results.keys() | later.faults.keys()
-        kept = {key: result for key, result in self.results.items() if key not in again}
-        kept_faults = {key: fault for key, fault in self.faults.items() if key not in again}
+        """Return all attempts; those that were repeated count as in `later`."""
+        repeated = later.results.keys() | later.faults.keys()
+        kept = {key: result for key, result in self.results.items() if key not in repeated}
+        kept_faults = {key: fault for key, fault in self.faults.items() if key not in repeated}
         return Attempts({**kept, **later.results}, {**kept_faults, **later.faults})
 
     def by_key(
-        self, of_result: Callable[[Result], Made], of_fault: Callable[[Fault], MadeOfFault]
-    ) -> dict[Key, Made | MadeOfFault]:
-        """Return what `of_result` makes of each result, then what `of_fault` makes of each Fault."""
-        made: dict[Key, Made | MadeOfFault] = {key: of_result(result) for key, result in self.results.items()}
+        self, of_result: Callable[[Result], Converted], of_fault: Callable[[Fault], ConvertedFault]
+    ) -> dict[Key, Converted | ConvertedFault]:
+        """Return the conversion of each result by `of_result`, then of each Fault by `of_fault`."""
+        values: dict[Key, Converted | ConvertedFault] = {key: of_result(result) for key, result in self.results.items()}
         for key, fault in self.faults.items():
-            made[key] = of_fault(fault)
-        return made
+            values[key] = of_fault(fault)
+        return values
 
 
 def attempt_each(attempts: Mapping[Key, Callable[[], Result]]) -> Attempts[Key, Result]:
-    """Return what each of the attempts gives, or the Fault it ends in."""
+    """Return the result of each attempt, or the Fault in which it ends."""
     results, faults = dict[Key, Result](), dict[Key, Fault]()
     for key, attempt in attempts.items():
         try:
@@ -52,7 +52,7 @@ def attempt_each(attempts: Mapping[Key, Callable[[], Result]]) -> Attempts[Key, 
 
 
 def attempt(faults: dict[str, Fault], name: str, solve: Callable[[], Result]) -> Result | None:
-    """Return what `solve` gives; None if it ends in a Fault, which `faults` then holds under that name."""
+    """Return the result of `solve`; on a Fault, store it in `faults` under `name` and return None."""
     try:
         return solve()
     except Fault as fault:

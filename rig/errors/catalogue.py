@@ -1,4 +1,4 @@
-"""The table of every error's name, catalogue.txt: what a name is looked up in, and what docs/errors.md is made from."""
+"""The table of all errors, catalogue.txt: the source of `rig explain` and docs/errors.md."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +10,12 @@ KINDS = (
     "either",
     "unprinted",
     "simulated",
-)  # how the source raises an error; catalogue.txt says what they mean
+)  # how the source raises an error; catalogue.txt explains them
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An error's name, one of `KINDS`, one clause saying when it occurs, and one saying what to do."""
+    """An error's name, one of `KINDS`, a clause on when it occurs, and one on what to do."""
 
     name: str
     kind: str
@@ -24,7 +24,7 @@ class Entry:
 
 
 def catalogue() -> tuple[Entry, ...]:
-    """The table, in its order. Raises ValueError for a line of another form than `name | kind | when | remedy`."""
+    """Return the table in its order. Raise ValueError for a line not of the form `name | kind | when | remedy`."""
     entries = []
     for number, line in enumerate(TABLE.read_text(encoding="utf-8").splitlines(), 1):
         if line.startswith("#"):

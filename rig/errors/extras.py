@@ -1,10 +1,10 @@
-"""The error for a library that only an optional part of the program brings: it names the command that brings it."""
+"""The error for a missing library of an optional part of the program, with the command to install it."""
 
 from rig.errors import Refused
 
 
 def missing_extra(error: ImportError, extra: str) -> Refused:
-    """Refused `missing_extra`, for a library that the optional part `extra` installs."""
+    """Return Refused `missing_extra` for a library that the optional part `extra` installs."""
     from firmware_host.installation import install_command
 
     return Refused(

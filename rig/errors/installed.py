@@ -1,4 +1,4 @@
-"""What packages installed here add to the rig, by the entry points of a group."""
+"""Extensions of the rig by installed packages, through the entry points of a group."""
 
 from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import EntryPoint, entry_points
@@ -10,9 +10,9 @@ from rig.errors import Refused
 def added(
     group: str, not_loaded: Callable[[str, str], Refused], stock: Iterable[EntryPoint] = ()
 ) -> Iterator[tuple[EntryPoint, Any]]:
-    """The entry points of the group, those in `stock` first, each with what it names.
+    """Yield the entry points of a group, those in `stock` first, each with its loaded object.
 
-    Raises `not_loaded` of what cannot be imported, by what is wrong and what to do.
+    Raise `not_loaded`, called with problem and remedy, for one that cannot be imported.
     """
     for entry in (*stock, *entry_points(group=group)):
         try:

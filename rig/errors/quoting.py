@@ -1,4 +1,4 @@
-"""Shows what somebody else wrote: serial numbers, names, paths, values. Nothing in it that a terminal would obey."""
+"""Quotation of foreign texts (serial numbers, names, paths, values) without control characters for a terminal."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -9,9 +9,10 @@ NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
 
 
 def printable(text: str) -> str:
-    """Return the text with every invisible character, line ends too, written as Python does: `\\x1b`, `\\n`.
+    """Return the text with every invisible character, line ends too, in Python's notation: `\\x1b`, `\
+    `.
 
-    A no-break space stays: it stands between a number and its power of ten or its unit.
+    A no-break space stays: it separates a number from its power of ten or its unit.
     """
     if text.isprintable():
         return text
@@ -20,23 +21,23 @@ def printable(text: str) -> str:
 
 
 def printable_lines(text: str) -> str:
-    """A message of several lines made printable, which keeps its lines."""
+    """Return a printable message that keeps its lines."""
     return "\n".join(map(printable, text.split("\n")))
 
 
 def shorten(text: str) -> str:
-    """The beginning of what is long, and how long it is; printable."""
+    """Return the beginning of a long text, printable, with its length."""
     shown = printable(text[:SHOWN_CHARACTERS])
     return shown if len(text) <= SHOWN_CHARACTERS else f"{shown}… ({len(text)} characters)"
 
 
 def quote(value: Any) -> str:
-    """A value as Python writes it, shortened."""
+    """Return a value in Python's notation, shortened."""
     return shorten(repr(value))
 
 
 def listing(names: Iterable[str]) -> str:
-    """The first of many names, which are shortened already, and how many more there are."""
+    """Return the first of many names, which are shortened already, and the number of the others."""
     every = list(names)
     more = len(every) - SHOWN_NAMES
     return (", ".join(every[:SHOWN_NAMES]) + (f", and {more} more" if more > 0 else "")) or "none"

@@ -1,1 +1,1 @@
-"""Several rigs at a glance: what each station tells a shared history of itself, and what the history knows today."""
+"""Several rigs at a glance: the present state of each station in a shared history, and today's calibrations."""

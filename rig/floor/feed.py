@@ -1,4 +1,4 @@
-"""The floor's page as its server is handed it: the history is looked at twice a second, in a thread of its own."""
+"""The feed of the floor's page: the history is read twice a second, in a thread of its own."""
 
 import threading
 from collections.abc import Iterator
@@ -14,19 +14,19 @@ from rig.errors.quoting import shorten
 from rig.floor import shown
 from rig.history import stations
 from rig.history.storage import schema
-from rig.history.storage.address import Place
+from rig.history.storage.address import HistoryAddress
 from rig.history.store import History, open_history
 from rig.page.server.sections import Sections
 
-LOOK_S = 0.5  # a rig that is dead after 3.5 s has to be shown as such within 5 s
+LOOK_S = 0.5  # a dead rig (3.5 s) must be shown as such within 5 s
 
 
 @contextmanager
-def looking(place: Place) -> Iterator[Sections]:
-    """A feed that is kept up to date for the length of the `with` block; the history is only read."""
+def looking(address: HistoryAddress) -> Iterator[Sections]:
+    """Keep a feed up to date for the length of the `with` block; the history is only read."""
     feed, over = Sections(), threading.Event()
-    feed.put(history={"label": place.label, "silent": None})
-    thread = threading.Thread(target=_look, args=(place, feed, over), name="floor", daemon=True)
+    feed.put(history={"label": address.label, "silent": None})
+    thread = threading.Thread(target=_look, args=(address, feed, over), name="floor", daemon=True)
     thread.start()
     try:
         yield feed
@@ -35,15 +35,15 @@ def looking(place: Place) -> Iterator[Sections]:
         thread.join(LOOK_S)
 
 
-def _look(place: Place, feed: Sections, over: threading.Event) -> None:
+def _look(address: HistoryAddress, feed: Sections, over: threading.Event) -> None:
     while not over.is_set():
         try:
-            with open_history(place) as history:
-                feed.put(history={"label": place.label, "silent": None})
+            with open_history(address) as history:
+                feed.put(history={"label": address.label, "silent": None})
                 _follow(history, feed, over)
-        except Exception as error:  # the page says it, and goes on trying
+        except Exception as error:  # the page shows it, and the thread tries again
             why = error.what if isinstance(error, Refused) else f"{type(error).__name__}: {shorten(str(error))}"
-            feed.put(history={"label": place.label, "silent": why})
+            feed.put(history={"label": address.label, "silent": why})
             over.wait(LOOK_S)
 
 
@@ -52,28 +52,28 @@ def _follow(history: History, feed: Sections, over: threading.Event) -> None:
     while not over.is_set():
         today = datetime.now(UTC).date()
         feed.put(**shown.rigs(*stations.heard(history.engine)))
-        entered = today, _entered(history)
-        if entered != before:  # trends of a long history take longer than a second
-            before = entered
+        version = today, _count_entries(history)
+        if version != before:  # trends of a long history take longer than a second
+            before = version
             feed.put(**_past(history, today))
         over.wait(LOOK_S)
 
 
 def _past(history: History, today: date) -> dict[str, Any]:
-    """What the history has of the past; of rows that cannot be read only that: the rigs are shown all the same."""
+    """Return the past calibrations; if rows cannot be read, only the error: the rigs are shown nevertheless."""
     try:
         pasts = history.calibrations()
         recalls = shown.recalls(pasts, today)
-        found = {"today": shown.todays(pasts, today), "standards": shown.standards(pasts), "recalls": recalls}
+        tables = {"today": shown.todays(pasts, today), "standards": shown.standards(pasts), "recalls": recalls}
     except SQLAlchemyError:
         raise  # the history does not answer
     except Exception as error:
         return {"unread": f"{type(error).__name__}: {shorten(str(error))}"}
-    return {**found, "unread": None}
+    return {**tables, "unread": None}
 
 
-def _entered(history: History) -> tuple[int, int]:
-    """What tells whether anything was entered: rows are only added."""
+def _count_entries(history: History) -> tuple[int, int]:
+    """Return numbers that change with every entry: rows are only added."""
     counts = (select(func.count()).select_from(table) for table in (schema.calibration, schema.voided))
     with history.engine.connect() as connection:
         calibrations, voided = (int(connection.scalar(question) or 0) for question in counts)

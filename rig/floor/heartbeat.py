@@ -1,6 +1,6 @@
-"""A station's heartbeat: tells a shared history what it does, from a thread of its own that holds nothing up.
+"""A station's heartbeat: writes its state to a shared history, in a thread of its own that delays nothing.
 
-A history that does not answer is tried again; a station works on without it, and the floor sees that it is silent.
+If the history does not answer, the thread tries again; the station works without it, and the floor shows it as silent.
 """
 
 import platform
@@ -11,39 +11,39 @@ from typing import TYPE_CHECKING
 
 from rig.batch.status import Now, last
 from rig.history import stations
-from rig.history.storage.address import Place
+from rig.history.storage.address import HistoryAddress
 from rig.history.store import open_history
 
 if TYPE_CHECKING:
     from sqlalchemy import Engine
 
 BEAT_S = 1.0
-AGAIN_S = 5.0  # after the history has not answered
-LAST_BEAT_S = 2.0  # that the last word may take
+RETRY_S = 5.0  # after a history that did not answer
+LAST_BEAT_S = 2.0  # for the last state
 
 
 class Heartbeat:
-    """What the station says of itself."""
+    """The writer of a station's state."""
 
-    def __init__(self, rig: str, place: Place, now: Now) -> None:
-        self._rig, self._place, self._now = rig, place, now
+    def __init__(self, rig: str, address: HistoryAddress, now: Now) -> None:
+        self._rig, self._address, self._now = rig, address, now
         self._changed = threading.Event()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
 
     def hear(self, now: Now) -> None:
-        """What the station does has changed; a new state is told at once."""
+        """Take a change of the station; write a new state at once."""
         news = now.state != self._now.state or now.part != self._now.part
         self._now = now
         if news:
             self._changed.set()
 
     def start(self) -> None:
-        """Begin to tell."""
+        """Start writing."""
         self._thread.start()
 
     def close(self) -> None:
-        """Tell the last state, and end."""
+        """Write the last state, and end."""
         self._now = last(self._now)
         self._over.set()
         self._changed.set()
@@ -52,16 +52,16 @@ class Heartbeat:
     def _beat(self) -> None:
         while True:
             try:
-                with open_history(self._place) as history:
+                with open_history(self._address) as history:
                     stations.make_table(history.engine)
-                    if self._tells(history.engine):
+                    if self._write_until_over(history.engine):
                         return
-            except Exception:  # whatever it is, nothing of the station depends on it
-                if self._over.wait(AGAIN_S):
+            except Exception:  # any error: nothing of the station depends on it
+                if self._over.wait(RETRY_S):
                     return
 
-    def _tells(self, engine: "Engine") -> bool:
-        """Tell until it is over, which is True then."""
+    def _write_until_over(self, engine: "Engine") -> bool:
+        """Write until the end; then return True."""
         while True:
             over = self._over.is_set()
             self._changed.clear()
@@ -72,9 +72,9 @@ class Heartbeat:
 
 
 @contextmanager
-def heartbeat(rig: str, place: Place, now: Now) -> Iterator[Heartbeat]:
-    """The heartbeat of a station on a `rig` for the length of the `with` block; a killed one just stops."""
-    beating = Heartbeat(rig, place, now)
+def heartbeat(rig: str, address: HistoryAddress, now: Now) -> Iterator[Heartbeat]:
+    """Run the heartbeat of a station on a `rig` for the length of the `with` block; if killed, it just stops."""
+    beating = Heartbeat(rig, address, now)
     beating.start()
     try:
         yield beating

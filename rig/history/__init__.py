@@ -1,1 +1,1 @@
-"""The laboratory's memory: every finished run, what became of each sensor since, and of the rig itself."""
+"""The laboratory's memory: all finished runs, each sensor over time, and the rig itself."""

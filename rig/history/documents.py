@@ -14,7 +14,7 @@ from rig.history.store import Past
 from rig.report.findings.followed import Parameter
 
 SCHEMA = "rig.history/1"
-FORMULA = ("=", "+", "-", "@")  # what one begins with, in one spreadsheet or another, after white space too
+FORMULA = ("=", "+", "-", "@")  # first characters of a formula in common spreadsheets, after white space too
 COLUMNS = (
     "calibration",
     "run",
@@ -47,20 +47,20 @@ COLUMNS = (
 def history_document(
     pasts: Sequence[Past], trends: Mapping[Subject, Mapping[str, Trend]] | None = None
 ) -> dict[str, Any]:
-    """Calibrations, and with `trends` what they say over time."""
-    document: dict[str, Any] = {"schema": SCHEMA, "calibrations": [calibration_entry(each) for each in pasts]}
+    """Return calibrations, and with `trends` their trends."""
+    document: dict[str, Any] = {"schema": SCHEMA, "calibrations": [calibration_entry(past) for past in pasts]}
     if trends is not None:
         document["trends"] = [
-            {**subject_entry(subject), "parameters": {name: trend_entry(trend) for name, trend in each.items()}}
-            for subject, each in trends.items()
+            {**subject_entry(subject), "parameters": {name: trend_entry(trend) for name, trend in by_name.items()}}
+            for subject, by_name in trends.items()
         ]
     return document
 
 
 def history_csv(pasts: Sequence[Past]) -> str:
-    """Comma-separated, with a heading; empty where nothing is known.
+    """Return comma-separated values with a heading; an unknown value is empty.
 
-    A text that a spreadsheet would take for a formula has an apostrophe before it, as somebody would type it there.
+    A text that a spreadsheet would read as a formula has an apostrophe before it, as one would type it there.
     """
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n")
@@ -74,7 +74,7 @@ def history_csv(pasts: Sequence[Past]) -> str:
 
 
 def calibration_entry(past: Past) -> dict[str, Any]:
-    """A calibration of the history as a document."""
+    """Return a calibration of the history as a document."""
     return {
         "calibration": past.id,
         "run": past.run_id,
@@ -92,17 +92,17 @@ def calibration_entry(past: Past) -> dict[str, Any]:
         "operator": past.operator,
         "note": past.note,
         "voided": past.voided,
-        "parameters": {name: _parameter(each) for name, each in past.parameters.items()},
+        "parameters": {name: _parameter(parameter) for name, parameter in past.parameters.items()},
     }
 
 
 def subject_entry(subject: Subject) -> dict[str, Any]:
-    """What was calibrated."""
+    """Return the sensor and the quantity that were calibrated."""
     return dict(zip(("part", "serial_number", "quantity", "full_scale", "simulated"), subject, strict=True))
 
 
 def trend_entry(trend: Trend) -> dict[str, Any]:
-    """What a parameter did over time; null where there are too few calibrations."""
+    """Return the trend of a parameter; null if there are too few calibrations."""
     line, mean = trend.line, trend.mean
     return {
         "unit": trend.unit,
@@ -122,7 +122,7 @@ def trend_entry(trend: Trend) -> dict[str, Any]:
 
 
 def change_entry(change: Change) -> dict[str, Any]:
-    """A parameter of two calibrations."""
+    """Return a parameter in two calibrations."""
     return {
         "unit": change.unit,
         "before": _parameter(change.before),
@@ -134,7 +134,7 @@ def change_entry(change: Change) -> dict[str, Any]:
 
 
 def rigs_document(states: Sequence[RigState], effects: Mapping[str, Sequence[RigEffect]]) -> dict[str, Any]:
-    """What check standards and shared sensors say of rigs; effects on scale factors are fractions."""
+    """Return the state of rigs by check standards and shared sensors; effects on scale factors are fractions."""
     return {
         "schema": SCHEMA,
         "rigs": [
@@ -148,23 +148,23 @@ def rigs_document(states: Sequence[RigState], effects: Mapping[str, Sequence[Rig
         "effects": {
             name: [
                 {
-                    "rig": each.rig,
-                    "reference": each.reference,
-                    "value": each.value,
-                    "std": each.std,
-                    "expanded": each.expanded,
-                    "between_std": each.between_std,
-                    "shared_sensors": each.sensors,
+                    "rig": effect.rig,
+                    "reference": effect.reference,
+                    "value": effect.value,
+                    "std": effect.std,
+                    "expanded": effect.expanded,
+                    "between_std": effect.between_std,
+                    "shared_sensors": effect.sensors,
                 }
-                for each in found
+                for effect in rig_effects
             ]
-            for name, found in effects.items()
+            for name, rig_effects in effects.items()
         },
     }
 
 
 def chart_entry(chart: Chart) -> dict[str, Any]:
-    """Null of the first results, which nothing could be held against."""
+    """Return a control chart; null for the first results, which have nothing before them."""
     return {
         "out_of_control": bool(chart.out_of_control) if chart.alarm.size else False,
         "deviation": _numbers(chart.deviation),
@@ -186,7 +186,7 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
 
 
 def cell(value: object) -> object:
-    """A value as a spreadsheet may read it: of one line, and no formula."""
+    """Return a value safe for a spreadsheet: one line, and not a formula."""
     if not isinstance(value, str):
         return value
     line = " ".join(value.splitlines())

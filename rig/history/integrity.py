@@ -1,4 +1,4 @@
-"""Whether what a history knows is still what was entered, and what lies on the disk."""
+"""Integrity of a history: its entries against the journal, and the files on the disk against the entries."""
 
 import os
 import platform
@@ -15,65 +15,65 @@ from rig.data.run_folder import RESULT, recordings
 from rig.history.entered.finished import CERTIFICATES, DOCUMENTS, content_sha256, document_sha256, recording_of
 from rig.history.entered.index import run_row, unlike
 from rig.history.store import History, Kept, Past
-from rig.report.findings.followed import Followed
+from rig.report.findings.followed import HistoryRecord
 from rig.station.words import calibrations_in_words
 
 State = Literal["ok", "changed", "missing", "elsewhere", "unknown"]
 STATES: Sequence[State] = get_args(State)
 WRONG: Sequence[State] = ("changed", "missing", "unknown")
-MOST_TOLD = 3
+MOST_TOLD = 3  # contradictions of a run that are listed
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """What became of one thing: of a file `what` is its path, of an entry its number."""
+class EntryState:
+    """The state of one thing: `what` is the path of a file, or the number of an entry."""
 
     what: str
     state: State
     why: str = ""
 
 
-def examined(history: History) -> Iterator[Found]:
-    """Triggers, numbers, rows against the journal, every run's against its result, and files against their hashes.
+def examined(history: History) -> Iterator[EntryState]:
+    """Yield the state of triggers, numbers and rows, of each run by its result, and of files by their hashes.
 
-    Files are looked at where they were seen last. What was entered on another computer and is not to be seen from here
-    is `elsewhere`; a file of a run that no run was entered with is `unknown`.
+    Files are read where they were last seen. Those entered on another computer and not accessible here are `elsewhere`;
+    a file of a run that was not entered with any run is `unknown`.
     """
-    here = platform.node()
-    for each in history.broken():
-        yield Found(each.what, each.state, each.why)
+    computer = platform.node()
+    for entry in history.broken():
+        yield EntryState(entry.what, entry.state, entry.why)
     documents = _files_by_folder(history)
-    looked_at: set[Path] = set()
+    examined_folders: set[Path] = set()
     for run in history.kept():
         pasts = history.of_run(run.run_id)
         why = "; ".join(_contradictions(run, pasts))
-        numbers = calibrations_in_words([each.id for each in pasts])
-        yield Found(f"run {run.run_id}, {numbers}", "changed" if why else "ok", why)
+        numbers = calibrations_in_words([past.id for past in pasts])
+        yield EntryState(f"run {run.run_id}, {numbers}", "changed" if why else "ok", why)
         folder = next((Path(path) for _, path in run.places if Path(path).is_dir()), None)
-        yield from _files(run, folder, here, documents)
-        if folder is not None and folder not in looked_at:
-            looked_at.add(folder)
+        yield from _files(run, folder, computer, documents)
+        if folder is not None and folder not in examined_folders:
+            examined_folders.add(folder)
             yield from _unknown(folder, documents)
 
 
 def _contradictions(run: Kept, pasts: Sequence[Past]) -> Iterator[str]:
-    """What in the rows of a run contradicts its result, the first few."""
+    """Yield the first contradictions between the rows of a run and its result."""
     try:
         if content_sha256(run.result) != run.content_sha256:
-            yield "the result in the history is not what was entered"
+            yield "the result in the history is not as it was entered"
         document = ResultDocument.model_validate_json(run.result)
     except (ValidationError, ValueError, LookupError, AttributeError, TypeError):
-        yield "the result in the history is none"
+        yield "the result in the history is not a valid one"
         return
     rows = [f"{name} is {run.row[name]}" for name, value in run_row(document).items() if run.row[name] != value]
-    found = [*rows, *unlike(document, list(map(_calibrated, pasts)))]
-    yield from found[:MOST_TOLD]
-    if len(found) > MOST_TOLD:
-        yield f"and {len(found) - MOST_TOLD} more"
+    differences = [*rows, *unlike(document, list(map(_record, pasts)))]
+    yield from differences[:MOST_TOLD]
+    if len(differences) > MOST_TOLD:
+        yield f"and {len(differences) - MOST_TOLD} more"
 
 
-def _calibrated(past: Past) -> Followed:
-    return Followed(
+def _record(past: Past) -> HistoryRecord:
+    return HistoryRecord(
         past.sensor,
         past.quantity,
         past.part,
@@ -86,30 +86,32 @@ def _calibrated(past: Past) -> Followed:
 
 
 def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
-    """What the files of a folder may be, by its path: a run that was resumed there was entered again."""
-    found: dict[str, set[tuple[str, str]]] = {}
+    """Return the entered files by the path of their folder: a resumed run was entered again there."""
+    by_folder: dict[str, set[tuple[str, str]]] = {}
     for path, name, sha256 in history.files():
-        found.setdefault(path, set()).add((name, sha256))
-    return found
+        by_folder.setdefault(path, set()).add((name, sha256))
+    return by_folder
 
 
-def _files(run: Kept, folder: Path | None, here: str, entered: Mapping[str, set[tuple[str, str]]]) -> Iterator[Found]:
+def _files(
+    run: Kept, folder: Path | None, here: str, entered: Mapping[str, set[tuple[str, str]]]
+) -> Iterator[EntryState]:
     if not run.recordings and not run.documents:
         return
     if folder is None:
-        elsewhere = [name for name, _ in run.places if name != here]
-        state: State = "elsewhere" if elsewhere else "missing"
-        why = f"on {elsewhere[0]}" if elsewhere else "the folder does not exist any more"
-        yield Found(run.places[0][1] if run.places else f"the folder of run {run.run_id}", state, why)
+        other_computers = [name for name, _ in run.places if name != here]
+        state: State = "elsewhere" if other_computers else "missing"
+        why = f"on {other_computers[0]}" if other_computers else "the folder no longer exists"
+        yield EntryState(run.places[0][1] if run.places else f"the folder of run {run.run_id}", state, why)
         return
     for recording in run.recordings:
         file = folder / recording.name
         try:
-            now = recording_of(file)
+            recorded = recording_of(file)
         except (UnfitFile, OSError) as error:
             yield _unreadable(file, error)
             continue
-        yield _held(file, now.sha256, {recording.sha256})
+        yield _compare(file, recorded.sha256, {recording.sha256})
     allowed = entered.get(str(folder), set())
     for name in sorted(_names(run, folder)):
         try:
@@ -118,36 +120,40 @@ def _files(run: Kept, folder: Path | None, here: str, entered: Mapping[str, set[
             yield _unreadable(folder / name, error)
             continue
         if sha256 is None:
-            yield Found(str(folder / name), "missing", "it was there when the run was entered")
+            yield EntryState(str(folder / name), "missing", "it existed when the run was entered")
         else:
-            yield _held(folder / name, sha256, {each for known, each in allowed if known == name})
+            yield _compare(
+                folder / name,
+                sha256,
+                {entered for allowed_name, entered in allowed if allowed_name == name},
+            )
 
 
-def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Iterator[Found]:
-    """Yield the files of a run in its folder that no run was entered with.
+def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Iterator[EntryState]:
+    """Yield the files of a run in its folder that were not entered with any run.
 
-    With a recording more, the folder gives another result.
+    An additional recording would change the folder's result.
     """
-    known = {name for name, _ in entered.get(str(folder), set())}
+    entered_names = {name for name, _ in entered.get(str(folder), set())}
     recorded = [file.name for readings in ("raw", "calibrated") for file in recordings(folder, readings)]
-    there = [name for name in (*DOCUMENTS, *CERTIFICATES) if os.path.lexists(folder / name)]
-    for name in (*recorded, *there):
-        if name not in known:
-            yield Found(str(folder / name), "unknown", "no run in this history was entered with it")
+    present = [name for name in (*DOCUMENTS, *CERTIFICATES) if os.path.lexists(folder / name)]
+    for name in (*recorded, *present):
+        if name not in entered_names:
+            yield EntryState(str(folder / name), "unknown", "no run in this history was entered with it")
 
 
 def _names(run: Kept, folder: Path) -> set[str]:
-    """What was there when the run was entered; and of what may have been written elsewhere, what is there now."""
+    """Return the entered files; of those that may have been written elsewhere, the present ones."""
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
 
 
-def _held(file: Path, sha256: str, entered: set[str]) -> Found:
+def _compare(file: Path, sha256: str, entered: set[str]) -> EntryState:
     if sha256 in entered:
-        return Found(str(file), "ok")
-    return Found(str(file), "changed", f"SHA-256 {sha256[:12]}…, which was never entered of it")
+        return EntryState(str(file), "ok")
+    return EntryState(str(file), "changed", f"SHA-256 {sha256[:12]}…, which was not entered for it")
 
 
-def _unreadable(file: Path, error: Exception) -> Found:
+def _unreadable(file: Path, error: Exception) -> EntryState:
     missing = isinstance(error, FileNotFoundError)
-    return Found(str(file), "missing" if missing else "changed", getattr(error, "strerror", None) or str(error))
+    return EntryState(str(file), "missing" if missing else "changed", getattr(error, "strerror", None) or str(error))

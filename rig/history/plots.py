@@ -1,4 +1,4 @@
-"""A sensor's series as pictures: every calibration with U, the drift, and the chart below. Needs matplotlib."""
+"""Pictures of a sensor's series: each calibration with U, the drift, and the control chart below. Needs matplotlib."""
 
 import math
 from collections.abc import Mapping
@@ -19,13 +19,13 @@ from rig.study.style import use_style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Of the figure's width and height. Letting the layout find them takes as long as drawing does.
+# Fractions of the figure's width and height. An automatic layout takes as long as the drawing itself.
 MARGINS = {"left": 0.07, "right": 0.985, "bottom": 0.06, "top": 0.93, "wspace": 0.3, "hspace": 0.25}
 ACROSS = 3
 
 
 def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> list[Path]:
-    """`history_<serial number>_<quantity>` as PNG and SVG for each subject into `folder`, which is there."""
+    """Draw `history_<serial number>_<quantity>` as PNG and SVG for each subject into the existing `folder`."""
     from matplotlib.figure import Figure
 
     written, names = [], set[str]()
@@ -34,7 +34,7 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
         while name in names:  # the same sensor at another range
             name += "_"
         names.add(name)
-        shown = [trends[each] for each in _drawn() if each in trends]
+        shown = [trends[name] for name in _drawn_names() if name in trends]
         if not shown:
             continue
         with use_style():
@@ -53,15 +53,15 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
     return written
 
 
-def _drawn() -> list[str]:
-    """The parameters that are drawn, in their order."""
-    beside = (each.parameters for each in every_characteristic() if each.series is not None and each.series.drawn)
-    return list(dict.fromkeys([*SCALES[1:], *BIASES, *(name for each in beside for name in each)]))
+def _drawn_names() -> list[str]:
+    """Return the parameters that are drawn, in their order."""
+    drawn = (row.parameters for row in every_characteristic() if row.series is not None and row.series.drawn)
+    return list(dict.fromkeys([*SCALES[1:], *BIASES, *(name for names in drawn for name in names)]))
 
 
 def _draw_values(axes: "Axes", trend: Trend) -> None:
     times = np.array(trend.times)
-    expanded = [each.expanded for each in trend.parameters]
+    expanded = [parameter.expanded for parameter in trend.parameters]
     axes.errorbar(times, trend.values, yerr=expanded, fmt="o", ms=3, lw=0.8, capsize=2, color="C0")
     axes.set_title(f"{trend.name}   {trend.unit}", loc="left")
     if trend.line is not None:
@@ -73,12 +73,12 @@ def _draw_values(axes: "Axes", trend: Trend) -> None:
 
 
 def _draw_chart(axes: "Axes", trend: Trend) -> None:
-    axes.set_ylabel("σ from those before")
+    axes.set_ylabel("σ from earlier results")
     if trend.chart is None:
         axes.text(0.5, 0.5, "too few calibrations", ha="center", transform=axes.transAxes)
         return
     chart, times = trend.chart, np.array(trend.times)
-    axes.plot(times, chart.deviation, ".", ms=4, color="C0", label="each")
+    axes.plot(times, chart.deviation, ".", ms=4, color="C0", label="single")
     axes.plot(times, chart.ewma, color="C1", lw=1.2, label="EWMA")
     for sign in (1, -1):
         axes.plot(times, sign * chart.limit, color="C1", lw=0.8, ls="--")

@@ -1,4 +1,4 @@
-"""Series of calibrations: what they say of a sensor over the years, and of the rigs it was calibrated on. Pure."""
+"""Series of calibrations: trends of a sensor over the years, and the state of its rigs. Pure."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,7 +12,7 @@ from rig.data.absent import NO_ARM
 from rig.data.installed_kinds import quantities
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import effective_freedom, joint_factors
-from rig.history.statistics.charts import FEWEST, Chart, chart, merged
+from rig.history.statistics.charts import FEWEST, Chart, chart, merge_charts
 from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
 from rig.history.statistics.recall import days_to_limit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
@@ -20,10 +20,10 @@ from rig.history.store import Past
 from rig.report.findings.followed import Parameter, is_scale, nominal
 
 YEAR_DAYS = 365.25
-# How often nothing has changed of a sensor that has not. The comparisons of a part's calibrations share results: with
-# 95 %, more than 5 of the 105 among 15 have changed in a third of all cases; with 98 % in 7 of 100.
+# The probability that no change is reported for an unchanged sensor. The comparisons of a part's calibrations share
+# results: at 95 %, more than 5 of the 105 among 15 are significant in a third of all cases; at 98 % in 7 of 100.
 UNCHANGED = 0.98
-DRIFT_DAYS = 10.0  # from the first result to the last: what less says of a year is its scatter
+DRIFT_DAYS = 10.0  # from the first result to the last: a shorter span gives a drift per year of scatter only
 DAY_S = 86400.0
 
 Subject = tuple[str, str, str, float, bool]
@@ -31,10 +31,10 @@ Subject = tuple[str, str, str, float, bool]
 
 @dataclass(frozen=True)
 class Trend:
-    """One parameter of one sensor over time: `times` of the calibrations, the parameter in each of them.
+    """One parameter of one sensor over time: `times` of the calibrations, and the parameter in each of them.
 
-    Lines, spreads and charts go by the statistical uncertainty of each result and by the spread that is seen beyond it;
-    what all results of a rig have in common moves none of them. They are None below five results.
+    Lines, spreads and charts use the statistical uncertainty of each result and the additional scatter between runs;
+    errors common to all results of a rig do not affect them. They are None below five results.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Trend:
 
     @property
     def count(self) -> int:
-        """How many results there are."""
+        """The number of results."""
         return len(self.parameters)
 
     @property
@@ -54,49 +54,49 @@ class Trend:
 
     @property
     def enough(self) -> bool:
-        """Whether there are as many as a statement over time needs."""
+        """Whether there are enough results for a statement over time."""
         return self.count >= FEWEST
 
     @property
     def days(self) -> Array:
-        """(n,) days since the first."""
+        """Days (n,) since the first."""
         return np.array([(time - self.times[0]).total_seconds() / DAY_S for time in self.times])
 
     @property
     def values(self) -> Array:
-        """(n,) values of the parameter."""
-        return np.array([each.value for each in self.parameters])
+        """Values (n,) of the parameter."""
+        return np.array([parameter.value for parameter in self.parameters])
 
     @property
     def std(self) -> Array:
-        """(n,) what differs by chance from run to run."""
-        return np.array([each.std_statistical for each in self.parameters])
+        """Standard deviations (n,) of the random part between runs."""
+        return np.array([parameter.std_statistical for parameter in self.parameters])
 
     @cached_property
     def mean(self) -> Fitted | None:
-        """The mean, and the spread between runs."""
+        """The mean, and the scatter between runs."""
         return fit(np.ones((self.count, 1)), self.values, self.std) if self.enough else None
 
     @cached_property
     def line(self) -> Fitted | None:
-        """Value at the first result, and change per day; None too where they are of less than `DRIFT_DAYS`."""
+        """Value at the first result, and change per day; None also for a span of less than `DRIFT_DAYS`."""
         if not self.enough or np.ptp(self.days) < DRIFT_DAYS:
             return None
         return fit(np.stack([np.ones(self.count), self.days], axis=1), self.values, self.std)
 
     @property
     def drifts(self) -> bool:
-        """Whether the change over time is more than chance."""
+        """Whether the change over time is significant."""
         return self.line is not None and self.line.p_value(1) < 1 - CONFIDENCE
 
     @cached_property
     def chart(self) -> Chart | None:
-        """Shewhart and EWMA."""
+        """Shewhart and EWMA charts."""
         return chart(self.values, self.std) if self.enough else None
 
     @cached_property
     def recall(self) -> date | None:
-        """The day on which value and uncertainty may have reached the limit; None without one within ten years."""
+        """The day on which value and uncertainty may reach the limit; None without one within ten years."""
         limit = self.last.max_deviation
         if self.line is None or limit is None:
             return None
@@ -106,7 +106,7 @@ class Trend:
 
 @dataclass(frozen=True, slots=True)
 class RigState:
-    """What all check standards of one rig say of it together: a chart of each parameter, in the order of time."""
+    """The state of one rig by all its check standards: a chart of each parameter, in the order of time."""
 
     rig: str
     standards: tuple[str, ...]
@@ -115,7 +115,7 @@ class RigState:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A parameter beside the one of the calibration before; `compared` is how many values are compared at once."""
+    """A parameter in this and the previous calibration; `compared` is the number of values compared at once."""
 
     name: str
     unit: str
@@ -130,48 +130,48 @@ class Change:
 
     @property
     def limit(self) -> float:
-        """The E_n that of all values compared none exceeds by chance in `UNCHANGED` of comparisons.
+        """The E_n that no compared value exceeds by chance in `UNCHANGED` of comparisons.
 
-        By Student's t for the effective degrees of freedom of the difference, and Bonferroni's inequality: parameters
-        of one calibration are correlated in ways that no history keeps.
+        It uses Student's t for the effective degrees of freedom of the difference, and Bonferroni's inequality, because
+        a history does not store the correlations between parameters of one calibration.
         """
         both = (self.before, self.now)
-        freedom = effective_freedom([each.std**2 for each in both], [each.freedom for each in both])
+        freedom = effective_freedom([parameter.std**2 for parameter in both], [parameter.freedom for parameter in both])
         factor = float(joint_factors(self.compared, freedom, UNCHANGED))
         return factor * math.hypot(self.before.std, self.now.std) / math.hypot(self.before.expanded, self.now.expanded)
 
     @property
     def has_changed(self) -> bool:
-        """Whether it is more than chance explains, among so many values."""
+        """Whether the change is significant among all compared values."""
         return self.normalised_error > self.limit
 
 
 def subjects(pasts: Iterable[Past]) -> dict[Subject, list[Past]]:
-    """Calibrations that count, by what was calibrated: neither voided nor unfit by their own checks."""
-    found: dict[Subject, list[Past]] = {}
-    for each in pasts:
-        if each.fit and each.voided is None:
-            found.setdefault(each.subject, []).append(each)
-    return found
+    """Return valid calibrations by subject: neither voided nor unfit by their own checks."""
+    by_subject: dict[Subject, list[Past]] = {}
+    for past in pasts:
+        if past.fit and past.voided is None:
+            by_subject.setdefault(past.subject, []).append(past)
+    return by_subject
 
 
 def trends(pasts: Sequence[Past]) -> dict[str, Trend]:
-    """The trend of every parameter that the newest of one subject's calibrations has."""
-    found = {}
+    """Return the trend of every parameter that the newest of one subject's calibrations has."""
+    by_name = {}
     for name in pasts[-1].parameters if pasts else ():
-        with_it = [each for each in pasts if name in each.parameters]
-        parameters = tuple(each.parameters[name] for each in with_it)
-        found[name] = Trend(name, parameters[-1].unit, tuple(time_of(each) for each in with_it), parameters)
-    return found
+        having = [past for past in pasts if name in past.parameters]
+        parameters = tuple(past.parameters[name] for past in having)
+        by_name[name] = Trend(name, parameters[-1].unit, tuple(time_of(past) for past in having), parameters)
+    return by_name
 
 
 Parameters = Mapping[str, Parameter]
 
 
 def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Change, ...], ...]:
-    """Return the changes within each pair, before and now, of the parameters by their names that both have.
+    """Return the changes within each pair, before and now, of the parameters that both have.
 
-    All pairs are those of one comparison, as of all sensors of a run: the values of all count.
+    All pairs belong to one comparison, as those of all sensors of a run: the number of all values counts.
     """
     shared = [[name for name in now if name in before] for before, now in pairs]
     compared = sum(map(len, shared))
@@ -182,54 +182,59 @@ def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Ch
 
 
 def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject, tuple[Change, ...]]:
-    """Return the changes of everything that both have, by what it is; they are one comparison.
+    """Return the changes of all subjects that both runs have, as one comparison.
 
-    Each are the calibrations of one run; of two of the same thing the last counts.
+    `before` and `now` are the calibrations of one run each; the last of a subject counts.
     """
     earlier, later = ({past.subject: past for past in pasts} for pasts in (before, now))
     both = [subject for subject in later if subject in earlier]
-    found = changes_in([(earlier[subject].parameters, later[subject].parameters) for subject in both])
-    return dict(zip(both, found, strict=True))
+    changes = changes_in([(earlier[subject].parameters, later[subject].parameters) for subject in both])
+    return dict(zip(both, changes, strict=True))
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
-    """Every rig that has check standards; a sensor is one if it was ever called one."""
-    # What drifts or turns is no standard, and readings from files tell of no rig.
-    found = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
-    standards = {subject: each for subject, each in found.items() if any(past.check_standard for past in each)}
+    """Return the state of every rig with check standards; a sensor is one if it was ever marked as one."""
+    # Drifts and curves are not standards, and external readings have no rig.
+    by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
+    standards = {key: own for key, own in by_subject.items() if any(past.check_standard for past in own)}
     states = []
-    for rig in dict.fromkeys(past.rig for each in standards.values() for past in each):
+    for rig in dict.fromkeys(past.rig for series in standards.values() for past in series):
         deviations: dict[str, list[tuple[datetime, float]]] = {}
         serials = []
-        for (_, serial_number, *_), each in standards.items():
-            of_rig = [past for past in each if past.rig == rig]
+        for (_, serial_number, *_), series in standards.items():
+            of_rig = [past for past in series if past.rig == rig]
             serials += [serial_number] if of_rig else []
             for name, trend in trends(of_rig).items():
                 if trend.chart is not None:
                     judged = zip(trend.times, trend.chart.deviation.tolist(), strict=True)
                     deviations.setdefault(name, []).extend(pair for pair in judged if np.isfinite(pair[1]))
-        charts = {name: merged(np.array([each for _, each in sorted(pairs)])) for name, pairs in deviations.items()}
+        charts = {
+            name: merge_charts(np.array([deviation for _, deviation in sorted(pairs)]))
+            for name, pairs in deviations.items()
+        }
         states.append(RigState(rig, tuple(dict.fromkeys(serials)), charts))
     return states
 
 
 def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
-    """What rigs differ in, by parameter of gyroscopes, from the sensors they share. Of scale factors as a fraction."""
+    """Return the differences between rigs by shared gyroscopes, by parameter; those of scale factors as fractions."""
     by_rigs = subjects(past for past in pasts if past.rig != NO_ARM)
-    series = [(name, past) for each in by_rigs.values() for past in each for name in past.parameters]
-    found = {}
+    series = [
+        (name, past) for pasts_of_subject in by_rigs.values() for past in pasts_of_subject for name in past.parameters
+    ]
+    by_name = {}
     for name in dict.fromkeys(name for name, past in series if past.quantity == "rate"):
-        having = [past for of, past in series if of == name and past.quantity == "rate"]
+        having = [past for parameter, past in series if parameter == name and past.quantity == "rate"]
         values = np.array([past.value(name) for past in having])
         std = np.array([past.parameters[name].std_statistical for past in having])
         if is_scale(name):
             values, std = np.log(values), std / values
-        told = rig_effects([past.rig for past in having], [str(past.subject) for past in having], values, std)
-        if told:
-            found[name] = told
-    return found
+        differences = rig_effects([past.rig for past in having], [str(past.subject) for past in having], values, std)
+        if differences:
+            by_name[name] = differences
+    return by_name
 
 
 def time_of(past: Past) -> datetime:
-    """When the run of a calibration began."""
+    """Return the time at which the run of a calibration began."""
     return datetime.fromisoformat(past.started_utc).astimezone(UTC)

@@ -1,7 +1,7 @@
-"""What each station says of itself at this moment, in a shared history: one row a rig, written anew every second.
+"""The present state of each station in a shared history: one row for each rig, replaced every second.
 
-It is no entry of the history: nothing rests on it, no journal keeps it, and its row is replaced. Ages are told by the
-database's clock alone, so the computers' clocks need not agree.
+It is not an entry of the history: no result depends on it, and no journal contains it. Ages are by the database's clock
+alone, so the computers' clocks need not agree.
 """
 
 from collections.abc import Mapping
@@ -31,10 +31,10 @@ from sqlalchemy.exc import IntegrityError, ProgrammingError
 
 from rig.history.storage.engine import WRITES
 
-LONGEST = 20_000  # characters of what a station says
+LONGEST = 20_000  # characters of a station's state
 NAME = 200
-MOST = 100  # stations that are told of
-SOONEST_S, LATEST_S = -1.0, 3e9  # ages that can be: clocks are corrected, and nobody told anything a century ago
+MOST = 100  # stations that are read
+SOONEST_S, LATEST_S = -1.0, 3e9  # plausible ages: clocks may be corrected, and no station is a century old
 metadata = MetaData()
 station = Table(
     "station",
@@ -52,19 +52,19 @@ _NOW: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What the station of a `rig` on a `computer` said last, as JSON, and how long ago; None if no time is told.
+    """The last state of the station of a `rig` on a `computer`, as JSON, and its age; None if the age is unknown.
 
-    Whoever may write to the history may have written anything there.
+    Every user with write access to the history can change it.
     """
 
     rig: str
     computer: str
-    told: str
+    state: str
     age_s: float | None
 
 
 def make_table(engine: Engine) -> None:
-    """The table, where there is none. Raises SQLAlchemyError where the role may make none."""
+    """Make the table if there is none. Raise SQLAlchemyError if the role may not make one."""
     if inspect(engine).has_table(station.name):
         return
     try:
@@ -75,44 +75,44 @@ def make_table(engine: Engine) -> None:
             raise
 
 
-def tell(engine: Engine, rig: str, computer: str, told: str) -> None:
-    """Say it, in the place of what the station said before. Raises SQLAlchemyError."""
+def tell(engine: Engine, rig: str, computer: str, state: str) -> None:
+    """Store the station's state in place of the previous one. Raise SQLAlchemyError."""
     with _writing(engine) as connection, connection.begin():
-        row: dict[str, Any] = {"heard_s": _now(connection), "told": told[:LONGEST]}
+        row: dict[str, Any] = {"heard_s": _now(connection), "told": state[:LONGEST]}
         key = {"rig": rig[:NAME], "computer": computer[:NAME]}
-        of_it = update(station).where(*(station.c[name] == value for name, value in key.items()))
-        if connection.execute(of_it.values(**row)).rowcount == 0:
+        own_row = update(station).where(*(station.c[name] == value for name, value in key.items()))
+        if connection.execute(own_row.values(**row)).rowcount == 0:
             connection.execute(insert(station).values(**key, **row))
 
 
 def heard(engine: Engine) -> tuple[list[Told], int]:
-    """Return what stations said last, by the rig's name, and how many more there are; none if no one ever said a word.
+    """Return the last states of stations, sorted by rig, and the number of further stations.
 
-    Of more than `MOST` stations those that were heard last.
+    Of more than `MOST` stations the latest are returned.
     """
     if not inspect(engine).has_table(station.name):
         return [], 0
     with engine.connect() as connection:
         age = _now(connection) - station.c.heard_s
         texts = (_text(connection, column, most) for column, most in _LENGTHS)
-        cannot_be = case((age.between(SOONEST_S, LATEST_S), 0), else_=1)
-        question = select(*texts, age).order_by(cannot_be, age, *station.primary_key).limit(MOST)
+        implausible = case((age.between(SOONEST_S, LATEST_S), 0), else_=1)
+        question = select(*texts, age).order_by(implausible, age, *station.primary_key).limit(MOST)
         rows: list[tuple[Any, ...]] = [tuple(row) for row in connection.execute(question)]
         every = connection.scalar(select(func.count()).select_from(station)) or 0
-    told = [Told(_decoded(rig), _decoded(computer), _decoded(said), _age_s(age)) for rig, computer, said, age in rows]
-    return sorted(told, key=lambda each: (each.rig, each.computer)), max(every - len(told), 0)
+    states = [Told(_decode(rig), _decode(computer), _decode(text), _age_s(age)) for rig, computer, text, age in rows]
+    return sorted(states, key=lambda state: (state.rig, state.computer)), max(every - len(states), 0)
 
 
 _LENGTHS = ((station.c.rig, NAME), (station.c.computer, NAME), (station.c.told, LONGEST + 1))
 
 
 def _text(connection: Connection, column: ColumnElement[str], most: int) -> ColumnElement[Any]:
-    """The beginning of a text. Of SQLite as bytes: a column holds whatever was put there, also what is no UTF-8."""
+    """Return the beginning of a text; from SQLite as bytes, because its columns hold any bytes, also invalid UTF-8."""
     start = func.substr(column, 1, most)
     return cast(start, LargeBinary) if connection.dialect.name == "sqlite" else start
 
 
-def _decoded(value: Any) -> str:
+def _decode(value: Any) -> str:
     return value.decode(errors="replace") if isinstance(value, bytes) else "" if value is None else str(value)
 
 

@@ -1,8 +1,8 @@
-"""A history: runs are entered, and found again.
+"""A history: runs are entered, and read again.
 
 with open_history() as history:                    # or open_history("postgresql://rig@lab-server/history")
-    for each in history.calibrations(Selection(serial_number="LSM9DS1-001")):
-        print(each.started_utc, each.value("kx"), each.parameters["kx"].expanded)
+    for past in history.calibrations(Selection(serial_number="LSM9DS1-001")):
+        print(past.started_utc, past.value("kx"), past.parameters["kx"].expanded)
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,17 +21,17 @@ from rig.history.entered.entering import enter_run, note_place, now_utc
 from rig.history.entered.finished import Finished, Recording
 from rig.history.entered.issued import Issued
 from rig.history.storage import journal, numbers, read_back, schema, triggers
-from rig.history.storage.address import Place, place
+from rig.history.storage.address import HistoryAddress, resolve_address
 from rig.history.storage.engine import WRITES, connection_apart, engine_of
 from rig.report.findings.characteristics import every_characteristic
 from rig.report.findings.followed import BIASES, SCALES, Parameter
 
-_MANY = 500  # keys in one question: SQLite takes no more than some thousands
+_MANY = 500  # keys in one query: SQLite allows a few thousand
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which calibrations; None is all. `rig` is its name or its arm's serial number, `board` that board's own."""
+    """A selection of calibrations; None selects all. `rig` is its name or its arm's serial number, `board` its own."""
 
     serial_number: str | None = None
     part: str | None = None
@@ -42,9 +42,9 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """A calibration of long ago or of just now. `id` names it, `run_id` the run it was part of.
+    """A calibration of the history. `id` is its number, `run_id` that of its run.
 
-    `voided` is why it does not count, None where it does.
+    `voided` is the reason why it does not count, None if it does.
     """
 
     id: int
@@ -71,17 +71,17 @@ class Past:
 
     @property
     def subject(self) -> tuple[str, str, str, float, bool]:
-        """What stays the same over the years: part, serial number, quantity, range, and whether it is simulated."""
+        """The constants of a series: part, serial number, quantity, range, and whether it is simulated."""
         return self.part, self.serial_number, self.quantity, self.full_scale, self.simulated
 
     def value(self, name: str) -> float:
-        """The value of the parameter `name`. Raises KeyError."""
+        """Return the value of the parameter `name`. Raise KeyError."""
         return self.parameters[name].value
 
 
 @dataclass(frozen=True, slots=True)
 class Entered:
-    """The run's `run_id`; `new` is False where the history had it already."""
+    """The number of a run; `new` is False if the history already had it."""
 
     run_id: int
     new: bool
@@ -89,10 +89,10 @@ class Entered:
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A run as it was entered: its result, its recordings, and where its folder was seen, the newest place first.
+    """A run as it was entered: its result, its recordings, and its folder's locations, the newest first.
 
-    `certificates` in the order they were entered; `documents` the other files of its folder, name and SHA-256; `row`
-    all that stands beside the result.
+    `certificates` are in the order of entry; `documents` are the other files of its folder, name and SHA-256; `row` is
+    the run's row with all other columns.
     """
 
     run_id: int
@@ -106,22 +106,21 @@ class Kept:
 
 
 @contextmanager
-def open_history(where: str | Place | None = None) -> Iterator["History"]:
-    """Open a history by its file or URL, the user's own by default; its tables are made or migrated if need be.
+def open_history(where: str | HistoryAddress | None = None) -> Iterator["History"]:
+    """Open a history by its file or URL, the user's own by default; make or migrate its tables if necessary.
 
-    Raises Refused `history_unreachable`, `history_too_old`, `history_too_new`, `not_a_history`, `missing_extra`;
-    `history_gone` or `history_exchanged` if this process has opened it before, and it is not there any more or another
-    is.
+    Raise Refused `history_unreachable`, `history_too_old`, `history_too_new`, `not_a_history`, `missing_extra`;
+    `history_gone` or `history_exchanged` if this process has opened it before and it is gone or another one.
     """
-    found = where if isinstance(where, Place) else place(where)
+    address = where if isinstance(where, HistoryAddress) else resolve_address(where)
     try:
-        with engine_of(found) as engine:
-            yield History(found, engine)
+        with engine_of(address) as engine:
+            yield History(address, engine)
     except (SQLAlchemyError, OSError) as error:
         why = str(getattr(error, "orig", None) or error).strip().splitlines()
         raise Refused(
             "history_unreachable",
-            f"the history {found.label} cannot be used: {why[0] if why else type(error).__name__}",
+            f"the history {address.label} cannot be used: {why[0] if why else type(error).__name__}",
             "Correct that, or name another history with --history or RIG_HISTORY; runs are entered later by "
             "`rig history import`",
         ) from error
@@ -129,47 +128,46 @@ def open_history(where: str | Place | None = None) -> Iterator["History"]:
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """An open history. A connection of its own has read back what the methods say is entered, or `entry_not_kept`."""
+    """An open history. Each entry is read back by another connection before a method returns, or `entry_not_kept`."""
 
-    place: Place
+    address: HistoryAddress
     engine: Engine
 
     def enter(self, finished: Finished) -> Entered:
-        """Add a run; one that is there already only gets the place of its folder noted, if that is another.
+        """Add a run; for one that the history already has, add only a new location of its folder.
 
-        It is taken at its word: whether its recordings give its result, `rig history import` finds out. Raises Refused
-        `entry_not_kept`.
+        The result is not compared with its recordings: `rig history import` does that. Raise Refused `entry_not_kept`.
         """
         content = finished.content_sha256
         try:
             with self._writing() as connection:
-                known = self._run_id(connection, content)
-                run_id = enter_run(connection, finished, content) if known is None else known
+                existing = self._run_id(connection, content)
+                run_id = enter_run(connection, finished, content) if existing is None else existing
                 note_place(connection, run_id, finished)
                 if finished.certificate is not None:
                     certificates.enter(connection, run_id, finished.certificate, now_utc())
-            entered = Entered(run_id, known is None)
+            entered = Entered(run_id, existing is None)
         except IntegrityError:
-            # Somebody else entered the same at the same moment, and was first.
+            # Another process entered the same run first.
             with self.engine.connect() as connection:
-                known = self._run_id(connection, content)
-            if known is None:
+                existing = self._run_id(connection, content)
+            if existing is None:
                 raise
-            entered = Entered(known, False)
+            entered = Entered(existing, False)
         if not entered.new:
             with connection_apart(self.engine) as connection:
-                read_back.refuse_missing(connection, self.place, schema.run, entered.run_id)
+                read_back.refuse_missing(connection, self.address, schema.run, entered.run_id)
         return entered
 
     def has(self, content_sha256: str) -> bool:
-        """Whether a run with that result was entered."""
+        """Return whether a run with that result was entered."""
         with self.engine.connect() as connection:
             return self._run_id(connection, content_sha256) is not None
 
     def certify(self, content_sha256: str, certificate: Issued) -> bool:
-        """Note a certificate of the run with that result; False where the history does not have it.
+        """Add a certificate of the run with that result; return False if the history does not have the run.
 
-        Raises Refused `entry_not_kept`.
+        Raise Refused `entry_not_kept`.
         """
         with self._writing() as connection:
             run_id = self._run_id(connection, content_sha256)
@@ -186,20 +184,20 @@ class History:
         return self._pasts(chosen(question if replaced_too else question.where(~replaced()), selection))
 
     def calibration(self, number: int) -> Past:
-        """One by its number, replaced or not. Raises Refused `not_in_history`."""
-        found = self._pasts(select(*_COLUMNS).select_from(_ROWS).where(schema.calibration.c.id == number))
-        if not found:
+        """Return one calibration by its number, replaced or not. Raise Refused `not_in_history`."""
+        pasts = self._pasts(select(*_COLUMNS).select_from(_ROWS).where(schema.calibration.c.id == number))
+        if not pasts:
             raise Refused("not_in_history", f"there is no calibration number {number}", "Look with `rig history`")
-        return found[0]
+        return pasts[0]
 
     def of_run(self, run_id: int) -> list[Past]:
-        """All of one run."""
+        """Return all calibrations of one run."""
         return self._pasts(select(*_COLUMNS).select_from(_ROWS).where(_RUN.id == run_id).order_by(*_IN_TIME))
 
     def void(self, number: int, reason: str) -> None:
-        """Say that a calibration does not count, and why.
+        """Mark a calibration as void, with the reason.
 
-        Raises Refused `not_in_history`, `already_voided`, `entry_not_kept`.
+        Raise Refused `not_in_history`, `already_voided`, `entry_not_kept`.
         """
         before = self.calibration(number).voided
         if before is not None:
@@ -214,7 +212,7 @@ class History:
             journal.note(connection, schema.voided, number)
 
     def kept(self, run_id: int | None = None) -> Iterator[Kept]:
-        """Runs as they were entered, one or all, in the order they were."""
+        """Yield runs as they were entered, one or all, in the order of entry."""
         question = select(schema.run).order_by(schema.run.c.id)
         if run_id is not None:
             question = question.where(schema.run.c.id == run_id)
@@ -224,53 +222,53 @@ class History:
                 yield _kept(connection, number)
 
     def files(self) -> Iterator[tuple[str, str, str]]:
-        """Where runs were seen, and what lies there: path, name, SHA-256."""
+        """Yield path, name and SHA-256 of all files of runs, for each location of their folders."""
         places, files = schema.location, schema.certificate_file
         recorded = places.join(schema.recording, schema.recording.c.run_id == places.c.run_id)
-        beside = places.join(schema.document, schema.document.c.run_id == places.c.run_id)
+        documented = places.join(schema.document, schema.document.c.run_id == places.c.run_id)
         issued = places.join(schema.certificate, schema.certificate.c.run_id == places.c.run_id).join(files)
         with self.engine.connect() as connection:
-            for table, of in ((schema.recording, recorded), (schema.document, beside), (files, issued)):
+            for table, joined in ((schema.recording, recorded), (schema.document, documented), (files, issued)):
                 yield from map(
-                    tuple, connection.execute(select(places.c.path, table.c.name, table.c.sha256).select_from(of))
+                    tuple, connection.execute(select(places.c.path, table.c.name, table.c.sha256).select_from(joined))
                 )
             result = select(places.c.path, schema.run.c.content_sha256).select_from(places.join(schema.run))
             yield from ((path, RESULT, sha256) for path, sha256 in connection.execute(result))
 
     def broken(self) -> Iterator[journal.Broken]:
-        """What is not as it was entered: triggers, numbers, and rows as `journal.broken`."""
+        """Yield triggers, numbers and rows that are not as they were entered, as `journal.broken`."""
         with self.engine.connect() as connection:
             yield from triggers.unlike_made(connection)
             yield from numbers.gaps(connection)
             yield from journal.broken(connection)
 
     def head(self) -> journal.Head:
-        """The end of the journal, as `journal.head`."""
+        """Return the end of the journal, as `journal.head`."""
         with self.engine.connect() as connection:
             return journal.head(connection)
 
-    def holds(self, known: journal.Head) -> bool:
-        """Whether the journal still goes on from what was its end once, as `journal.holds`."""
+    def holds(self, earlier: journal.Head) -> bool:
+        """Return whether the journal contains an earlier end of it unchanged, as `journal.holds`."""
         with self.engine.connect() as connection:
-            return journal.holds(connection, known)
+            return journal.holds(connection, earlier)
 
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
-        """A transaction that enters something; when it has ended, its entries are read back."""
+        """Begin a transaction that enters rows; read them back when it has ended."""
         with self.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
             journal.alone(connection)
             before = journal.head(connection)
             yield connection
             after = journal.head(connection)
         with connection_apart(self.engine) as connection:
-            read_back.refuse_lost(connection, self.place, before, after)
+            read_back.refuse_lost(connection, self.address, before, after)
 
     @staticmethod
     def _run_id(connection: Connection, content_sha256: str) -> int | None:
-        found: int | None = connection.scalar(
+        number: int | None = connection.scalar(
             select(schema.run.c.id).where(schema.run.c.content_sha256 == content_sha256)
         )
-        return found
+        return number
 
     def _pasts(self, question: Select[Any]) -> list[Past]:
         with self.engine.connect() as connection:
@@ -309,30 +307,30 @@ _IN_TIME = (_RUN.started_utc, _RUN.id, _CALIBRATION.id)
 def _kept(connection: Connection, number: int) -> Kept:
     places, files, documents = schema.location.c, schema.recording.c, schema.document.c
     row = connection.execute(select(schema.run).where(_RUN.id == number)).mappings().one()
-    seen = select(places.computer, places.path).where(places.run_id == number).order_by(places.id.desc())
-    had = select(files.name, files.bytes, files.sha256).where(files.run_id == number).order_by(files.name)
-    beside = select(documents.name, documents.sha256).where(documents.run_id == number).order_by(documents.name)
+    locations = select(places.computer, places.path).where(places.run_id == number).order_by(places.id.desc())
+    recorded = select(files.name, files.bytes, files.sha256).where(files.run_id == number).order_by(files.name)
+    documented = select(documents.name, documents.sha256).where(documents.run_id == number).order_by(documents.name)
     return Kept(
         number,
         row["content_sha256"],
         row["result"],
-        tuple(Recording(*each) for each in connection.execute(had)),
-        tuple((computer, path) for computer, path in connection.execute(seen)),
+        tuple(Recording(*row) for row in connection.execute(recorded)),
+        tuple((computer, path) for computer, path in connection.execute(locations)),
         certificates.of_run(connection, number),
-        tuple((name, sha256) for name, sha256 in connection.execute(beside)),
+        tuple((name, sha256) for name, sha256 in connection.execute(documented)),
         dict(row),
     )
 
 
 def replaced() -> Any:
-    """Whether there is a later result of the same measurement, of a row of the runs."""
+    """Return the condition that a run's row has a later result of the same measurement."""
     later = schema.run.alias("later")
     newer = or_(later.c.solved_utc > _RUN.solved_utc, and_(later.c.solved_utc == _RUN.solved_utc, later.c.id > _RUN.id))
     return exists(select(later.c.id).where(later.c.measurement_sha256 == _RUN.measurement_sha256, newer))
 
 
 def chosen(question: Select[Any], selection: Selection) -> Select[Any]:
-    """A question for runs, or for their calibrations, narrowed to those that were chosen."""
+    """Return a query for runs, or for their calibrations, restricted to a selection."""
     if selection.serial_number is not None:
         question = question.where(_CALIBRATION.serial_number == selection.serial_number)
     if selection.part is not None:
@@ -347,22 +345,22 @@ def chosen(question: Select[Any], selection: Selection) -> Select[Any]:
 
 
 def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dict[str, Parameter]]:
-    columns, found = schema.parameter.c, dict[int, dict[str, Parameter]]()
+    columns, by_number = schema.parameter.c, dict[int, dict[str, Parameter]]()
     for start in range(0, len(numbers), _MANY):
-        some = numbers[start : start + _MANY]
-        for row in connection.execute(select(schema.parameter).where(columns.calibration_id.in_(some))):
+        batch = numbers[start : start + _MANY]
+        for row in connection.execute(select(schema.parameter).where(columns.calibration_id.in_(batch))):
             number, name, *values = row
-            found.setdefault(number, {})[name] = Parameter(name, *values)
+            by_number.setdefault(number, {})[name] = Parameter(name, *values)
     order = _order()
-    places = {name: place for place, name in enumerate(order)}
+    positions = {name: position for position, name in enumerate(order)}
 
-    def place_of(parameter: tuple[str, Parameter]) -> tuple[int, str]:
-        return places.get(parameter[0], len(order)), parameter[0]
+    def sort_key(parameter: tuple[str, Parameter]) -> tuple[int, str]:
+        return positions.get(parameter[0], len(order)), parameter[0]
 
-    return {number: dict(sorted(each.items(), key=place_of)) for number, each in found.items()}
+    return {number: dict(sorted(by_name.items(), key=sort_key)) for number, by_name in by_number.items()}
 
 
 def _order() -> list[str]:
-    """The parameters in the order in which they stand; one that is none of them comes last."""
-    beside = (name for each in every_characteristic() for name in each.parameters)
-    return list(dict.fromkeys([*SCALES, *BIASES, *beside]))
+    """Return the parameters in their order of display; unknown ones come last."""
+    further = (name for characteristic in every_characteristic() for name in characteristic.parameters)
+    return list(dict.fromkeys([*SCALES, *BIASES, *further]))

@@ -1,1 +1,1 @@
-"""The rig in a notebook: recordings and results as objects that show themselves."""
+"""The rig in a notebook: recordings and results as objects that display themselves."""

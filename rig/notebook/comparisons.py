@@ -1,4 +1,4 @@
-"""Two sensors of one run beside each other, before and after calibration."""
+"""Two sensors of one run in comparison, before and after calibration."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SensorComparison:
-    """Readings of `sensor` beside those of `reference`, in the frame of `sensor`.
+    """Readings of `sensor` compared with those of `reference`, in the frame of `sensor`.
 
-    `before` are its raw readings, `after` those that the board had corrected; None where they were not recorded.
+    `before` has its raw readings, `after` those corrected by the board; None if they were not recorded.
     """
 
     sensor: str
@@ -35,47 +35,45 @@ class SensorComparison:
 
     @property
     def shown(self) -> Comparison:
-        """What is plotted: calibrated readings where there are any."""
-        return next(found for found in (self.after, self.before) if found is not None)
+        """The plotted comparison: of calibrated readings if there are any."""
+        return next(part for part in (self.after, self.before) if part is not None)
 
     def plot(self) -> "Plot":
-        """A plot of sensor and reference over time, and of their difference."""
+        """Return a plot of sensor and reference over time, and of their difference."""
         from rig.notebook.plots import plot_comparison
 
         return plot_comparison(self.shown, self.sensor, self.reference)
 
     def to_dict(self) -> dict[str, Any]:
-        """RMS of the difference on each axis, rad/s, and how the two sit to each other, as plain numbers."""
+        """Return the RMS of the difference on each axis, rad/s, and the relative rotation, as plain numbers."""
         parts = {"before": self.before, "after": self.after}
         return {
             "sensor": self.sensor,
             "reference": self.reference,
             "rotation_rad": self.rotation.vector_rad.tolist(),
-            "rms_rad_s": {
-                when: found.movement.rms_rad_s.tolist() for when, found in parts.items() if found is not None
-            },
+            "rms_rad_s": {when: part.movement.rms_rad_s.tolist() for when, part in parts.items() if part is not None},
         }
 
     def _rows(self) -> list[tuple[str, ...]]:
         return [
-            (when, *(f"{rms:.5f}" for rms in found.movement.rms_rad_s))
-            for when, found in (("before", self.before), ("after", self.after))
-            if found is not None
+            (when, *(f"{rms:.5f}" for rms in comparison.movement.rms_rad_s))
+            for when, comparison in (("before", self.before), ("after", self.after))
+            if comparison is not None
         ]
 
     def __repr__(self) -> str:
         rms = "; ".join(f"{when} {' '.join(values)}" for when, *values in self._rows())
-        return f"<{self.sensor} beside {self.reference}: RMS {rms} rad/s>"
+        return f"<{self.sensor} against {self.reference}: RMS {rms} rad/s>"
 
     def _repr_html_(self) -> str:
-        return table(f"{self.sensor} beside {self.reference}, RMS rad/s", ("calibration", "x", "y", "z"), self._rows())
+        return table(f"{self.sensor} against {self.reference}, RMS rad/s", ("calibration", "x", "y", "z"), self._rows())
 
 
 def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
-    """Compare two sensors of a run sample by sample, the one corrected by what is known of it.
+    """Compare two sensors of a run sample by sample; the reference's readings are corrected.
 
-    The reference's calibration is the turntable's where the run names one, else this run's own. Raises Refused
-    `no_such_sensor`, `nothing_to_compare`; Fault as `rig.analysis.gyroscope.comparison.compare` does.
+    The reference's calibration is the turntable's if the run names it, else that of this run. Raise Refused
+    `no_such_sensor`, `nothing_to_compare`; Fault as `rig.analysis.gyroscope.comparison.compare`.
     """
     for name in (sensor, reference):
         if RATE.name not in run[name].quantities:
@@ -85,17 +83,19 @@ def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
     calibration = run.calibration
     before = calibration.recordings if calibration is not None else ()
     raw = before or run.corrected
-    known = _known(run, reference, raw)
-    rotation = relative_mounting(sensor, known, raw, calibration.results[sensor] if calibration is not None else None)
+    standard = _correction_of(run, reference, raw)
+    rotation = relative_mounting(
+        sensor, standard, raw, calibration.results[sensor] if calibration is not None else None
+    )
     parts = (
-        compare_readings(part, sensor, _known(run, reference, part), rotation.matrix) if part else None
+        compare_readings(part, sensor, _correction_of(run, reference, part), rotation.matrix) if part else None
         for part in (before, run.corrected)
     )
     return SensorComparison(sensor, reference, rotation, *parts)
 
 
-def _known(run: Run, name: str, recordings: Sequence[ObservedRun]) -> Reference:
-    """What corrects a sensor's readings in these recordings: nothing where the board has done it already."""
+def _correction_of(run: Run, name: str, recordings: Sequence[ObservedRun]) -> Reference:
+    """Return the correction of a sensor's readings in these recordings; none if the board has corrected them."""
     if recordings[0].run.sensors[name].mode == "calibrated":
         return Reference(name, np.ones(3), np.zeros(3))
     turntable = run.settings.reference
@@ -107,5 +107,5 @@ def _known(run: Run, name: str, recordings: Sequence[ObservedRun]) -> Reference:
             f"{run.path} does not contain {name}'s own calibration",
             "Compare with the sensor whose role is reference",
         )
-    found = run.calibration.results[name]
-    return Reference(name, found.scale, found.bias_rad_s)
+    result = run.calibration.results[name]
+    return Reference(name, result.scale, result.bias_rad_s)

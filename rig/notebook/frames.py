@@ -1,4 +1,4 @@
-"""pandas for those who have it: the extra `pandas` brings it, and nothing is loaded before a table is asked for."""
+"""pandas tables: the extra `pandas` installs the library, which is loaded on demand."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def frame(columns: Mapping[str, Any], index: Sequence[Any], name: str) -> "DataFrame":
-    """A table of `columns` (n,) by name over an `index` (n,) of that `name`. Raises Refused `missing_extra`."""
+    """Return a table of `columns` (n,) by name over an `index` (n,) of that `name`. Raise Refused `missing_extra`."""
     try:
         import pandas
     except ImportError as error:

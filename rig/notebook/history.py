@@ -1,4 +1,4 @@
-"""The laboratory's memory from a notebook: all calibrations of a sensor, and what changed from one run to another."""
+"""The laboratory's memory in a notebook: all calibrations of a sensor, and changes between runs."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 from rig.errors import Refused
 from rig.history.documents import COLUMNS, change_entry
 from rig.history.series import Change, changes_in, time_of
-from rig.history.storage.address import own_place, place
+from rig.history.storage.address import own_place, resolve_address
 from rig.history.store import Past, Selection, open_history
 from rig.history.terminal.tables import title_of, value_text
 from rig.notebook.frames import frame
 from rig.notebook.html import table
 from rig.notebook.results import Result, solve
 from rig.notebook.runs import Run
-from rig.report.findings.followed import Followed, Parameter
+from rig.report.findings.followed import HistoryRecord, Parameter
 from rig.report.kinds.registry import followed
 
 if TYPE_CHECKING:
@@ -27,26 +27,26 @@ HEADINGS = ("parameter", "before ± U", "now ± U", "E_n")
 
 @dataclass(frozen=True, eq=False)
 class Calibrations(Sequence[Past]):
-    """Calibrations out of a history, in the order of time."""
+    """Calibrations of a history, in the order of time."""
 
     pasts: tuple[Past, ...]
 
     def to_frame(self) -> "DataFrame":
-        """One row for each calibration, its number as index, as a pandas table.
+        """Return one row for each calibration, indexed by its number, as a pandas table.
 
         `started_utc` are times; every parameter has two columns, `kx` and its expanded uncertainty `kx_expanded`, in SI
-        units, NaN where a calibration does not have it. Raises Refused `missing_extra`.
+        units, NaN if a calibration lacks it. Raise Refused `missing_extra`.
         """
         names = dict.fromkeys(name for past in self.pasts for name in past.parameters)
         columns: dict[str, Any] = {name: [_about(past, name) for past in self.pasts] for name in ABOUT}
         for name in names:
-            found = [past.parameters.get(name) for past in self.pasts]
-            columns[name] = [float("nan") if each is None else each.value for each in found]
-            columns[f"{name}_expanded"] = [float("nan") if each is None else each.expanded for each in found]
+            parameters = [past.parameters.get(name) for past in self.pasts]
+            columns[name] = [float("nan") if p is None else p.value for p in parameters]
+            columns[f"{name}_expanded"] = [float("nan") if p is None else p.expanded for p in parameters]
         return frame(columns, [past.id for past in self.pasts], "calibration")
 
-    def __getitem__(self, place: Any) -> Any:
-        return self.pasts[place]
+    def __getitem__(self, index: Any) -> Any:
+        return self.pasts[index]
 
     def __len__(self) -> int:
         return len(self.pasts)
@@ -63,37 +63,37 @@ class Calibrations(Sequence[Past]):
 
 @dataclass(frozen=True, eq=False)
 class SensorChanges:
-    """The changes of one sensor's parameters with their normalised errors E_n, and which chance does not explain."""
+    """The changes of one sensor's parameters with their normalised errors E_n and significance."""
 
     title: str
     changes: tuple[Change, ...]
 
     @property
     def changed(self) -> tuple[Change, ...]:
-        """Return the values that have changed by more than chance explains, among all values of the two runs."""
-        return tuple(each for each in self.changes if each.has_changed)
+        """The significant changes among all values of the two runs."""
+        return tuple(change for change in self.changes if change.has_changed)
 
     def to_frame(self) -> "DataFrame":
-        """One row for each parameter, SI units, as a pandas table. Raises Refused `missing_extra`."""
+        """Return one row for each parameter, SI units, as a pandas table. Raise Refused `missing_extra`."""
         columns = {
-            "unit": [each.unit for each in self.changes],
-            "before": [each.before.value for each in self.changes],
-            "before_expanded": [each.before.expanded for each in self.changes],
-            "now": [each.now.value for each in self.changes],
-            "now_expanded": [each.now.expanded for each in self.changes],
-            "normalised_error": [each.normalised_error for each in self.changes],
-            "normalised_error_limit": [each.limit for each in self.changes],
-            "changed": [each.has_changed for each in self.changes],
+            "unit": [change.unit for change in self.changes],
+            "before": [change.before.value for change in self.changes],
+            "before_expanded": [change.before.expanded for change in self.changes],
+            "now": [change.now.value for change in self.changes],
+            "now_expanded": [change.now.expanded for change in self.changes],
+            "normalised_error": [change.normalised_error for change in self.changes],
+            "normalised_error_limit": [change.limit for change in self.changes],
+            "changed": [change.has_changed for change in self.changes],
         }
-        return frame(columns, [each.name for each in self.changes], "parameter")
+        return frame(columns, [change.name for change in self.changes], "parameter")
 
     def to_dict(self) -> dict[str, Any]:
-        """What `rig history compare --json` says of the parameters."""
-        return {each.name: change_entry(each) for each in self.changes}
+        """Return the parameters as `rig history compare --json` prints them."""
+        return {change.name: change_entry(change) for change in self.changes}
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{each.name} (E_n {each.normalised_error:.1f})" for each in self.changed)
-        return f"<{self.title}: {f'changed: {told}' if told else f'none of {len(self.changes)} values changed'}>"
+        names = ", ".join(f"{change.name} (E_n {change.normalised_error:.1f})" for change in self.changed)
+        return f"<{self.title}: {f'changed: {names}' if names else f'none of {len(self.changes)} values changed'}>"
 
     def _repr_html_(self) -> str:
         return table(self.title, HEADINGS, map(_row, self.changes))
@@ -101,86 +101,86 @@ class SensorChanges:
 
 @dataclass(frozen=True, eq=False)
 class Changes(Mapping[str, SensorChanges]):
-    """What changed from one run to another, by sensor: "gyro", and "gyro, acceleration" of what else it measures."""
+    """The changes from one run to another, by sensor: "gyro", and "gyro, acceleration" for its other quantities."""
 
-    of: Mapping[str, SensorChanges]
+    by_sensor: Mapping[str, SensorChanges]
 
     def __getitem__(self, name: str) -> SensorChanges:
-        return self.of[name]
+        return self.by_sensor[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.of)
+        return iter(self.by_sensor)
 
     def __len__(self) -> int:
-        return len(self.of)
+        return len(self.by_sensor)
 
     def __repr__(self) -> str:
         return f"<changes: {', '.join(map(repr, self.values()))}>"
 
     def _repr_html_(self) -> str:
-        return "".join(each._repr_html_() for each in self.values())
+        return "".join(changes._repr_html_() for changes in self.values())
 
 
 def calibrations(
     serial_number: str | None = None, *, part: str | None = None, history: str | Path | None = None
 ) -> Calibrations:
-    """All calibrations of a serial number, or of a part, or all there are, as `rig history` lists them.
+    """Return all calibrations of a serial number, of a part, or of all sensors, as `rig history` lists them.
 
-    `history` is a file or a URL, by default what RIG_HISTORY names, else the user's own. Raises Refused
-    `not_in_history` where there is none of that serial number, and as `open_history`.
+    `history` is a file or a URL, by default that of RIG_HISTORY, else the user's own. Raise Refused `not_in_history` if
+    there is none of that serial number, and as `open_history`.
     """
-    said = None if history is None else str(history)
-    with open_history(own_place(said) or place(None)) as opened:
-        found = opened.calibrations(Selection(serial_number=serial_number, part=part))
-    if not found and serial_number is not None:
+    address = None if history is None else str(history)
+    with open_history(own_place(address) or resolve_address(None)) as opened:
+        pasts = opened.calibrations(Selection(serial_number=serial_number, part=part))
+    if not pasts and serial_number is not None:
         raise Refused(
             "not_in_history",
             f"no calibration of {serial_number} in the history fits",
             "Look with `rig history`, or enter runs with `rig history import`",
         )
-    return Calibrations(tuple(found))
+    return Calibrations(tuple(pasts))
 
 
 def changes(before: Run | Result, now: Run | Result) -> Changes:
-    """What changed from a run to a later one, sensor by sensor, as `rig history compare` prints it.
+    """Return the changes from a run to a later one, sensor by sensor, as `rig history compare` prints them.
 
     Sensors are the same by part, serial number, quantity and range. A run is solved by its usual estimator; give
-    results to compare what other estimators say. Raises Refused `not_comparable` where the two share no sensor.
+    results to compare those of other estimators. Raise Refused `not_comparable` if the runs have no sensor in common.
     """
-    first, second = ({_same(each): each for each in _followed(of)} for of in (before, now))
-    found = {}
+    first, second = ({_subject(record): record for record in _records(source)} for source in (before, now))
+    by_sensor = {}
     both = [subject for subject in second if subject in first]
-    pairs = [(_by_name(first[subject]), _by_name(second[subject])) for subject in both]
-    for subject, changed in zip(both, changes_in(pairs), strict=True):
+    pairs = [(_parameters(first[subject]), _parameters(second[subject])) for subject in both]
+    for subject, sensor_changes in zip(both, changes_in(pairs), strict=True):
         new = second[subject]
         name = new.sensor if new.quantity == "rate" else f"{new.sensor}, {new.quantity}"
-        found[name] = SensorChanges(title_of((*subject, False)), changed)
-    if not found:
+        by_sensor[name] = SensorChanges(title_of((*subject, False)), sensor_changes)
+    if not by_sensor:
         raise Refused(
             "not_comparable",
-            f"the first is of {_named(first)}, the second of {_named(second)}",
+            f"the first is of {_titles(first)}, the second of {_titles(second)}",
             "Give two calibrations of one sensor at one range",
         )
-    return Changes(found)
+    return Changes(by_sensor)
 
 
 Subject = tuple[str, str, str, float]
 
 
-def _same(of: Followed) -> Subject:
-    return of.part, of.serial_number, of.quantity, of.full_scale
+def _subject(record: HistoryRecord) -> Subject:
+    return record.part, record.serial_number, record.quantity, record.full_scale
 
 
-def _followed(of: Run | Result) -> tuple[Followed, ...]:
-    return followed((solve(of) if isinstance(of, Run) else of).document)
+def _records(source: Run | Result) -> tuple[HistoryRecord, ...]:
+    return followed((solve(source) if isinstance(source, Run) else source).document)
 
 
-def _by_name(sensor: Followed) -> dict[str, Parameter]:
+def _parameters(sensor: HistoryRecord) -> dict[str, Parameter]:
     return {parameter.name: parameter for parameter in sensor.parameters}
 
 
-def _named(sensors: Mapping[Subject, Followed]) -> str:
-    return "; ".join(title_of((*each, False)) for each in sensors) or "no sensor"
+def _titles(sensors: Mapping[Subject, HistoryRecord]) -> str:
+    return "; ".join(title_of((*subject, False)) for subject in sensors) or "no sensor"
 
 
 def _about(past: Past, name: str) -> Any:

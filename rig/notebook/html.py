@@ -5,7 +5,7 @@ from html import escape
 
 
 def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table with a caption; the first column is a heading of its row."""
+    """Return a table with a caption; the first column has the headings of the rows."""
     head = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
     body = "".join(
         f"<tr><th>{escape(first)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in rest)}</tr>"

@@ -1,4 +1,4 @@
-"""Pictures of readings, residuals and comparisons. Needs matplotlib, which the extra `study` brings."""
+"""Pictures of readings, residuals and comparisons. They need matplotlib, which the extra `study` installs."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,12 +27,12 @@ DPI = 110
 
 @dataclass(frozen=True)
 class Plot:
-    """A picture that a notebook shows by itself; `figure` is matplotlib's, to go on with."""
+    """A picture that a notebook displays; `figure` is matplotlib's, for further changes."""
 
     figure: "Figure"
 
     def save(self, path: str | Path) -> None:
-        """Write the figure into a file; its ending says which format."""
+        """Write the figure into a file; its ending determines the format."""
         self.figure.savefig(path, dpi=DPI)
 
     def _repr_png_(self) -> bytes:
@@ -42,7 +42,7 @@ class Plot:
 
 
 def plot_readings(time_s: Array, values: Mapping[str, Array], sweeps: Iterable[Window], title: str) -> Plot:
-    """Values (n,) of each axis over the arm's time (n,), the sweeps shaded; the title says what in which unit."""
+    """Return a plot of the axes' values (n,) over the arm's time (n,), with the sweeps shaded."""
     figure = _figure(10, 3.5)
     axes = figure.subplots()
     begin_s = float(time_s[0]) if len(time_s) else 0.0
@@ -55,39 +55,40 @@ def plot_readings(time_s: Array, values: Mapping[str, Array], sweeps: Iterable[W
     return Plot(figure)
 
 
-def plot_residuals(left: Sequence[tuple[str, Unexplained]]) -> Plot:
-    """What is left of every mean, a panel for each, under its name. Raises Refused `nothing_to_plot`."""
-    if not left:
+def plot_residuals(panels: Sequence[tuple[str, Unexplained]]) -> Plot:
+    """Return a plot with a panel of residuals for each name. Raise Refused `nothing_to_plot`."""
+    if not panels:
         raise Refused(
             "nothing_to_plot",
-            "nothing here was solved by a model that leaves residuals",
+            "no model of the result has residuals",
             "The result says why, sensor by sensor",
         )
-    figure = _figure(10, 3 * len(left))
-    for axes, (name, found) in zip(figure.subplots(len(left), squeeze=False)[:, 0], left, strict=True):
-        places, largest = np.arange(len(found.values)), float(np.abs(found.values).max())
-        _, unit = reach_in(largest, found.quantity.residuals)
-        values, bars = found.values / unit.size, COVERAGE_FACTOR * found.stds / unit.size
-        for i, axis in enumerate(found.quantity.axes):
-            beside = places + (i - 1) * 0.15
-            axes.errorbar(beside, values[:, i], bars[:, i], fmt="o", ms=3, lw=0.8, label=axis)
+    figure = _figure(10, 3 * len(panels))
+    for axes, (name, unexplained) in zip(figure.subplots(len(panels), squeeze=False)[:, 0], panels, strict=True):
+        positions, largest = np.arange(len(unexplained.values)), float(np.abs(unexplained.values).max())
+        _, unit = reach_in(largest, unexplained.quantity.residuals)
+        values, bars = unexplained.values / unit.size, COVERAGE_FACTOR * unexplained.stds / unit.size
+        for i, axis in enumerate(unexplained.quantity.axes):
+            shifted = positions + (i - 1) * 0.15
+            axes.errorbar(shifted, values[:, i], bars[:, i], fmt="o", ms=3, lw=0.8, label=axis)
         axes.axhline(0, color="0.5", lw=0.8)
         axes.set(ylabel=unit.name)
-        axes.set_xticks(places, found.labels, rotation=60, ha="right")
-        _finish(axes, f"{name}: {found.shown}\n")
-        axes.text(0, 1.02, f"± 2 σ: {found.of}", transform=axes.transAxes, fontsize="x-small", color="0.4")
+        axes.set_xticks(positions, unexplained.labels, rotation=60, ha="right")
+        _finish(axes, f"{name}: {unexplained.shown}\n")
+        note = f"± 2 σ: {unexplained.expectation}"
+        axes.text(0, 1.02, note, transform=axes.transAxes, fontsize="x-small", color="0.4")
     return Plot(figure)
 
 
 def plot_comparison(comparison: Comparison, sensor: str, reference: str) -> Plot:
-    """Readings of both on the left, their difference on the right."""
+    """Return a plot of both sensors' readings on the left, their difference on the right."""
     figure = _figure(10, 7.5)
     draw_comparison(figure, comparison, sensor, reference)
     return Plot(figure)
 
 
 def _finish(axes: "Axes", title: str) -> None:
-    """A title on the left, the axes' names on the right of it."""
+    """Set a title on the left and the axes' names on the right of it."""
     axes.set_title(title, loc="left")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=3, frameon=False)
 

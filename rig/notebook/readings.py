@@ -1,4 +1,4 @@
-"""Readings of one sensor in SI units on the arm's clock: rates, accelerations, fields, whatever it measures."""
+"""Readings of one sensor in SI units on the arm's clock, of any quantity."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -29,15 +29,15 @@ HEADINGS = ("sensor", "part", "serial number", "measures", "Hz", "samples", "rea
 
 
 class NoSuchSensor(Refused, KeyError):
-    """There is no sensor of that name; a KeyError as well, so that `name in run` and `run.get(name)` work."""
+    """The refusal of an unknown sensor; also a KeyError, so that `name in run` and `run.get(name)` work."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """What a sensor has read of one quantity, in its SI unit.
+    """A sensor's readings of one quantity, in its SI unit.
 
-    `time_s` (n,) is on the arm's clock; `values` are (n, 3), of a temperature or a pressure (n,). `sweeps` are the
-    windows in which the arm swept.
+    `time_s` (n,) is on the arm's clock; `values` are (n, 3), for a temperature or a pressure (n,). `sweeps` are the
+    windows of the arm's sweeps.
     """
 
     name: str
@@ -52,21 +52,21 @@ class Signal:
         return self.quantity.unit
 
     def columns(self) -> dict[str, Array]:
-        """Columns (n,) by name and unit: `x_rad_s`, `y_rad_s`, `z_rad_s`."""
+        """Return columns (n,) by name and unit: `x_rad_s`, `y_rad_s`, `z_rad_s`."""
         values = self.values.reshape(len(self.time_s), -1)
         return {name: values[:, i] for i, name in enumerate(self.quantity.columns)}
 
     def to_frame(self) -> "DataFrame":
-        """The columns as a pandas table over `time_s`. Raises Refused `missing_extra`."""
+        """Return the columns as a pandas table over `time_s`. Raise Refused `missing_extra`."""
         return frame(self.columns(), self.time_s.tolist(), "time_s")
 
     def plot(self) -> "Plot":
-        """A plot of the values over time, the sweeps shaded. Raises Refused `missing_extra`."""
+        """Return a plot of the values over time, with the sweeps shaded. Raise Refused `missing_extra`."""
         from rig.notebook.plots import plot_readings
 
         letters = getattr(self.quantity, "axes", ("",))
-        named = dict(zip(letters, self.columns().values(), strict=True))
-        return plot_readings(self.time_s, named, self.sweeps, f"{self.name}, {self.quantity.name} {self.unit}")
+        by_axis = dict(zip(letters, self.columns().values(), strict=True))
+        return plot_readings(self.time_s, by_axis, self.sweeps, f"{self.name}, {self.quantity.name} {self.unit}")
 
     def __repr__(self) -> str:
         return f"<{self.name}, {self.quantity.name}: {len(self.time_s)} readings in {self.unit}>"
@@ -74,9 +74,9 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """One sensor's readings in all recordings of a movement, in the order they were made.
+    """One sensor's readings in all recordings of a movement, in their order.
 
-    `rate`, `acceleration`, `field` and `temperature` are its signals, as far as it measures them; `signal` finds more.
+    `rate`, `acceleration`, `field` and `temperature` are its signals, if it measures them; `signal` returns others.
     """
 
     name: str
@@ -85,36 +85,36 @@ class Readings:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The names of what it measures; the first is what `on_arm_clock` and `plot` show."""
-        names = [each.quantity for each in self.sensor.channels]
+        """The names of the measured quantities; `on_arm_clock` and `plot` use the first."""
+        names = [channel.quantity for channel in self.sensor.channels]
         return tuple(sorted(names, key=lambda name: name != RATE.name))
 
     @property
     def rate(self) -> Signal:
-        """The turn rates in rad/s of a gyroscope."""
+        """The rates of a gyroscope in rad/s."""
         return self.signal(RATE.name)
 
     @property
     def acceleration(self) -> Signal:
-        """The specific forces in m/s² of an accelerometer; at rest they point up."""
+        """The specific forces of an accelerometer in m/s²; at rest they point up."""
         return self.signal(ACCELERATION.name)
 
     @property
     def field(self) -> Signal:
-        """The magnetic fields in T of a magnetometer."""
+        """The magnetic fields of a magnetometer in T."""
         return self.signal(FIELD.name)
 
     @property
     def temperature(self) -> Signal:
-        """The temperatures in °C of its own thermometer."""
+        """The temperatures of the sensor's own thermometer in °C."""
         return self.signal(TEMPERATURE.name)
 
     def signal(self, quantity: str) -> Signal:
-        """The readings of the quantity of that name.
+        """Return the readings of the quantity of that name.
 
-        Raises Refused `no_such_quantity`; Fault as `on_arm_clock` does.
+        Raise Refused `no_such_quantity`; Fault as `on_arm_clock`.
         """
-        channel = next((each for each in self.sensor.channels if each.quantity == quantity), None)
+        channel = next((channel for channel in self.sensor.channels if channel.quantity == quantity), None)
         if channel is None:
             raise Refused(
                 "no_such_quantity",
@@ -125,23 +125,23 @@ class Readings:
         return Signal(self.name, channel.measures, self._time_s, values, self._windows)
 
     def on_arm_clock(self) -> tuple[Array, Array]:
-        """Controller times (n,) in s and readings (n, 3) in SI: of a gyroscope in rad/s, else of what it measures.
+        """Return controller times (n,) in s and readings (n, 3) in SI units: rates in rad/s if it has any.
 
-        Raises Fault as `estimate_time_base` does.
+        Raise Fault as `estimate_time_base`.
         """
         signal = self.signal(self.quantities[0])
         return signal.time_s, signal.values
 
     @property
     def samples(self) -> NDArray[Any]:
-        """(n,) samples, SAMPLE_DTYPE: counts, board times and sequence numbers as the board sent them."""
+        """Samples (n,), SAMPLE_DTYPE: counts, board times and sequence numbers as the board sent them."""
         return np.concatenate([run.samples[self.name] for run in self.recordings])
 
     def to_frame(self, sweep: int | None = None) -> "DataFrame":
-        """All that it measures as a pandas table over `time_s`, SI units in the names; of one `sweep` alone if wanted.
+        """Return all quantities as a pandas table over `time_s`, SI units in the names, optionally of one `sweep`.
 
-        Sweeps are numbered as in `result.json`; where one was repeated, the last counts. Raises Refused
-        `missing_extra`, `no_such_sweep`; Fault as `on_arm_clock` does.
+        Sweeps are numbered as in `result.json`; of repeated ones the last counts. Raise Refused `missing_extra`,
+        `no_such_sweep`; Fault as `on_arm_clock`.
         """
         columns: dict[str, Array] = {}
         for quantity in self.quantities:
@@ -154,48 +154,52 @@ class Readings:
         return frame({name: column[inside] for name, column in columns.items()}, times, "time_s")
 
     def to_dict(self) -> dict[str, Any]:
-        """What is known of the sensor, as plain numbers and texts; not the samples."""
+        """Return the sensor's description as plain numbers and texts, without the samples."""
         return {"name": self.name, **asdict(self.sensor), "samples": len(self.samples)}
 
     def plot(self) -> "Plot":
-        """A plot of the three axes over time, the sweeps shaded. Raises Refused `missing_extra`."""
+        """Return a plot of the three axes over time, with the sweeps shaded. Raise Refused `missing_extra`."""
         return self.signal(self.quantities[0]).plot()
 
     def row(self) -> tuple[str, ...]:
-        """The sensor in words, under `HEADINGS`."""
+        """Return the sensor in words, under `HEADINGS`."""
         sensor, measures = self.sensor, ", ".join(self.quantities)
         rate = f"{sensor.rate_hz:g}"
         return self.name, sensor.part, sensor.serial_number, measures, rate, str(len(self.samples)), sensor.mode
 
     @cached_property
     def _time_s(self) -> Array:
-        """Times (n,) of all samples, found once; of readings from files, their file's."""
+        """Times (n,) of all samples, computed once; those of a file for external readings."""
         if any(run.elsewhere is not None for run in self.recordings):
             times_of_file: Array = self.samples["host_time_s"]
             return times_of_file
         return np.concatenate([times_s(run, self.name, self._bases(run)) for run in self.recordings])
 
     def _bases(self, run: RunData) -> Mapping[str, Any]:
-        """The clock by the sensor's own rates, else by those of the first gyroscope on its clock; {} without any."""
+        """Return the time base by the sensor's own rates, else by a gyroscope on its clock; {} without any."""
         gyroscopes = run.measuring(RATE)
-        others = (each for each in gyroscopes if one_clock(run, self.name, each))
-        by = self.name if self.name in gyroscopes else next(others, None)
-        return {} if by is None else {by: on_the_arms_clock(run.samples[by], gyroscopes[by], motion_of(run)).clock}
+        others = (name for name in gyroscopes if one_clock(run, self.name, name))
+        source = self.name if self.name in gyroscopes else next(others, None)
+        return (
+            {}
+            if source is None
+            else {source: on_the_arms_clock(run.samples[source], gyroscopes[source], motion_of(run)).clock}
+        )
 
     @cached_property
-    def _swept(self) -> Sequence[Finished]:
+    def _finished_sweeps(self) -> Sequence[Finished]:
         return [finished for run in self.recordings for finished in swept(run)]
 
     @property
     def _windows(self) -> Sequence[Window]:
-        return [finished.window for finished in self._swept]
+        return [finished.window for finished in self._finished_sweeps]
 
     def _window(self, sweep: int) -> Window:
-        found = {finished.sweep.index: finished.window for finished in self._swept}
-        if sweep not in found:
-            known = f"Choose one of: {', '.join(map(str, sorted(found)))}" if found else "Leave the sweep out"
-            raise Refused("no_such_sweep", f"no sweep {sweep} was finished in this recording", known)
-        return found[sweep]
+        windows = {finished.sweep.index: finished.window for finished in self._finished_sweeps}
+        if sweep not in windows:
+            choices = f"Choose one of: {', '.join(map(str, sorted(windows)))}" if windows else "Leave the sweep out"
+            raise Refused("no_such_sweep", f"no sweep {sweep} was finished in this recording", choices)
+        return windows[sweep]
 
     def __repr__(self) -> str:
         name, part, serial_number, measures, rate_hz, samples, mode = self.row()

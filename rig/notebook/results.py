@@ -1,4 +1,4 @@
-"""A run's result: each sensor's calibration with its uncertainty, the checks, the verdict."""
+"""A run's result: the sensors' calibrations with their uncertainties, the checks, the verdict."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -28,48 +28,49 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Result(Mapping[str, Calibration]):
-    """What a run amounts to: `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` one beside it.
+    """A run's result: `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` that of another
+    quantity.
 
-    Where a sensor has but one, its own name finds it. `document` is the whole, as `result.json` has it.
+    If a sensor has only one, its own name is enough. `document` is the complete `result.json`.
     """
 
     document: ResultDocument
 
     @cached_property
     def _calibrations(self) -> dict[str, Calibration]:
-        found = (
-            Calibration(shown.name, finding, shown, self._beside(finding))
+        calibrations = (
+            Calibration(shown.name, finding, shown, self._characteristics(finding))
             for _, show, finding in outlets(self.document, lambda kind: kind.shown)
             if (shown := show(finding)).scale is not None
         )
-        return {each.name: each for each in found}
+        return {calibration.name: calibration for calibration in calibrations}
 
-    def _beside(self, of: Finding[Any]) -> dict[str, CharacteristicValue]:
-        """What was found of a sensor's quantity beside its scale and bias, by whatever kind of result."""
-        of_it = of.sensor, of.quantity
-        found = (each for each in terms_of(self.document) if (each.finding.sensor, each.finding.quantity) == of_it)
+    def _characteristics(self, finding: Finding[Any]) -> dict[str, CharacteristicValue]:
+        """Return the characteristics of a sensor's quantity, of any kind of result."""
+        key = finding.sensor, finding.quantity
+        terms = (term for term in terms_of(self.document) if (term.finding.sensor, term.finding.quantity) == key)
         return {
             term.name: CharacteristicValue(
                 tuple(term.characteristic.labels),
-                np.array(term.known.values),
+                np.array(term.numbers.values),
                 np.array(term.expanded.widths),
                 term.units.si,
             )
-            for term in found
+            for term in terms
         }
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
-        """What the checks together say."""
+        """The verdict of all checks."""
         return self.document.verdict
 
     @property
     def checks(self) -> tuple[CheckEntry, ...]:
-        """Every limit beside what was measured."""
+        """All checks with their limits."""
         return self.document.checks
 
     def to_dict(self) -> dict[str, Any]:
-        """The result as `result.json` has it: plain numbers, lists and texts."""
+        """Return the result as in `result.json`: plain numbers, lists and texts."""
         return self.document.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
     def to_frame(self) -> "DataFrame":
@@ -91,23 +92,23 @@ class Result(Mapping[str, Calibration]):
         )
 
     def plot(self) -> "Plot":
-        """A plot of what models leave of each sweep, rest, attitude and repeat, sensor by sensor, and were expected to.
+        """Return a plot of the residuals of each sweep, rest, attitude and repeat, sensor by sensor.
 
-        Raises Refused `nothing_to_plot`, `missing_extra`.
+        Raise Refused `nothing_to_plot`, `missing_extra`.
         """
         from rig.notebook.plots import plot_residuals
 
-        asked = outlets(self.document, lambda kind: kind.unexplained)
-        found = ((f"{finding.sensor}, {kind.name}", leave(finding)) for kind, leave, finding in asked)
-        return plot_residuals([(name, left) for name, left in found if left is not None])
+        available = outlets(self.document, lambda kind: kind.unexplained)
+        panels = ((f"{finding.sensor}, {kind.name}", residuals(finding)) for kind, residuals, finding in available)
+        return plot_residuals([(name, unexplained) for name, unexplained in panels if unexplained is not None])
 
     def __getitem__(self, name: str) -> Calibration:
-        known = self._calibrations
-        of_that_sensor = [each for each in known.values() if each.found.sensor == name]
-        if name not in known and len(of_that_sensor) != 1:
-            choices = f"Choose one of: {', '.join(known)}" if known else "Solve the recording of a calibration"
+        by_name = self._calibrations
+        of_sensor = [calibration for calibration in by_name.values() if calibration.finding.sensor == name]
+        if name not in by_name and len(of_sensor) != 1:
+            choices = f"Choose one of: {', '.join(by_name)}" if by_name else "Solve the recording of a calibration"
             raise NoSuchSensor("no_such_sensor", f"this result has no calibration of {name}", choices)
-        return known[name] if name in known else of_that_sensor[0]
+        return by_name[name] if name in by_name else of_sensor[0]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._calibrations)
@@ -119,8 +120,8 @@ class Result(Mapping[str, Calibration]):
         return f"<result: {self.verdict}, {', '.join(map(repr, self.values()))}>"
 
     def _repr_html_(self) -> str:
-        found = [row for each in shown(self.document) for row in rows(each)]
-        calibrated = table(f"verdict: {self.verdict}; {U_TEXT}", HEADINGS, found)
+        values = [row for display_row in shown(self.document) for row in rows(display_row)]
+        calibrated = table(f"verdict: {self.verdict}; {U_TEXT}", HEADINGS, values)
         checks = table("checks", ("check", "value", "limit", "unit", ""), map(_row, self.checks))
         return calibrated + checks
 
@@ -128,17 +129,17 @@ class Result(Mapping[str, Calibration]):
 def solve(run: Run, estimator: str | None = None, **changes: float) -> Result:
     """Solve and judge a run, as `rig solve` does, by its procedure's own estimator unless another is named.
 
-    `changes` are thresholds or limits to judge it by instead of the recorded ones: `max_lost_fraction=0.01`. Raises
-    Fault and Refused by name as `rig solve` does; `unknown_setting` says what can be changed.
+    `changes` are thresholds or limits to use instead of the recorded ones: `max_lost_fraction=0.01`. Raise Fault and
+    Refused by name as `rig solve`; `unknown_setting` lists the possible changes.
     """
     overrides = [f"{setting(key)}={value!r}" for key, value in changes.items()]
     return Result(document_of(judged(run.recorded.judged_by(overrides), estimator)))
 
 
 def load_result(path: str | Path) -> Result:
-    """Load the `result.json` of a run folder, or at `path` itself: what was found then, without solving again.
+    """Load the `result.json` of a run folder, or at `path` itself, without solving again.
 
-    Raises Refused `no_result`, `not_a_result`.
+    Raise Refused `no_result`, `not_a_result`.
     """
     return Result(read_result(Path(path)))
 

@@ -1,4 +1,4 @@
-"""A run as it was recorded: its sensors' readings, and what the rig made of them."""
+"""A recorded run: its sensors' readings, and the rig's results."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from rig.plans.recorded import RecordedRun, judged, open_run
 class Run(Mapping[str, Readings]):
     """A recorded run: `run["gyro"]` are a sensor's readings.
 
-    `verification` is the movement with calibrated readings that followed, if one did.
+    `verification` is the following movement with calibrated readings, if there is one.
     """
 
     recorded: RecordedRun
@@ -31,17 +31,17 @@ class Run(Mapping[str, Readings]):
 
     @property
     def settings(self) -> RunSettings:
-        """What the run is judged by."""
+        """The settings by which the run is judged."""
         return self.recorded.movement[0].settings
 
     @property
     def provenance(self) -> Provenance:
-        """What was measured with what, and when."""
+        """The equipment and the times of the measurement."""
         return self.recorded.movement[0].provenance
 
     @property
     def verification(self) -> "Run | None":
-        """The movement with calibrated readings, where it followed a calibration."""
+        """The movement with calibrated readings, if it followed a calibration."""
         recorded = self.recorded
         if not (recorded.raw and recorded.corrected):
             return None
@@ -49,16 +49,16 @@ class Run(Mapping[str, Readings]):
 
     @cached_property
     def calibration(self) -> Outcome | None:
-        """What the raw readings amount to by themselves; None where none were recorded."""
+        """The outcome of the raw readings alone; None if none were recorded."""
         return judged(self.recorded.only_raw()) if self.recorded.raw else None
 
     @cached_property
     def corrected(self) -> tuple[ObservedRun, ...]:
-        """The recordings of readings that the board had corrected."""
+        """The recordings of readings corrected by the board."""
         return observe_runs(self.recorded.corrected) if self.recorded.corrected else ()
 
     def to_dict(self) -> dict[str, Any]:
-        """What was recorded and what it is judged by, as plain numbers, lists and texts; not the samples."""
+        """Return the recording's description and settings as plain numbers, lists and texts, without the samples."""
         sensors = {name: readings.to_dict() for name, readings in self.items()}
         return {"path": str(self.path), "settings": self.settings.document(), "sensors": sensors}
 
@@ -69,8 +69,8 @@ class Run(Mapping[str, Readings]):
 
     def __getitem__(self, name: str) -> Readings:
         if name not in self._readings:
-            known = f"Choose one of: {', '.join(self._readings)}" if self._readings else "Give a run that an arm made"
-            raise NoSuchSensor("no_such_sensor", f"{self.path} holds no samples of a sensor {name}", known)
+            choices = f"Choose one of: {', '.join(self._readings)}" if self._readings else "Give a run that an arm made"
+            raise NoSuchSensor("no_such_sensor", f"{self.path} has no samples of a sensor {name}", choices)
         return self._readings[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -88,9 +88,9 @@ class Run(Mapping[str, Readings]):
 
 
 def load(path: str | Path, script: str | Path | None = None) -> Run:
-    """A run folder, or a run file alone; nothing that lies beside the recordings is executed unless it is one's own.
+    """Load a run folder or a run file; no foreign code in the folder is executed.
 
-    `script` names the script it was recorded by, where that is another's: it is executed. Raises Refused `no_run`, and
-    as `read_run` and `load_script`.
+    `script` names the script of the recording if it is another's: it is executed. Raise Refused `no_run`, and as
+    `read_run` and `load_script`.
     """
     return Run(open_run(Path(path), None if script is None else Path(script)))

@@ -1,4 +1,4 @@
-"""What the page is told of a run before anything has happened."""
+"""The page's facts about a run before its first event."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -6,9 +6,13 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What is known before anything has happened: the run's folder, whether it is replayed, whether the page may answer
-    the operator's questions, each sensor's part and serial number; of the `arm` how it is built, of a recorded one its
-    names as well; the command that stores a calibration of it on the board (`storing`), where a board keeps it.
+    """Facts about a run before its first event.
+
+    - `folder`, `procedure`: of the run. `replayed`: whether it is a recording. `simulated`: whether the laboratory is.
+    - `may_answer`: whether the page may answer the operator's questions.
+    - `parts`: each sensor's part and serial number.
+    - `storing`: the command that stores a calibration on the board, if it can.
+    - `arm`: the arm's geometry; for a recording also its names.
     """
 
     folder: str

@@ -1,4 +1,4 @@
-"""Has the recording looked at after each step that measures, by a process of its own (`rig.page.live_analysis`)."""
+"""Analysis of the recording after each step that measures, by a process of its own (`rig.page.live_analysis`)."""
 
 import json
 import subprocess
@@ -16,13 +16,13 @@ from rig.page.server.feed import Feed
 from rig.station.events import PhaseStarted, RunEvent, StepFinished
 from rig.station.plain_text import say
 
-WRITTEN_S = 0.6  # after which an event is in the file
-SHARE = 0.1  # of the time looking may take: a recording of hours is long to read
+WRITTEN_S = 0.6  # delay until an event is in the file
+FRACTION = 0.1  # of the time for analysis at most: a recording of hours takes long to read
 ENDING_S = 5.0
 
 
 class Lookout:
-    """A listener that wakes the thread which asks."""
+    """A listener that wakes the thread of the analysis."""
 
     def __init__(self) -> None:
         self.wanted = threading.Event()
@@ -30,7 +30,7 @@ class Lookout:
         self._raw = True
 
     def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does: a finished step is looked at."""
+        """Take an event, as a Listener does: a finished step starts an analysis."""
         match event:
             case PhaseStarted(_, _, sensors):
                 self._raw = "calibrated" not in sensors.values()
@@ -40,9 +40,9 @@ class Lookout:
 
 @contextmanager
 def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
-    """A lookout for the length of the block; what it sees is shown by `feed`.
+    """Run the analysis for the length of the block, and show its results by `feed`.
 
-    A process that fails says so on stderr: the page goes without what it would see, and the run goes on.
+    If its process fails, it says so on stderr: the page lacks its results, and the run continues.
     """
     lookout = Lookout()
     command = [sys.executable, "-P", "-m", "rig.page.live_analysis", str(folder)]
@@ -66,7 +66,7 @@ def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
         process.wait()
         thread.join(ENDING_S)
         for pipe in pipes:
-            with suppress(OSError):  # what it was asked last may never have reached it
+            with suppress(OSError):  # the last question may not have been sent
                 pipe.close()
 
 
@@ -74,29 +74,29 @@ def _ask(questions: TextIO, answers: TextIO, lookout: Lookout, feed: Feed) -> No
     why = "its process has ended"
     try:
         _follow(questions, answers, lookout, feed)
-    except Exception as error:  # whatever it may be: no part of the run hangs on it
+    except Exception as error:  # any error: no part of the run depends on it
         why = f"{type(error).__name__}: {error}"
     if not lookout.over.is_set():
         _say_that_it_ended(why)
 
 
 def _say_that_it_ended(why: str) -> None:
-    what = "The page shows no more of observations and parameters until the verdict"
-    say(f"{what} ({why}). The run goes on.", sys.stderr)
+    what = "The page shows no new observations and parameters until the verdict"
+    say(f"{what} ({why}). The run continues.", sys.stderr)
 
 
 def _follow(questions: TextIO, answers: TextIO, lookout: Lookout, feed: Feed) -> None:
-    """Ask for what has come, whenever that is wanted; returns when all is over, or when nobody answers."""
+    """Ask for an analysis whenever one is wanted; return when all is over, or without an answer."""
     while lookout.wanted.wait() and not lookout.over.wait(WRITTEN_S):
         lookout.wanted.clear()
-        asked_s = time.monotonic()
+        start_s = time.monotonic()
         questions.write("\n")
         questions.flush()
         line = answers.readline()
         if not line.endswith("\n"):
             return
-        seen = json.loads(line)
-        if "observations" in seen:
-            feed.look(Look(**seen))
-        if lookout.over.wait((time.monotonic() - asked_s) * (1 / SHARE - 1)):
+        document = json.loads(line)
+        if "observations" in document:
+            feed.look(Look(**document))
+        if lookout.over.wait((time.monotonic() - start_s) * (1 / FRACTION - 1)):
             return

@@ -1,4 +1,4 @@
-"""When what the page shows arrived last, and so how old it is."""
+"""Arrival times of what the page shows, and so its age."""
 
 from rig.station.events import ArmConnected, ArmSeen, PhaseStarted, RunEvent, SamplesTaken
 
@@ -6,15 +6,15 @@ ARM, READINGS = "arm", "readings"
 
 
 class Arrivals:
-    """When the newest state of the arm arrived, and the newest readings, whatever turns and whatever reads.
+    """The arrival of the newest state of the arm and of the newest readings, for any turner and sensor.
 
-    An event that repeats a state or a number of samples brings nothing: only what is newer than before arrives.
+    An event that repeats a state or a number of samples does not count.
     """
 
     def __init__(self) -> None:
         self._arrived_s: dict[str, float] = {}
         self._state_s: float | None = None  # the newest state's time, by the turner's own clock
-        self._samples: dict[str, int] = {}  # how many, by sensor
+        self._samples: dict[str, int] = {}  # their number, by sensor
 
     def take(self, event: RunEvent, now_s: float) -> bool:
         """Take an event at the time `now_s`, s; return whether it brought anything newer."""
@@ -24,7 +24,7 @@ class Arrivals:
             case ArmSeen(state):
                 return self._take_state(state.q_rad, state.time_s, now_s)
             case SamplesTaken(sensors):
-                before, self._samples = self._samples, {each.sensor: each.samples for each in sensors}
+                before, self._samples = self._samples, {sensor.sensor: sensor.samples for sensor in sensors}
                 newer = any(count and count != before.get(sensor) for sensor, count in self._samples.items())
                 return newer and self._arrive(READINGS, now_s)
             case PhaseStarted():
@@ -33,11 +33,11 @@ class Arrivals:
         return False
 
     def ages_s(self, now_s: float) -> dict[str, float]:
-        """Return the ages of the arm's state and of the readings at the time `now_s`, s, without what never arrived."""
+        """Return the ages of the arm's state and of the readings at the time `now_s`, s, if they have arrived."""
         return {name: round(now_s - arrived_s, 1) for name, arrived_s in self._arrived_s.items()}
 
     def _take_state(self, q_rad: tuple[float, ...], time_s: float, now_s: float) -> bool:
-        """Take a state; one without joints says nothing of what turns."""
+        """Take a state; one without joints does not count."""
         if not q_rad or time_s == self._state_s:
             return False
         self._state_s = time_s

@@ -1,4 +1,4 @@
-"""What the page shows of a session by hand: what is to be done, what was heard, what the hand does now."""
+"""A session by hand on the page: the instruction, the response, the present movement."""
 
 from math import degrees
 from typing import Any
@@ -19,8 +19,8 @@ from rig.station.events import HandSeen
 Section = dict[str, Any]
 
 
-def seen(event: HandSeen) -> Section:
-    """The present moment, in degrees."""
+def live_section(event: HandSeen) -> Section:
+    """Return the present moment, in degrees."""
     return {
         "doing": event.doing,
         "since_s": round(event.since_s, 1),
@@ -37,12 +37,12 @@ def seen(event: HandSeen) -> Section:
 
 
 def step(event: HandSeen) -> Section:
-    """How far the list is made; how long the rest of it takes nobody can say."""
+    """Return the progress of the list; its remaining time is unknown."""
     count = event.taken + len(event.pairs) + len(event.turns)
     return {
         "number": event.taken,
         "count": count,
-        "name": f"{event.taken} of {count} moves taken",
+        "name": f"{event.taken} of {count} moves accepted",
         "kind": "by_hand",
         "fraction": 1.0,
         "elapsed_s": 0.0,
@@ -50,21 +50,21 @@ def step(event: HandSeen) -> Section:
     }
 
 
-def told(before: Section, event: OfTheHand) -> Section:
-    """The section after something was asked, heard, taken or refused; each but the first has a tone of its own."""
+def update(before: Section, event: OfTheHand) -> Section:
+    """Return the section after an instruction, a rest or a move; each but the first instruction has its own tone."""
     match event:
         case HandAsked(instruction, again, why):
-            asked = {"say": instruction.say, "face": instruction.face, "turns": instruction.turns}
-            now = {**before, "asked": {**asked, "words": instruction.words}, "again": again, "why": why}
-            reminded = again is not None and before.get("tone") != "again"
-            return _sounding(now, "again") if reminded else now
+            instruction_fields = {"say": instruction.say, "face": instruction.face, "turns": instruction.turns}
+            now = {**before, "asked": {**instruction_fields, "words": instruction.words}, "again": again, "why": why}
+            is_reminder = again is not None and before.get("tone") != "again"
+            return _add_tone(now, "again") if is_reminder else now
         case HandRested(face=face):
-            return _sounding({**before, "face": face}, "rest")
+            return _add_tone({**before, "face": face}, "rest")
         case HandMoveTaken():
-            return _sounding(before, "taken")
+            return _add_tone(before, "taken")
         case HandMoveRefused() | HandRestRefused() | HandBegunAnew():
-            return _sounding(before, "again")
+            return _add_tone(before, "again")
 
 
-def _sounding(section: Section, tone: str) -> Section:
+def _add_tone(section: Section, tone: str) -> Section:
     return {**section, "tone": tone, "tones": section.get("tones", 0) + 1}

@@ -7,7 +7,7 @@ from typing import Any
 
 SPAN_S = 60.0
 STEP_S = 0.1  # between two points, in the controller's time
-SOON_S = 0.95 * STEP_S  # what is rounded is not early
+SOON_S = 0.95 * STEP_S  # rounded times are not early
 POINTS = round(SPAN_S / STEP_S)
 
 Values = Mapping[str, tuple[float, ...]]  # by the name of a line, such as "gyro.rate"
@@ -15,7 +15,7 @@ Values = Mapping[str, tuple[float, ...]]  # by the name of a line, such as "gyro
 
 @dataclass(slots=True)
 class History:
-    """Points in their order, counted from the first: what a browser has already need not be sent again."""
+    """Points in their order, counted from the first: a browser gets only those that it lacks."""
 
     first: int = 0
     _points: deque[tuple[float, Values]] = field(default_factory=lambda: deque(maxlen=POINTS))
@@ -26,11 +26,11 @@ class History:
         return self.first + len(self._points)
 
     def due(self, time_s: float) -> bool:
-        """Whether a point of that time is wanted: the last one is older, or time runs backwards and begins anew."""
+        """Return whether a point of that time is due: the last one is older, or time has run backwards."""
         return not self._points or not 0 <= time_s - self._points[-1][0] < SOON_S
 
     def add(self, time_s: float, values: Values) -> None:
-        """Take a point, unless the last one is as good as now; time that runs backwards begins anew."""
+        """Add a point if it is due; if time has run backwards, start again."""
         if not self.due(time_s):
             return
         if self._points and time_s < self._points[-1][0]:
@@ -40,12 +40,12 @@ class History:
         self._points.append((time_s, values))
 
     def clear(self) -> None:
-        """Forget what was: another movement begins."""
+        """Remove all points: another movement begins."""
         self.first = self.end
         self._points.clear()
 
     def since(self, number: int) -> dict[str, Any]:
-        """The points from `number` on, as the page reads them: when, and each line's values (null: none)."""
+        """Return the points from `number` on in the page's form: times, and the values of each line (null: none)."""
         start = max(number, self.first)
         points = list(self._points)[start - self.first :]
         lines = sorted({line for _, values in points for line in values})
@@ -53,10 +53,10 @@ class History:
             "from": start,
             "first": self.first,
             "time_s": [round(time_s, 2) for time_s, _ in points],
-            "lines": {line: [rounded(values.get(line)) for _, values in points] for line in lines},
+            "lines": {line: [round_digits(values.get(line)) for _, values in points] for line in lines},
         }
 
 
-def rounded(vector: tuple[float, ...] | None) -> list[float] | None:
-    """The vector to six digits, which is more than a screen shows and less than a wire carries."""
+def round_digits(vector: tuple[float, ...] | None) -> list[float] | None:
+    """Return the vector to six digits, more than a screen shows."""
     return None if vector is None else [float(f"{component:.6g}") for component in vector]

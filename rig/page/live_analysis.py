@@ -1,7 +1,7 @@
-"""Looks at the recordings of a run that goes on, as a process of its own: `python -m rig.page.live_analysis FOLDER`.
+"""Analyses the recordings of a running run, in a process of its own: `python -m rig.page.live_analysis FOLDER`.
 
-For each line on its standard input it answers with one of JSON: the rows of observations and parameters so far. The
-arithmetic of an estimator would hold up the threads that take samples, and this process can be as slow as it likes.
+For each line on standard input it answers with a line of JSON: the rows of observations and parameters so far. In the
+run's process an estimator would delay the threads that take samples; this process may be slow.
 """
 
 import json
@@ -21,19 +21,19 @@ NICENESS = 10  # the run comes first
 
 
 def look(folder: Path) -> dict[str, object]:
-    """What the recordings of raw readings in a run folder amount to."""
+    """Return the rows for the recordings of raw readings in a run folder."""
     return asdict(look_of(so_far([read_run(path) for path in recordings(folder, "raw")])))
 
 
 def main() -> None:
-    """Look at the folder at every line that comes, until standard input ends."""
+    """Analyse the folder for each line on standard input, until it ends."""
     with suppress(OSError, AttributeError):
         os.nice(NICENESS)
     folder = Path(sys.argv[1])
     for _ in sys.stdin:
         try:
             answer = look(folder)
-        except (RigError, OSError) as error:  # a recording that is only just begun
+        except (RigError, OSError) as error:  # a recording that has just begun
             answer = {"nothing": str(error)}
         print(json.dumps(answer), flush=True)
 

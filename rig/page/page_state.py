@@ -1,4 +1,4 @@
-"""What the page shows, made of a run's events. No thread, no clock, and of files only the result that is told of."""
+"""The state of the page, built from a run's events. No thread, no clock, and no file but the reported result."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -23,9 +23,9 @@ from rig.motion.steps import Dwell, Rest, Step, Sweep
 from rig.page import by_hand
 from rig.page.about import About
 from rig.page.arm import connected, geometry, stance
-from rig.page.history import History, rounded
+from rig.page.history import History, round_digits
 from rig.page.outcome import after_fault, after_verdict, outcome_rows, since_rows
-from rig.page.rows import Look, along, dwell_row, observation_row, parameter_rows
+from rig.page.rows import Look, dwell_row, observation_row, parameter_rows, projection
 from rig.report.words.mounts import mount_lines
 from rig.station.events import (
     Advice,
@@ -56,15 +56,15 @@ from rig.station.events import (
 )
 from rig.station.words import line
 
-LINES = 40  # of what was said last
+LINES = 40  # newest lines of the log
 ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
 
 
 class Shown:
-    """The page's sections by name, each of plain numbers and texts, and the `changed` ones since somebody looked.
+    """The page's sections by name, in plain numbers and texts, and the `changed` ones since the last request.
 
-    Samples, states and progress come fifty times a second, and somebody looks ten times: the newest are kept as they
-    came, and made into sections by `sections`.
+    Samples, states and progress come fifty times a second, but are requested ten times: only the newest are stored, and
+    `sections` converts them.
     """
 
     def __init__(self, about: About) -> None:
@@ -96,7 +96,7 @@ class Shown:
         self._samples: tuple[SensorSamples, ...] = ()
         self._fresh = False  # the samples are newer than the arm's state
         self._newest: dict[type, SamplesTaken | ArmSeen | Progress | HandSeen] = {}  # not in the sections yet
-        self._seen: dict[tuple[str, int], dict[str, Any]] = {}
+        self._observations: dict[tuple[str, int], dict[str, Any]] = {}
         self._turns: dict[int, dict[str, Any]] = {}
         self._prompts = 0
         self._solved = False
@@ -104,7 +104,7 @@ class Shown:
 
     @property
     def sections(self) -> dict[str, Any]:
-        """Everything as it is now."""
+        """All sections as they are now."""
         for event in self._newest.values():
             match event:
                 case SamplesTaken(sensors):
@@ -114,13 +114,13 @@ class Shown:
                 case Progress():
                     self.put("step", _progress(event))
                 case HandSeen():
-                    self.put("hand", {**(self._sections["hand"] or {}), **by_hand.seen(event)})
+                    self.put("hand", {**(self._sections["hand"] or {}), **by_hand.live_section(event)})
                     self.put("step", by_hand.step(event))
         self._newest.clear()
         return self._sections
 
     def changed(self) -> dict[str, Any]:
-        """The sections that have changed since this was asked last."""
+        """Return the sections that have changed since the last call."""
         sections = self.sections
         changed = {name: sections[name] for name in self._changed}
         self._changed.clear()
@@ -132,53 +132,53 @@ class Shown:
         self._changed.add(name)
 
     def take(self, event: RunEvent) -> None:
-        """Show what has happened."""
+        """Show an event."""
         match event:
             case SamplesTaken(sensors):
                 self._newest[SamplesTaken] = event
                 self._samples, self._fresh = sensors, True
             case ArmSeen(state):
                 self._newest[ArmSeen] = event
-                # The arm is seen once more when it was let go, and no sample came with that.
+                # One more state comes when the arm is released, without samples.
                 if self._fresh and self.history.due(state.time_s):
                     self.history.add(state.time_s, _values(self._samples))
                 self._fresh = False
             case Progress():
                 self._newest[Progress] = event
             case HandAsked() | HandRested() | HandMoveTaken() | HandMoveRefused() | HandRestRefused() | HandBegunAnew():
-                self.put("hand", by_hand.told(self.sections["hand"] or {}, event))
+                self.put("hand", by_hand.update(self.sections["hand"] or {}, event))
                 if isinstance(event, HandAsked):
                     self._state("by_hand", event.instruction.words)
-                self._said(event)
+                self._add_line(event)
             case HandSeen(time_s=time_s):
                 self._newest[HandSeen] = event
                 if self._fresh and self.history.due(time_s):
                     self.history.add(time_s, _values(self._samples))
                 self._fresh = False
             case _:
-                self._told(event)
-                self._said(event)
+                self._take_once(event)
+                self._add_line(event)
 
-    def _said(self, event: RunEvent) -> None:
+    def _add_line(self, event: RunEvent) -> None:
         if (text := line(event)) is not None:
             self.put("lines", [*self.sections["lines"], text][-LINES:])
 
     def look(self, look: Look) -> None:
-        """What the recording so far amounts to: each sweep's observation or refusal, and the parameters."""
-        for each in look.observations:
-            self._observation(each)
+        """Show the analysis of the recording so far: each sweep's observation or refusal, and the parameters."""
+        for row in look.observations:
+            self._observation(row)
         if not self._solved:
             self.put("parameters", look.parameters)
 
-    def _told(self, event: RunEvent) -> None:
-        """What happens once, after all that came before is in the sections."""
+    def _take_once(self, event: RunEvent) -> None:
+        """Take an event that happens once, after all earlier ones are in the sections."""
         sections = self.sections
         match event:
             case ArmConnected(report):
                 self.put("arm", {**sections["arm"], **connected(report)})
             case PhaseStarted(procedure, plan, sensors):
                 self._modes = sensors
-                self._turns = {each.index: _turn(each) for each in plan.sweeps}
+                self._turns = {sweep.index: _turn(sweep) for sweep in plan.sweeps}
                 self.history.clear()
                 self._samples = ()
                 self.put("sensors", [])
@@ -189,14 +189,14 @@ class Shown:
                 self._state("ready", "Pre-flight passed: plan and arm are within limits")
             case Prompt(announcement, to_do, to_tick):
                 self._prompts += 1
-                asked = {"announcement": list(announcement), "to_do": to_do, "to_tick": to_tick}
-                self.put("prompt", {"number": self._prompts, **asked})
+                question = {"announcement": list(announcement), "to_do": to_do, "to_tick": to_tick}
+                self.put("prompt", {"number": self._prompts, **question})
                 self._state("asking", "The operator is asked")
             case Answered(agreed):
                 self.put("prompt", None)
                 self._state("ready", "The operator agreed" if agreed else "The operator did not agree")
             case StepStarted(number, count, step):
-                self.put("step", {**(sections["step"] or {}), **_place(number, count, step)})
+                self.put("step", {**(sections["step"] or {}), **_step_fields(number, count, step)})
                 self._state(_kind(step), step.name)
             case StepFinished():
                 self._state("ready", "Between two steps")
@@ -205,17 +205,17 @@ class Shown:
                 self.put("hand", None)
                 self._state("judging", "Recorded; averaging, solving, judging")
             case BoardObserved(sensor, sweep, speed_rad_s, observation):
-                seen = {"sensor": sensor, "sweep": sweep, "by": "board", "speed_rad_s": speed_rad_s}
-                self._observation({**seen, "mean_rad_s": rounded(observation.mean_rad_s)})
+                fields = {"sensor": sensor, "sweep": sweep, "by": "board", "speed_rad_s": speed_rad_s}
+                self._observation({**fields, "mean_rad_s": round_digits(observation.mean_rad_s)})
             case BoardNotObserved(sensor, sweep, reason):
                 self._observation({"sensor": sensor, "sweep": sweep, "by": "board", "refused": reason})
             case ObservationMade() | AttitudeRead():
                 self._observation(_row(event))
             case _:
-                self._ended(event)
+                self._take_ending(event)
 
-    def _ended(self, event: RunEvent) -> None:
-        """What is told when nothing moves any more."""
+    def _take_ending(self, event: RunEvent) -> None:
+        """Take an event that comes when nothing moves any more."""
         match event:
             case Checked(check):
                 self._checks.append(check)
@@ -224,8 +224,8 @@ class Shown:
                 }
                 self.put("checks", [*self.sections["checks"], row])
             case VerdictReached(passed):
-                held = sum(check["passed"] for check in self.sections["checks"])
-                text = f"{held} of {len(self.sections['checks'])} checks passed"
+                count = sum(check["passed"] for check in self.sections["checks"])
+                text = f"{count} of {len(self.sections['checks'])} checks passed"
                 self._state("passed" if passed else "failed", text)
                 self.put("next", after_verdict(self._about, self._checks, passed=passed, stored=self._stored))
             case CalibrationStored():
@@ -264,55 +264,62 @@ class Shown:
             "samples": sensor.samples,
             "lost": sensor.lost,
             "temperature_c": next(iter(sensor.latest.get(TEMPERATURE.name, ())), None),
-            "units": {of.named(of.name): [of.name, shown.name] for of, shown in _quantities(sensor)},
+            "units": {
+                quantity.named(quantity.name): [quantity.name, unit.name] for quantity, unit in _quantities(sensor)
+            },
         }
 
     def _observation(self, row: dict[str, Any]) -> None:
-        """The host's own takes the place of what the board said of the same sweep, never the other way."""
+        """Show an observation; the host's replaces the board's of the same sweep, never the reverse."""
         key = row["sensor"], row["sweep"]
-        before = self._seen.get(key, {})
+        before = self._observations.get(key, {})
         if before.get("by") != "host" or row["by"] == "host":
-            self._seen[key] = {**self._turns.get(row["sweep"], {}), **before, **row}
-            self.put("observations", [self._seen[each] for each in sorted(self._seen, key=lambda k: (k[1], k[0]))])
+            self._observations[key] = {**self._turns.get(row["sweep"], {}), **before, **row}
+            self.put(
+                "observations",
+                [self._observations[key] for key in sorted(self._observations, key=lambda k: (k[1], k[0]))],
+            )
 
 
 def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, Unit]]:
-    """What a sensor sends, and the unit it is shown in: that of its bias."""
-    known = measured()
-    for of in (known[name] for name in select_displayed(sensor.latest)):
-        yield of, of.bias if isinstance(of, Quantity) else of.reading
+    """Yield the quantities of a sensor, and the unit in which they are shown: that of its bias."""
+    by_name = measured()
+    for quantity in (by_name[name] for name in select_displayed(sensor.latest)):
+        yield quantity, quantity.bias if isinstance(quantity, Quantity) else quantity.reading
 
 
 def _values(sensors: tuple[SensorSamples, ...]) -> dict[str, tuple[float, ...]]:
-    """The newest readings, by the name of their line."""
+    """Return the newest readings, by the name of their line."""
     return {
-        f"{sensor.sensor}.{of.named(of.name)}": tuple(each / shown.size for each in sensor.latest[of.name])
+        f"{sensor.sensor}.{quantity.named(quantity.name)}": tuple(
+            value / unit.size for value in sensor.latest[quantity.name]
+        )
         for sensor in sensors
-        for of, shown in _quantities(sensor)
+        for quantity, unit in _quantities(sensor)
     }
 
 
-def _row(made: ObservationMade | AttitudeRead) -> dict[str, Any]:
-    if isinstance(made, ObservationMade):
-        return observation_row(made.sensor, made.observation)
-    return dwell_row(made.read)
+def _row(event: ObservationMade | AttitudeRead) -> dict[str, Any]:
+    if isinstance(event, ObservationMade):
+        return observation_row(event.sensor, event.observation)
+    return dwell_row(event.read)
 
 
 def _turn(sweep: Sweep) -> dict[str, Any]:
-    return {"joint": sweep.joint_name, "direction": sweep.direction, "along": along(sweep.axis_flange)}
+    return {"joint": sweep.joint_name, "direction": sweep.direction, "along": projection(sweep.axis_flange)}
 
 
 def _kind(step: Step) -> str:
     return {Sweep: "measuring", Dwell: "measuring", Rest: "resting"}.get(type(step), "moving")
 
 
-def _place(number: int, count: int, step: Step) -> dict[str, Any]:
+def _step_fields(number: int, count: int, step: Step) -> dict[str, Any]:
     return {"number": number, "count": count, "name": step.name, "kind": _kind(step)}
 
 
 def _progress(progress: Progress) -> dict[str, Any]:
     return {
-        **_place(progress.number, progress.count, progress.step),
+        **_step_fields(progress.number, progress.count, progress.step),
         "fraction": round(progress.fraction, 4),
         "elapsed_s": round(progress.elapsed_s, 2),
         "remaining_s": round(progress.remaining_s, 2),

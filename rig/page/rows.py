@@ -1,4 +1,4 @@
-"""Rows of the page's tables: observations and parameters, of a run that goes on and of one with its result."""
+"""Rows of the page's tables: observations and parameters, of a live run and of one with its result."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.statistics.mean import QuantityInDwell, ReadAtRest
-from rig.page.history import rounded
-from rig.report.findings.kind import Shown, Three
+from rig.page.history import round_digits
+from rig.report.findings.kind import AxisValues, DisplayRow
 from rig.report.kinds.registry import shown
 
 NOISE_ONLY, COMBINED = "noise only", "combined"
@@ -24,14 +24,14 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What recordings amount to at some time: rows of observations and of parameters."""
+    """The analysis of recordings at some time: rows of observations and of parameters."""
 
     observations: list[Row]
     parameters: list[Row]
 
 
 def observation_row(sensor: str, observation: Observation) -> Row:
-    """A revolution the host has averaged: what one axis read stands beside the part of 2π/T that is along it."""
+    """Return a revolution averaged by the host: one axis's reading with the component of 2π/T along it."""
     average = observation.average
     return {
         "sensor": sensor,
@@ -42,8 +42,8 @@ def observation_row(sensor: str, observation: Observation) -> Row:
         "axis": observation.axis,
         "sign": observation.sign,
         "speed_rad_s": float(observation.speed_rad_s),
-        "along": along(observation.axis_flange),
-        "mean_rad_s": rounded(tuple(average.mean_rad_s.tolist())),
+        "along": projection(observation.axis_flange),
+        "mean_rad_s": round_digits(tuple(average.mean_rad_s.tolist())),
         "std_rad_s": float(average.mean_std_rad_s["xyz".index(observation.axis)]),
         "samples": average.samples,
         "lost": observation.lost,
@@ -51,13 +51,13 @@ def observation_row(sensor: str, observation: Observation) -> Row:
     }
 
 
-def along(axis_flange: Sequence[float] | Array) -> float:
-    """The part of a turn about a unit vector (3,) that the nearest axis feels, of a sensor mounted along the flange."""
+def projection(axis_flange: Sequence[float] | Array) -> float:
+    """Return the component of a unit vector (3,) along the nearest axis of a sensor mounted along the flange."""
     return float(np.max(np.abs(axis_flange)))
 
 
 def dwell_row(read: ReadAtRest) -> Row:
-    """What was read in an attitude: the size of it stands beside the one that is expected, in the unit on a screen."""
+    """Return a dwell: the magnitude of the reading with the expected one, in the unit of screens."""
     quantity, reading = read.subject.quantity, read.reading
     mean, size, unit = reading.mean, float(np.linalg.norm(reading.mean)), quantity.reading
     axis, sign = nearest_axis(mean)
@@ -73,12 +73,12 @@ def dwell_row(read: ReadAtRest) -> Row:
     }
 
 
-def _dwell(of: QuantityInDwell) -> Row:
-    return {"sensor": of.quantity.label(of.sensor), "sweep": of.index, "by": "host", "dwell": of.dwell}
+def _dwell(dwell: QuantityInDwell) -> Row:
+    return {"sensor": dwell.quantity.label(dwell.sensor), "sweep": dwell.index, "by": "host", "dwell": dwell.dwell}
 
 
 def look_of(partial: SoFar) -> Look:
-    """What is known of a run that goes on."""
+    """Return the rows of a live run."""
     sensors = partial.gyroscopes
     observations = [row for name, sensor in sensors.items() for row in _sweep_rows(name, sensor.sweeps)]
     observations += _dwell_rows(partial.at_rest)
@@ -86,8 +86,8 @@ def look_of(partial: SoFar) -> Look:
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
-    """The rows of a run's result, kind by kind; U is what the result states, or twice its noise."""
-    return [_row(each) for each in shown(result)]
+    """Return the rows of a run's result, kind by kind; U is that of the result, or twice its noise."""
+    return [_row(row) for row in shown(result)]
 
 
 def _sweep_rows(sensor: str, sweeps: Attempts[int, Observation]) -> list[Row]:
@@ -100,33 +100,33 @@ def _sweep_rows(sensor: str, sweeps: Attempts[int, Observation]) -> list[Row]:
 
 def _dwell_rows(dwells: Attempts[QuantityInDwell, ReadAtRest]) -> list[Row]:
     """Return the rows of all dwells, by sensor in the order of the plan."""
-    rows = {of: dwell_row(read) for of, read in dwells.results.items()}
-    rows |= {of: {**_dwell(of), "refused": str(fault)} for of, fault in dwells.faults.items()}
-    return [rows[of] for of in sorted(rows, key=lambda of: (of.sensor, of.index))]
+    rows = {dwell: dwell_row(read) for dwell, read in dwells.results.items()}
+    rows |= {dwell: {**_dwell(dwell), "refused": str(fault)} for dwell, fault in dwells.faults.items()}
+    return [rows[dwell] for dwell in sorted(rows, key=lambda dwell: (dwell.sensor, dwell.index))]
 
 
 def _parameters_so_far(name: str, partial: Turned) -> Row:
     if (solution := partial.solution) is not None:
         u = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
-        bias, scale = Three(solution.bias_rad_s.tolist(), u[3:]), Three(solution.scale.tolist(), u[:3])
-        return _row(Shown(name, RATE, name, RATE.bias, bias, combined=False, scale=scale))
+        bias, scale = AxisValues(solution.bias_rad_s.tolist(), u[3:]), AxisValues(solution.scale.tolist(), u[:3])
+        return _row(DisplayRow(name, RATE, name, RATE.bias, bias, combined=False, scale=scale))
     missing = None if partial.missing is None else partial.missing.what
     if partial.bias_rad_s is None:
-        return {**_row_of(name, RATE.bias, None, None, of=NOISE_ONLY), "missing": missing}
+        return {**_row_of(name, RATE.bias, None, None, contents=NOISE_ONLY), "missing": missing}
     mean, std = partial.bias_rad_s
-    bias = Three(mean.tolist(), (COVERAGE_FACTOR * std).tolist())
-    return {**_row_of(name, RATE.bias, bias, None, of=NOISE_ONLY), "missing": missing}
+    bias = AxisValues(mean.tolist(), (COVERAGE_FACTOR * std).tolist())
+    return {**_row_of(name, RATE.bias, bias, None, contents=NOISE_ONLY), "missing": missing}
 
 
-def _row(shown: Shown) -> Row:
-    of = COMBINED if shown.combined else NOISE_ONLY
-    row = _row_of(shown.name, shown.unit, shown.numbers, shown.scale, of=of)
+def _row(shown: DisplayRow) -> Row:
+    contents = COMBINED if shown.combined else NOISE_ONLY
+    row = _row_of(shown.name, shown.unit, shown.numbers, shown.scale, contents=contents)
     return {**row, "labels": list(shown.labels), "missing": None}
 
 
-def _row_of(name: str, unit: Unit, bias: Three | None, scale: Three | None, *, of: str) -> Row:
-    row: Row = {"sensor": name, "labels": list(RATE.axes), "unit": unit.name, "of": of}
-    for what, each in (("scale", scale), ("bias", bias)):
-        row[what] = None if each is None else [float(value) for value in each.values]  # rounded on the screen alone
-        row[f"{what}_u"] = None if each is None else rounded(tuple(each.expanded))
+def _row_of(name: str, unit: Unit, bias: AxisValues | None, scale: AxisValues | None, *, contents: str) -> Row:
+    row: Row = {"sensor": name, "labels": list(RATE.axes), "unit": unit.name, "of": contents}
+    for key, three in (("scale", scale), ("bias", bias)):
+        row[key] = None if three is None else [float(value) for value in three.values]  # rounded on the screen
+        row[f"{key}_u"] = None if three is None else round_digits(tuple(three.expanded))
     return row

@@ -8,20 +8,20 @@ from rig.analysis.outcome import Origin, Outcome
 from rig.data.meaning import Meaning
 from rig.data.result_file import SCHEMA, CheckEntry, MountEntry, ProvenanceEntry, ResultDocument
 from rig.report.entries.budget import clock_entry
-from rig.report.entries.external import unsolved
-from rig.report.entries.omitted import notes, omitted
+from rig.report.entries.external import unsolved_entries
+from rig.report.entries.omitted import notes, omitted_entries
 from rig.report.entry import entry
-from rig.report.findings.kind import Without
+from rig.report.findings.kind import NoOutlet
 from rig.report.kinds.registry import kinds
 
-ALWAYS = ("gyroscopes", "verification")  # there of every run, if only to say that there are none
+ALWAYS = ("gyroscopes", "verification")  # in every result, even if they are empty
 
 
 def document_of(outcome: Outcome) -> ResultDocument:
-    """The result as plain numbers, texts and tuples, in SI units, of schema "rig.result/1"."""
-    made = {kind.key: kind.entries(outcome) for kind in kinds() if not isinstance(kind.entries, Without)}
-    found: dict[str, object] = {key: entries for key, entries in made.items() if entries or key in ALWAYS}
-    others = {key: _plain(found.pop(key)) for key in list(found) if key not in ResultDocument.model_fields}
+    """Return the result as plain numbers, texts and tuples, in SI units, by the schema "rig.result/1"."""
+    by_kind = {kind.key: kind.entries(outcome) for kind in kinds() if not isinstance(kind.entries, NoOutlet)}
+    entries: dict[str, object] = {key: of_kind for key, of_kind in by_kind.items() if of_kind or key in ALWAYS}
+    others = {key: _plain(entries.pop(key)) for key in list(entries) if key not in ResultDocument.model_fields}
     clock = {} if outcome.clock is None else {"clock": clock_entry(outcome.clock)}
     return ResultDocument.model_validate(
         {
@@ -30,10 +30,10 @@ def document_of(outcome: Outcome) -> ResultDocument:
             "checks": tuple(map(_check, outcome.checks)),
             "provenance": _provenance(outcome.provenance),
             **clock,
-            **found,
-            **({"unsolved": faults} if (faults := unsolved(outcome)) else {}),
-            **({"omitted": left_out} if (left_out := omitted(outcome)) else {}),
-            **({"notes": said} if (said := notes(outcome)) else {}),
+            **entries,
+            **({"unsolved": faults} if (faults := unsolved_entries(outcome)) else {}),
+            **({"omitted": omissions} if (omissions := omitted_entries(outcome)) else {}),
+            **({"notes": remarks} if (remarks := notes(outcome)) else {}),
             **({"others": others} if others else {}),
             **({"mounts": tuple(map(_mount, outcome.mounts))} if outcome.mounts else {}),
         }
@@ -47,8 +47,8 @@ def _mount(mount: FoundMount) -> MountEntry:
 
 
 def _plain(entries: Any) -> dict[str, Any]:
-    """Entries of a kind that a package adds, as JSON has them."""
-    return {name: each.model_dump(mode="json") for name, each in entries.items()}
+    """Return entries of a kind that a package adds, as JSON holds them."""
+    return {name: sensor_entry.model_dump(mode="json") for name, sensor_entry in entries.items()}
 
 
 def _check(check: Check) -> CheckEntry:
@@ -61,7 +61,7 @@ def _check(check: Check) -> CheckEntry:
 
 
 def _meaning(means: Meaning) -> dict[str, Any]:
-    """Return what a check is of, by the fields of its entry."""
+    """Return the sensor, the quantity and the parameter that a check is about, by the fields of its entry."""
     return {
         "kind": means.kind,
         "sensor": means.sensor,

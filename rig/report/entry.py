@@ -1,4 +1,4 @@
-"""From what the analysis found to the entries of `result.json`, by the table of `rig/report/entry_sources.py`."""
+"""Builds entries of `result.json` from results of the analysis, by the table of `rig/report/entry_sources.py`."""
 
 from collections.abc import Mapping
 from typing import Any, TypeVar
@@ -12,11 +12,11 @@ EntryT = TypeVar("EntryT", bound=BaseModel)
 
 
 def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
-    """Return an entry of that kind: each field from `more`, or by the table from the first source that has it.
+    """Return an entry of `kind`: each field from `more`, or by the table from the first source that has it.
 
-    Arrays become tuples. Raises ValueError for a field that nothing says or whose value does not fit, TypeError for one
-    of `more` that the entry does not have and for a source that the table does not know: reading ignores what it does
-    not know, writing must not. Raises AttributeError where a source has lost what the table takes.
+    Arrays become tuples. Raise ValueError if a field has no source or its value does not fit. Raise TypeError if the
+    entry has no field of that name in `more`, or if the table does not list a source: a reader ignores unknown keys, a
+    writer must not. Raise AttributeError if a source lacks an attribute of the table.
     """
     if unknown := more.keys() - kind.model_fields.keys():
         raise TypeError(f"{kind.__name__} has no {', '.join(sorted(unknown))}")
@@ -27,17 +27,17 @@ def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
 
 
 def counted(freedom: Array | None) -> list[Any] | None:
-    """Degrees of freedom of any shape, infinite ones as null; None where nobody counted."""
+    """Return degrees of freedom of any shape as lists, infinite ones as null; None if they are unknown."""
     if freedom is None:
         return None
-    found = freedom.astype(object)
-    found[~np.isfinite(freedom)] = None
-    return list(found.tolist())
+    numbers = freedom.astype(object)
+    numbers[~np.isfinite(freedom)] = None
+    return list(numbers.tolist())
 
 
 def _attributes(kind: type[BaseModel], source: object) -> Mapping[str, str]:
-    """Return the attribute of a source that fills each field of such an entry."""
-    from rig.report.entry_sources import SOURCES  # all that is analysed: only what writes entries needs it
+    """Return by field the attribute of a source that fills an entry of `kind`."""
+    from rig.report.entry_sources import SOURCES  # which imports all of analysis: only writing entries needs it
 
     for row in SOURCES.get(kind, ()):
         if isinstance(source, row.classes):

@@ -1,8 +1,8 @@
-"""The table of what each entry of `result.json` takes from what the analysis returns.
+"""The table of what each entry of `result.json` takes from the results of the analysis.
 
-A row names the classes that it reads, and for each field of the entry the attribute that fills it. A field that no row
-names is given by the function that makes the entry, or is left out. So an attribute may get another name, or a new one
-the name of a field, without any change of a file.
+A row names the classes that it reads and, for each field of the entry, the attribute that fills it. A field without a
+row is set by the function that builds the entry, or is left out. So an attribute may be renamed, or may get the name of
+a field, without a change of the file.
 """
 
 from collections.abc import Mapping
@@ -61,14 +61,14 @@ from rig.observation.timebase import TimeBase
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What an entry takes from an object of one of the `classes`: the attribute of each field."""
+    """The attributes of objects of `classes` that fill an entry, by field."""
 
     classes: tuple[type, ...]
     attributes: Mapping[str, str]
 
 
 def _row(*classes: type, same: str = "", **renamed: str) -> Row:
-    """Return the row of these classes: fields whose attribute has the `same` name today, and those `renamed`."""
+    """Return the row of these classes: fields with attributes of the `same` name, and those `renamed`."""
     return Row(classes, {**{name: name for name in same.split()}, **renamed})
 
 

@@ -10,7 +10,7 @@ from rig.config.files.written_file import write_new
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import VectorSolution
-from rig.report.findings.kind import said
+from rig.report.findings.kind import outlet_items
 from rig.report.kinds.registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 
@@ -18,20 +18,21 @@ NOTHING: Mapping[str, Array] = MappingProxyType({})
 
 
 def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """`calibration.h`, unless the calibration failed its limits: nobody should compile it in then."""
-    found = {name: g_sensitivity(result) for name, result in outcome.results.items()}
-    sensed = {name: matrix for name, matrix in found.items() if matrix is not None}
-    if not outcome.passed or not any(_calibrations(document, sensed)):
+    """Write `calibration.h`, unless the calibration failed its limits and must not be used."""
+    by_sensor = {name: g_sensitivity(result) for name, result in outcome.results.items()}
+    sensitivities = {name: matrix for name, matrix in by_sensor.items() if matrix is not None}
+    if not outcome.passed or not any(_calibrations(document, sensitivities)):
         return ()
     path = folder / "calibration.h"
-    write_new(path, calibration_header(document, sensed))
+    write_new(path, calibration_header(document, sensitivities))
     return (DocumentWritten(path),)
 
 
 def g_sensitivity(result: SensorResult) -> Array | None:
-    """(3, 3) what gravity in the frame of the corrected rates adds to a reading, rad/s per m/s²; None if not found.
+    """Return the g-sensitivity (3, 3), rad/s per m/s² of gravity in the frame of the corrected rates, or None if
+    unknown.
 
-    The vector model has it with gravity in the flange frame, which its `mounting` R turns into the sensor's: G Rᵀ.
+    The vector model has it for gravity in the flange frame. Its `mounting` R rotates that into the sensor's: G Rᵀ.
     """
     vector = result.vector_model
     if not isinstance(vector, VectorSolution) or vector.g_sensitivity is None:
@@ -41,12 +42,12 @@ def g_sensitivity(result: SensorResult) -> Array | None:
 
 
 def calibration_header(document: ResultDocument, g_sensitivity: Mapping[str, Array] = NOTHING) -> str:
-    """C source text for the sensors of a result.
+    """Return C source text for the sensors of a result.
 
-    For each calibrated sensor its scale factors (no unit), its biases in rad/s, the matrix M of g = M (m + b) by which
-    the board corrects it, and the function that does the same; where `g_sensitivity` (3, 3), rad/s per m/s², is known,
-    that too and a function that takes it out first. Of each calibrated accelerometer and magnetometer bias, matrix and
-    function. Names are those of the sensors, with everything that C does not allow written as `_`.
+    A calibrated gyroscope gets its scale factors (1), its biases (rad/s), the matrix M of g = M (m + b) by which the
+    board corrects it, and a function that does the same. If its `g_sensitivity` (3, 3), rad/s per m/s², is known, it
+    gets that and a function that subtracts its effect first. An accelerometer and a magnetometer get bias, matrix and
+    function. C names are the sensors' names with `_` for every character that C does not allow.
     """
     lines = [
         "/* Calibrations. Of gyroscopes g = M (m + b): rate_rad_s = matrix * (reading_rad_s + bias_rad_s), where",
@@ -59,7 +60,7 @@ def calibration_header(document: ResultDocument, g_sensitivity: Mapping[str, Arr
     return "\n".join([*lines, "", "#endif", ""])
 
 
-def _calibrations(document: ResultDocument, sensed: Mapping[str, Array]) -> Iterator[str]:
+def _calibrations(document: ResultDocument, sensitivities: Mapping[str, Array]) -> Iterator[str]:
     for kind in kinds():
-        for found in kind.found(document):
-            yield from said(kind.header, found, sensed)
+        for finding in kind.find(document):
+            yield from outlet_items(kind.header, finding, sensitivities)

@@ -1,4 +1,4 @@
-"""What a finished run leaves in its folder. A new document is a file with its writer, and its line in `WRITERS`."""
+"""Writes the documents of a finished run. A new document is a file with its writer, and its line in `WRITERS`."""
 
 import importlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -10,7 +10,7 @@ from rig.config.files.written_file import replace_together
 from rig.data.result_file import ResultDocument, write_result
 from rig.data.run_folder import RESULT
 from rig.report.document import document_of
-from rig.report.findings.kind import Without
+from rig.report.findings.kind import NoOutlet
 from rig.report.kinds.registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 
@@ -22,27 +22,29 @@ WRITERS: Sequence[str] = (
 
 
 class Writer(Protocol):
-    """Writes files of its own into the run folder, by `rig.config.files.written_file`; returns what to tell of it.
+    """A function that writes files of its own into the run folder, by `rig.config.files.written_file`.
 
-    `outcome` has everything the analysis found, curves too; `document` is what `result.json` will say of it.
+    `outcome` has everything that the analysis computed, curves too; `document` is the content of `result.json`. The
+    events that it returns are passed on to the operator.
     """
 
     def __call__(self, outcome: Outcome, document: ResultDocument, folder: Path, /) -> Iterable[RunEvent]: ...
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> Iterator[RunEvent]:
-    """All documents and `result.json`, which ends the run; yields what to tell of them when they are there.
+    """Write all documents and then `result.json`, which ends the run; yield their events once all are in place.
 
-    No document lies there without the result: on a full disk none of them takes its place, and the run can be resumed.
+    No document appears without the result: if the disk is full, none of them is put in place, and the run can be
+    resumed.
     """
     document = document_of(outcome)
-    pictures = dict.fromkeys(kind.figures for kind in kinds() if not isinstance(kind.figures, Without))
-    told: list[RunEvent] = []
+    pictures = dict.fromkeys(kind.figures for kind in kinds() if not isinstance(kind.figures, NoOutlet))
+    events: list[RunEvent] = []
     with replace_together():
         for name in (*pictures, *WRITERS):
-            told += _writer(name)(outcome, document, folder)
+            events += _writer(name)(outcome, document, folder)
         write_result(document, folder)
-    yield from told
+    yield from events
     yield DocumentWritten(folder / RESULT)
 
 

@@ -58,7 +58,7 @@ def refuse_unsteady(felt: Felt, turner: str) -> None:
         raise Refused(
             "item_not_at_rest",
             f"{felt.name} reads rates that change by {degrees(moved.max()):.1f} °/s while the {turner} stands still",
-            "Take your hands off the item and its cable, wait until nothing swings, then go on",
+            "Take your hands off the item and its cable, wait until nothing swings, then continue",
         )
 
 

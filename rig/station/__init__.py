@@ -1,1 +1,1 @@
-"""Whoever stands at the rig: what the operator sees and is asked."""
+"""The operator's side of a run: events, views, questions."""

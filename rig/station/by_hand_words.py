@@ -1,4 +1,4 @@
-"""What is said of a session by hand: the line for the operator, and what became of each move."""
+"""A session by hand in words: the instruction for the operator, and the outcome of each move."""
 
 from math import degrees
 
@@ -12,52 +12,54 @@ from rig.data.recording.hand_events import (
 )
 from rig.station.events import HandSeen, RunEvent
 
-RED_FROM = 0.8  # of the range: from there on a reading may clip
+RED_FROM = 0.8  # of the range: above it a reading may clip
 
 
 def by_hand_line(event: RunEvent) -> str | None:
-    """An event of a session by hand in one line; None for what only an instrument shows, and for other events."""
+    """Return an event of a session by hand in one line; None for other events and those of instruments."""
     text: str | None
     match event:
         case HandAsked(instruction, again, why):
-            text = f"to do: {instruction.words}" if again is None else f"again: {why} To do: {instruction.words}"
+            text = (
+                f"your turn: {instruction.words}" if again is None else f"again: {why} Your turn: {instruction.words}"
+            )
         case HandRested(face=face):
-            text = f"heard: it rests with the side {face} up"
+            text = f"detected: it rests with the side {face} up"
         case HandMoveTaken(kind="flip", from_face=before, to_face=after):
-            text = f"taken: from {before} to {after}"
+            text = f"accepted: from {before} to {after}"
         case HandMoveTaken(turns=turns, from_face=face):
-            again_laid = f"taken: laid down again with the side {face} up"
-            text = f"taken: {turns:+d} whole turns with the side {face} up" if turns else again_laid
+            again_laid = f"accepted: laid down again with the side {face} up"
+            text = f"accepted: {turns:+d} whole turns with the side {face} up" if turns else again_laid
         case HandMoveRefused(again=again):
-            text = f"not taken: {again}"
+            text = f"not accepted: {again}"
         case HandRestRefused(again=again):
             text = f"no rest: {again}"
         case HandBegunAnew(again=again):
-            text = f"begun anew: {again}; what was before does not count"
+            text = f"started again: {again}; earlier moves do not count"
         case _:
             text = None
     return text
 
 
-def live_rows(seen: HandSeen) -> tuple[tuple[str, str], ...]:
-    """What a session shows of this moment, by the names of its rows."""
-    peak, whole = degrees(seen.peak_rad_s), degrees(seen.range_rad_s)
-    fast = "  TOO FAST" if whole and peak > RED_FROM * whole else ""
-    of_range = f" of {whole:.0f}" if whole else ""
+def live_rows(state: HandSeen) -> tuple[tuple[str, str], ...]:
+    """Return the present state of a session, by the names of its rows."""
+    peak, range_deg_s = degrees(state.peak_rad_s), degrees(state.range_rad_s)
+    fast = "  TOO FAST" if range_deg_s and peak > RED_FROM * range_deg_s else ""
+    of_range = f" of {range_deg_s:.0f}" if range_deg_s else ""
     rows = [
-        ("now", f"{seen.doing} for {seen.since_s:.1f} s"),
-        ("turned", f"{degrees(seen.turned_rad):6.1f} °"),
+        ("now", f"{state.doing} for {state.since_s:.1f} s"),
+        ("turned", f"{degrees(state.turned_rad):6.1f} °"),
         ("fastest", f"{peak:6.0f}{of_range} °/s{fast}"),
-        ("sides seen", " ".join(seen.faces) or "none"),
-        ("still wanted", wanted_words(seen)),
+        ("sides done", " ".join(state.faces) or "none"),
+        ("still open", wanted_words(state)),
     ]
-    if seen.expanded_scale is not None:
-        rows.append(("U of the scale", f"{seen.expanded_scale:.1e}"))
+    if state.expanded_scale is not None:
+        rows.append(("U of the scale", f"{state.expanded_scale:.1e}"))
     return tuple(rows)
 
 
-def wanted_words(seen: HandSeen) -> str:
-    """How many moves are still open."""
-    flips = f"{len(seen.pairs)} moves from side to side" if len(seen.pairs) != 1 else "1 move from side to side"
-    turns = f", {len(seen.turns)} whole turn{'' if len(seen.turns) == 1 else 's'}" if seen.turns else ""
+def wanted_words(state: HandSeen) -> str:
+    """Return the number of open moves in words."""
+    flips = f"{len(state.pairs)} moves from side to side" if len(state.pairs) != 1 else "1 move from side to side"
+    turns = f", {len(state.turns)} whole turn{'' if len(state.turns) == 1 else 's'}" if state.turns else ""
     return flips + turns

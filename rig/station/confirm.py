@@ -1,4 +1,4 @@
-"""Asks the operator before something is done that cannot be taken back."""
+"""Asks the operator before an action that cannot be reversed."""
 
 import sys
 from collections.abc import Sequence
@@ -8,13 +8,13 @@ from rig.errors import Refused
 from rig.errors.quoting import printable_lines
 from rig.station.plain_text import for_file
 
-NOT_AGREED = "Run again and agree, or agree before: --yes, in Python yes=True"
+NOT_AGREED = "Run again and agree, or agree in advance: --yes, in Python yes=True"
 
 
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
-    """Show what will be done and wait for yes or y; where there is no terminal, there is nobody to say it.
+    """Show what will be done and wait for yes or y; return False without a terminal.
 
-    What was typed before that was shown is no answer.
+    Input typed before that does not count.
     """
     forget_what_was_typed()
     for line in announcement:
@@ -26,8 +26,8 @@ def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
 
 
 def forget_what_was_typed() -> None:
-    """Nobody agrees to what he has not read: lines that wait at the terminal are thrown away."""
-    with suppress(ImportError):  # a system that has other terminals
+    """Discard lines that wait at the terminal: they do not answer a question that was not shown yet."""
+    with suppress(ImportError):  # a system with other terminals
         import termios
 
         with suppress(termios.error, OSError, ValueError):  # no terminal
@@ -35,12 +35,12 @@ def forget_what_was_typed() -> None:
 
 
 def agreed_or_refused(announcement: Sequence[str], to_do: str, assume_yes: bool) -> None:
-    """Go on only if the operator agrees. Raises Refused `not_confirmed`."""
+    """Continue only if the operator agrees. Raise Refused `not_confirmed`."""
     if not assume_yes and not ask_operator(announcement, to_do):
-        raise Refused("not_confirmed", "nobody agreed to the change", NOT_AGREED)
+        raise Refused("not_confirmed", "the operator did not agree to the change", NOT_AGREED)
 
 
 def refuse_unless_answerable(assume_yes: bool) -> None:
-    """Look for a terminal before what takes long and asks at its end. Raises Refused `not_confirmed` where none is."""
+    """Require a terminal before a long action with a question at its end. Raise Refused `not_confirmed`."""
     if not assume_yes and not sys.stdin.isatty():
-        raise Refused("not_confirmed", "there is no terminal at which somebody could agree to the change", NOT_AGREED)
+        raise Refused("not_confirmed", "there is no terminal at which to agree to the change", NOT_AGREED)

@@ -1,4 +1,4 @@
-"""What happens in a run, as typed events. Words are made of them where they are read; nothing parses sentences.
+"""The events of a run, typed. Views make words of them; no program parses sentences.
 
 All events of a run come in order, from the thread that runs the procedure.
 """
@@ -27,8 +27,10 @@ class BoardConnected:
 
 @dataclass(frozen=True, slots=True)
 class SensorConnected:
-    """The instrument `sensor` answered at a port of its own; `corrected` settings in its memory were not as needed:
-    name → what was there."""
+    """The instrument `sensor` answered at a port of its own.
+
+    `corrected` are settings in its memory that were changed: name → earlier value.
+    """
 
     sensor: str
     part: str
@@ -39,7 +41,7 @@ class SensorConnected:
 
 @dataclass(frozen=True, slots=True)
 class ArmConnected:
-    """What turns answered and said how it stands; nothing has moved. `called` is its kind's name among operators."""
+    """The turner answered and reported its state; nothing has moved. `called` is the name of its kind for operators."""
 
     report: Report
     called: str = "arm"
@@ -47,7 +49,7 @@ class ArmConnected:
 
 @dataclass(frozen=True, slots=True)
 class RunResumed:
-    """An interrupted run goes on: `done` of the `planned` sweeps and dwells count already."""
+    """An interrupted run continues: `done` of the `planned` sweeps and dwells count already."""
 
     done: int
     planned: int
@@ -55,8 +57,10 @@ class RunResumed:
 
 @dataclass(frozen=True, slots=True)
 class PhaseStarted:
-    """A movement is about to be recorded: by which procedure, the steps it has, the sensors (name → "raw" or
-    "calibrated" readings)."""
+    """The recording of a movement is about to start: its procedure, its steps, its sensors.
+
+    `sensors`: name → "raw" or "calibrated" readings.
+    """
 
     procedure: str
     plan: Plan
@@ -65,7 +69,7 @@ class PhaseStarted:
 
 @dataclass(frozen=True, slots=True)
 class PreflightPassed:
-    """All that can be known beforehand is right with the plan and what turns, `called` as its kind is."""
+    """Plan and turner passed all tests before the first movement; `called` is the name of the turner's kind."""
 
     plan: Plan
     report: Report
@@ -74,10 +78,11 @@ class PreflightPassed:
 
 @dataclass(frozen=True, slots=True)
 class Prompt:
-    """The operator is told `announcement` and asked to agree `to_do` it, which a page has them tick first.
+    """A question to the operator: the `announcement`, and the agreement `to_do` it, which a page shows with a box
+    `to_tick`.
 
-    What is `for_a_person` is not agreed to beforehand: nobody but somebody who is asked can say yes to it. Before a
-    stage for which the item is mounted, `mounts` is its number, from 0.
+    A question `for_a_person` cannot be agreed to in advance. Before a stage with a new mounting, `mounts` is the number
+    of the stage, from 0.
     """
 
     announcement: tuple[str, ...]
@@ -89,14 +94,14 @@ class Prompt:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """What came of the last `Prompt`."""
+    """The answer to the last `Prompt`."""
 
     agreed: bool
 
 
 @dataclass(frozen=True, slots=True)
 class SamplingStarted:
-    """Every sensor delivers."""
+    """Every sensor sends readings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +115,7 @@ class StepStarted:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far the run is, many times in each step: the `fraction` of the step from 0 to 1, times of the whole plan."""
+    """The progress of the run, many times in each step: the `fraction` of the step (0 to 1), times of the plan."""
 
     number: int
     count: int
@@ -123,7 +128,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class SensorSamples:
-    """What one sensor has delivered so far: samples, gaps in their numbers, the newest mean readings by quantity.
+    """The samples of one sensor so far: their number, gaps in their numbering, the newest mean readings by quantity.
 
     A reading has a number for each axis, or one, in the quantity's unit (`rig.data.installed_kinds.measured`).
     """
@@ -136,9 +141,9 @@ class SensorSamples:
 
 @dataclass(frozen=True, slots=True)
 class ArmSeen:
-    """How the arm stands by its newest state, and how many states it sent that were missed (None: nobody counted).
+    """The arm's newest state, and the number of missed states (None: not counted).
 
-    Comes with every `Progress`, and once more when the arm was let go.
+    It comes with every `Progress`, and once more when the arm is released.
     """
 
     state: State
@@ -164,7 +169,7 @@ class StepFinished:
 
 @dataclass(frozen=True, slots=True)
 class PhaseRecorded:
-    """A movement is done and recorded; `missed_states` are gaps in what the arm said of itself."""
+    """A movement is recorded; `missed_states` counts gaps in the arm's states."""
 
     sensors: tuple[SensorSamples, ...]
     missed_states: int
@@ -172,12 +177,12 @@ class PhaseRecorded:
 
 @dataclass(frozen=True, slots=True)
 class HandSeen:
-    """What a hand does at this moment, ten times a second, by the first sensor to calibrate.
+    """The present movement of a hand, ten times a second, by the first sensor to calibrate.
 
-    `time_s` counts by the board's clock. `doing` is "starting", "resting", "moving" or "held" for `since_s`; the move
-    has `turned_rad` so far, its fastest reading was `peak_rad_s` of the `range_rad_s`. `expanded_scale` is U (k = 2) of
-    the scale factors so far, the largest, None before anything is known; `faces` lay up already, `pairs` and `turns`
-    are still open.
+    - `time_s`: by the board's clock. `doing`: "starting", "resting", "moving" or "held", for `since_s`.
+    - `turned_rad`: the angle of the move so far. `peak_rad_s`: its fastest reading. `range_rad_s`: the sensor's range.
+    - `expanded_scale`: the largest U (k = 2) of the scale factors so far, None before a solution.
+    - `faces`: the sides done. `pairs`, `turns`: the open moves. `taken`: the number of accepted moves.
     """
 
     time_s: float
@@ -195,7 +200,7 @@ class HandSeen:
 
 @dataclass(frozen=True, slots=True)
 class ObservationMade:
-    """The host has averaged a revolution of `sensor`: once a phase is judged, each that its calibration rests on."""
+    """The host has averaged a revolution of `sensor`; after a phase is judged, all those of its calibration."""
 
     sensor: str
     observation: Observation
@@ -203,14 +208,14 @@ class ObservationMade:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeRead:
-    """The host has averaged what a sensor read in a dwell: once a phase is judged, every one."""
+    """The host has averaged a dwell of a sensor; after a phase is judged, all of them."""
 
     read: ReadAtRest
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationStored:
-    """The board keeps the sensor's new calibration, as its record number `record`."""
+    """The board has stored the sensor's new calibration, as its record number `record`."""
 
     sensor: str
     part: str
@@ -220,16 +225,16 @@ class CalibrationStored:
 
 @dataclass(frozen=True, slots=True)
 class PhaseSkipped:
-    """What was to follow, the verification, does not: the calibration failed its limits and is not stored."""
+    """The verification is skipped: the calibration failed its limits and is not stored."""
 
     procedure: str
 
 
 @dataclass(frozen=True, slots=True)
 class UncertaintySoFar:
-    """The expanded uncertainties after a repeat. If they are `as_wanted`, the other repeats are left out.
+    """The expanded uncertainties after a repeat. If they are `as_wanted`, the other repeats are skipped.
 
-    `scale_u` and `bias_u_rad_s` are those of the axis and the sensor that is known worst.
+    `scale_u` and `bias_u_rad_s` are the largest of all axes and sensors.
     """
 
     scale_u: float
@@ -240,26 +245,26 @@ class UncertaintySoFar:
 
 @dataclass(frozen=True, slots=True)
 class DocumentWritten:
-    """A document of the outcome lies at `path`."""
+    """A document of the outcome was written to `path`."""
 
     path: Path
 
 
 @dataclass(frozen=True, slots=True)
 class Plotted:
-    """Plots lie in the run folder, each as PNG and SVG under these names without their endings."""
+    """Plots were written to the run folder, as PNG and SVG under these names without their endings."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class NotPlotted:
-    """There are no plots: what draws them is not installed."""
+    """There are no plots: the library for them is not installed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """One limit beside what was measured."""
+    """A check with its limit."""
 
     check: Check
 
@@ -273,7 +278,7 @@ class VerdictReached:
 
 @dataclass(frozen=True, slots=True)
 class ListenerDropped:
-    """A listener raised `error` when it was told something; it hears nothing more."""
+    """A listener raised `error` on an event; it gets no further ones."""
 
     listener: str
     error: str
@@ -281,17 +286,17 @@ class ListenerDropped:
 
 @dataclass(frozen=True, slots=True)
 class RunFolderWritten:
-    """The run is over, and all of it lies in `folder`."""
+    """The run is over, and its files are in `folder`."""
 
     folder: Path
 
 
 @dataclass(frozen=True, slots=True)
 class Since:
-    """What the calibration before, its number and day, found of the `quantity` of a `sensor`, by parameter (`kx`).
+    """The previous calibration of the `quantity` of a `sensor`: its number, its day, its values by parameter (`kx`).
 
-    `before` has values with their U, in SI units; `normalised_error` is E_n of the changes since. `changed` are those
-    that have changed by more than chance explains, among all values of the run.
+    `before` has values with their U, in SI units; `normalised_error` is E_n of the changes since. `changed` are the
+    significant changes among all values of the run.
     """
 
     sensor: str
@@ -305,10 +310,9 @@ class Since:
 
 @dataclass(frozen=True, slots=True)
 class Remembered:
-    """The run stands in `history` as the calibrations of these `numbers`, by which `rig history` finds them.
+    """The run was entered in `history` as the calibrations of these `numbers`, by which `rig history` finds them.
 
-    `usual` is whether the command looks there by itself. `since` are the calibrations before of the sensors that had
-    any.
+    `usual` is whether that is the command's default history. `since` are the previous calibrations of the sensors.
     """
 
     history: str
@@ -319,7 +323,7 @@ class Remembered:
 
 @dataclass(frozen=True, slots=True)
 class NotRemembered:
-    """The run in `folder` could not be entered in the history, and why. It is none the worse."""
+    """The run in `folder` could not be entered in the history, and why. The run itself is not affected."""
 
     folder: Path
     why: str
@@ -327,7 +331,7 @@ class NotRemembered:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What to do after a failure: the data are in `folder`; `command` goes on there, or `repeats` refused sweeps."""
+    """The next step after a failure: the data are in `folder`; `command` continues, or `repeats` refused sweeps."""
 
     folder: Path
     command: str
@@ -336,14 +340,14 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """The run was refused or ended in a fault, named. The data are kept if there are any."""
+    """The run was refused or ended in a named fault. Recorded data are kept."""
 
     error: RigError
 
 
 @dataclass(frozen=True, slots=True)
 class Interrupted:
-    """Somebody ended the run; the text says how the arm was left and how to go on."""
+    """The run was interrupted; the text states how the arm was left and how to continue."""
 
     text: str
 
@@ -355,7 +359,7 @@ class Crashed:
     traceback: str
 
 
-# What the recording keeps is told as well: sweeps, rests, and what the board observed and solved.
+# The recording's own events are included: sweeps, rests, and the board's observations and solutions.
 RunEvent = (
     Event
     | BoardConnected

@@ -1,4 +1,4 @@
-"""The run's log: a line with the time for everything that happened."""
+"""The run's log: a line with the time for every event."""
 
 import os
 from collections.abc import Iterator
@@ -15,13 +15,13 @@ from rig.station.words import line, reason
 
 
 class Log:
-    """Writes into an open file. One that can no longer be written is no error here: the recording says so."""
+    """The writer of an open log file. If it cannot be written, that is no error here: the recording reports it."""
 
     def __init__(self, file: TextIO) -> None:
         self._file = file
 
     def event(self, event: RunEvent) -> None:
-        """Write the event's line, if it is worth one."""
+        """Write the event's line, if it has one."""
         text = line(event) or reason(event)
         if text is not None:
             now = datetime.now().isoformat(sep=" ", timespec="milliseconds").replace(".", ",")
@@ -32,15 +32,17 @@ class Log:
 
 @contextmanager
 def log(path: Path) -> Iterator[Log]:
-    """The log at `path`, for the length of the `with` block; what is there already stays.
+    """Open the log at `path` for the length of the `with` block; existing lines stay.
 
-    Raises Refused `run_folder` where it cannot be written: then the recording beside it cannot either.
+    Raise Refused `run_folder` if it cannot be written: then the recording in the same folder cannot either.
     """
     try:
         file = os.fdopen(open_to_append(path), "a", encoding="utf-8")
     except OSError as error:
         what = f"{path} cannot be written: {error.strerror or error}"
-        raise Refused("run_folder", what, "Make room there, or copy the folder to where you may write") from error
+        raise Refused(
+            "run_folder", what, "Free space on the disk, or copy the folder to one that you may write"
+        ) from error
     try:
         yield Log(file)
     finally:

@@ -1,4 +1,4 @@
-"""Texts with something from outside in them (serial numbers, names, paths) on stdout, stderr and in tables."""
+"""Texts with foreign parts (serial numbers, names, paths) on stdout, stderr and in tables."""
 
 import os
 import re
@@ -11,41 +11,41 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 
-LONG_S = 600.0  # from then on one thinks in minutes
-NARROWEST, USUAL = 30, 80  # columns of a terminal: where lines are still broken between words, and without an answer
+LONG_S = 600.0  # longer times are in minutes
+NARROWEST, USUAL = 30, 80  # columns of a terminal: the least for breaking lines, and the default
 INDENT = "  "
-COMMAND = re.compile("(`[^`]*`|(?<=: )rig .*$)")  # what is copied: between backticks, or the end of a line
+COMMAND = re.compile("(`[^`]*`|(?<=: )rig .*$)")  # between backticks, or at the end of a line
 UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
 def say(text: str, file: TextIO | None = None) -> None:
-    """One printable line, on stdout unless told otherwise; a terminal gets it broken between words."""
+    """Print one printable line, on stdout by default, broken between words for a terminal."""
     file = sys.stdout if file is None else file
     print(for_file(printable(text), file), file=file)
 
 
 def say_on_terminal(doing: str) -> None:
-    """What goes on, for who waits for it at a terminal; a program that reads stderr has no use for it."""
+    """Print the present activity for a person at a terminal, not for a program that reads stderr."""
     if sys.stderr.isatty():
         print(f"{printable(doing)} …", file=sys.stderr, flush=True)
 
 
 def for_file(text: str, file: TextIO) -> str:
-    """A message in lines for stderr or its like: broken between words where it is a terminal, else as it is."""
+    """Return a message for stderr or its like, in lines broken between words for a terminal, else unchanged."""
     if not file.isatty():
         return text
     width = _columns(file)
     if width < NARROWEST:
         return text
-    return "\n".join(each for line in text.split("\n") for each in wrapped(line, width) or [""])
+    return "\n".join(row for line in text.split("\n") for row in wrapped(line, width) or [""])
 
 
 def wrapped(text: str, width: int) -> list[str]:
-    """One line's text in lines of at most `width`; a command and a long word stay whole, whatever their length."""
+    """Return one line's text in lines of at most `width`; a command or a long word is not broken."""
     import textwrap
 
-    whole = "".join(part.replace(" ", UNBROKEN) if i % 2 else part for i, part in enumerate(COMMAND.split(text)))
-    lines = textwrap.wrap(whole, width, subsequent_indent=INDENT, break_long_words=False, break_on_hyphens=False)
+    unbroken = "".join(part.replace(" ", UNBROKEN) if i % 2 else part for i, part in enumerate(COMMAND.split(text)))
+    lines = textwrap.wrap(unbroken, width, subsequent_indent=INDENT, break_long_words=False, break_on_hyphens=False)
     return [line.replace(UNBROKEN, " ") for line in lines]
 
 
@@ -58,14 +58,14 @@ def _columns(file: TextIO) -> int:
 
 
 def plain(text: str, style: str = "") -> "Text":
-    """The printable text for rich, which searches a string for markup such as `[red]` and for `:smileys:`."""
+    """Return printable text for rich, which would interpret markup such as `[red]` and `:smileys:` in a string."""
     from rich.text import Text
 
     return Text(printable(text), style)
 
 
 def duration_words(duration_s: float) -> str:
-    """`66 s`, `5 h 36 min`: how long something takes, as one says it."""
+    """Return a duration in words: `66 s`, `5 h 36 min`."""
     if duration_s < LONG_S:
         return f"{duration_s:.0f} s"
     hours, minutes = divmod(round(duration_s / 60), 60)

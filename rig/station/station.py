@@ -1,4 +1,4 @@
-"""Whoever stands at the rig: is told what happens, and agrees to what is asked."""
+"""The operator's station: receives events and answers questions."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ from rig.station.events import Answered, ListenerDropped, Prompt, RunEvent
 
 
 class Listener(Protocol):
-    """Is told everything, and must not block. One that raises is told nothing more: a run does not depend on it."""
+    """A receiver of all events, which must not block. If it raises, it gets no more: a run does not depend on it."""
 
     def event(self, event: RunEvent) -> None: ...
 
 
 class Station(Protocol):
-    """Where a run reports to and asks."""
+    """The receiver of a run's events and questions."""
 
     def event(self, event: RunEvent) -> None: ...
 
@@ -23,9 +23,9 @@ class Station(Protocol):
 
 @dataclass(slots=True)
 class Stations:
-    """Several listeners, and one who answers; not `attended`, everything was agreed to beforehand.
+    """Several listeners and one answer; if not `attended`, everything was agreed to in advance.
 
-    Who can `mount` the item for a stage does so when that is agreed to: the operator of a simulated laboratory.
+    `mount` mounts the item for a stage after agreement: the operator of a simulated laboratory does.
     """
 
     listeners: Sequence[Listener]
@@ -34,20 +34,20 @@ class Stations:
     mount: Callable[[int], None] | None = None
 
     def event(self, event: RunEvent) -> None:
-        """Tell everyone, in order. Who raises is dropped, and the others are told of that."""
+        """Send an event to all listeners, in order. Drop those that raise, and report that to the others."""
         failed: list[tuple[Listener, Exception]] = []
         for listener in self.listeners:
             try:
                 listener.event(event)
             except Exception as error:
                 failed.append((listener, error))
-        for gone, _ in failed:
-            self.listeners = [listener for listener in self.listeners if listener is not gone]
-        for gone, why in failed:
-            self.event(ListenerDropped(type(gone).__name__, f"{type(why).__name__}: {why}"))
+        for dropped, _ in failed:
+            self.listeners = [listener for listener in self.listeners if listener is not dropped]
+        for dropped, why in failed:
+            self.event(ListenerDropped(type(dropped).__name__, f"{type(why).__name__}: {why}"))
 
     def ask(self, prompt: Prompt) -> bool:
-        """Whether the operator agrees; everyone hears the question and the answer."""
+        """Return whether the operator agrees; all listeners get the question and the answer."""
         self.event(prompt)
         mounts = self.mount is not None and prompt.mounts is not None
         can_be_answered = self.attended or mounts or not prompt.for_a_person
@@ -59,5 +59,5 @@ class Stations:
 
 
 def always_yes(announcement: Sequence[str], to_do: str) -> bool:
-    """The answer where there is nobody to ask."""
+    """Return True, if there is no one to ask."""
     return True

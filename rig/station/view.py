@@ -1,4 +1,4 @@
-"""What the operator sees while the rig works: a live view on a terminal, plain lines elsewhere."""
+"""The operator's view of a run: a live panel on a terminal, plain lines elsewhere."""
 
 import sys
 import time
@@ -25,10 +25,10 @@ REFRESH_S = 0.1
 
 
 class PlainView:
-    """Lines on stderr, one for each thing that happened: for log files, CI and pipes."""
+    """Lines on stderr, one for each event: for log files, CI and pipes."""
 
     def event(self, event: RunEvent) -> None:
-        """Progress within a step is for people watching; it has no line."""
+        """Print an event's line; progress within a step has none."""
         text = line(event)
         if text is not None:
             print(printable_lines(text), file=sys.stderr, flush=True)
@@ -41,7 +41,7 @@ class LiveView:
         self._live = live
         self._shown_at_s = 0.0
         self._samples = SamplesTaken(())
-        self._asked: HandAsked | None = None
+        self._instruction: HandAsked | None = None
 
     def event(self, event: RunEvent) -> None:
         """Show an event: as a line, or in the panel."""
@@ -51,17 +51,17 @@ class LiveView:
             case Progress():
                 self._show(_panel(event, self._samples))
             case HandAsked():
-                self._asked = event
+                self._instruction = event
                 self._line(event)
             case HandSeen():
-                self._show(_panel_by_hand(event, self._asked, self._samples))
+                self._show(_panel_by_hand(event, self._instruction, self._samples))
             case _:
                 self._line(event)
 
     def _line(self, event: RunEvent) -> None:
         text = line(event)
         if text is not None:
-            # Nothing in a path is markup, and a command that is to be copied must not be broken into lines.
+            # A path has no markup, and a command must stay in one line to be copied.
             shown = for_file(printable_lines(text), sys.stderr)
             self._live.console.print(shown, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
@@ -81,7 +81,7 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
     for sensor in samples.sensors:
         for name, readings in _readings(sensor):
             table.add_row(plain(name), readings)
-    table.add_row("time", f"{progress.elapsed_s:5.1f} s gone, {progress.remaining_s:5.1f} s left")
+    table.add_row("time", f"{progress.elapsed_s:5.1f} s elapsed, {progress.remaining_s:5.1f} s left")
     return table
 
 
@@ -96,11 +96,11 @@ def _fraction_of_run(progress: Progress) -> float:
     return progress.elapsed_s / planned_s if planned_s > 0 else progress.fraction
 
 
-def _panel_by_hand(seen: HandSeen, asked: HandAsked | None, samples: SamplesTaken) -> Table:
+def _panel_by_hand(state: HandSeen, instruction: HandAsked | None, samples: SamplesTaken) -> Table:
     table = Table.grid(padding=(0, 2))
-    if asked is not None:
-        table.add_row("to do", plain(asked.instruction.words, "bold"))
-    for name, text in live_rows(seen):
+    if instruction is not None:
+        table.add_row("your turn", plain(instruction.instruction.words, "bold"))
+    for name, text in live_rows(state):
         table.add_row(name, plain(text))
     for sensor in samples.sensors:
         for name, readings in _readings(sensor):
@@ -109,19 +109,19 @@ def _panel_by_hand(seen: HandSeen, asked: HandAsked | None, samples: SamplesTake
 
 
 def _readings(sensor: SensorSamples) -> list[tuple[str, str]]:
-    """The rows of a sensor, one for each quantity that it sends; the first says how many samples came."""
-    came, rows = f"{sensor.samples} samples, {sensor.lost} lost", list[tuple[str, str]]()
+    """Return the rows of a sensor, one for each of its quantities; the first has the number of samples."""
+    counts, rows = f"{sensor.samples} samples, {sensor.lost} lost", list[tuple[str, str]]()
     for quantity in select_displayed(sensor.latest):
-        of = measured()[quantity]
-        shown = " ".join(f"{component / of.reading.size:+7.2f}" for component in sensor.latest[quantity])
-        name, more = (f"{sensor.sensor}, {of.sensor}", "") if rows else (sensor.sensor, f", {came}")
-        rows.append((name, f"{shown} {of.reading.name}{more}"))
-    return rows or [(sensor.sensor, f"waiting, {came}")]
+        kind = measured()[quantity]
+        shown = " ".join(f"{component / kind.reading.size:+7.2f}" for component in sensor.latest[quantity])
+        name, more = (f"{sensor.sensor}, {kind.sensor}", "") if rows else (sensor.sensor, f", {counts}")
+        rows.append((name, f"{shown} {kind.reading.name}{more}"))
+    return rows or [(sensor.sensor, f"waiting, {counts}")]
 
 
 @contextmanager
 def view() -> Iterator[Listener]:
-    """The view that suits stderr."""
+    """Yield the view that suits stderr."""
     if sys.stderr.isatty():
         with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
             yield LiveView(live)

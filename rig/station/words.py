@@ -1,4 +1,4 @@
-"""The line an event is worth, for a terminal and for the log."""
+"""The line for an event, at a terminal and in the log."""
 
 import shlex
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ from rig.station.events import (
 
 
 def line(event: RunEvent) -> str | None:
-    """What to say of it in one line; None for what only an instrument shows, or what others say."""
+    """Return an event in one line; None for those of instruments, or printed elsewhere."""
     text: str | None
     match event:
         case Prompt(mounts=int(), announcement=(stage, *_)):
@@ -44,7 +44,7 @@ def line(event: RunEvent) -> str | None:
         case RunResumed(planned=0):
             text = "resuming: the rests and moves so far count"
         case RunResumed(done, planned):
-            text = f"resuming: {done} of {planned} sweeps and dwells are recorded and sound"
+            text = f"resuming: {done} of {planned} sweeps and dwells are recorded and valid"
         case BoardConnected(port, identity):
             text = f"board: {identity.unique_id}, firmware {identity.firmware} at {port}"
         case SensorConnected(sensor, part, serial_number, port, corrected):
@@ -61,67 +61,67 @@ def line(event: RunEvent) -> str | None:
                 f"{len(plan.motions)} motions within limits, {plan.duration_s:.0f} s"
             ) + "".join(f"; {doubt}" for doubt in doubts(plan))
         case SamplingStarted():
-            text = "sampling: every sensor delivers"
+            text = "sampling: every sensor sends readings"
         case StepFinished(_, _, step, took_s):
             text = f"done: {step.name}, {took_s:.2f} s"
         case PhaseRecorded(sensors, missed_states):
             samples, lost = (sum(counts) for counts in zip(*((s.samples, s.lost) for s in sensors), strict=True))
             text = f"recorded: {samples} samples, {lost} lost; {missed_states} arm states missed"
         case _:
-            text = by_hand_line(event) or _of_the_temperature(event) or _of_the_outcome(event)
+            text = by_hand_line(event) or _temperature_line(event) or _outcome_line(event)
     return text
 
 
-def _of_the_temperature(event: RunEvent) -> str | None:
-    """An event of a calibration over temperature in words."""
+def _temperature_line(event: RunEvent) -> str | None:
+    """Return an event of a calibration over temperature in words."""
     match event:
         case TemperatureWanted(warming, now_c, next_c, heated):
             until = f"until it is at {next_c:.1f} °C; it is at {now_c:.1f} °C"
             if heated:
                 return f"the heater {'warms the board' if warming else 'lets the board cool'} {until}"
-            return f"to do: {'warm' if warming else 'cool'} the board {until}"
+            return f"your turn: {'warm' if warming else 'cool'} the board {until}"
         case SetMeasured(temperatures_c=temperatures):
-            return "set made: " + ", ".join(f"{name} at {value:.1f} °C" for name, value in temperatures.items())
+            return "set measured: " + ", ".join(f"{name} at {value:.1f} °C" for name, value in temperatures.items())
         case _:
             return None
 
 
-def _of_the_outcome(event: RunEvent) -> str | None:
-    """An event in words, of those told when nothing moves any more; None says nothing."""
+def _outcome_line(event: RunEvent) -> str | None:
+    """Return an event in words, of those that come when nothing moves any more; None for others."""
     text: str | None
     match event:
         case CalibrationStored(sensor, part, serial_number, record):
             text = f"stored on the board: {sensor}, {part} {serial_number}, record {record}"
-        case UncertaintySoFar(scale_u, bias_u_rad_s, left, as_wanted):
+        case UncertaintySoFar(scale_u, bias_u_rad_s, repeats_left, as_wanted):
             text = f"U = {scale_u:.3g} of the scale factors, {bias_u_rad_s:.3g} rad/s of the biases, "
-            text += "as wanted" if as_wanted else "more than wanted"
-            text += f": {left} more {'repeat' if left == 1 else 'repeats'} "
-            text += f"{'is' if left == 1 else 'are'} left out" if as_wanted else "at most"
+            text += "target reached" if as_wanted else "above the target"
+            text += f": {repeats_left} more {'repeat' if repeats_left == 1 else 'repeats'} "
+            text += f"{'is' if repeats_left == 1 else 'are'} skipped" if as_wanted else "at most"
         case PhaseSkipped():
-            text = "not verified: the calibration failed its limits, so the board keeps what it had"
+            text = "not verified: the calibration failed its limits, so the board keeps its old calibration"
         case Plotted(names):
             text = f"plotted: {', '.join(names)} (.png, .svg)"
         case NotPlotted():
             text = f"no plots: they need matplotlib. Install it: {install_command('study')}"
         case Remembered(history, numbers, usual=usual):
-            text = _entered(history, numbers, usual=usual)
+            text = _entry_words(history, numbers, usual=usual)
         case NotRemembered(folder, why):
             later = f"rig history import {shlex.quote(str(folder))}"
-            text = f"not entered in the history, which does not matter to the run ({why}); later: {later}"
+            text = f"not entered in the history; the run itself is not affected ({why}); later: {later}"
         case RunFolderWritten(folder):
             text = f"written: {folder}"
         case Advice(folder, command, repeats):
-            to_do = "to repeat refused sweeps" if repeats else "when it is corrected, go on with"
+            to_do = "to repeat refused sweeps" if repeats else "after correcting the cause, continue with"
             text = f"the data are kept in {folder}; {to_do}: {command}"
         case ListenerDropped(listener, error):
-            text = f"{listener} hears nothing more of this run: it failed ({error})"
+            text = f"{listener} was disconnected from this run: it failed ({error})"
         case _:
             text = None
     return text
 
 
 def calibrations_in_words(numbers: Sequence[int]) -> str:
-    """Calibrations of a history by their numbers: "calibration 8", "calibrations 8 to 10", "calibrations 8, 11"."""
+    """Return calibrations of a history in words: "calibration 8", "calibrations 8 to 10", "calibrations 8, 11"."""
     match list(numbers):
         case []:
             return "a run without calibrations"
@@ -133,14 +133,14 @@ def calibrations_in_words(numbers: Sequence[int]) -> str:
             return f"calibrations {', '.join(map(str, several))}"
 
 
-def _entered(history: str, numbers: Sequence[int], *, usual: bool) -> str:
-    there = "" if usual else f" --history {shlex.quote(history)}"
-    shown = f" (rig history show {numbers[0]}{there})" if numbers else ""
+def _entry_words(history: str, numbers: Sequence[int], *, usual: bool) -> str:
+    option = "" if usual else f" --history {shlex.quote(history)}"
+    shown = f" (rig history show {numbers[0]}{option})" if numbers else ""
     return f"entered in {history} as {calibrations_in_words(numbers)}{shown}"
 
 
 def reason(event: RunEvent) -> str | None:
-    """Why a run ended early. The log keeps it; on a terminal the command says it last."""
+    """Return why a run ended early. The log keeps it; on a terminal the command prints it last."""
     match event:
         case Failed(error) if error.name == "script_failed" and error.__cause__ is not None:
             return f"{error}\n{''.join(format_exception(error.__cause__)).rstrip()}"

@@ -18,9 +18,9 @@ from weakref import ReferenceType, ref
 import pytest
 
 from rig.batch.batch import Batch, BatchEnded, Begun, Chip, Entry, Part, PartBegun, PartEnded, doubt_of, state_of
-from rig.batch.journal import JOURNAL, opened, resumed
+from rig.batch.journal import JOURNAL, open_journal, resume_journal
 from rig.batch.label import Label, files_of, zpl
-from rig.batch.operators import Asked, Question, Terminal
+from rig.batch.operators import Operator, Question, Terminal
 from rig.batch.parts_in_turn import Bench, Desk, Work
 from rig.batch.series import following, numbers_in
 from rig.batch.table import csv_of, page_of, summary
@@ -96,22 +96,22 @@ def test_a_batch_passes_when_every_number_has_passed_in_the_end() -> None:
 
 def test_the_journal_gives_the_batch_back_after_a_kill_in_the_middle_of_a_line(tmp_path: Path) -> None:
     folder = tmp_path / "batch"
-    journal = opened(folder, tmp_path, BEGUN)
+    journal = open_journal(folder, tmp_path, BEGUN)
     for entry in entries(("G-001", PASSED), ("G-002", None))[1:]:
         journal.enter(entry)
     with (folder / JOURNAL).open("a", encoding="utf-8") as file:
         file.write('{"entry": "part_ended", "outc')
-    again = opened(folder, tmp_path, Begun("", "", AT))
+    again = open_journal(folder, tmp_path, Begun("", "", AT))
     assert again.batch == journal.batch
     again.enter(PASSED)
     again.enter(BatchEnded(AT))
-    assert resumed(folder).batch == again.batch and again.batch.passed
+    assert resume_journal(folder).batch == again.batch and again.batch.passed
 
 
 def test_a_journal_that_tells_of_no_batch_is_refused(tmp_path: Path) -> None:
     (tmp_path / JOURNAL).write_text('{"entry": "part_ended", "outcome": "pass", "at_utc": ""}\n', encoding="utf-8")
     with pytest.raises(Refused, match="no_batch"):
-        resumed(tmp_path)
+        resume_journal(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -125,11 +125,11 @@ def test_a_journal_that_tells_of_no_batch_is_refused(tmp_path: Path) -> None:
     ids=["a folder elsewhere", "a number", "no entry", "deep"],
 )
 def test_a_journal_of_somebody_elses_leads_nowhere_else(line: str, tmp_path: Path) -> None:
-    opened(tmp_path / "batch", tmp_path, BEGUN)
+    open_journal(tmp_path / "batch", tmp_path, BEGUN)
     with (tmp_path / "batch" / JOURNAL).open("a", encoding="utf-8") as file:
         file.write(f"{line}\n")
     with pytest.raises(Refused, match="no_batch"):
-        resumed(tmp_path / "batch")
+        resume_journal(tmp_path / "batch")
 
 
 def test_what_texts_of_somebody_elses_journal_hide_is_shown(tmp_path: Path) -> None:
@@ -144,30 +144,30 @@ def test_what_texts_of_somebody_elses_journal_hide_is_shown(tmp_path: Path) -> N
         ),
         encoding="utf-8",
     )
-    batch = resumed(tmp_path).batch
+    batch = resume_journal(tmp_path).batch
     assert {batch.begun.operator, batch.parts[0].serial} == {r"G\x1b[31m\nverdict: PASS"}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit for files there")
 def test_a_batch_that_cannot_be_begun_leaves_nothing_in_its_way(tmp_path: Path) -> None:
     with full_disk(20), pytest.raises(Refused, match=r"run_folder: .*too large: '.*batch\.jsonl'"):
-        opened(tmp_path / "batch", tmp_path, BEGUN)
-    assert opened(tmp_path / "batch", tmp_path, BEGUN).batch.begun == BEGUN
+        open_journal(tmp_path / "batch", tmp_path, BEGUN)
+    assert open_journal(tmp_path / "batch", tmp_path, BEGUN).batch.begun == BEGUN
 
 
 def test_nothing_is_written_through_a_link_in_a_batch_folder(tmp_path: Path) -> None:
-    folder = opened(tmp_path / "batch", tmp_path, BEGUN).folder
+    folder = open_journal(tmp_path / "batch", tmp_path, BEGUN).folder
     (tmp_path / "elsewhere").mkdir()
     (folder / "labels").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(Refused, match="not_written_through"):
-        resumed(folder)
+        resume_journal(folder)
 
 
 def test_a_simulated_batch_is_not_gone_on_with_on_a_real_rig(tmp_path: Path) -> None:
-    folder = opened(tmp_path / "batch", tmp_path, replace(BEGUN, simulated=True)).folder
-    assert opened(folder, tmp_path, replace(BEGUN, simulated=True)).batch.begun.simulated
+    folder = open_journal(tmp_path / "batch", tmp_path, replace(BEGUN, simulated=True)).folder
+    assert open_journal(folder, tmp_path, replace(BEGUN, simulated=True)).batch.begun.simulated
     with pytest.raises(Refused, match="begun in a simulated laboratory"):
-        opened(folder, tmp_path, BEGUN)
+        open_journal(folder, tmp_path, BEGUN)
 
 
 def test_at_the_terminal_what_is_typed_ahead_is_no_answer_and_a_number_mounts_nothing(
@@ -184,9 +184,9 @@ def test_at_the_terminal_what_is_typed_ahead_is_no_answer_and_a_number_mounts_no
     monkeypatch.setattr("sys.stdin", keyboard)
     monkeypatch.setattr("sys.stderr", SimpleNamespace(write=shown, flush=lambda: None, isatty=lambda: False))
     try:
-        assert not Asked(Terminal()).mounted(Part(1, "G-001", "01-G-001", AT))
+        assert not Operator(Terminal()).is_mounted(Part(1, "G-001", "01-G-001", AT))
         os.write(terminal, b"go\n")
-        assert not Asked(Terminal()).agrees(("The arm will move.",), Prompt(()).to_do)
+        assert not Operator(Terminal()).agrees(("The arm will move.",), Prompt(()).to_do)
     finally:
         monkeypatch.undo()
         keyboard.close()
@@ -196,13 +196,13 @@ def test_at_the_terminal_what_is_typed_ahead_is_no_answer_and_a_number_mounts_no
 def test_a_number_that_is_not_taken_is_asked_for_again_with_the_reason(tmp_path: Path) -> None:
     questions = list[Question]()
 
-    class Operator:
+    class Typist:
         def answer(self, question: Question) -> str:
             questions.append(question)
             return "G-1" if len(questions) == 1 else ""
 
     bench = cast(Bench, SimpleNamespace(simulated=True, today=lambda serial: None))
-    Work(opened(tmp_path / "batch", tmp_path, BEGUN), SECTION, Asked(Operator()), bench).all_parts()
+    Work(open_journal(tmp_path / "batch", tmp_path, BEGUN), SECTION, Operator(Typist()), bench).all_parts()
     first, second = questions
     assert not first.lines
     assert second.lines == (r"G-1 does not match the pattern G-\d{3}.",)
@@ -228,7 +228,7 @@ def test_between_two_parts_nothing_of_a_run_is_left_in_memory(tmp_path: Path) ->
     numbers = ["G-001", "G-002", "G-003"]
     gc.disable()
     try:
-        Work(opened(tmp_path / "batch", tmp_path, BEGUN), SECTION, Asked(None, numbers), bench).all_parts()
+        Work(open_journal(tmp_path / "batch", tmp_path, BEGUN), SECTION, Operator(None, numbers), bench).all_parts()
     finally:
         gc.enable()
     assert len(left) == len(numbers)

@@ -13,7 +13,7 @@ from selenium.webdriver.remote.webelement import WebElement
 
 from rig.batch.batch import Part
 from rig.batch.on_page import on_page
-from rig.batch.operators import Asked
+from rig.batch.operators import Operator
 from rig.batch.status import Now, Present
 from rig.page.server.control import STOPPED
 from rig.page.server.serving import Address
@@ -29,7 +29,7 @@ WORDS = ("The arm at 127.0.0.2 will move for 29 s.", "Nobody and nothing may be 
 
 
 @contextmanager
-def answered(asked: Asked, *questions: str) -> Iterator["SimpleQueue[object]"]:
+def answered(asked: Operator, *questions: str) -> Iterator["SimpleQueue[object]"]:
     """The station's side, which asks one after the other."""
     answers = SimpleQueue[object]()
 
@@ -54,7 +54,7 @@ def replaced(button: WebElement) -> bool:
 
 def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
     questions = "number", "go", "go"
-    with on_page(Present(NOW), Address(port=0)) as (voice, url), answered(Asked(voice), *questions) as answers:
+    with on_page(Present(NOW), Address(port=0)) as (voice, url), answered(Operator(voice), *questions) as answers:
         driver.get(url)
         wait_for(lambda: "serial number" in text(driver, "text"), "the question for a number")
         assert text(driver, "part") == "<b>G-003</b>" and "A. Person" in text(driver, "who")
@@ -90,7 +90,7 @@ def test_after_a_stop_the_page_says_that_and_not_that_there_is_no_news(driver: C
         stop = driver.find_element(By.ID, "halt")
         try:
             threading.Timer(0, stop.click).start()
-            Asked(voice, asking=present.asking).mounted(Part(1, "G-003", "01-G-003", "2026-11-25T08:00:00+00:00"))
+            Operator(voice, asking=present.asking).is_mounted(Part(1, "G-003", "01-G-003", "2026-11-25T08:00:00+00:00"))
         except KeyboardInterrupt as interrupt:
             present.event(Interrupted(f"{interrupt} between two parts"))
             raise

@@ -63,7 +63,7 @@ def test_twenty_parts_in_a_row_each_get_the_right_verdict(tmp_path: Path) -> Non
                 at.waits_for(NUMBER)
                 at.types(number)
                 at.waits_for(f"{number} is done")
-                at.waits_for("Go on all the same? ")
+                at.waits_for("Continue anyway? ")
                 at.types("no")
                 at.sees(NUMBER)
         at.types("")

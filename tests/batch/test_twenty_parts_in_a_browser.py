@@ -17,7 +17,7 @@ from support.processes.waiting import PATIENCE_S, wait_for
 
 PARTS = 20
 GROWTH = 0.02
-NUMBER, MOUNT, GO, DOUBT, AGAIN = "serial number", "mount it", "Type go", "Go on all the same", "again?"
+NUMBER, MOUNT, GO, DOUBT, AGAIN = "serial number", "mount it", "Type go", "Continue anyway", "again?"
 pytestmark = [
     pytest.mark.slow, pytest.mark.proof, needs_browser,
     pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere"),

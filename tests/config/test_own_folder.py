@@ -8,7 +8,7 @@ import pytest
 from rig.config.files.own_folder import own_folder
 from rig.data.own_texts import is_own, note_own
 from rig.errors import Refused
-from rig.history.storage.address import place
+from rig.history.storage.address import resolve_address
 
 NOBODY = 987_654
 
@@ -30,10 +30,10 @@ def test_a_folder_of_ones_own_needs_a_home(monkeypatch: pytest.MonkeyPatch, tmp_
 
 def test_a_history_without_a_home_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(Refused, match="no_home"):
-        place(None)
+        resolve_address(None)
     with pytest.raises(Refused, match="history_address: the history ~/of the laboratory"):
-        place("~/of the laboratory")
-    assert place(str(tmp_path / "history")).where == tmp_path / "history"
+        resolve_address("~/of the laboratory")
+    assert resolve_address(str(tmp_path / "history")).where == tmp_path / "history"
 
 
 def test_what_was_run_is_not_known_later_and_lies_nowhere(tmp_path: Path) -> None:

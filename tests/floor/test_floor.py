@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from rig.batch.batch import Begun, PartBegun, PartEnded, state_of
-from rig.batch.status import Now, Present, after, last, of_batch
+from rig.batch.status import Now, Present, after, last, update_by_batch
 from rig.errors import Fault, Refused
 from rig.floor import shown
 from rig.floor.feed import looking
 from rig.floor.heartbeat import heartbeat
 from rig.history import stations
 from rig.history.stations import Told
-from rig.history.storage.address import place
+from rig.history.storage.address import resolve_address
 from rig.history.store import open_history
 from rig.motion.state import Report
 from rig.page.server.control import Control
@@ -50,7 +50,7 @@ def state(now: Now, age_s: float = 0.4) -> str:
 def test_a_station_tells_its_batch_and_its_run() -> None:
     passed = PartEnded("pass", AT)
     batch = state_of([Begun("A. Person", "W-17", AT), PartBegun("G-1", "01", AT), passed, PartBegun("G-2", "02", AT)])
-    now = of_batch(Now(), batch)
+    now = update_by_batch(Now(), batch)
     assert (now.state, now.part, now.operator) == ("checking", "G-2", "A. Person")
     assert now.counts == {"pass": 1, "open": 1} and now.parts == (("G-1", "pass"), ("G-2", "open"))
     assert after(now, Prompt(())).state == "asking"
@@ -131,7 +131,7 @@ def states_become(feed: Sections, wanted: dict[str, str]) -> None:
 
 @pytest.mark.slow
 def test_what_stations_tell_a_history_is_on_the_floor(tmp_path: Path) -> None:
-    where = place(str(tmp_path / "history.sqlite"))
+    where = resolve_address(str(tmp_path / "history.sqlite"))
     with open_history(where), looking(where) as feed:
         with heartbeat("bench 1", where, Now("running")), heartbeat("bench 2", where, Now("waiting")) as second:
             states_become(feed, {"bench 1": "running", "bench 2": "waiting"})
@@ -185,7 +185,7 @@ def test_the_database_alone_tells_ages(tmp_path: Path) -> None:
             stations.tell(history.engine, "bench 1", "lab-1", text)
         time.sleep(0.3)
         (only,), _ = stations.heard(history.engine)
-        assert only.age_s is not None and only.told == '{"state":"running"}' and 0.25 < only.age_s < 60
+        assert only.age_s is not None and only.state == '{"state":"running"}' and 0.25 < only.age_s < 60
         assert list(history.broken()) == []
 
 

@@ -10,7 +10,7 @@ from selenium.webdriver import Chrome
 from rig.batch.status import Now
 from rig.floor.feed import looking
 from rig.history import stations
-from rig.history.storage.address import place
+from rig.history.storage.address import resolve_address
 from rig.history.store import open_history
 from rig.page.server.control import Control
 from rig.page.server.sections import Sections
@@ -31,7 +31,7 @@ SAID = {
 
 @pytest.fixture
 def feed(tmp_path: Path) -> Iterator[Sections]:
-    where = place(str(tmp_path / "history.sqlite"))
+    where = resolve_address(str(tmp_path / "history.sqlite"))
     days = (datetime.now(UTC) - FIRST).total_seconds() / 86400
     with open_history(where) as history:
         stations.make_table(history.engine)

@@ -31,7 +31,7 @@ def test_others_change_in_the_unit_of_a_screen() -> None:
     assert said(*changes) == [
         "bias of y changed by −0.1 °/s, 62 U",
         "angle between x and y changed by +0.1°, 6.2 U",
-        "what an acceleration along y adds to the rate of x changed by +0.5 rad/s/(m/s²), 1.8 U",
+        "g-sensitivity x/y changed by +0.5 rad/s/(m/s²), 1.8 U",
     ]
 
 

@@ -201,7 +201,7 @@ def test_nobody_works_on_in_a_file_that_is_not_the_history_any_more(
 def test_the_floor_says_that_its_history_is_gone_and_begins_none(file: Path) -> None:
     with open_history(str(file)) as history:
         history.enter(finished(0))
-        place = history.place
+        place = history.address
     with looking(place) as feed:
         wait_for(lambda: b'"today"' in feed.whole(), "what the history has")
         remove(file)

@@ -14,7 +14,7 @@ from sqlalchemy import URL
 
 from rig.config.load import ConfigurationRefused, load
 from rig.errors import Refused
-from rig.history.storage.address import place
+from rig.history.storage.address import resolve_address
 from rig.history.storage.libpq import connect_arguments
 from rig.history.store import open_history
 from support.paths import DEMO
@@ -30,7 +30,7 @@ SECRET = "a-secret-of-the-operator"
 def test_a_url_of_a_history_says_where_it_is_and_nothing_else(query: str) -> None:
     url = f"postgresql://rig@lab/history{query}"
     with pytest.raises(Refused, match="history_address"):
-        place(url)
+        resolve_address(url)
     with pytest.raises(ConfigurationRefused, match=r"question mark|sslmode"):
         load(DEMO, [f"history.url={url}"])
 
@@ -113,7 +113,7 @@ def test_a_password_is_said_to_no_server_that_asks_for_it(
 
 def test_another_computer_has_to_prove_that_it_knows_the_password() -> None:
     def arguments(url: str, **environment: str) -> tuple[object, object]:
-        server = place(url).where
+        server = resolve_address(url).where
         assert isinstance(server, URL)
         said = connect_arguments(server, environment)
         return said["require_auth"], said.get("sslmode")

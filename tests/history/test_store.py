@@ -22,7 +22,7 @@ from rig.history.entered.finished import Finished, compact, content_sha256, fini
 from rig.history.entered.issued import Issued
 from rig.history.series import Trend, changes_between, effects, rig_states, subjects, trends
 from rig.history.storage import schema
-from rig.history.storage.address import chosen_place, place
+from rig.history.storage.address import chosen_place, resolve_address
 from rig.history.storage.engine import engine_of
 from rig.history.store import History, Selection, open_history
 from rig.report.entries.budget import budget_entry
@@ -240,7 +240,7 @@ def test_a_history_is_in_the_user_s_folder_unless_somebody_says_otherwise(monkey
 
 
 def test_a_password_is_not_told_and_not_taken_from_a_file_that_recordings_keep() -> None:
-    secret = place("postgresql://rig:secret@lab/history")
+    secret = resolve_address("postgresql://rig:secret@lab/history")
     assert isinstance(secret.where, URL) and secret.where.password == "secret" and "secret" not in secret.label
     for url in ("postgresql://rig:secret@lab/history", "postgresql://lab/history?password=secret", "mysql://lab/x"):
         with pytest.raises(ConfigurationRefused) as refused:
@@ -253,7 +253,7 @@ def test_a_server_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(Refused, match="history_unreachable"), open_history(f"postgresql://rig@/x?host={tmp_path}"):
         pass
     with pytest.raises(Refused, match="history_address"):
-        engine_of(place("nonsense://x"))
+        engine_of(resolve_address("nonsense://x"))
 
 
 def test_what_has_changed_is_named(history: History) -> None:

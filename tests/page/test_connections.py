@@ -97,7 +97,7 @@ def test_headers_that_do_not_come_end_the_connection() -> None:
         connections = Connections(request_s=0.05)
 
         async def take(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            connections.made(writer.get_extra_info("peername"), writer.transport)
+            connections.add(writer.get_extra_info("peername"), writer.transport)
 
         server = await asyncio.start_server(take, "127.0.0.1", 0)
         reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())

@@ -102,7 +102,10 @@ def test_what_was_found_is_in_print_as_the_certificate_has_it(driver: Chrome, tm
     x = six_found().gyroscopes["lsm9ds1"].scale[0]
     assert f"{x:.4f}" in rows[0] and "± 0.0013" in rows[0] and "rad/s" in rows[0] and "m/s²" in rows[3]
     assert "kz changed since no 8, 2026-11-20" in rows[0]
-    assert "nothing changed since no 9, 2026-11-20 (kz: E_n 0.4)" in rows[1] and "the first" in rows[2]
+    assert (
+        "nothing changed since no 9, 2026-11-20 (kz: E_n 0.4)" in rows[1]
+        and "first calibration of this part" in rows[2]
+    )
     assert text(driver, "next-command") == "rig history LSM9DS1-003"
     # The rest of a row comes on demand, by the keyboard too.
     first = driver.find_element(By.CSS_SELECTOR, "#found summary")

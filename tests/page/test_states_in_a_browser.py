@@ -143,7 +143,7 @@ def test_other_endings_say_why(driver: Chrome, tmp_path: Path, ending: str) -> N
         picture(driver, ending)
 
 
-ELSEWHERE = {True: "It is answered at the terminal, not here.", False: "This address lacks its token"}
+ELSEWHERE = {True: "Answer it at the terminal, not here.", False: "This address lacks its token"}
 
 
 @pytest.mark.parametrize("token", ELSEWHERE)
@@ -163,7 +163,7 @@ def test_a_line_that_is_lost_makes_all_of_it_old(driver: Chrome, tmp_path: Path)
         tell(*before_it_moves(plan), *moving(plan, 52.0))
         tell.word("Resting")
         assert text(driver, "link-words") == "connected"
-    wait_for(lambda: text(driver, "link-words") == "no connection: what stands here is old", "that the line is down")
+    wait_for(lambda: text(driver, "link-words") == "no connection: the values shown are old", "that the line is down")
     picture(driver, "line-lost")
     driver.get("about:blank")  # so that it asks no longer
     assert all("ERR_CONNECTION_REFUSED" in entry for entry in severe(driver))

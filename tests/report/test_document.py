@@ -79,4 +79,4 @@ def test_the_result_says_which_arm_was_reckoned_with_and_at_what_speed_it_is_val
     assert "nonlinearity" not in sensor
     console = Console(width=150, file=io.StringIO(), record=True)
     print_result(document, console)
-    assert "the scale factors are those at ±60.0 °/s" in console.export_text()
+    assert "the scale factors apply at ±60.0 °/s" in console.export_text()

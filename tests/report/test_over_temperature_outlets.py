@@ -140,7 +140,7 @@ def test_the_header_corrects_by_temperature(
     assert held == (asked_c == taken_c) and np.allclose(rate, matrix @ (READING + bias), atol=2e-6)
 
 
-def named(lines: str, separator: str, name: int, value: int) -> dict[str, float]:
+def read_fields(lines: str, separator: str, name: int, value: int) -> dict[str, float]:
     rows = [line.split(separator) for line in lines.splitlines() if line and not line.startswith("#")]
     return {row[name]: float(row[value]) for row in rows}
 
@@ -155,7 +155,7 @@ def ours(entry: OverTemperatureEntry, temperature_c: float) -> Array:
 @pytest.mark.parametrize("temperature_c", [0.0, FROM_C + 0.5, REFERENCE_C, 35.0, 47.3, TO_C - 1, 80.0])
 def test_px4_corrects_as_we_do(result: ResultDocument, entry: OverTemperatureEntry, temperature_c: float) -> None:
     """By calc_thermal_offsets_3D of TemperatureCompensation.cpp and Gyroscope::Correct."""
-    said = named(px4_files(calibrations(result))["px4.params"], "\t", 2, 3)
+    said = read_fields(px4_files(calibrations(result))["px4.params"], "\t", 2, 3)
     delta = min(max(temperature_c, said["TC_G0_TMIN"]), said["TC_G0_TMAX"]) - said["TC_G0_TREF"]
     thermal = [
         said[f"TC_G0_X0_{i}"] + said[f"TC_G0_X1_{i}"] * delta + said[f"TC_G0_X2_{i}"] * delta**2
@@ -172,7 +172,7 @@ def test_px4_corrects_as_we_do(result: ResultDocument, entry: OverTemperatureEnt
 @pytest.mark.parametrize("temperature_c", [0.0, FROM_C + 0.5, REFERENCE_C, 35.0, 47.3, TO_C - 1, 80.0])
 def test_ardupilot_corrects_as_we_do(result: ResultDocument, entry: OverTemperatureEntry, temperature_c: float) -> None:
     """By TCal::correct_sensor of AP_InertialSensor_tempcal.cpp and _rotate_and_correct_gyro."""
-    said = named(ardupilot_files(calibrations(result))["ardupilot.param"], ",", 0, 1)
+    said = read_fields(ardupilot_files(calibrations(result))["ardupilot.param"], ",", 0, 1)
 
     def evaluated(warm: float) -> Array:
         away = min(max(warm, said["INS_TCAL1_TMIN"]), said["INS_TCAL1_TMAX"]) - 35.0

@@ -19,7 +19,7 @@ from rig.report.certificate.plots import (
 from rig.report.document import document_of
 from rig.report.findings.finding import Finding
 from rig.report.findings.unexplained import EXPECTED, EXPECTED_IN_ATTITUDES, OF_SAMPLES
-from rig.report.words.printed_budget import printed_budget
+from rig.report.words.printed_budget import lay_out_budget
 from support.documents.certified import certificate, everything, read, result
 from support.paths import RECORDINGS
 
@@ -35,7 +35,7 @@ def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
     sensor = result().gyroscopes["gyro"]
     assert isinstance(sensor.vector_model, VectorEntry) and sensor.vector_model.residuals_std_rad_s is not None
     picture = residuals(Finding("gyro", RATE, sensor))
-    assert picture is not None and picture.of == EXPECTED
+    assert picture is not None and picture.expectation == EXPECTED
     factor = {"mrad/s": 1e3, "µrad/s": 1e6}[picture.unit]
     expected = 2 * factor * np.array(sensor.vector_model.residuals_std_rad_s)
     np.testing.assert_allclose(bars(picture), expected, atol=0.01 * expected.max())
@@ -47,8 +47,8 @@ def test_bars_of_solutions_without_a_model_of_their_scatter_are_called_what_they
     assert isinstance(sensor.vector_model, VectorEntry)
     alone = sensor.vector_model.model_copy(update={"residuals_std_rad_s": None})
     picture = residuals(Finding("gyro", RATE, sensor.model_copy(update={"vector_model": alone})))
-    assert picture is not None and picture.of == OF_SAMPLES
-    assert "which holds vibration" in picture.of
+    assert picture is not None and picture.expectation == OF_SAMPLES
+    assert "which includes vibration" in picture.expectation
 
 
 @pytest.mark.slow
@@ -64,7 +64,7 @@ def test_bars_of_attitudes_are_what_the_solve_expects_of_them() -> None:
         (attitude_residuals(Finding("imu", FIELD, field)), [each.residual_std_t for each in field.dwells]),
     )
     for picture, expected in pictures:
-        assert picture.of in (EXPECTED_IN_ATTITUDES[ACCELERATION], EXPECTED_IN_ATTITUDES[FIELD])
+        assert picture.expectation in (EXPECTED_IN_ATTITUDES[ACCELERATION], EXPECTED_IN_ATTITUDES[FIELD])
         told = 2 * np.array(expected, dtype=np.float64)
         drawn = bars(picture)
         np.testing.assert_allclose(drawn * (told.max() / drawn.max()), told, atol=0.02 * told.max())
@@ -83,10 +83,10 @@ def test_frozen_attitudes_agree_with_their_bars() -> None:
 def test_the_picture_of_contributions_is_of_the_values_of_the_budget() -> None:
     sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
-    table = printed_budget(sensor.budget, sensor.scale, RATE.bias)
+    table = lay_out_budget(sensor.budget, sensor.scale, RATE.bias)
     picture = contributions(sensor.budget, sensor.scale)
     assert picture.axes == tuple(each.axis for each in table.columns)
-    places = [each.place for each in table.columns]
+    places = [each.index for each in table.columns]
     for name, _, *drawn in picture.rows:
         (line,) = (each for each in sensor.budget.contributors if each.name == name)
         for place, x in zip(places, drawn, strict=True):
@@ -97,8 +97,8 @@ def test_the_picture_of_contributions_is_of_the_values_of_the_budget() -> None:
 
 def test_every_picture_has_words_of_its_own() -> None:
     page = read(certificate(everything()))
-    assert HEIGHT > 0 and page.text.count("hold zero.") == 5
-    assert "What makes up the uncertainty of the scale factor of" in page.text
+    assert HEIGHT > 0 and page.text.count("contain zero.") == 5
+    assert "Contributions to the uncertainty of the scale factor of" in page.text
 
 
 def filled(document: ResultDocument) -> list[float]:

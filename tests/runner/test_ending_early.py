@@ -131,7 +131,7 @@ def test_a_run_ends_when_what_is_wanted_is_reached_and_is_resumed_after_an_inter
         tmp_path / "run",
     )
     begun = subprocess.Popen([sys.executable, "-m", "rig", "run", config, "--out", run], stderr=subprocess.DEVNULL)
-    wait_for_log(run, "as wanted: 15 more repeats are left out")
+    wait_for_log(run, "target reached: 15 more repeats are skipped")
     begun.send_signal(signal.SIGINT)
     begun.wait()
     if begun.returncode == 130:  # else it was home already
@@ -152,7 +152,7 @@ def test_a_run_that_does_not_come_to_what_is_wanted_fails_by_its_name(tmp_path: 
         tmp_path / "run",
     )
     assert done.returncode == 1, done.stderr
-    assert "more than wanted: 1 more repeat at most" in done.stderr
+    assert "above the target: 1 more repeat at most" in done.stderr
     assert "FAILED gyro.scale_u" in done.stdout
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     assert len(result["gyroscopes"]["gyro"]["observations"]) == 12

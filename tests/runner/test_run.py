@@ -77,7 +77,7 @@ def test_a_run_leaves_everything_in_its_folder(finished: tuple[Path, dict[str, A
     *lines, last = done.stdout.splitlines()
     assert last == "verdict: PASS" and len(lines) < 12
     assert float(lines[1].split()[1]) == pytest.approx(result["gyroscopes"]["gyro"]["scale"][0], abs=1e-4)
-    assert f"everything: rig show {out} --all" in lines
+    assert f"all details: rig show {out} --all" in lines
     whole = rig("show", out, "--all").stdout
     assert ", vector" in whole and "six_observation: k" in whole and "non-orthogonality" in whole
     with h5py.File(out / "run.h5", "r") as file:

@@ -53,6 +53,6 @@ def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agree
         assert process.wait(PATIENCE_S) == 3
         failed.pop_all()
     os.close(operator)
-    assert b"rig: not_confirmed: " in said and b"go on with: rig resume" in said, said
+    assert b"rig: not_confirmed: " in said and b"continue with: rig resume" in said, said
     state = handle.state()
     assert not state["moving"] and abs(state["q_rad"][0] - 0.2) < 1e-3

@@ -50,7 +50,7 @@ class Everything:
 
 
 def test_a_line_is_made_of_what_the_event_holds() -> None:
-    assert line(RunResumed(2, 6)) == "resuming: 2 of 6 sweeps and dwells are recorded and sound"
+    assert line(RunResumed(2, 6)) == "resuming: 2 of 6 sweeps and dwells are recorded and valid"
     assert line(PhaseRecorded(SAMPLES, 4)) == "recorded: 150 samples, 3 lost; 4 arm states missed"
     stored = CalibrationStored("gyro", "lsm9ds1", "LSM9DS1-001", 3)
     assert line(stored) == "stored on the board: gyro, lsm9ds1 LSM9DS1-001, record 3"
@@ -61,7 +61,7 @@ def test_a_line_is_made_of_what_the_event_holds() -> None:
     kept = "the data are kept in a run"
     again = f"{kept}; to repeat refused sweeps: rig resume 'a run'"
     assert line(Advice(Path("a run"), "rig resume 'a run'", repeats=True)) == again
-    going_on = f"{kept}; when it is corrected, go on with: rig resume 'a run'"
+    going_on = f"{kept}; after correcting the cause, continue with: rig resume 'a run'"
     assert line(Advice(Path("a run"), "rig resume 'a run'", repeats=False)) == going_on
     assert line(Remembered("h", (8,))) == "entered in h as calibration 8 (rig history show 8)"
     assert line(Remembered("h", (8, 9, 10))) == "entered in h as calibrations 8 to 10 (rig history show 8)"
@@ -82,7 +82,7 @@ def test_the_log_keeps_lines_and_reasons_with_the_time(tmp_path: Path) -> None:
             listener.event(event)
     said = (tmp_path / "log.txt").read_text(encoding="utf-8").splitlines()
     assert [text[24:] for text in said] == [
-        "INFO sampling: every sensor delivers",
+        "INFO sampling: every sensor sends readings",
         "INFO no_luck: it broke. Mend it.",
         "INFO interrupted",
         "INFO Traceback",
@@ -142,7 +142,7 @@ def test_a_listener_that_raises_is_dropped_and_the_others_are_told_so_once() -> 
     dropped = ListenerDropped("Raising", "ValueError: too much")
     assert one.events == other.events == [*told[:2], dropped, told[2]]
     assert raising.events == list(told[:2])
-    assert line(dropped) == "Raising hears nothing more of this run: it failed (ValueError: too much)"
+    assert line(dropped) == "Raising was disconnected from this run: it failed (ValueError: too much)"
 
 
 def test_the_log_keeps_where_a_script_failed() -> None:

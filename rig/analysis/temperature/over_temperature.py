@@ -37,7 +37,7 @@ ASSUMED_GRADIENT_K = 0.1  # half a width, where no configuration states it
 NOT_RECORDED = Fault(
     "temperature_not_recorded",
     "a calibration over temperature is asked for, and the readings have no temperature",
-    "Record the part's thermometer beside its readings, column temperature_c",
+    "Record the part's thermometer with its readings, column temperature_c",
 )
 
 Polynomials = Mapping[str, Mapping[Quantity, OverTemperature]]

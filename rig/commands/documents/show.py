@@ -55,7 +55,7 @@ def run(options: Namespace) -> int:
 def _sensors(result: "ResultDocument") -> list[str]:
     from rig.report.kinds.registry import kinds
 
-    return [*dict.fromkeys(found.sensor for kind in kinds() for found in kind.found(result))]
+    return [*dict.fromkeys(found.sensor for kind in kinds() for found in kind.find(result))]
 
 
 def _scalars(run: Path) -> dict[str, str]:

@@ -13,7 +13,7 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.report.signatures.findings import Looked, Seen
+    from rig.report.signatures.findings import Looked, SignatureReport
 
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
@@ -60,7 +60,7 @@ def add(parser: ArgumentParser) -> None:
 @dataclass(frozen=True, slots=True)
 class _Found:
     file: Path
-    signatures: "tuple[Seen, ...]"
+    signatures: "tuple[SignatureReport, ...]"
     history: tuple[str, ...]
     attached_to: str | None
     problems: tuple[Refused, ...]
@@ -106,11 +106,11 @@ def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Loo
     """What the history says of each file."""
     from rig.commands.history.waiting import answer_of
     from rig.history.entered_file import known
-    from rig.history.storage.address import place
+    from rig.history.storage.address import resolve_address
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 
-    where = place(named)
+    where = resolve_address(named)
     if not is_there(where):  # to look makes none
         raise Refused("history_unreachable", f"there is no history {where.label}", "Name another with --history")
 

@@ -10,7 +10,7 @@ from rig.commands.history.waiting import answer_of
 from rig.errors import RigError
 
 if TYPE_CHECKING:
-    from rig.history.storage.address import Place
+    from rig.history.storage.address import HistoryAddress
 
 T = TypeVar("T")
 
@@ -25,7 +25,7 @@ TO_CONNECT = {
 }
 
 
-def history_answer(place: "Place", work: Callable[[], T], imported: Sequence[str] = ()) -> T:
+def history_answer(place: "HistoryAddress", work: Callable[[], T], imported: Sequence[str] = ()) -> T:
     """Return what `work` gets of the history at `place`, or raise what it raises; TimeoutError after `ANSWER_S`.
 
     That time is the history's alone: what the work needs is imported before, the modules named `imported` too.

@@ -17,7 +17,7 @@ from rig.errors.extras import missing_extra
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.entered.finished import PAGE, Finished, finished_run
 from rig.history.series import changes_between, effects, rig_states, subjects, trends
-from rig.history.storage.address import own_place, place
+from rig.history.storage.address import own_place, resolve_address
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.terminal.change_words import comparison_in_words
 from rig.history.terminal.tables import (
@@ -194,7 +194,7 @@ def void(options: Namespace) -> int:
 
 def opened(options: Namespace) -> AbstractContextManager[History]:
     """The history that is meant. Raises Refused as `open_history`, and as `load` where a configuration names it."""
-    return open_history(own_place(named_history(options.history)) or place(None))
+    return open_history(own_place(named_history(options.history)) or resolve_address(None))
 
 
 def _selection(options: Namespace) -> Selection:

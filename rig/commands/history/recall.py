@@ -9,7 +9,7 @@ from rig.data.absent import NO_BOARD
 from rig.runner.mounted import CalibratedBefore, Memory
 
 if TYPE_CHECKING:
-    from rig.history.storage.address import Place
+    from rig.history.storage.address import HistoryAddress
     from rig.history.store import Past, Selection
 
 
@@ -51,19 +51,19 @@ def known_board(
     return f"{same[0].serial_number}, calibrated {same[0].words}"
 
 
-def _on(where: "Place", board: str) -> tuple[CalibratedBefore, ...]:
+def _on(where: "HistoryAddress", board: str) -> tuple[CalibratedBefore, ...]:
     from rig.history.store import Selection
 
     return _found(where, [Selection(board=board)])
 
 
-def _of(where: "Place", serial_numbers: list[str]) -> tuple[CalibratedBefore, ...]:
+def _of(where: "HistoryAddress", serial_numbers: list[str]) -> tuple[CalibratedBefore, ...]:
     from rig.history.store import Selection
 
     return _found(where, [Selection(serial_number=number) for number in serial_numbers])
 
 
-def _found(where: "Place", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
+def _found(where: "HistoryAddress", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
     """What a history has of that, the newest first; a file that is not there has nothing."""
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history

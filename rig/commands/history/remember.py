@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rig.history.entered.finished import Finished
     from rig.history.entered.issued import Issued
     from rig.history.series import Change
-    from rig.history.storage.address import Place
+    from rig.history.storage.address import HistoryAddress
     from rig.history.store import History, Past
 
 
@@ -44,7 +44,9 @@ def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tupl
     return _remembered(folder, lambda: own_place(named))
 
 
-def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[RunEvent | None, tuple[Beside, ...]]:
+def _remembered(
+    folder: Path, chosen: Callable[[], "HistoryAddress | None"]
+) -> tuple[RunEvent | None, tuple[Beside, ...]]:
     label = "the history"
     try:
         from rig.history.entered.finished import finished_run
@@ -60,7 +62,7 @@ def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[Run
     return Remembered(label, numbers, tuple(map(_since, beside)), usual=_is_usual(where)), beside
 
 
-def _is_usual(where: "Place") -> bool:
+def _is_usual(where: "HistoryAddress") -> bool:
     """Whether it is the one that a command means which names none."""
     from rig.history.storage.address import own_place
 
@@ -136,7 +138,7 @@ def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _entered(where: "Place", run: "Finished") -> "tuple[tuple[int, ...], tuple[Beside, ...]]":
+def _entered(where: "HistoryAddress", run: "Finished") -> "tuple[tuple[int, ...], tuple[Beside, ...]]":
     from rig.history.store import open_history
 
     with open_history(where) as history:
@@ -144,7 +146,7 @@ def _entered(where: "Place", run: "Finished") -> "tuple[tuple[int, ...], tuple[B
         return tuple(each.id for each in history.of_run(run_id)), tuple(_beside(history, run_id))
 
 
-def _certified(place: "Place", content_sha256: str, certificate: "Issued") -> bool:
+def _certified(place: "HistoryAddress", content_sha256: str, certificate: "Issued") -> bool:
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 
@@ -154,7 +156,7 @@ def _certified(place: "Place", content_sha256: str, certificate: "Issued") -> bo
         return history.certify(content_sha256, certificate)
 
 
-def _end(place: "Place") -> tuple[int, str] | None:
+def _end(place: "HistoryAddress") -> tuple[int, str] | None:
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 

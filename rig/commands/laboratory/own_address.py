@@ -32,7 +32,7 @@ def own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[
     with ExitStack() as held:
         own = next((each for each in (host, *_others()) if _take(each, held)), host)
         if own != host:
-            say(f"simulated laboratory: another one is at {host}, so this one is at {own}", file=sys.stderr)
+            say(f"simulated laboratory: another one uses {host}, so this one uses {own}", file=sys.stderr)
         yield [] if own == host else [*_turner_moved(config, laboratory, own), *_moved(config, own)]
 
 

@@ -17,7 +17,7 @@ from rig.errors import Fault
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.batch.operators import Asked, Voice
+    from rig.batch.operators import Operator, Voice
     from rig.batch.status import Present
     from rig.commands.configured import Configured
     from rig.commands.page_arguments import PageWish
@@ -52,7 +52,7 @@ def run(options: Namespace) -> int:
     Raises Refused as `configured`, `claimed`, `numbers_in` and `opened`; `missing_extra`, `not_confirmed`.
     """
     from rig.batch.label import refuse_without_library
-    from rig.batch.operators import Asked, Terminal, refuse_without_terminal
+    from rig.batch.operators import Operator, Terminal, refuse_without_terminal
     from rig.batch.series import numbers_in
     from rig.batch.status import Now, Present
     from rig.commands.configured import configured_here
@@ -71,12 +71,12 @@ def run(options: Namespace) -> int:
         elif numbers is None or not (options.yes or found.loaded.simulated):
             refuse_without_terminal()
             voice = Terminal()
-        return _carried_out(options, found, Asked(voice, numbers, present.asking), present)
+        return _carried_out(options, found, Operator(voice, numbers, present.asking), present)
 
 
-def _carried_out(options: Namespace, configured: "Configured", operator: "Asked", present: "Present") -> int:
+def _carried_out(options: Namespace, configured: "Configured", operator: "Operator", present: "Present") -> int:
     from rig.batch.batch import Begun
-    from rig.batch.journal import opened
+    from rig.batch.journal import open_journal
     from rig.batch.parts_in_turn import Work, now_utc
     from rig.batch.table import CSV, summary
     from rig.commands.station.bench import Station, bench
@@ -84,7 +84,7 @@ def _carried_out(options: Namespace, configured: "Configured", operator: "Asked"
 
     config = configured.loaded.config
     begun = Begun(options.operator, options.work_order, now_utc(), simulated=configured.loaded.simulated)
-    journal = opened(options.out, Path(config.output.folder), begun)
+    journal = open_journal(options.out, Path(config.output.folder), begun)
     folder, said = journal.folder, journal.batch.begun
     say(f"batch folder: {folder}", sys.stderr)
     same = going_on(options, folder)

@@ -10,7 +10,7 @@ Cubic = Annotated[tuple[Vector3, ...], Field(min_length=4, max_length=4)]
 
 
 class TemperatureContributorEntry(Entry):
-    """A contributor to the uncertainty; `std` is that of kx ky kz bx by bz at the reference temperature."""
+    """Contributions to the uncertainty; `std` is that of kx ky kz bx by bz at the reference temperature."""
 
     name: str
     kind: Literal["A", "B"]

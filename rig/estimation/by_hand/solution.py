@@ -109,7 +109,7 @@ def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> Hand
         raise insufficient_session(session, None)
     if len(session.rests) > MOST_RESTS:
         what = f"there are {len(session.rests)} rests; no more than {MOST_RESTS} are solved together"
-        raise Fault("too_many_moves", what, "Give the recording in pieces")
+        raise Fault("too_many_moves", what, "Split the recording")
     if session.acceleration is not None:
         refusals.check_signal(np.array([rest.acceleration_m_s2 for rest in session.rests]))
     check_axes(session)

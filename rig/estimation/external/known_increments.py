@@ -206,7 +206,7 @@ def _check(given: Fixes, left: Fixes, settled: _Settled) -> None:
             "clocks_apart",
             f"the attitudes' clock comes out {1e3 * settled.state.clock_s:+.0f} ± {2e3 * std_s:.0f} ms off the "
             f"readings', and {1e3 * MOST_CLOCK * CLOCK_STD_S:.0f} ms is the most that is allowed for",
-            "Write both files by one clock, or let --estimate-clock-offset find what is between them",
+            "Write both files by one clock, or let --estimate-clock-offset find the difference",
         )
     if len(odd) > _may_be_odd(given):
         where_s = float(given.at_s[np.searchsorted(given.fix, odd.min())])

@@ -1,1 +1,1 @@
-"""Every recording of a history solved again, and what that changes."""
+"""All recordings of a history solved again, and the changes of their results."""

@@ -1,4 +1,4 @@
-"""Which results of a history are to be solved again, in a handful of questions however many there are."""
+"""The results of a history that are to be solved again, by a few queries."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
@@ -18,20 +18,24 @@ _RUN = schema.run.c
 
 
 def stated_results(history: History, selection: Selection) -> tuple[Stated, ...]:
-    """Every result that counts, in the order of time, and replaced ones that a certificate in force relies on.
+    """Return all valid results in the order of time, and replaced ones on which a certificate in force relies.
 
-    Voided calibrations do not count, nor does a run that has no others. Runs without calibrations, such as a
-    verification alone, are among them where no serial number and no part is asked for.
+    Voided calibrations do not count, nor runs with no others. Runs without calibrations, such as a verification alone,
+    are included unless a serial number or part is selected.
     """
     pasts: dict[int, list[Past]] = defaultdict(list)
-    for each in history.calibrations(selection, replaced_too=True):
-        pasts[each.run_id].append(each)
-    of_all = selection.serial_number is None and selection.part is None
-    asked = select(_RUN.id, _RUN.content_sha256, _RUN.started_utc, _RUN.rig, _RUN.verdict, replaced().label("replaced"))
-    runs = chosen(asked.order_by(_RUN.started_utc, _RUN.id), replace(selection, serial_number=None, part=None))
+    for past in history.calibrations(selection, replaced_too=True):
+        pasts[past.run_id].append(past)
+    includes_all = selection.serial_number is None and selection.part is None
+    query = select(_RUN.id, _RUN.content_sha256, _RUN.started_utc, _RUN.rig, _RUN.verdict, replaced().label("replaced"))
+    runs = chosen(query.order_by(_RUN.started_utc, _RUN.id), replace(selection, serial_number=None, part=None))
     with history.engine.connect() as connection:
         rows = connection.execute(runs).all()
-        recordings, places, certificates = _recordings(connection), _places(connection), _in_force(connection)
+        recordings, places, certificates = (
+            _recordings(connection),
+            _places(connection),
+            _certificates(connection),
+        )
     return tuple(
         Stated(
             row.id,
@@ -39,46 +43,46 @@ def stated_results(history: History, selection: Selection) -> tuple[Stated, ...]
             row.started_utc,
             row.rig,
             row.verdict,
-            tuple(each for each in pasts.get(row.id, ()) if each.voided is None),
+            tuple(past for past in pasts.get(row.id, ()) if past.voided is None),
             recordings.get(row.id, ()),
             places.get(row.id, ()),
             certificates.get(row.id, ()),
         )
         for row in rows
-        if (any(each.voided is None for each in pasts[row.id]) if row.id in pasts else of_all)
+        if (any(past.voided is None for past in pasts[row.id]) if row.id in pasts else includes_all)
         and (not row.replaced or row.id in certificates)
     )
 
 
 def _recordings(connection: Connection) -> Mapping[int, tuple[Recording, ...]]:
     columns = schema.recording.c
-    asked = select(columns.run_id, columns.name, columns.bytes, columns.sha256).order_by(columns.name)
-    return _by_run((row.run_id, Recording(row.name, row.bytes, row.sha256)) for row in _rows(connection, asked))
+    query = select(columns.run_id, columns.name, columns.bytes, columns.sha256).order_by(columns.name)
+    return _group_by_run((row.run_id, Recording(row.name, row.bytes, row.sha256)) for row in _rows(connection, query))
 
 
 def _places(connection: Connection) -> Mapping[int, tuple[tuple[str, str], ...]]:
     columns = schema.location.c
-    asked = select(columns.run_id, columns.computer, columns.path).order_by(columns.id.desc())
-    return _by_run((row.run_id, (row.computer, row.path)) for row in _rows(connection, asked))
+    query = select(columns.run_id, columns.computer, columns.path).order_by(columns.id.desc())
+    return _group_by_run((row.run_id, (row.computer, row.path)) for row in _rows(connection, query))
 
 
-def _in_force(connection: Connection) -> Mapping[int, tuple[Issued, ...]]:
-    """The certificates to rely on: without a mark, and replaced by none that this history knows."""
+def _certificates(connection: Connection) -> Mapping[int, tuple[Issued, ...]]:
+    """Return the certificates in force: without a mark, and not replaced by another of this history."""
     rows = _rows(connection, select(schema.certificate).order_by(schema.certificate.c.id))
-    gone = {row.replaces for row in rows if not row.marks}  # one that is not valid replaces none that is
-    return _by_run(
+    replaced_numbers = {row.replaces for row in rows if not row.marks}  # an invalid one does not replace a valid one
+    return _group_by_run(
         (row.run_id, Issued(row.number, row.title, row.issued, row.replaces, row.marks))
         for row in rows
-        if row.number not in gone and not row.marks
+        if row.number not in replaced_numbers and not row.marks
     )
 
 
-def _rows(connection: Connection, asked: Select[Any]) -> list[Row[Any]]:
-    return list(connection.execute(asked).all())
+def _rows(connection: Connection, query: Select[Any]) -> list[Row[Any]]:
+    return list(connection.execute(query).all())
 
 
-def _by_run(pairs: Iterable[tuple[int, Value]]) -> dict[int, tuple[Value, ...]]:
-    found: dict[int, list[Value]] = defaultdict(list)
+def _group_by_run(pairs: Iterable[tuple[int, Value]]) -> dict[int, tuple[Value, ...]]:
+    groups: dict[int, list[Value]] = defaultdict(list)
     for key, value in pairs:
-        found[key].append(value)
-    return {key: tuple(values) for key, values in found.items()}
+        groups[key].append(value)
+    return {key: tuple(values) for key, values in groups.items()}

@@ -1,4 +1,4 @@
-"""Everything again in documents: CSV for machines, a page of what is to be looked at, and its lines for a terminal."""
+"""A recomputation in documents: CSV for machines, a page of notable results, and its lines for a terminal."""
 
 import csv
 import io
@@ -45,7 +45,7 @@ COLUMNS = (
 )
 STATE_WORDS = {
     "refused": "refused by today's method",
-    "unjudged": "without the setting or estimator asked for",
+    "unjudged": "without the requested setting or estimator",
     "missing": "missing",
     "damaged": "damaged",
     "lost": "lost with a worker",
@@ -54,18 +54,18 @@ STATE_WORDS = {
 
 
 def again_csv(outcome: Outcome) -> str:
-    """A line for each calibration, with the parameter of it that moved most; a run without any has one line."""
+    """Return a line for each calibration, with its parameter that moved most; a run without any has one line."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()
-    for each in outcome.compared:
-        for row in _rows(each):
+    for comparison in outcome.compared:
+        for row in _rows(comparison):
             writer.writerow({name: cell(value) for name, value in row.items() if value is not None})
     return out.getvalue()
 
 
 def again_page(outcome: Outcome, question: Question, history: str) -> str:
-    """HTML that loads nothing from anywhere: what was asked, in numbers, and what is to be looked at."""
+    """Return HTML that loads nothing from outside: the question, the numbers, and notable results."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -82,7 +82,7 @@ def again_page(outcome: Outcome, question: Question, history: str) -> str:
 
 
 def counts(outcome: Outcome) -> Iterator[str]:
-    """The outcome in two or three lines."""
+    """Yield the numbers in two or three lines."""
     unsolved = [f"{count} {STATE_WORDS[state]}" for state, count in sorted(outcome.unsolved.items())]
     unsolved += [f"{outcome.unreached} not reached"] if outcome.unreached else []
     yield f"{len(outcome.compared)} results: {', '.join([f'{outcome.solved} solved', *unsolved])}"
@@ -95,31 +95,31 @@ def counts(outcome: Outcome) -> Iterator[str]:
 
 
 def notable_table(outcome: Outcome, most: int) -> FittingTable:
-    """The first lines of what is to be looked at, in the order of time."""
+    """Return the first notable results, in the order of time."""
     lines = list(_lines(outcome))[:most]
     columns = (
-        Column("number", [each["number"] for each in lines], number=True),
-        Column("day", [each["started"][:10] for each in lines], rank=3),
-        Column("serial", [each["serial"] for each in lines]),
-        Column("quantity", [each["quantity"] for each in lines], rank=4),
-        Column("verdict", [each["verdict"] for each in lines]),
-        Column("moved most", [each["moved"] for each in lines], rank=1),
-        Column("withdraw", [each["withdraw"] for each in lines], rank=2),
-        Column("why not solved", [each["why"] for each in lines], wraps=True, least=20),
+        Column("number", [line["number"] for line in lines], number=True),
+        Column("day", [line["started"][:10] for line in lines], rank=3),
+        Column("serial", [line["serial"] for line in lines]),
+        Column("quantity", [line["quantity"] for line in lines], rank=4),
+        Column("verdict", [line["verdict"] for line in lines]),
+        Column("moved most", [line["moved"] for line in lines], rank=1),
+        Column("withdraw", [line["withdraw"] for line in lines], rank=2),
+        Column("why not solved", [line["why"] for line in lines], wraps=True, least=20),
     )
-    return FittingTable("to be looked at", columns)
+    return FittingTable("needs attention", columns)
 
 
 def _lines(outcome: Outcome) -> Iterator[dict[str, str]]:
-    for each in outcome.notable:
-        for past in each.stated.calibrations or (None,):
-            yield _line(each, past)
+    for comparison in outcome.notable:
+        for past in comparison.stated.calibrations or (None,):
+            yield _line(comparison, past)
 
 
 def _line(compared: Compared, past: Past | None) -> dict[str, str]:
-    """What a person reads of one calibration."""
+    """Return the texts of one calibration."""
     move = _most_moved(compared, past)
-    moved = past is not None and past.id in compared.moved
+    has_moved = past is not None and past.id in compared.moved
     return {
         "number": "" if past is None else str(past.id),
         "started": compared.stated.started_utc.replace("T", " ")[:16],
@@ -127,8 +127,8 @@ def _line(compared: Compared, past: Past | None) -> dict[str, str]:
         "quantity": "" if past is None else past.quantity,
         "rig": compared.stated.rig,
         "verdict": _verdict(compared),
-        "moved": _move_words(move) if moved and move is not None else "",
-        "change": "" if not moved or move is None else _change(move),
+        "moved": _move_words(move) if has_moved and move is not None else "",
+        "change": "" if not has_moved or move is None else _change(move),
         "withdraw": _numbers(compared.withdrawn),
         "why": f"{STATE_WORDS[compared.answer.state]}: {compared.answer.why}" if isinstance(compared.answer, Unsolved)
         else "not reached" if compared.answer is None else compared.answer.left_out or "",
@@ -144,7 +144,7 @@ def _verdict(compared: Compared) -> str:
 
 def _move_words(move: Move) -> str:
     if move.now is None:
-        return f"{move.before.name}: not given any more"
+        return f"{move.before.name}: no longer in the result"
     if move.shift >= move.growth:
         return f"{move.before.name} by {figures(move.shift)} U"
     return f"U of {move.before.name} grew by {figures(move.growth)}"
@@ -155,7 +155,7 @@ def _change(move: Move) -> str:
 
 
 def _numbers(certificates: tuple[Issued, ...]) -> str:
-    return ", ".join(each.number for each in certificates)
+    return ", ".join(certificate.number for certificate in certificates)
 
 
 def _most_moved(compared: Compared, past: Past | None) -> Move | None:
@@ -165,7 +165,7 @@ def _most_moved(compared: Compared, past: Past | None) -> Move | None:
 
 def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
     answer = compared.answer
-    of_run: dict[str, Any] = {
+    columns: dict[str, Any] = {
         "run": compared.stated.run_id,
         "started_utc": compared.stated.started_utc,
         "rig": compared.stated.rig,
@@ -175,30 +175,30 @@ def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
         "folder": compared.stated.places[0][1] if compared.stated.places else None,
     }
     if isinstance(answer, Given):
-        of_run |= {
+        columns |= {
             "state": "solved",
             "verdict_now": answer.verdict,
             "failed_now": ", ".join(answer.failed),
             "omitted": answer.left_out,
         }
     else:
-        of_run |= {"state": "unreached"} if answer is None else {"state": answer.state, "why": answer.why}
+        columns |= {"state": "unreached"} if answer is None else {"state": answer.state, "why": answer.why}
     for past in compared.stated.calibrations:
         move = _most_moved(compared, past)
         yield {
-            **of_run,
+            **columns,
             "calibration": past.id,
             "part": past.part,
             "serial_number": past.serial_number,
             "quantity": past.quantity,
             **({} if not isinstance(answer, Given) else {"moved": past.id in compared.moved}),
-            **({} if move is None else _of_move(move)),
+            **({} if move is None else _move_columns(move)),
         }
     if not compared.stated.calibrations:
-        yield of_run
+        yield columns
 
 
-def _of_move(move: Move) -> dict[str, Any]:
+def _move_columns(move: Move) -> dict[str, Any]:
     now = move.now
     return {
         "parameter": move.before.name,

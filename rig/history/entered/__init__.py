@@ -1,1 +1,1 @@
-"""A finished run as a history keeps it: its result, its rows, its certificates."""
+"""A finished run in the form of a history: its result, its rows, its certificates."""

@@ -1,4 +1,4 @@
-"""Certificates in a history, within somebody's transaction: entered once by their number, and found again by run."""
+"""Certificates in a history, within a caller's transaction: entered once by number, and read by run."""
 
 from sqlalchemy import Connection, insert, select
 
@@ -9,7 +9,7 @@ from rig.history.storage.schema import certificate, certificate_file
 
 
 def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> None:
-    """Add the certificate, and those of its files that are not known; what is there already stays as it is."""
+    """Add the certificate, and those of its files that are new; existing rows stay unchanged."""
     number = connection.scalar(select(certificate.c.id).where(certificate.c.number == issued.number))
     if number is None:
         number = next_number(connection, certificate)
@@ -26,8 +26,8 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
         connection.execute(insert(certificate).values(row))
         journal.note(connection, certificate, number)
     files = certificate_file.c
-    there = select(files.name, files.sha256).where(files.certificate_id == number)
-    entered = {(row.name, row.sha256) for row in connection.execute(there)}
+    existing = select(files.name, files.sha256).where(files.certificate_id == number)
+    entered = {(row.name, row.sha256) for row in connection.execute(existing)}
     for name, sha256 in issued.files:
         if (name, sha256) not in entered:
             row = {"certificate_id": number, "name": name, "sha256": sha256, "entered_utc": now_utc}
@@ -36,16 +36,16 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
 
 
 def of_run(connection: Connection, run_id: int) -> tuple[Issued, ...]:
-    """Certificates of a run in the order they were entered, and so are the files of each."""
-    asked = select(certificate).where(certificate.c.run_id == run_id).order_by(certificate.c.id)
+    """Return the certificates of a run, and the files of each, in the order of entry."""
+    query = select(certificate).where(certificate.c.run_id == run_id).order_by(certificate.c.id)
     return tuple(
         Issued(row.number, row.title, row.issued, row.replaces, row.marks, _files(connection, row.id))
-        for row in connection.execute(asked).all()
+        for row in connection.execute(query).all()
     )
 
 
 def _files(connection: Connection, number: int) -> tuple[tuple[str, str], ...]:
     files = certificate_file.c
-    asked = select(files.name, files.sha256).where(files.certificate_id == number)
-    rows = connection.execute(asked.order_by(files.entered_utc, files.name)).all()
+    query = select(files.name, files.sha256).where(files.certificate_id == number)
+    rows = connection.execute(query.order_by(files.entered_utc, files.name)).all()
     return tuple((row.name, row.sha256) for row in rows)

@@ -1,4 +1,4 @@
-"""The rows of a run, within somebody's transaction."""
+"""The rows of a run, within a caller's transaction."""
 
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -10,11 +10,11 @@ from rig.history.storage import journal, schema
 from rig.history.storage.numbers import next_number
 
 if TYPE_CHECKING:
-    from rig.report.findings.followed import Followed
+    from rig.report.findings.followed import HistoryRecord
 
 
 def enter_run(connection: Connection, finished: Finished, content_sha256: str) -> int:
-    """Add a run with all that belongs to it; its number."""
+    """Add a run with all that belongs to it; return its number."""
     from rig.history.entered.index import run_row
     from rig.report.kinds.registry import followed
 
@@ -37,14 +37,15 @@ def enter_run(connection: Connection, finished: Finished, content_sha256: str) -
     if finished.documents:
         rows = [{"run_id": run_id, "name": name, "sha256": sha256} for name, sha256 in finished.documents]
         connection.execute(insert(schema.document), rows)
-    for each in followed(finished.document):
-        _enter_calibration(connection, run_id, each, check_standard=each.serial_number in finished.check_standards)
+    for record in followed(finished.document):
+        is_standard = record.serial_number in finished.check_standards
+        _enter_calibration(connection, run_id, record, check_standard=is_standard)
     journal.note(connection, schema.run, run_id)
     return run_id
 
 
 def note_place(connection: Connection, run_id: int, finished: Finished) -> None:
-    """Where the run's folder was seen, unless that is known."""
+    """Add the location of the run's folder, unless it is known."""
     places = schema.location.c
     same = (places.run_id == run_id, places.computer == finished.computer, places.path == finished.path)
     if connection.scalar(select(places.id).where(*same)) is None:
@@ -55,11 +56,13 @@ def note_place(connection: Connection, run_id: int, finished: Finished) -> None:
 
 
 def now_utc() -> str:
-    """The time now, UTC to the millisecond."""
+    """Return the present time, UTC to the millisecond."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def _enter_calibration(connection: Connection, run_id: int, calibration: "Followed", *, check_standard: bool) -> None:
+def _enter_calibration(
+    connection: Connection, run_id: int, calibration: "HistoryRecord", *, check_standard: bool
+) -> None:
     number = next_number(connection, schema.calibration)
     row = {
         "id": number,

@@ -1,4 +1,4 @@
-"""A finished run as its folder has it: what is entered into a history."""
+"""A finished run in its folder, ready to be entered into a history."""
 
 import hashlib
 import json
@@ -23,7 +23,7 @@ PAGE, HEADER = "certificate.html", "calibration.h"
 DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
 CERTIFICATES = (PAGE, "certificate.pdf", "certificate.xml")
 CHUNK_BYTES = 1 << 20
-PAGE_MAX_BYTES = 64_000_000  # of a run of six sweeps it has 30,000
+PAGE_MAX_BYTES = 64_000_000  # that of six sweeps has 30,000
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +37,14 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """`text` is all of result.json, compact; `rig` what the rig is called; `computer` and `path` where it lies.
+    """A finished run.
 
-    `check_standards` are the serial numbers of sensors that are there to watch the rig; `operator` and `note` what the
-    configuration says of them; `certificate` is that in the folder, and `documents` what else a run leaves there: name
-    and SHA-256, of result.json that of what it says.
+    - `text`: result.json in compact form; `document`: its content.
+    - `rig`: the rig's name. `computer`, `path`: the location of the folder. `simulated`: whether the laboratory is.
+    - `check_standards`: serial numbers of the sensors that monitor the rig.
+    - `recordings`, `documents`: files in the folder; a document has its name and SHA-256, for result.json that of its
+      content.
+    - `operator`, `note`: statements of the configuration. `certificate`: that in the folder.
     """
 
     text: str
@@ -59,14 +62,14 @@ class Finished:
 
     @property
     def content_sha256(self) -> str:
-        """Checksum of the result without the time it was computed: the same numbers again are no other result."""
+        """The checksum of the result without its time of computation: the same numbers are the same result."""
         return content_sha256(self.text)
 
 
 def finished_run(folder: Path, document: "ResultDocument | None" = None) -> Finished:
-    """The run in `folder`, with its result.json or, in place of it, the `document` that was computed from it.
+    """Return the run in `folder`, with its result.json or the `document` that was computed from its recordings.
 
-    Raises Refused as `read_result`; OSError when a recording cannot be read.
+    Raise the errors of `read_result`; OSError if a recording cannot be read.
     """
     from rig.config.judging.judging_sections import HistorySection
     from rig.data.recording.provenance import calls_itself_simulated
@@ -90,7 +93,7 @@ def finished_run(folder: Path, document: "ResultDocument | None" = None) -> Fini
         check_standards=section.check_standards,
         simulated=simulated or calls_itself_simulated(provenance.arm_software),
         computer=platform.node(),
-        path=os.fsencode(folder.resolve()).decode("utf-8", "backslashreplace"),  # no database takes other bytes
+        path=os.fsencode(folder.resolve()).decode("utf-8", "backslashreplace"),  # databases accept no other bytes
         recordings=tuple(
             recording_of(file) for readings in ("raw", "calibrated") for file in recordings(folder, readings)
         ),
@@ -105,9 +108,9 @@ def finished_run(folder: Path, document: "ResultDocument | None" = None) -> Fini
 
 
 def document_sha256(folder: Path, name: str) -> str | None:
-    """Checksum of a file that a run leaves beside its recordings, of result.json that of what it says; None without it.
+    """Return the checksum of a file in a run folder, for result.json that of its content; None if it is missing.
 
-    Raises OSError, and UnfitFile for what is no file of a run.
+    Raise OSError, and UnfitFile for a file that does not belong to a run.
     """
     try:
         content = read_regular_file(folder / name, PAGE_MAX_BYTES)
@@ -117,12 +120,12 @@ def document_sha256(folder: Path, name: str) -> str | None:
         try:
             return content_sha256(content.decode())
         except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise UnfitFile("it is no result") from error
+            raise UnfitFile("it is not a result") from error
     return hashlib.sha256(content).hexdigest()
 
 
 def recording_of(file: Path) -> Recording:
-    """A recording with its hash. Raises OSError, and UnfitFile for what is no file of a run."""
+    """Return a recording with its hash. Raise OSError, and UnfitFile for a file that does not belong to a run."""
     digest, size = hashlib.sha256(), 0
     with open_regular_file(file, RECORDING_MAX_BYTES) as stream:
         while chunk := stream.read(CHUNK_BYTES):
@@ -132,26 +135,25 @@ def recording_of(file: Path) -> Recording:
 
 
 def compact(document: Any) -> str:
-    """JSON with nothing between its words."""
+    """Return JSON without white space."""
     return json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def content_sha256(text: str) -> str:
-    """The hash of a result.json that tells it from others; in the order of the alphabet, without `solved_utc`.
+    """Return the hash of a result.json's content, with sorted keys and without `solved_utc`.
 
-    Raises ValueError if it is no JSON or a key stands twice, and what else a result of another form leads to.
+    Raise ValueError if it is not JSON or has a key twice, and other errors for a result of another form.
     """
     document = json.loads(text, object_pairs_hook=refuse_duplicate_keys)
     document["provenance"].pop("solved_utc", None)
-    said = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return hashlib.sha256(said.encode()).hexdigest()
+    canonical = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(canonical.encode()).hexdigest()
 
 
 def configured_in(folder: Path) -> "Loaded | None":
     """Return the folder's configuration.
 
-    None if there is none, or if this program refuses it, by a key that it does not know: a result is entered all the
-    same.
+    None if there is none, or if this program refuses it because of an unknown key: the result is entered nevertheless.
     """
     if not (folder / CONFIG).exists():
         return None
@@ -164,9 +166,9 @@ def configured_in(folder: Path) -> "Loaded | None":
 
 
 def _certificate(folder: Path, document: "ResultDocument", stated: "Stated") -> Issued | None:
-    """The page in the folder, if it is to the letter the certificate of this result: its number alone proves nothing.
+    """Return the certificate in the folder if it is exactly that of this result: its number alone proves nothing.
 
-    An amended one was entered when it was made.
+    An amended one is entered when it is made.
     """
     try:
         page = read_regular_file(folder / PAGE, PAGE_MAX_BYTES)

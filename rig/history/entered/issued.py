@@ -1,4 +1,4 @@
-"""A certificate as a history keeps it: its number, what it says of itself, and the hashes of its files. Pure."""
+"""A certificate in a history: its number, its statements about itself, and the hashes of its files. Pure."""
 
 import hashlib
 from collections.abc import Mapping
@@ -11,9 +11,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Issued:
-    """`issued` is a day; `replaces` the number it amends; `marks` what stands across its pages, empty if nothing does.
+    """An issued certificate.
 
-    `files` are what it was written to: name and SHA-256 of each.
+    `issued` is a day; `replaces` the number that it amends; `marks` the text across its pages, empty if there is none.
+    `files` are its files, name and SHA-256.
     """
 
     number: str
@@ -25,7 +26,7 @@ class Issued:
 
 
 def issued_certificate(certificate: "Certificate", files: Mapping[str, bytes]) -> Issued:
-    """The certificate as it is entered: with the checksums of its files, by name."""
+    """Return the certificate for a history, with the checksums of its files."""
     return Issued(
         certificate.number,
         certificate.title,

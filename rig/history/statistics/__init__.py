@@ -1,1 +1,1 @@
-"""What a series of calibrations says: arrays in, results out, no database."""
+"""Statistics of a series of calibrations: arrays in, results out, no database."""

@@ -1,4 +1,4 @@
-"""A linear model of results that each have an uncertainty of their own and spread by more than that from run to run."""
+"""A random-effects linear model: results with stated uncertainties and additional scatter between runs."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """`coefficients` (p,) and their `covariance` (p, p); `between_std` is the spread that the values' own stds leave.
+    """`coefficients` (p,) and their `covariance` (p, p); `between_std` is the scatter beyond the values' stated stds.
 
     `freedom` is n − p.
     """
@@ -23,45 +23,45 @@ class Fitted:
 
     @property
     def std(self) -> Array:
-        """(p,) standard deviations of the coefficients."""
+        """Standard deviations (p,) of the coefficients."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def coverage_factor(self) -> float:
-        """Student's, for 95 %."""
+        """Student's t for 95 %."""
         from scipy.special import stdtrit
 
         return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2))
 
     def p_value(self, index: int) -> float:
-        """How likely a coefficient as far from 0 is where the true one is 0."""
+        """Return the probability of a coefficient at least as far from 0 if the true one is 0."""
         from scipy.special import stdtr
 
         return float(2 * stdtr(self.freedom, -abs(self.coefficients[index]) / self.std[index]))
 
     def at(self, row: Array) -> tuple[Array, Array]:
-        """The model's value and its std at rows (…, p) of a design."""
+        """Return the model's value and its std at rows (…, p) of a design."""
         value: Array = row @ self.coefficients
         variance: Array = np.einsum("...i,ij,...j->...", row, self.covariance, row)
         return value, np.sqrt(variance)
 
 
 def fit(design: Array, values: Array, std: Array) -> Fitted:
-    """Weighted least squares of values (n,) with stds (n,) on a design (n, p) of full rank, n > p.
+    """Return the weighted least-squares fit of values (n,) with stds (n,) to a design (n, p) of full rank, n > p.
 
-    The variance between runs is DerSimonian and Laird's estimate by moments (Control. Clin. Trials 7 (1986) 177), for
-    any design as in a meta-regression. The covariance is that of Knapp and Hartung (Stat. Med. 22 (2003) 2693), which
-    with Student's t holds for few runs too; never below what the stds themselves say. Raises ValueError for fewer rows.
+    The variance between runs is DerSimonian and Laird's moment estimate (Control. Clin. Trials 7 (1986) 177), for any
+    design as in a meta-regression. The covariance is Knapp and Hartung's (Stat. Med. 22 (2003) 2693), which with
+    Student's t is valid for few runs too; it is never below that of the stated stds. Raise ValueError for fewer rows.
     """
     n, p = design.shape
     if n <= p:
-        raise ValueError(f"{n} values do not determine {p} coefficients and a spread")
+        raise ValueError(f"{n} values do not determine {p} coefficients and a scatter")
     fixed = 1 / std**2
     residuals = values - design @ _solve(design, values, fixed)
-    # Of weights W the expectation of Q = Σ w r² is n − p + τ² (ΣW − tr[(XᵀWX)⁻¹ XᵀW²X]).
+    # For weights W the expectation of Q = Σ w r² is n − p + τ² (ΣW − tr[(XᵀWX)⁻¹ XᵀW²X]).
     squares = np.linalg.solve((design.T * fixed) @ design, (design.T * fixed**2) @ design)
-    beyond = float(fixed @ residuals**2) - (n - p)
-    between_variance = max(0.0, beyond / float(fixed.sum() - np.trace(squares)))
+    excess = float(fixed @ residuals**2) - (n - p)
+    between_variance = max(0.0, excess / float(fixed.sum() - np.trace(squares)))
     weights = 1 / (std**2 + between_variance)
     coefficients = _solve(design, values, weights)
     residuals = values - design @ coefficients
@@ -72,5 +72,5 @@ def fit(design: Array, values: Array, std: Array) -> Fitted:
 
 def _solve(design: Array, values: Array, weights: Array) -> Array:
     root = np.sqrt(weights)
-    found = np.linalg.lstsq(design * root[:, None], values * root, rcond=None)[0]
-    return np.asarray(found, dtype=np.float64)
+    coefficients = np.linalg.lstsq(design * root[:, None], values * root, rcond=None)[0]
+    return np.asarray(coefficients, dtype=np.float64)

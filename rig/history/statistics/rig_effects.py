@@ -1,4 +1,4 @@
-"""What a rig adds to every result, told apart from what each sensor is: by sensors calibrated on several rigs."""
+"""Effects of rigs on results, separated from those of sensors by sensors calibrated on several rigs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from rig.history.statistics.random_effects import fit
 
 @dataclass(frozen=True, slots=True)
 class RigEffect:
-    """What `rig` finds more than `reference` does of the same sensors, with its std and Student's factor for 95 %."""
+    """The mean difference of `rig` from `reference` for the same sensors, with its std and Student's t for 95 %."""
 
     rig: str
     reference: str
@@ -28,20 +28,21 @@ class RigEffect:
 
 
 def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std: Array) -> tuple[RigEffect, ...]:
-    """The effects of rigs on results (n,) with stds (n,), each by one of `rigs` (n) of one of `sensors` (n).
+    """Return the effects of rigs on results (n,) with stds (n,), by `rigs` (n) and `sensors` (n).
 
-    The two-way model value = sensor + rig + run, runs random (`random_effects.fit`). Within each group of rigs that
-    sensors connect, the effects are relative to the rig with the most results; a rig that shares no sensor has none.
+    The two-way model is value = sensor + rig + run, with random runs (`random_effects.fit`). Within each group of rigs
+    connected by sensors, the effects are relative to the rig with the most results; a rig without shared sensors has
+    none.
     """
-    found: list[RigEffect] = []
+    effects: list[RigEffect] = []
     names = np.array(rigs)
-    for group in _connected(rigs, sensors):
-        of_rig = [rig for rig in dict.fromkeys(rigs) if rig in group]
-        if len(of_rig) < 2:
+    for group in _connected_groups(rigs, sensors):
+        group_rigs = [rig for rig in dict.fromkeys(rigs) if rig in group]
+        if len(group_rigs) < 2:
             continue
-        reference = max(of_rig, key=lambda rig: int(np.sum(names == rig)))
-        others = [rig for rig in of_rig if rig != reference]
-        rows = np.flatnonzero(np.isin(names, of_rig))
+        reference = max(group_rigs, key=lambda rig: int(np.sum(names == rig)))
+        others = [rig for rig in group_rigs if rig != reference]
+        rows = np.flatnonzero(np.isin(names, group_rigs))
         subjects = np.array(sensors)[rows]
         subject_names = list(dict.fromkeys(subjects.tolist()))
         design = np.column_stack(
@@ -52,13 +53,15 @@ def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std:
         fitted = fit(design, values[rows], std[rows])
         for i, rig in enumerate(others):
             shared = len(set(subjects[names[rows] == rig]) & set(subjects[names[rows] != rig]))
-            value, of_value = float(fitted.coefficients[i]), float(fitted.std[i])
-            found.append(RigEffect(rig, reference, value, of_value, fitted.coverage_factor, fitted.between_std, shared))
-    return tuple(found)
+            value, value_std = float(fitted.coefficients[i]), float(fitted.std[i])
+            effects.append(
+                RigEffect(rig, reference, value, value_std, fitted.coverage_factor, fitted.between_std, shared)
+            )
+    return tuple(effects)
 
 
-def _connected(rigs: Sequence[str], sensors: Sequence[str]) -> list[set[str]]:
-    """Groups of rigs between which a way leads over sensors that they share."""
+def _connected_groups(rigs: Sequence[str], sensors: Sequence[str]) -> list[set[str]]:
+    """Return groups of rigs that are connected by shared sensors."""
     rig_names, sensor_names = list(dict.fromkeys(rigs)), list(dict.fromkeys(sensors))
     nodes = len(rig_names) + len(sensor_names)
     rows = [rig_names.index(rig) for rig in rigs]

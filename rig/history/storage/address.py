@@ -1,4 +1,4 @@
-"""Which history is meant: a file of the user's own unless somebody says otherwise."""
+"""The address of a history: the user's own file by default."""
 
 import os
 from collections.abc import Mapping
@@ -16,59 +16,60 @@ if TYPE_CHECKING:
     from rig.config.judging.judging_sections import HistorySection
 
 ENVIRONMENT = "RIG_HISTORY"
-OFF = "off"
+SWITCHED_OFF = "off"
 NAME = "history.sqlite"
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """`where` is an SQLite file or a server's URL; `label` is what people are told, without any password."""
+class HistoryAddress:
+    """`where` is an SQLite file or a server's URL; `label` is its name for people, without a password."""
 
     label: str
     where: "Path | URL"
 
 
-def chosen_place(section: "HistorySection", environment: Mapping[str, str] = os.environ) -> Place | None:
-    """Where a run is entered: by the environment's `RIG_HISTORY`, else by its configuration; None for nowhere.
+def chosen_place(section: "HistorySection", environment: Mapping[str, str] = os.environ) -> HistoryAddress | None:
+    """Return the history of a run: by the environment's `RIG_HISTORY`, else by its configuration; None for none.
 
-    `section` is of a configuration that the user has named or knows, never of a folder that came from somewhere.
-    Raises Refused `history_address`.
+    `section` must be of a configuration that the user has named or knows, never of a foreign folder. Raise Refused
+    `history_address`.
     """
-    said = environment.get(ENVIRONMENT)
-    if said == OFF or (section.off and not said):
+    variable = environment.get(ENVIRONMENT)
+    if variable == SWITCHED_OFF or (section.off and not variable):
         return None
-    return place(said or section.url)
+    return resolve_address(variable or section.url)
 
 
-def own_place(address: str | None) -> Place | None:
-    """The user's: `address` as in a command, else in `RIG_HISTORY`, else the file of their own; None where it is off.
+def own_place(address: str | None) -> HistoryAddress | None:
+    """Return the user's history: by the command's `address`, else `RIG_HISTORY`, else the own file; None if switched
+    off.
 
-    Raises Refused `history_address`.
+    Raise Refused `history_address`.
     """
     address = address or os.environ.get(ENVIRONMENT)
-    return None if address == OFF else place(address)
+    return None if address == SWITCHED_OFF else resolve_address(address)
 
 
-def place(address: str | None) -> Place:
-    """A file's name or a URL; None is the user's own file. Raises Refused `history_address`, and as `own_folder`."""
+def resolve_address(address: str | None) -> HistoryAddress:
+    """Return the history at a file's name or a URL; None is the user's own file. Raise Refused `history_address`."""
     if not address:
         address = str(own_folder() / NAME)
     if "://" not in address:
         try:
             path = Path(address).expanduser().absolute()
-        except RuntimeError as error:  # a `~` of somebody who has no home
+        except RuntimeError as error:  # `~` of a user without a home folder
             remedy = "Write out the folder in --history, RIG_HISTORY or the configuration"
             raise Refused("history_address", f"the history {address} cannot be found: {error}", remedy) from None
-        return Place(str(path), path)
+        return HistoryAddress(str(path), path)
     try:
         url = history_url(address)
     except ValueError as error:
-        # Not with what was said: it may hold a password.
+        # Without the address itself: it may contain a password.
         raise Refused(
             "history_address",
             f"the address of the history, {address.partition('://')[0]}://…, {error}",
             "Correct it in --history, RIG_HISTORY or the configuration: docs/how-to/finished-runs/shared-history.md",
         ) from error
     if url.drivername == "sqlite":
-        return place(url.database)
-    return Place(url.set(password=None).render_as_string(), url.set(drivername="postgresql+psycopg"))
+        return resolve_address(url.database)
+    return HistoryAddress(url.set(password=None).render_as_string(), url.set(drivername="postgresql+psycopg"))

@@ -1,4 +1,4 @@
-"""No connection crosses a fork: neither SQLite's locks nor a server's session do.
+"""Connections do not survive a fork: neither SQLite's locks nor a server's session do.
 
 Source: https://sqlite.org/howtocorrupt.html, 2.6; SQLAlchemy, "Using connection pools with multiprocessing".
 """
@@ -9,18 +9,18 @@ from weakref import WeakSet
 from sqlalchemy import Engine, Pool
 
 _engines: "WeakSet[Engine]" = WeakSet()
-_of_the_parent: list[Pool] = []
+_parent_pools: list[Pool] = []
 
 
 def kept_from_children(engine: Engine) -> Engine:
-    """Return the engine, which in a forked process begins with connections of its own."""
+    """Return the engine; in a forked process it starts with new connections."""
     _engines.add(engine)
     return engine
 
 
 def _leave_to_the_parent() -> None:
     for engine in list(_engines):
-        _of_the_parent.append(engine.pool)  # not even closed here, which would work on the parent's files
+        _parent_pools.append(engine.pool)  # not closed here: that would act on the parent's files
         engine.dispose(close=False)
 
 

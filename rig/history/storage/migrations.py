@@ -1,7 +1,7 @@
-"""A history's tables are made when it is opened, or migrated if an older program made them; others are refused.
+"""Tables of a history are made when it is opened, or migrated from an older version; other versions are refused.
 
-A migration is a function from a connection to the next version. All of them run in one transaction. They only add: what
-was entered stays as it was.
+A migration is a function from a connection to the next version. All run in one transaction. They only add: existing
+entries stay unchanged.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,16 +14,16 @@ from rig.history.storage import journal, schema
 from rig.history.storage.triggers import create_triggers
 
 VERSION_KEY = "schema_version"
-DEVELOPMENT_KEY = "version"  # of the tables before 0.1.0, which nobody migrates
+DEVELOPMENT_KEY = "version"  # of the tables before 0.1.0, which are not migrated
 
-# From each version to the next one: version 1 is the first that is released.
+# From each version to the next one: version 1 is the first released one.
 MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {}
 
 
 def version_of(connection: Connection, label: str) -> int:
     """Return the version of the tables, 0 if there are none.
 
-    Raises Refused `not_a_history`, `history_too_old`, `history_too_new`.
+    Raise Refused `not_a_history`, `history_too_old`, `history_too_new`.
     """
     tables = inspect(connection).get_table_names()
     if not tables:
@@ -35,8 +35,8 @@ def version_of(connection: Connection, label: str) -> int:
     if not version.isdecimal():
         raise Refused(
             "not_a_history",
-            f"{label} holds {', '.join(sorted(tables)[:5])}, which do not belong to a history",
-            "Give a history, or a file or database that is new",
+            f"{label} has the tables {', '.join(sorted(tables)[:5])}, which do not belong to a history",
+            "Give a history, or a new file or database",
         )
     if int(version) > schema.VERSION:
         raise Refused(
@@ -48,7 +48,7 @@ def version_of(connection: Connection, label: str) -> int:
 
 
 def bring_up_to_date(connection: Connection, label: str) -> None:
-    """Make the tables or migrate them, in the connection's transaction. Raises Refused as `version_of`."""
+    """Make or migrate the tables in the connection's transaction. Raise Refused as `version_of`."""
     journal.alone(connection)
     version = version_of(connection, label)
     if version == 0:
@@ -81,7 +81,7 @@ def _make(connection: Connection) -> None:
 
 
 def _meta(connection: Connection) -> dict[str, str | None]:
-    """Return what `meta` says, or nothing if a table of that name has other columns."""
+    """Return the content of `meta`, or nothing if a table of that name has other columns."""
     if {column["name"] for column in inspect(connection).get_columns(schema.meta.name)} != {"key", "value"}:
         return {}
     return {row.key: row.value for row in connection.execute(select(schema.meta))}

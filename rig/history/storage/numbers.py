@@ -1,4 +1,4 @@
-"""The numbers of a history's rows: counted up by one, so that a row that was taken away leaves a gap."""
+"""Numbers of a history's rows: counted up by one, so that a removed row leaves a gap."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ def next_number(connection: Connection, table: Table) -> int:
 
 
 def gaps(connection: Connection) -> Iterator[Broken]:
-    """Yield the numbers that no row has."""
+    """Yield missing numbers."""
     for table in NUMBERED:
         before = 0
         for number in connection.scalars(select(table.c.id).order_by(table.c.id)):

@@ -1,6 +1,7 @@
-"""The tables of a history. Rows are only ever added: what was entered stays as it was (`triggers`, `journal`).
+"""The tables of a history. Rows are only ever added and never changed (`triggers`, `journal`).
 
-`run.result` is the whole `result.json`; every other column of a run, its calibrations and parameters is an index of it.
+`run.result` is the complete `result.json`; all other columns of a run, its calibrations and parameters are an index of
+it.
 """
 
 from sqlalchemy import (
@@ -25,22 +26,22 @@ HASH, TIME, NAME, NOTE = 64, 40, 400, 1000  # longest texts of their kind
 metadata = MetaData()
 
 
-def numbered() -> Column[int]:
-    """Make a column of numbers from 1 on without gaps, which whoever enters a row counts up (`numbers`).
+def number_column() -> Column[int]:
+    """Return a column of numbers from 1 without gaps, which the writer of a row counts up (`numbers`).
 
-    Not the database: what PostgreSQL's sequences hand out to a transaction that ends without its rows is a gap.
+    The database does not: PostgreSQL's sequences leave a gap for a transaction that ends without its rows.
     """
     return Column("id", Integer, primary_key=True, autoincrement=False)
 
 
 meta = Table("meta", metadata, Column("key", String(40), primary_key=True), Column("value", String(NAME)))
 
-# `measurement_sha256` is the same for results of the same recordings: one that was computed again, or of a run that was
-# resumed, takes the place of the earlier one wherever series are made.
+# `measurement_sha256` is the same for results of the same recordings: a recomputed result, or one of a resumed run,
+# replaces the earlier one in series.
 run = Table(
     "run",
     metadata,
-    numbered(),
+    number_column(),
     Column("content_sha256", String(HASH), nullable=False, unique=True),
     Column("measurement_sha256", String(HASH), nullable=False, index=True),
     Column("started_utc", String(TIME), nullable=False, index=True),
@@ -61,7 +62,7 @@ run = Table(
 location = Table(
     "location",
     metadata,
-    numbered(),
+    number_column(),
     Column("run_id", ForeignKey("run.id"), nullable=False),
     Column("computer", String(NAME), nullable=False),
     Column("path", String(4096), nullable=False),
@@ -81,7 +82,7 @@ recording = Table(
 calibration = Table(
     "calibration",
     metadata,
-    numbered(),
+    number_column(),
     Column("run_id", ForeignKey("run.id"), nullable=False),
     Column("sensor", String(NAME), nullable=False),
     Column("quantity", String(40), nullable=False),
@@ -102,13 +103,13 @@ parameter = Table(
     Column("name", String(40), primary_key=True),
     Column("value", Float, nullable=False),
     Column("std_statistical", Float, nullable=False),
-    Column("std_combined", Float),  # null where no more than noise is known
+    Column("std_combined", Float),  # null if only the noise is known
     Column("unit", String(40), nullable=False),
     Column("max_deviation", Float),  # from the nominal value, by the limits of that run
     Column("coverage_factor", Float, nullable=False),  # of U
 )
 
-# A wrong entry is not taken away: it is said that it is wrong, and why.
+# A wrong entry is not removed but marked as wrong, with the reason.
 voided = Table(
     "voided",
     metadata,
@@ -117,13 +118,12 @@ voided = Table(
     Column("voided_utc", String(TIME), nullable=False),
 )
 
-# A certificate by its number, which another content does not have; `replaces` is the number it says it
-# amends, of this history or another. `marks` is what stands across its pages, such as that the laboratory is simulated:
-# only one without any is a certificate to rely on.
+# A certificate by its number, which depends on its content; `replaces` is the number that it amends, of this history or
+# another. `marks` is the text across its pages, such as that the laboratory is simulated: a valid one has none.
 certificate = Table(
     "certificate",
     metadata,
-    numbered(),
+    number_column(),
     Column("number", String(40), nullable=False, unique=True),
     Column("run_id", ForeignKey("run.id"), nullable=False, index=True),
     Column("title", String(40), nullable=False),
@@ -133,7 +133,7 @@ certificate = Table(
     Column("entered_utc", String(TIME), nullable=False),
 )
 
-# The files it was written to. A table of their own: a PDF that is made later adds a row, and changes none.
+# The files of a certificate, in a table of their own: a PDF made later adds a row and changes none.
 certificate_file = Table(
     "certificate_file",
     metadata,
@@ -143,7 +143,7 @@ certificate_file = Table(
     Column("entered_utc", String(TIME), nullable=False),
 )
 
-# What lay beside the recordings when the run was entered; of result.json the hash of what it says.
+# Other files of the run folder at the time of entry; for result.json the hash of its content.
 document = Table(
     "document",
     metadata,
@@ -158,9 +158,9 @@ journal = Table(
     metadata,
     Column("number", Integer, primary_key=True, autoincrement=False),
     Column("kind", String(40), nullable=False),  # the table
-    Column("key", String(1000), nullable=False),  # what finds the row there, as JSON
+    Column("key", String(1000), nullable=False),  # the row's primary key, as JSON
     Column("sha256", String(HASH), nullable=False),
     Column("entered_utc", String(TIME), nullable=False),
-    Column("chain_sha256", String(HASH), nullable=False),  # of this line and, through the one before it, of all before
+    Column("chain_sha256", String(HASH), nullable=False),  # of this line and, by the one before it, of all earlier
     UniqueConstraint("kind", "key"),
 )

@@ -1,4 +1,4 @@
-"""Engines of SQLite files: one for each file in a process, whoever works on it there, and none that crosses a fork."""
+"""Engines of SQLite files: one for each file in a process, for all its users; none survives a fork."""
 
 import os
 import sqlite3
@@ -17,28 +17,30 @@ from rig.history.storage.continuity import refuse_unlike
 from rig.history.storage.forks import kept_from_children
 from rig.history.storage.sqlite_file import address_of, identities, refuse_unmarked
 
-WAIT_S = 30  # for others who write; for nobody so long, since an entry takes milliseconds
+WAIT_S = 30  # for other writers; far more than an entry takes
 WRITES = "rig_writes"  # execution option of a connection that will write
 
 
 @dataclass(slots=True)
 class _Shared:
+    """An engine with the number of its users."""
+
     engine: Engine
     users: int = 0
 
 
-_shared: dict[Path, _Shared] = {}
+_engines: dict[Path, _Shared] = {}
 _sharing = threading.Lock()
 
 
 @contextmanager
 def shared_engine(file: Path, label: str) -> Iterator[Engine]:
-    """Yield the one engine that this process has of a history's file; the last who uses it closes its connections."""
+    """Yield this process's engine of a history's file; its last user closes its connections."""
     key = file.parent.resolve() / file.name
     with _sharing:
-        if key not in _shared:
-            _shared[key] = _Shared(sqlite_engine(file, label))
-        shared = _shared[key]
+        if key not in _engines:
+            _engines[key] = _Shared(sqlite_engine(file, label))
+        shared = _engines[key]
         shared.users += 1
     try:
         with shut_files(partial(identities, file)):
@@ -47,27 +49,26 @@ def shared_engine(file: Path, label: str) -> Iterator[Engine]:
         with _sharing:
             shared.users -= 1
             if last := not shared.users:
-                _shared.pop(key, None)
+                _engines.pop(key, None)
         if last:
             shared.engine.dispose()
 
 
 def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
-    """Make an engine of a file that is a history, or that will be a `new` one.
+    """Return an engine of a file that is a history, or will be a `new` one.
 
-    Each use of a connection raises Refused `history_gone` or `history_exchanged` where the file is not there any more,
-    or another is.
+    Each use of a connection raises Refused `history_gone` or `history_exchanged` if the file is gone or another one.
     """
     may_write = new or (os.access(file, os.W_OK) and os.access(file.parent, os.W_OK))
-    there = file_identity(file)
+    identity = file_identity(file)
 
     def refuse_another_file(*_: Any) -> None:
         if not new:
-            refuse_unlike(there, file, label)
+            refuse_unlike(identity, file, label)
 
     def connect() -> sqlite3.Connection:
         refuse_another_file()
-        return _to_write(file, new=new) if may_write else _only_to_read(file)
+        return _connect_to_write(file, new=new) if may_write else _connect_to_read(file)
 
     url = URL.create("sqlite", database=str(file))
     engine = kept_from_children(create_engine(url, creator=connect))
@@ -77,42 +78,42 @@ def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
 
         @event.listens_for(engine, "begin")
         def begin(connection: Connection) -> None:
-            # A transaction that reads first and writes then cannot wait for a writer: it would have read what is old.
+            # A transaction that reads before it writes cannot wait for a writer: it would have read old rows.
             writes = connection.get_execution_options().get(WRITES)
             connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
     return engine
 
 
-def _to_write(file: Path, *, new: bool) -> sqlite3.Connection:
+def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
     """Open a file with a write-ahead log: readers and a writer do not wait for each other. Not for network shares."""
-    connection = _connected(file, "mode=rwc" if new else "mode=rw")
+    connection = _connect(file, "mode=rwc" if new else "mode=rw")
     if not new:
         refuse_unmarked(connection, file)
     connection.isolation_level = None  # transactions are begun by the engine, not by the driver at the first change
-    # An entry that is told as such outlasts a power cut: its transaction ends when the disk has it (FULL).
+    # A reported entry survives a power failure: its transaction ends when the disk has it (FULL).
     for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
         connection.execute(f"PRAGMA {pragma}")
     return connection
 
 
-def _only_to_read(file: Path) -> sqlite3.Connection:
-    """Open a file that this user may only read, in a folder in which nothing can be laid beside it.
+def _connect_to_read(file: Path) -> sqlite3.Connection:
+    """Open a file that this user may only read, in a folder in which no files can be made.
 
-    Whoever writes it has a log beside it; without one it stays as it is while it is read, so that nothing is locked.
+    A writer would have a log there; without a log the file does not change while it is read, so no lock is needed.
     """
     log = file.with_name(f"{file.name}-wal")
-    return _connected(file, "mode=ro" if log.exists() else "mode=ro&immutable=1")
+    return _connect(file, "mode=ro" if log.exists() else "mode=ro&immutable=1")
 
 
-def _connected(file: Path, options: str) -> sqlite3.Connection:
-    # Of any thread: the engine's pool hands a connection to one at a time.
+def _connect(file: Path, options: str) -> sqlite3.Connection:
+    # For any thread: the engine's pool gives a connection to one at a time.
     return sqlite3.connect(address_of(file, options), uri=True, timeout=WAIT_S, check_same_thread=False)
 
 
 def _begin_anew() -> None:
-    """Forget in a forked process the engines that its parent shares: who works on a file there, begins there."""
-    _shared.clear()
+    """Forget the parent's engines in a forked process, which opens its own."""
+    _engines.clear()
     _sharing.release()
 
 

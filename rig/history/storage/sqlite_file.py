@@ -1,7 +1,7 @@
-"""A history's file is looked at before anything opens it to write: what is no history stays as it is.
+"""Inspection of a history's file before it is opened for writing: a file that is not a history stays unchanged.
 
-SQLite alone opens the file. Its locks belong to the process (POSIX advisory locks): if any other code of the process
-opens the file and closes it, the locks of all its connections are gone, and the next process believes that it is alone.
+Only SQLite opens the file. Its locks belong to the process (POSIX advisory locks): if any other code of the process
+opens and closes the file, the locks of all its connections are lost, and another process may take the file as unused.
 Source: "How To Corrupt An SQLite Database File", 2.2, https://sqlite.org/howtocorrupt.html.
 """
 
@@ -18,13 +18,13 @@ from rig.errors import Refused
 from rig.history.storage.migrations import DEVELOPMENT_KEY, too_old
 from rig.history.storage.schema import APPLICATION_ID
 
-BESIDE = ("-wal", "-shm")  # what SQLite lays beside a database: its log, and the log's index with locks of its own
+SUFFIXES = ("-wal", "-shm")  # of SQLite's companion files: its log, and the log's index with locks of its own
 
 
 def history_is_there(file: Path) -> bool:
-    """Return whether there is a history; False if there is nothing at all.
+    """Return whether there is a history; False if there is no file at all.
 
-    Raises Refused `not_a_history`, `history_too_old`; OSError.
+    Raise Refused `not_a_history`, `history_too_old`; OSError.
     """
     try:
         status = file.lstat()
@@ -34,75 +34,75 @@ def history_is_there(file: Path) -> bool:
         _refuse_unfit(status)
         _look(file)
     except UnfitFile as error:
-        raise _refused(file, str(error)) from error
+        raise _not_a_history(file, str(error)) from error
     return True
 
 
 def identities(file: Path) -> Iterator[FileIdentity]:
-    """Identify a history's file, its log and the log's index, as far as they are there."""
-    for name in ("", *BESIDE):
-        if (found := file_identity(file.with_name(file.name + name))) is not None:
-            yield found
+    """Yield the identities of a history's file, its log and the log's index, as far as they exist."""
+    for suffix in ("", *SUFFIXES):
+        if (identity := file_identity(file.with_name(file.name + suffix))) is not None:
+            yield identity
 
 
 def address_of(file: Path, options: str) -> str:
-    """The address under which SQLite opens a file; `options` as in https://sqlite.org/uri.html, 3.3."""
+    """Return the address by which SQLite opens a file; `options` as in https://sqlite.org/uri.html, 3.3."""
     return f"{file.absolute().as_uri()}?{options}"
 
 
 def refuse_unmarked(connection: sqlite3.Connection, file: Path) -> None:
-    """Read from a new connection whose database it is, before it writes anything. Raises Refused `not_a_history`."""
+    """Refuse a database that is not a history, before the connection writes. Raise Refused `not_a_history`."""
     if not _is_marked(connection):
-        raise _refused(file, "it is a database of something else")
+        raise _not_a_history(file, "it is another kind of database")
 
 
 @contextmanager
-def made_whole(file: Path) -> Iterator[Path]:
-    """The path for a new database, which is put in place of `file` when it is finished, or is gone.
+def new_file_in_place(file: Path) -> Iterator[Path]:
+    """Yield the path for a new database, which replaces `file` when it is complete, or is removed.
 
-    Somebody else's that is there by then stays. Nobody ever sees a part of one. Raises OSError.
+    A file that another process has put there meanwhile stays. An incomplete one is never visible. Raise OSError.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".history-", dir=file.parent) as folder:
-        beside = Path(folder) / file.name
-        yield beside
+        temporary = Path(folder) / file.name
+        yield temporary
         try:
-            os.link(beside, file)
+            os.link(temporary, file)
         except FileExistsError:
             pass
-        except OSError:  # a file system without links, where of two that begin at the same moment the later one stays
+        except OSError:  # a file system without links: of two simultaneous files the later one stays
             if not file.exists():
-                beside.replace(file)
+                temporary.replace(file)
 
 
 def _refuse_unfit(status: os.stat_result) -> None:
     if stat.S_ISLNK(status.st_mode):
-        raise UnfitFile("it is a link to something else")
+        raise UnfitFile("it is a link")
     if not stat.S_ISREG(status.st_mode):
-        raise UnfitFile("it is no regular file")
+        raise UnfitFile("it is not a regular file")
     if status.st_size == 0:
-        raise UnfitFile("it is an empty file, and a new history needs a name that does not exist yet")
+        raise UnfitFile("it is an empty file; a new history needs a name that does not exist yet")
 
 
 def _look(file: Path) -> None:
-    """Read a file as on a medium that takes no more: lock and write nothing.
+    """Read a file without locking or writing.
 
-    Raises UnfitFile if it is no history, Refused `history_too_old`.
+    Raise UnfitFile if it is not a history, Refused `history_too_old`.
     """
     try:
         with closing(sqlite3.connect(address_of(file, "mode=ro&immutable=1"), uri=True)) as connection:
             if _is_too_old(connection):
                 raise too_old(str(file))
             if not _is_marked(connection):
-                raise UnfitFile("it is a database of something else")
+                raise UnfitFile("it is another kind of database")
     except sqlite3.DatabaseError as error:
         code = getattr(error, "sqlite_errorcode", None)
         if code == sqlite3.SQLITE_NOTADB:
-            raise UnfitFile("it is no database of SQLite") from error
+            raise UnfitFile("it is not an SQLite database") from error
         if code == sqlite3.SQLITE_CANTOPEN:
             raise OSError(str(error)) from error
-        # Read without a lock, a history into which another process just writes its log may look damaged: whoever opens
-        # it looks again under a lock, by `refuse_unmarked`.
+        # Without a lock, a history may look damaged while another process writes its log into it: `refuse_unmarked`
+        # reads it again under a lock.
 
 
 def _is_marked(connection: sqlite3.Connection) -> bool:
@@ -111,7 +111,7 @@ def _is_marked(connection: sqlite3.Connection) -> bool:
 
 
 def _is_too_old(connection: sqlite3.Connection) -> bool:
-    """Return whether it has the tables of a history before 0.1.0, of which not all were marked."""
+    """Return whether it has the tables of a history before 0.1.0, not all of which were marked."""
     try:
         version = connection.execute("SELECT value FROM meta WHERE key = ?", [DEVELOPMENT_KEY]).fetchone()
         return version is not None and connection.execute("SELECT count(*) FROM run").fetchone() is not None
@@ -119,9 +119,9 @@ def _is_too_old(connection: sqlite3.Connection) -> bool:
         return False
 
 
-def _refused(file: Path, why: str) -> Refused:
+def _not_a_history(file: Path, why: str) -> Refused:
     return Refused(
         "not_a_history",
         f"{file} is not a history, and was not changed: {why}",
-        "Give a history, or a file or database that is new",
+        "Give a history, or a new file or database",
     )

@@ -1,7 +1,7 @@
-"""The database itself says no to whoever changes or takes away a row, by whatever program.
+"""Triggers by which the database refuses to change or remove rows, for any program.
 
-It guards against mistakes and against roles without the right to drop triggers, not against the owner of the database.
-That triggers are gone, or are not those that were made, `unlike_made` finds out.
+They protect against mistakes and against roles without the right to drop triggers, not against the owner of the
+database. `unlike_made` detects missing or changed triggers.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,16 +13,16 @@ from rig.history.storage import schema
 from rig.history.storage.journal import Broken
 
 NO = "a history keeps its rows as they were entered"
-# A migration says so in `meta`; nothing else there changes.
+# A migration changes the version in `meta`; nothing else there changes.
 NEWER = (
     "OLD.key = 'schema_version' AND NEW.key = 'schema_version' "
     "AND CAST(NEW.value AS INTEGER) > CAST(OLD.value AS INTEGER)"
 )
 FUNCTION = "history_keeps_its_rows"
 _BODY = f" BEGIN RAISE EXCEPTION USING MESSAGE = '{NO}: ' || TG_OP || ' of ' || TG_TABLE_NAME; END "
-# What PostgreSQL's catalogue has of a trigger, in bits of pg_trigger.tgtype (PostgreSQL's catalog/pg_trigger.h).
+# Bits of pg_trigger.tgtype for the properties of a trigger (PostgreSQL's catalog/pg_trigger.h).
 _BITS: Mapping[str, int] = {"ROW": 1, "BEFORE": 2, "DELETE": 8, "UPDATE": 16, "TRUNCATE": 32}
-_FIRES = ("O", "A")  # pg_trigger.tgenabled: in a session that replicates nothing, or in every one
+_FIRES = ("O", "A")  # pg_trigger.tgenabled: in sessions without replication, or in all
 _MADE_BY_SERVER = text(
     "SELECT c.relname, t.tgname, t.tgenabled, t.tgtype, t.tgqual IS NOT NULL, p.prosrc FROM pg_trigger t "
     "JOIN pg_class c ON c.oid = t.tgrelid JOIN pg_proc p ON p.oid = t.tgfoid "
@@ -32,100 +32,100 @@ _MADE_BY_SERVER = text(
 
 @dataclass(frozen=True, slots=True)
 class _ServerTrigger:
-    """One of PostgreSQL: when it fires, for each row or once for a statement, and on which condition if any."""
+    """A trigger of PostgreSQL: its events, its level (for each row or statement), and its condition, if any."""
 
     table: Table
     name: str
     events: tuple[str, ...]
-    each: str = "STATEMENT"
+    level: str = "STATEMENT"
     condition: str = ""
 
     @property
     def statement(self) -> str:
         when = f"WHEN ({self.condition}) " if self.condition else ""
-        fires = f"BEFORE {' OR '.join(self.events)} ON {self.table} FOR EACH {self.each} {when}"
+        fires = f"BEFORE {' OR '.join(self.events)} ON {self.table} FOR EACH {self.level} {when}"
         return f"CREATE TRIGGER {self.name} {fires}EXECUTE FUNCTION {FUNCTION}()"
 
     @property
     def bits(self) -> int:
-        return sum(_BITS.get(word, 0) for word in ("BEFORE", self.each, *self.events))
+        return sum(_BITS.get(word, 0) for word in ("BEFORE", self.level, *self.events))
 
 
 def create_triggers(connection: Connection) -> None:
-    """Create the triggers on every table of a history, which has none yet."""
+    """Create the triggers on all tables of a new history."""
     if connection.dialect.name == "postgresql":
         connection.exec_driver_sql(f"CREATE FUNCTION {FUNCTION}() RETURNS trigger LANGUAGE plpgsql AS $${_BODY}$$")
-        for trigger in _of_server():
+        for trigger in _server_triggers():
             connection.exec_driver_sql(trigger.statement)
         return
-    for statement in _of_file().values():
+    for statement in _file_triggers().values():
         connection.exec_driver_sql(statement)
 
 
 def unlike_made(connection: Connection) -> Iterator[Broken]:
-    """Yield the triggers that are not there any more, that do not fire, and that are not the ones that were made."""
+    """Yield triggers that are missing, disabled, or different from those that were made."""
     if connection.dialect.name == "postgresql":
         yield from _unlike_made_by_server(connection)
         return
-    asked = text("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'")
-    there = {row.name: row.sql for row in connection.execute(asked)}
-    for name, statement in _of_file().items():
-        if name not in there:
-            yield _dropped(name)
-        elif there[name].split() != statement.split():
-            yield _another(name)
+    query = text("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'")
+    existing = {row.name: row.sql for row in connection.execute(query)}
+    for name, statement in _file_triggers().items():
+        if name not in existing:
+            yield _dropped_trigger(name)
+        elif existing[name].split() != statement.split():
+            yield _changed_trigger(name)
 
 
 def _unlike_made_by_server(connection: Connection) -> Iterator[Broken]:
-    there = {(table, name): row for table, name, *row in connection.execute(_MADE_BY_SERVER)}
-    for trigger in _of_server():
-        name, found = f"{trigger.name} of {trigger.table}", there.get((trigger.table.name, trigger.name))
-        if found is None:
-            yield _dropped(name)
+    existing = {(table, name): row for table, name, *row in connection.execute(_MADE_BY_SERVER)}
+    for trigger in _server_triggers():
+        name, row = f"{trigger.name} of {trigger.table}", existing.get((trigger.table.name, trigger.name))
+        if row is None:
+            yield _dropped_trigger(name)
             continue
-        fires, bits, conditional, body = found
+        fires, bits, conditional, body = row
         if fires not in _FIRES:
             yield Broken(f"trigger {name}", "changed", "it is disabled, so that rows can be changed or removed")
         elif (bits, conditional, body) != (trigger.bits, bool(trigger.condition), _BODY):
-            yield _another(name)
+            yield _changed_trigger(name)
 
 
-def _dropped(name: str) -> Broken:
+def _dropped_trigger(name: str) -> Broken:
     return Broken(f"trigger {name}", "missing", "it was dropped, so that rows can be changed or removed")
 
 
-def _another(name: str) -> Broken:
-    return Broken(f"trigger {name}", "changed", "it is not the one that the history was made with")
+def _changed_trigger(name: str) -> Broken:
+    return Broken(f"trigger {name}", "changed", "it is not the one with which the history was made")
 
 
-def _of_file() -> Mapping[str, str]:
+def _file_triggers() -> Mapping[str, str]:
     """Return the statements that make SQLite's triggers, by the triggers' names."""
-    made: dict[str, str] = {}
+    statements: dict[str, str] = {}
     for table in schema.metadata.sorted_tables:
         unless = f"WHEN NOT ({NEWER})" if table is schema.meta else ""
         refused = f"BEGIN SELECT RAISE(ABORT, '{NO}'); END"
-        # INSERT OR REPLACE removes a row without asking the trigger of removal.
-        there = f"EXISTS (SELECT 1 FROM {table} WHERE {_same_row(table)})"
+        # INSERT OR REPLACE removes a row without firing the trigger of removal.
+        exists = f"EXISTS (SELECT 1 FROM {table} WHERE {_same_row(table)})"
         for name, fires in {
             f"{table}_not_changed": f"BEFORE UPDATE ON {table} {unless}",
             f"{table}_not_removed": f"BEFORE DELETE ON {table}",
-            f"{table}_not_replaced": f"BEFORE INSERT ON {table} WHEN {there}",
+            f"{table}_not_replaced": f"BEFORE INSERT ON {table} WHEN {exists}",
         }.items():
-            made[name] = f"CREATE TRIGGER {name} {fires} {refused}"
-    return made
+            statements[name] = f"CREATE TRIGGER {name} {fires} {refused}"
+    return statements
 
 
 def _same_row(table: Table) -> str:
-    """Where a row of `table` has a key of the new one."""
+    """Return the condition that a row of `table` has a key of the new one."""
     keys = [list(table.primary_key.columns)]
-    keys += [list(each.columns) for each in table.constraints if isinstance(each, UniqueConstraint)]
+    keys += [list(unique.columns) for unique in table.constraints if isinstance(unique, UniqueConstraint)]
     keys += [list(index.columns) for index in table.indexes if index.unique]
     return " OR ".join(
         "(" + " AND ".join(f'{table}."{column.name}" = NEW."{column.name}"' for column in key) + ")" for key in keys
     )
 
 
-def _of_server() -> Iterator[_ServerTrigger]:
+def _server_triggers() -> Iterator[_ServerTrigger]:
     for table in schema.metadata.sorted_tables:
         if table is schema.meta:
             yield _ServerTrigger(table, "not_changed", ("UPDATE",), "ROW", f"NOT ({NEWER})")

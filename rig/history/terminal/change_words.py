@@ -1,4 +1,4 @@
-"""What has changed since another calibration of the same sensor, in sentences. Pure."""
+"""Changes since another calibration of the same sensor, in sentences. Pure."""
 
 from collections.abc import Iterable, Sequence
 from math import pi
@@ -14,55 +14,55 @@ DEGREE_RAD = pi / 180
 
 
 def changed_values(changes: Iterable[Change]) -> list[Change]:
-    """Return the values that have changed by more than chance explains, the largest change for its U first."""
+    """Return the significant changes, the largest change in multiples of its U first."""
     return sorted((change for change in changes if change.has_changed), key=lambda change: -change.normalised_error)
 
 
 def comparison_in_words(changes: Sequence[Change]) -> str:
-    """Return how many of the values of one sensor have changed, and from which E_n on one has."""
+    """Return the number of significant changes of one sensor, and the E_n above which a change is significant."""
     if not changes:
         return "the two have no value in common"
     changed, limits, compared = changed_values(changes), [change.limit for change in changes], changes[0].compared
-    share = f"{len(changed) or 'none'} of {len(changes)} values changed"
+    fraction = f"{len(changed) or 'none'} of {len(changes)} values changed"
     others = f" (with {compared - len(changes)} of the run's other sensors)" if compared > len(changes) else ""
     limit = " to ".join(dict.fromkeys(f"{size:.2f}" for size in (min(limits), max(limits))))
     return (
-        f"{share}. As {compared} are compared{others}, one has changed if its E_n is above {limit}: "
-        "chance alone takes one of them that far in 2 of 100 comparisons at most"
+        f"{fraction}. {compared} are compared{others}, so a change is significant if E_n is above {limit}: "
+        "by chance one of them exceeds it in at most 2 of 100 comparisons"
     )
 
 
 def change_in_short(change: Change) -> str:
-    """The change of one parameter in as few words as a line has room for; U is that of such a change."""
+    """Return the change of one parameter in a short phrase; U is that of the difference."""
     name = name_in_words(change.name).removeprefix("the ")
     times = f"{change.normalised_error:.{1 if change.normalised_error < 10 else 0}f}"
     return f"{name} changed by {_size(change)}, {times} U"
 
 
 def name_in_words(name: str) -> str:
-    """A parameter of the history in words, as they stand within a sentence; a name that is not known stays."""
+    """Return a parameter of the history in words within a sentence; an unknown name stays."""
     if name in SCALES:
         return f"the scale factor of {name[1]}" if name[1:] else "the mean scale factor"
     if name in BIASES:
         return f"the bias of {name[1]}"
-    return next((each.parameters[name] for each in every_characteristic() if name in each.parameters), name)
+    return next((row.parameters[name] for row in every_characteristic() if name in row.parameters), name)
 
 
 def _size(change: Change) -> str:
-    """The size of a change with its sign: of a scale factor as a share, of others in the unit that a screen shows."""
+    """Return the size of a change with its sign: relative for a scale factor, else in the unit of screens."""
     difference = change.now.value - change.before.value
     if is_scale(change.name):
-        share = difference / change.before.value
-        size, unit = (PERCENT, "%") if abs(share) >= PERCENT / 100 else (PPM, "ppm")
-        return f"{signed(share / size)} {unit}"
+        relative = difference / change.before.value
+        size, unit = (PERCENT, "%") if abs(relative) >= PERCENT / 100 else (PPM, "ppm")
+        return f"{add_sign(relative / size)} {unit}"
     if change.unit == "rad":
-        return f"{signed(difference / DEGREE_RAD)}°"
-    shown = next((each.reading for each in quantities().values() if each.unit == change.unit), None)
+        return f"{add_sign(difference / DEGREE_RAD)}°"
+    shown = next((q.reading for q in quantities().values() if q.unit == change.unit), None)
     if shown is not None:
-        return f"{signed(difference / shown.size)} {shown.name}"
-    return signed(difference) + ("" if change.unit == "1" else f" {change.unit}")
+        return f"{add_sign(difference / shown.size)} {shown.name}"
+    return add_sign(difference) + ("" if change.unit == "1" else f" {change.unit}")
 
 
-def signed(value: float) -> str:
-    """Return a difference in three figures at most, always with its sign."""
+def add_sign(value: float) -> str:
+    """Return at most three digits with a sign."""
     return f"{'−' if value < 0 else '+'}{figures(abs(value))}"

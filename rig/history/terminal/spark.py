@@ -5,19 +5,19 @@ import numpy as np
 from rig.history.series import Trend
 
 BLOCKS = "▁▂▃▄▅▆▇█"
-PLAIN = str.maketrans(BLOCKS, "__..--''")  # where a terminal has no blocks
+PLAIN = str.maketrans(BLOCKS, "__..--''")  # for a terminal without blocks
 MOST = 16  # of the newest results
 
 
 def picture(trend: Trend) -> str:
-    """A block for each of the newest results, as high as the value lies from the lowest value − U to the highest + U.
+    """Return a block for each of the newest results, by its place between the lowest value − U and the highest + U.
 
-    So a row of equal blocks has changed by less than its U, and one that climbs by more. Empty for a single result.
+    So a row of equal blocks has changed by less than its U, and a climbing one by more. Empty for a single result.
     """
     newest = trend.parameters[-MOST:]
     if len(newest) < 2:
         return ""
-    values, widths = (np.array([getattr(each, of) for each in newest]) for of in ("value", "expanded"))
+    values, widths = (np.array([getattr(parameter, name) for parameter in newest]) for name in ("value", "expanded"))
     low, high = (values - widths).min(), (values + widths).max()
     heights = (values - low) / (high - low)
     return "".join(BLOCKS[min(int(height * len(BLOCKS)), len(BLOCKS) - 1)] for height in heights)

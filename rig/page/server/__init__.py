@@ -1,1 +1,1 @@
-"""The server of a page: its addresses, connections, the stream of what is shown, and who may speak to it."""
+"""The server of a page: addresses, connections, the event stream, access control."""

@@ -1,4 +1,4 @@
-"""The page's addresses: files to show it, the stream of what is shown, the certificate, and two that act."""
+"""The page's addresses: its files, the event stream, the certificate, and two that act."""
 
 import json
 from collections.abc import Awaitable, Callable, Sequence
@@ -24,21 +24,21 @@ LARGEST_CERTIFICATE = 8_000_000
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-def guarded(routes: Sequence[Route], door: Door, connections: Connections) -> Guard:
-    """The addresses behind their door."""
+def guard_routes(routes: Sequence[Route], door: Door, connections: Connections) -> Guard:
+    """Return the addresses behind their guard."""
     return Guard(Starlette(routes=routes), door, connections)
 
 
 def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
-    """The addresses that whoever looks on needs; `home` is the page that opens first."""
+    """Return the addresses for spectators; `home` is the page that opens first."""
 
     async def stream(request: Request) -> Response:
         if not door.may_look(request.headers):
-            return _refused()
-        known = door.may_act(request.headers)
-        if broadcast.full(known=known):
-            return PlainTextResponse("too many browsers look on\n", 503)
-        streaming = StreamingResponse(broadcast.frames(known=known), media_type="text/event-stream")
+            return _token_needed()
+        has_token = door.may_act(request.headers)
+        if broadcast.full(known=has_token):
+            return PlainTextResponse("too many browsers are connected\n", 503)
+        streaming = StreamingResponse(broadcast.frames(known=has_token), media_type="text/event-stream")
         if door.looking_needs_token:
             streaming.set_cookie(COOKIE, door.pass_to_look, path=f"/{CERTIFICATE}", httponly=True, samesite="strict")
         return streaming
@@ -53,30 +53,30 @@ def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
 
 
 def acting(door: Door, handler: Handler) -> Handler:
-    """A handler for those alone who have the token."""
+    """Return a handler that requires the token."""
 
     async def allowed(request: Request) -> Response:
-        return await handler(request) if door.may_act(request.headers) else _refused()
+        return await handler(request) if door.may_act(request.headers) else _token_needed()
 
     return allowed
 
 
 async def body_of(request: Request) -> bytes:
-    """A request's body; nothing of one that is longer than any that is wanted."""
+    """Return a request's body; empty if it is longer than any valid one."""
     body = b""
-    async for piece in request.stream():
-        body += piece
+    async for chunk in request.stream():
+        body += chunk
         if len(body) > LARGEST_BODY:
             return b""
     return body
 
 
-def of_a_run(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> list[Route]:
-    """The addresses of a run in `folder`: its certificate, and the two that act."""
+def run_routes(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> list[Route]:
+    """Return the addresses of a run in `folder`: its certificate, and the two that act."""
 
     async def certificate(request: Request) -> Response:
         if not door.may_open(request.headers, request.cookies):
-            return _refused()
+            return _token_needed()
         try:
             text = await run_in_threadpool(
                 read_regular_file, folder / CERTIFICATE, LARGEST_CERTIFICATE, follow_links=False
@@ -94,12 +94,12 @@ def of_a_run(broadcast: Broadcast, control: Control, door: Door, folder: Path) -
         return Response(status_code=202)
 
     async def answer(request: Request) -> Response:
-        said = await _answer(request)
-        if said is None:
-            return PlainTextResponse('wanted: {"number": 1, "agreed": true}\n', 400)
-        number, agreed = said
+        parsed = await _answer(request)
+        if parsed is None:
+            return PlainTextResponse('expected: {"number": 1, "agreed": true}\n', 400)
+        number, agreed = parsed
         if not control.answer(number, agreed=agreed):
-            return PlainTextResponse("that is not asked, or not here\n", 409)
+            return PlainTextResponse("this question is not open, or not answered here\n", 409)
         return Response(status_code=202)
 
     return [
@@ -119,15 +119,19 @@ def _file(path: Path) -> Handler:
 
 
 async def _answer(request: Request) -> tuple[int, bool] | None:
-    """The question's number and the answer; None for anything else."""
+    """Return the question's number and the answer; None for anything else."""
     try:
-        said = json.loads(await body_of(request))
+        document = json.loads(await body_of(request))
     except ValueError:
         return None
-    if not isinstance(said, dict) or type(said.get("number")) is not int or type(said.get("agreed")) is not bool:
+    if (
+        not isinstance(document, dict)
+        or type(document.get("number")) is not int
+        or type(document.get("agreed")) is not bool
+    ):
         return None
-    return said["number"], said["agreed"]
+    return document["number"], document["agreed"]
 
 
-def _refused() -> Response:
-    return PlainTextResponse("the address with the token is needed, as the terminal shows it\n", 403)
+def _token_needed() -> Response:
+    return PlainTextResponse("use the address with the token that the terminal shows\n", 403)

@@ -1,7 +1,6 @@
-"""What a browser may ask of a run: to stop it, and, where the operator is asked on the page, to agree.
+"""Requests of a browser to a run: to stop it and, if the page asks the operator, to agree.
 
-A stop interrupts the thread that runs the procedure, as Ctrl-C does: what stops the arm and keeps the data then
-is the same code.
+A stop interrupts the thread that runs the procedure, as Ctrl-C does, so the same code stops the arm and keeps the data.
 """
 
 import _thread
@@ -14,31 +13,31 @@ from types import FrameType
 from rig.data.processes.ending_signals import INTERRUPTS, signal_name
 
 STOPPED = "stopped from the page"
-STOP_SIGNAL = getattr(signal, "SIGUSR1", signal.SIGINT)  # its own: SIGINT may be ignored, as in a script's background
+STOP_SIGNAL = getattr(signal, "SIGUSR1", signal.SIGINT)  # SIGINT may be ignored in background jobs
 
 
 class Control:
-    """What the page may do to a run, between the server's thread and the run's, which is the main one."""
+    """The page's control of a run, between the server's thread and the run's, which is the main one."""
 
     def __init__(self, *, may_answer: bool) -> None:
         self._may_answer = may_answer
         self._changed = threading.Condition()
         self._stop: Callable[[], None] | None = None
         self._stopping = False
-        self._asked = 0
+        self._question = 0
         self._answer: bool | None = None
         self._waiting = False
         self._gone = False
 
     @contextmanager
     def stoppable(self) -> Iterator[None]:
-        """A block of the main thread's in which `stop` ends in a KeyboardInterrupt."""
+        """Open a block of the main thread in which `stop` raises KeyboardInterrupt."""
 
-        def stopped(number: int, frame: FrameType | None) -> None:
+        def interrupt(number: int, frame: FrameType | None) -> None:
             INTERRUPTS.hear(number, frame, STOPPED if self._stopping else f"interrupted by {signal_name(number)}")
 
         INTERRUPTS.allow()
-        before = signal.signal(STOP_SIGNAL, stopped)
+        before = signal.signal(STOP_SIGNAL, interrupt)
         try:
             with self._changed:
                 self._stop = _interrupt_the_main_thread
@@ -49,7 +48,7 @@ class Control:
             signal.signal(STOP_SIGNAL, before)
 
     def stop(self) -> bool:
-        """End the run; False when there is none that could be."""
+        """End the run; return False if there is none to end."""
         with self._changed:
             if self._stop is None:
                 return False
@@ -58,12 +57,12 @@ class Control:
             return True
 
     def ask(self, announcement: Sequence[str], to_do: str) -> bool | None:
-        """Wait for the operator's answer from a browser; None when no page is left that could bring one.
+        """Wait for the operator's answer from a browser; return None if no page is left to answer.
 
-        The page shows the question as it shows all that happens.
+        The page shows the question like all events.
         """
         with self._changed:
-            self._asked += 1
+            self._question += 1
             self._answer, self._waiting = None, True
             try:
                 while self._answer is None and not self._gone:
@@ -73,9 +72,9 @@ class Control:
                 self._waiting = False
 
     def answer(self, number: int, *, agreed: bool) -> bool:
-        """The answer to question `number` from 1; False when that is not the one that is asked."""
+        """Answer question `number`, from 1; return False if that is not the open one."""
         with self._changed:
-            if not (self._may_answer and self._waiting) or number != self._asked or self._answer is not None:
+            if not (self._may_answer and self._waiting) or number != self._question or self._answer is not None:
                 return False
             self._answer = agreed
             self._changed.notify_all()
@@ -83,18 +82,18 @@ class Control:
 
     @property
     def gone(self) -> bool:
-        """Whether no browser can ask for anything any more."""
+        """Whether no browser can send requests any more."""
         return self._gone
 
     def leave(self) -> None:
-        """No browser can ask for anything any more."""
+        """Note that no browser can send requests any more."""
         with self._changed:
             self._gone = True
             self._changed.notify_all()
 
 
 def _interrupt_the_main_thread() -> None:
-    """Interrupt the main thread out of whatever it waits for, where the system can do that."""
+    """Interrupt the main thread, also while it waits if the system allows that."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, STOP_SIGNAL)
     else:

@@ -1,8 +1,8 @@
-"""From the thread of the run to any number of browsers, none of which can hold it up.
+"""The feed from the run's thread to any number of browsers, none of which can delay it.
 
-The run's thread changes what is shown and goes on. The server's thread looks ten times a second, makes one frame of
-what has changed and lays it into each browser's mailbox, which holds one. A browser that has not taken its last frame
-by then gets none; once it reads again, it gets everything at once as it is by then.
+The run's thread changes the page's state and continues. The server's thread builds a frame of the changes ten times a
+second and puts it into each browser's mailbox, which holds one. A browser that has not taken its last frame gets none;
+when it reads again, it gets the complete state.
 """
 
 import asyncio
@@ -18,13 +18,13 @@ from rig.page.rows import Look
 from rig.station.events import RunEvent
 
 FRAME_S = 0.1
-SIGN_OF_LIFE_S = 0.8  # without news: a browser that hears nothing for 2 s says so
-CLIENTS = 32  # browsers at a time that have the token
-STRANGERS = 16  # … and that have none
+SIGN_OF_LIFE_S = 0.8  # without news: a browser reports silence after 2 s
+CLIENTS = 32  # browsers with the token at a time
+STRANGERS = 16  # … and without
 
 
 class Source(Protocol):
-    """What is shown: all of it, and what has changed since it was last asked for."""
+    """The content of a page: all of it, and its changes since the last request."""
 
     @property
     def ended(self) -> bool: ...
@@ -35,17 +35,17 @@ class Source(Protocol):
 
 
 class Feed:
-    """What is shown, between two threads; a listener of the run's events. Every frame tells how old it all is."""
+    """The page's state between two threads; a listener of the run's events. Every frame has the ages of its content."""
 
     def __init__(self, shown: Shown, now: Callable[[], float] = time.monotonic) -> None:
         self._shown, self._now = shown, now
         self._arrivals = Arrivals()
         self._lock = threading.Lock()
         self._sent = 0  # points that were in a frame
-        self._seen_at = ""  # when anything came last, by this computer's clock, for people
+        self._seen_at = ""  # the time of the last arrival, by this computer's clock, for people
 
     def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does: it changes what is shown, waits for nobody."""
+        """Take an event, as a Listener does: change the state without waiting."""
         with self._lock:
             before = self._shown.ended
             self._shown.take(event)
@@ -55,7 +55,7 @@ class Feed:
                 self._shown.put("ended", {"at": _clock(), "seen_at": self._seen_at})
 
     def look(self, look: Look) -> None:
-        """What the recording amounts to so far, from any thread."""
+        """Show the analysis of the recording so far, from any thread."""
         with self._lock:
             self._shown.look(look)
 
@@ -65,13 +65,13 @@ class Feed:
         return self._shown.ended
 
     def whole(self) -> bytes:
-        """Everything, for a browser that has nothing yet."""
+        """Return the complete state, for a new browser."""
         with self._lock:
             points = self._shown.history.since(0)
             return frame_of("all", {**self._shown.sections, "points": points, "age_s": self._ages_s()})
 
     def news(self) -> bytes | None:
-        """What has changed since the last time, None if nothing has."""
+        """Return the changes since the last call, None if there are none."""
         with self._lock:
             shown = self._shown
             changed = shown.changed()
@@ -96,18 +96,18 @@ class Mailbox:
         self.closed = False
 
     def put(self, frame: bytes) -> None:
-        """Lay a frame in; where one lies already, both are dropped, and the next is to be whole."""
+        """Put a frame in; if there is one already, drop both, and send the complete state next."""
         self._behind = self._behind or self._frame is not None
         self._frame = None if self._behind else frame
         self._news.set()
 
     def close(self) -> None:
-        """Close the mailbox: nothing comes after what is in it."""
+        """Close the mailbox: nothing follows its content."""
         self.closed = True
         self._news.set()
 
     async def take(self, feed: Source) -> bytes | None:
-        """The next frame, whole if any was dropped; None when it is closed and empty."""
+        """Return the next frame, the complete state if any was dropped; None when it is closed and empty."""
         if not self.closed:
             await self._news.wait()
             self._news.clear()
@@ -123,12 +123,12 @@ class Broadcast:
 
     def __init__(self, feed: Source) -> None:
         self._feed = feed
-        self._mailboxes: dict[Mailbox, bool] = {}  # whether its browser is known by the token
+        self._mailboxes: dict[Mailbox, bool] = {}  # whether its browser has the token
         self._closing = False
 
     def full(self, *, known: bool) -> bool:
-        """Whether there is room for no more browsers with the token, or without: neither takes the others' places."""
-        return sum(each == known for each in self._mailboxes.values()) >= (CLIENTS if known else STRANGERS)
+        """Return whether there is no room for another browser with the token, or without: their limits are separate."""
+        return sum(has_token == known for has_token in self._mailboxes.values()) >= (CLIENTS if known else STRANGERS)
 
     @property
     def over(self) -> bool:
@@ -136,12 +136,12 @@ class Broadcast:
         return self._feed.ended
 
     def post(self, frame: bytes) -> None:
-        """One frame for everybody."""
+        """Send one frame to all browsers."""
         for mailbox in self._mailboxes:
             mailbox.put(frame)
 
     async def run(self) -> None:
-        """Post what is new, ten times a second, until `close`."""
+        """Send news ten times a second, until `close`."""
         idle_s = 0.0
         while not self._closing:
             await asyncio.sleep(FRAME_S)
@@ -153,7 +153,7 @@ class Broadcast:
                 self.post(frame)
 
     async def close(self, within_s: float) -> None:
-        """Post the last news; wait until everybody has them, but no longer than `within_s`."""
+        """Send the last news; wait until all browsers have them, at most `within_s`."""
         self._closing = True
         if (frame := self._feed.news()) is not None:
             self.post(frame)
@@ -164,7 +164,7 @@ class Broadcast:
             await asyncio.sleep(FRAME_S / 4)
 
     async def frames(self, *, known: bool = True) -> AsyncGenerator[bytes, None]:
-        """The frames for one browser: everything, then what changes."""
+        """Yield the frames for one browser: the complete state, then changes."""
         mailbox = Mailbox()
         self._mailboxes[mailbox] = known
         if self._closing:
@@ -185,7 +185,7 @@ def _clock() -> str:
 
 
 def frame_of(name: str, document: dict[str, Any]) -> bytes:
-    """One server-sent event. JSON knows no NaN; what is not a number is told as null, what is no character as "?"."""
+    """Return a server-sent event. JSON has no NaN: it becomes null, and an invalid character becomes "?"."""
     try:
         text = json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     except ValueError:
@@ -197,5 +197,5 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float):
         return value if abs(value) < float("inf") else None
     if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    return [_finite(each) for each in value] if isinstance(value, list | tuple) else value
+        return {key: _finite(item) for key, item in value.items()}
+    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value

@@ -1,7 +1,7 @@
-"""Who may speak to the server: a browser that knows it by its own name, from its own page, with the token to act.
+"""Access control of the server: a browser must use its proper name, come from its own page, and act with the token.
 
-A page of somewhere else can make a browser send requests here, and its name server can even make it believe that here
-is its own (DNS rebinding). Neither can change the Host, Origin and Sec-Fetch-Site that the browser sends.
+A foreign page can make a browser send requests here, and its name server can even give this address for its own name
+(DNS rebinding). Neither can change the Host, Origin and Sec-Fetch-Site that the browser sends.
 """
 
 from collections.abc import Mapping
@@ -20,12 +20,12 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-# A certificate may be of a folder that somebody sent: it runs nothing, sends nothing, and leads nowhere by itself.
+# A certificate may be from a foreign folder: it may run no script, send nothing, and open nothing by itself.
 CERTIFICATE_POLICY = (
     "sandbox; default-src 'none'; style-src 'unsafe-inline'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-OWN_SITE = (b"same-origin", b"none")  # its own page, or an address that somebody typed
+OWN_SITE = (b"same-origin", b"none")  # its own page, or a typed address
 HEADERS = {
     "content-security-policy": POLICY,
     "x-content-type-options": "nosniff",
@@ -33,19 +33,19 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "cache-control": "no-store",
 }
-OPENER = {"cross-origin-opener-policy": "same-origin"}  # heeded from loopback, complained of from elsewhere without TLS
+OPENER = {"cross-origin-opener-policy": "same-origin"}  # browsers obey it for loopback, and warn without TLS otherwise
 
 
 def new_token() -> str:
-    """128 bits, as they fit into an address."""
+    """Return 128 random bits in a form for an address."""
     return token_urlsafe(TOKEN_BYTES)
 
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """The page's door: under which `hosts` (name:port) it is known, the `token`, whether it is needed even to look on.
+    """Access to the page: its `hosts` (name:port), the `token`, and whether spectators need it too.
 
-    `pass_to_look` opens the certificate and nothing else: it is for a cookie, and cookies know no port.
+    `pass_to_look` opens the certificate only: it is for a cookie, and cookies are not bound to a port.
     """
 
     hosts: frozenset[str]
@@ -54,22 +54,22 @@ class Door:
     pass_to_look: str = field(default_factory=new_token)
 
     def may_act(self, headers: Mapping[str, str]) -> bool:
-        """Whether a request carries the token. A cookie is not enough: browsers send it unasked."""
-        scheme, _, given = headers.get("authorization", "").partition(" ")
-        return scheme == "Bearer" and _same(given, self.token)
+        """Return whether a request has the token. A cookie does not count: browsers send it without request."""
+        scheme, _, token = headers.get("authorization", "").partition(" ")
+        return scheme == "Bearer" and _same(token, self.token)
 
     def may_look(self, headers: Mapping[str, str]) -> bool:
-        """Whether it may read what is shown."""
+        """Return whether a request may read the page."""
         return not self.looking_needs_token or self.may_act(headers)
 
     def may_open(self, headers: Mapping[str, str], cookies: Mapping[str, str]) -> bool:
-        """Whether it may read the certificate, which opens by a link that can carry no header."""
+        """Return whether a request may read the certificate, which opens by a link without headers."""
         return self.may_look(headers) or _same(cookies.get(COOKIE, ""), self.pass_to_look)
 
     def refusal(self, path: str, headers: Mapping[bytes, bytes]) -> tuple[int, str] | None:
-        """Status and reason for a request that comes from elsewhere, None for one that may go on."""
+        """Return status and reason for a request from elsewhere, None for a permitted one."""
         if headers.get(b"host", b"").decode("latin-1").lower() not in self.hosts:
-            return 400, "this server is not known by that name"
+            return 400, "this server does not have that name"
         origin = headers.get(b"origin")
         if origin is not None and origin.decode("latin-1").lower() not in {f"http://{host}" for host in self.hosts}:
             return 403, "this request comes from another page"
@@ -79,12 +79,12 @@ class Door:
         return None
 
 
-def _same(given: str, wanted: str) -> bool:
-    return compare_digest(given.encode(), wanted.encode())
+def _same(one: str, other: str) -> bool:
+    return compare_digest(one.encode(), other.encode())
 
 
 class Guard:
-    """A guard around the application: refuses what comes from elsewhere, tells browsers what they may do with it."""
+    """A guard around the application: refuses foreign requests and sets security headers."""
 
     def __init__(self, app: "ASGIApp", door: Door, connections: Connections) -> None:
         self._app, self._door, self._connections = app, door, connections
@@ -92,14 +92,14 @@ class Guard:
         self._headers = [(name.encode(), value.encode()) for name, value in headers.items()]
 
     async def __call__(self, scope: "Scope", receive: "Receive", send: "Send") -> None:
-        """Answer a request, as ASGI has it, with the headers that guard the page."""
+        """Answer an ASGI request with the security headers."""
         if scope["type"] != "http":
             return
 
         async def with_headers(message: "Message") -> None:
             if message["type"] == "http.response.start":
-                there = {name for name, _ in message.get("headers", ())}
-                more = [(name, value) for name, value in self._headers if name not in there]
+                present = {name for name, _ in message.get("headers", ())}
+                more = [(name, value) for name, value in self._headers if name not in present]
                 message = {**message, "headers": [*message.get("headers", ()), *more]}
             await send(message)
 
@@ -108,6 +108,6 @@ class Guard:
 
         refusal = self._door.refusal(scope["path"], dict(scope["headers"]))
         app = self._app if refusal is None else PlainTextResponse(f"{refusal[1]}\n", refusal[0])
-        known = refusal is None and self._door.may_act(Headers(scope=scope))
-        with self._connections.answering(client_of(scope.get("client")), known=known):
+        has_token = refusal is None and self._door.may_act(Headers(scope=scope))
+        with self._connections.answering(client_of(scope.get("client")), known=has_token):
             await app(scope, receive, with_headers)

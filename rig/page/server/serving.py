@@ -1,4 +1,4 @@
-"""The server in a thread of its own, beside whatever it shows."""
+"""The server of a page, in a thread of its own."""
 
 import asyncio
 import socket
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import Refused
-from rig.page.server.connections import Connections, counted
+from rig.page.server.connections import Connections, counting_protocol
 from rig.page.server.control import Control
 from rig.page.server.feed import Broadcast, Source
 from rig.page.server.guard import Door, new_token
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     from starlette.routing import Route
 
 ADDRESS, PORT = "127.0.0.1", 8137
-LAST_NEWS_S = 4.0  # for browsers to take what was shown last
+LAST_NEWS_S = 4.0  # for browsers to take the last news
 ENDING_S = 8.0
 SHORTEST_TOKEN = 22  # characters of base64, 128 bits
-AT_ONCE = 8  # connections accepted between two looks at those that are there
-WAITING = 128  # … and as many may wait for that
+AT_ONCE = 8  # connections accepted in one cycle of the event loop
+WAITING = 128  # … and those that may wait for it
 IDLE_S = 3  # a browser's connection is kept for its next request
 LARGEST_HEADERS = 8192  # bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """Where the page is: without a `port`, the usual one, or any that is free where that is taken."""
+    """The page's address: without a `port` the usual one, or any free one if that is taken."""
 
     host: str = ADDRESS
     port: int | None = None
@@ -42,7 +42,7 @@ class Address:
 
     @property
     def loopback(self) -> bool:
-        """Whether only this computer reaches it."""
+        """Whether only this computer can reach it."""
         try:
             return ip_address(self.host).is_loopback
         except ValueError:
@@ -51,7 +51,7 @@ class Address:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """Which page opens first, its `home`, and the addresses that it has beyond those to look on."""
+    """The page that opens first (`home`), and its addresses beyond those for spectators."""
 
     home: str = "page.html"
     routes: "Callable[[Door], Sequence[Route]]" = lambda door: ()
@@ -62,13 +62,13 @@ RUN = Page()
 
 @contextmanager
 def serving(feed: Source, control: Control, folder: Path | None, address: Address, shown: Page = RUN) -> Iterator[str]:
-    """Show `feed` to browsers on a page for the length of the block; yields its address, with the token.
+    """Show `feed` to browsers for the length of the block; yield the page's address, with the token.
 
-    Without a `folder` there is no run behind it, which could be stopped, and no certificate.
-    A page that fails says so on stderr and is gone: what it shows goes on. Raises Refused `page_address`.
+    Without a `folder` there is no run to stop, and no certificate. If the page fails, it says so on stderr and ends:
+    the run continues. Raise Refused `page_address`.
     """
     check(address)
-    listening = _bound(address)
+    listening = _listen(address)
     port = listening.getsockname()[1]
     host = f"[{address.host}]" if ":" in address.host else address.host
     names = {host, "localhost"} if address.loopback else {host}
@@ -83,7 +83,7 @@ def serving(feed: Source, control: Control, folder: Path | None, address: Addres
         served = asyncio.create_task(server.serve([listening]))
         while not server.started and not served.done():
             await asyncio.sleep(0.01)
-        listening.listen(WAITING)  # the server has made it AT_ONCE
+        listening.listen(WAITING)  # the server has set it to AT_ONCE
         ending = asyncio.create_task(over.wait())
         await asyncio.wait((ending, served, posting), return_when=asyncio.FIRST_COMPLETED)
         ending.cancel()
@@ -106,36 +106,36 @@ def serving(feed: Source, control: Control, folder: Path | None, address: Addres
             listening.close()
             control.leave()
         if why:
-            say(f"The page has ended ({why}). What it showed goes on without it.", sys.stderr)
+            say(f"The page has ended ({why}). The run is not affected.", sys.stderr)
 
     thread = threading.Thread(target=work, name="page", daemon=True)
     thread.start()
     try:
         yield f"http://{host}:{port}/#{token}"
     finally:
-        with suppress(RuntimeError):  # its loop is closed: it has ended before
+        with suppress(RuntimeError):  # its loop is closed: it has ended already
             loop.call_soon_threadsafe(over.set)
-        thread.join(ENDING_S)  # which closes what it listened at; one that is starved ends with the process
+        thread.join(ENDING_S)  # it closes its socket; a starved one ends with the process
 
 
 def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | None, shown: Page) -> "uvicorn.Server":
     import uvicorn
 
-    from rig.page.server.application import guarded, looking, of_a_run
+    from rig.page.server.application import guard_routes, looking, run_routes
 
     connections = Connections()
     served = [*looking(broadcast, door, shown.home), *shown.routes(door)]
     if folder is not None:
-        served = [*served, *of_a_run(broadcast, control, door, folder)]
+        served = [*served, *run_routes(broadcast, control, door, folder)]
     config = uvicorn.Config(
-        guarded(served, door, connections),
-        http=counted(connections),
+        guard_routes(served, door, connections),
+        http=counting_protocol(connections),
         h11_max_incomplete_event_size=LARGEST_HEADERS,
         backlog=AT_ONCE,
         timeout_keep_alive=IDLE_S,
-        proxy_headers=False,  # anybody can write one, and a connection is known by where it comes from
+        proxy_headers=False,  # anyone can send one; a connection is identified by its own address
         log_config=None,
-        log_level="critical",  # what strangers send is not to fill the terminal
+        log_level="critical",  # requests of strangers must not fill the terminal
         access_log=False,
         lifespan="off",
         ws="none",
@@ -146,7 +146,7 @@ def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | N
 
 
 def check(address: Address) -> None:
-    """Raises Refused `page_address` for one that will not do, whatever is free here."""
+    """Raise Refused `page_address` for an address that is invalid on any computer."""
     if address.host in ("", "0.0.0.0", "::", "*"):
         raise Refused(
             "page_address",
@@ -169,11 +169,11 @@ def check(address: Address) -> None:
         )
 
 
-def _bound(address: Address) -> socket.socket:
-    """The listening socket, of which uvicorn makes its server."""
-    wanted = [PORT, 0] if address.port is None else [address.port]
+def _listen(address: Address) -> socket.socket:
+    """Return the listening socket for uvicorn."""
+    ports = [PORT, 0] if address.port is None else [address.port]
     why: OSError | None = None
-    for port in wanted:
+    for port in ports:
         try:
             family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
             return socket.create_server((address.host, port), family=family, backlog=64)
@@ -181,6 +181,6 @@ def _bound(address: Address) -> socket.socket:
             why = error if isinstance(error, OSError) else OSError(str(error))
     raise Refused(
         "page_address",
-        f"the page cannot be served at {address.host}:{wanted[0]} ({why})",
+        f"the page cannot be served at {address.host}:{ports[0]} ({why})",
         "Give an address of this computer and a port that is free: --page-address ADDRESS:PORT",
     )

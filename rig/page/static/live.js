@@ -9,7 +9,7 @@ let heard = performance.now();
 
 export const WORDS = {
   waiting: "◌ waits for a part", checking: "◌ checks", asking: "? asks", running: "◉ runs", solving: "Σ solves", refused: "⊘ refused",
-  fault: "⚠ fault", stopped: "■ stopped", ended: "■ the batch has ended", dead: "⚠ no sign of life", unread: "? says what this page cannot read",
+  fault: "⚠ fault", stopped: "■ stopped", ended: "■ the batch has ended", dead: "⚠ no sign of life", unread: "? sends a state that this page cannot read",
 };
 export const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
 export let up = false;

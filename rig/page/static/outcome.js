@@ -31,7 +31,7 @@ function summary(row, past, since) {
 
 function comparison(past, since) {
   if (!since) return "";
-  if (!past) return "the first";
+  if (!past) return "first calibration of this part";
   const when = `since no ${past.number}, ${past.day}`;
   const [name, error] = past.worst;
   if (past.changed.length) return `⚠ ${past.changed.join(", ")} changed ${when}`;

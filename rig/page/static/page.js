@@ -14,7 +14,7 @@ const $ = (id) => document.getElementById(id);
 const shown = {};
 const WORDS = {
   connecting: ["Connecting", "…"], connected: ["Connected", "…"], ready: ["Ready", "■"], asking: ["Your answer is needed", "?"],
-  moving: ["Moving", "➜"], measuring: ["Measuring", "◉"], resting: ["Resting", "‖"], by_hand: ["To do", "☞"], judging: ["Solving", "Σ"],
+  moving: ["Moving", "➜"], measuring: ["Measuring", "◉"], resting: ["Resting", "‖"], by_hand: ["Your turn", "☞"], judging: ["Solving", "Σ"],
   passed: ["PASS", "✓"], failed: ["FAIL", "✗"], refused: ["Refused", "⊘"], fault: ["Fault", "⚠"], stopped: ["Stopped", "■"],
 };
 
@@ -199,7 +199,7 @@ function say(text) {
 let line = { up: false, why: "connecting" };
 
 function linked(up, why) {
-  line = { up, why: up ? "connected" : why ?? "no connection: what stands here is old" };
+  line = { up, why: up ? "connected" : why ?? "no connection: the values shown are old" };
   lineIs(up);
   if (!up && !shown.state) { // nothing has been shown that could be old
     $("sign").textContent = "⚠";

@@ -17,7 +17,7 @@ export function prompt(asked, mayAnswer) {
   $("prompt-answer").hidden = !here;
   $("prompt-elsewhere").hidden = here;
   $("prompt-elsewhere").textContent = mayAnswer
-    ? "This address lacks its token, so it is answered on a page that has it." : "It is answered at the terminal, not here.";
+    ? "This address lacks its token: answer it on a page that has it." : "Answer it at the terminal, not here.";
   if (asked.number !== before) {
     box.dataset.number = asked.number;
     $("clear").checked = false;

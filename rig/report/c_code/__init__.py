@@ -1,1 +1,1 @@
-"""C functions that correct readings, of which `calibration.h` is made."""
+"""C functions that correct readings, for `calibration.h`."""

@@ -12,30 +12,30 @@ from rig.estimation.arrays import Array
 from rig.report.findings.finding import Finding
 
 
-def gyroscope_lines(finding: Finding[GyroscopeEntry], sensed: Mapping[str, Array]) -> Iterator[str]:
-    """C of a gyroscope that was calibrated; none of a reference."""
+def gyroscope_lines(finding: Finding[GyroscopeEntry], sensitivities: Mapping[str, Array]) -> Iterator[str]:
+    """Yield C source for a calibrated gyroscope; nothing for a reference."""
     if finding.entry.role != "calibrate":
         return
-    prefix, sensitivity = prefix_of(finding.sensor), sensed.get(finding.sensor)
+    prefix, sensitivity = prefix_of(finding.sensor), sensitivities.get(finding.sensor)
     yield from _correction(prefix, finding.entry)
     if sensitivity is not None:
         yield from _without_gravity(prefix, sensitivity)
 
 
 def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
-    """C of an accelerometer."""
+    """Yield C source for an accelerometer."""
     entry = finding.entry
-    axes = "its own axes" if entry.alignment is None else "the gyroscope beside it"
-    left_out = "" if entry.second_order_s2_m is None else "\n * The second order that result.json has is left out."
+    axes = "its own axes" if entry.alignment is None else "its gyroscope"
+    omission = "" if entry.second_order_s2_m is None else "\n * The second order that result.json has is left out."
     about = f"{entry.part}, serial number {entry.serial_number}{_warm(entry.temperature_c)}"
     return _subtracting(finding, entry.bias_m_s2, entry.correction_matrix, "force_m_s2", (
         f"/* Accelerometer of {_comment(about)}: s = M (a - b), specific force: at rest it points up.",
-        f" * In the right-angled frame of {axes}, relative to gravity, {entry.gravity_m_s2:g} m/s^2.{left_out} */",
+        f" * In the right-angled frame of {axes}, relative to gravity, {entry.gravity_m_s2:g} m/s^2.{omission} */",
     ))  # fmt: skip
 
 
 def magnetometer_lines(finding: Finding[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
-    """C of a magnetometer, as it was mounted."""
+    """Yield C source for a magnetometer, as it was mounted."""
     entry = finding.entry
     return _subtracting(finding, entry.bias_t, entry.correction_matrix, "field_t", (
         f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",
@@ -48,7 +48,7 @@ def _warm(temperature_c: float | None) -> str:
 
 
 def prefix_of(name: str) -> str:
-    """What a sensor's names in C begin with."""
+    """Return the prefix of a sensor's names in C."""
     return re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
 
 
@@ -75,8 +75,8 @@ def _correction(prefix: str, sensor: GyroscopeEntry) -> Iterator[str]:
 def _without_gravity(prefix: str, sensitivity: Array) -> Iterator[str]:
     yield from (
         "",
-        "/* The same without what gravity adds to a reading: gravity_m_s2 points down, in the frame of the corrected",
-        " * rates; it is an accelerometer's reading at rest with the other sign. */",
+        "/* The same, corrected for g-sensitivity: gravity_m_s2 points down, in the frame of the corrected",
+        " * rates; it is an accelerometer's reading at rest with the opposite sign. */",
         f"static const float {prefix}_g_sensitivity_rad_s_per_m_s2[3][3] = {c_rows(sensitivity)};",
         "",
         f"static inline void {prefix}_calibrate_with_gravity(",
@@ -96,13 +96,16 @@ def _without_gravity(prefix: str, sensitivity: Array) -> Iterator[str]:
 def _subtracting(
     finding: Finding[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
 ) -> Iterator[str]:
-    """Bias, matrix and function of a sensor whose bias is part of its reading; `true` is what the function finds."""
-    of, unit = f"{prefix_of(finding.sensor)}_{finding.quantity}", finding.quantity.suffix
+    """Yield bias, matrix and function of a sensor whose bias is subtracted from its reading.
+
+    `true` is the name of the corrected value in C.
+    """
+    name, unit = f"{prefix_of(finding.sensor)}_{finding.quantity}", finding.quantity.suffix
     yield from (
         "",
         *about,
-        f"static const float {of}_bias_{unit}[3] = {_array(bias)};",
-        f"static const float {of}_matrix[3][3] = {c_rows(matrix)};",
+        f"static const float {name}_bias_{unit}[3] = {_array(bias)};",
+        f"static const float {name}_matrix[3][3] = {c_rows(matrix)};",
         "",
         f"static inline void {prefix_of(finding.sensor)}_calibrate_{finding.quantity}("
         f"const float reading_{unit}[3], float {true}[3])",
@@ -110,14 +113,14 @@ def _subtracting(
         "    for (int i = 0; i < 3; i++) {",
         f"        {true}[i] = 0.0f;",
         "        for (int j = 0; j < 3; j++)",
-        f"            {true}[i] += {of}_matrix[i][j] * (reading_{unit}[j] - {of}_bias_{unit}[j]);",
+        f"            {true}[i] += {name}_matrix[i][j] * (reading_{unit}[j] - {name}_bias_{unit}[j]);",
         "    }",
         "}",
     )
 
 
 def c_rows(matrix: Iterable[Iterable[float]]) -> str:
-    """The rows of a matrix as C has them."""
+    """Return a matrix as an initializer of C."""
     return "{" + ", ".join(_array(row) for row in matrix) + "}"
 
 
@@ -126,5 +129,5 @@ def _array(values: Iterable[float]) -> str:
 
 
 def _comment(text: str) -> str:
-    """What a serial number may hold must not end the comment it stands in."""
+    """Return text that cannot end the comment around it, as a serial number could."""
     return printable(" ".join(text.split())).replace("*/", "* /").replace("/*", "/ *")

@@ -1,1 +1,1 @@
-"""The calibration certificate: what ISO/IEC 17025, 7.8, asks for, said by a result and by the laboratory."""
+"""The calibration certificate: the content of ISO/IEC 17025, 7.8, from a result and the laboratory's statements."""

@@ -1,4 +1,4 @@
-"""The numbers of accelerometers, of magnetometers and of biases by repeat as a certificate prints them."""
+"""Numbers of accelerometers, magnetometers and biases by repeat, as a certificate prints them."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,10 @@ MICRO = 1e6
 
 @dataclass(frozen=True, slots=True)
 class ReversalRow:
-    """One axis of a magnetometer that was turned over; `mixed` where it was not, and the bias is that as mounted."""
+    """One axis of a magnetometer's reversal.
+
+    If it was not turned over, it is `mixed`: its bias is that as mounted, arm's field included.
+    """
 
     axis: str
     scale: Pair
@@ -30,7 +33,7 @@ class ReversalRow:
 
 @dataclass(frozen=True, slots=True)
 class DriftRow:
-    """One axis' bias: in the first and in the last repeat, how far it ever moved, and over temperature if known."""
+    """The bias of one axis: in the first and the last repeat, its largest change, and its temperature slope if any."""
 
     axis: str
     first: Pair
@@ -40,17 +43,17 @@ class DriftRow:
 
 
 def acceleration_rows(entry: AccelerometerEntry) -> list[AxisRow]:
-    """An accelerometer's axes with U; the bias in m/s² and in thousandths of the stated gravity."""
+    """Return an accelerometer's axes with U; the bias in m/s² and in thousandths of the stated gravity."""
     return rows_of(entry.scale, entry.bias_m_s2, entry.budget.expanded, too=1000 / entry.gravity_m_s2)
 
 
 def field_rows(entry: MagnetometerEntry) -> list[AxisRow]:
-    """A magnetometer's axes with U; the bias in µT."""
+    """Return a magnetometer's axes with U; the bias in µT."""
     return rows_of(entry.scale, entry.bias_t, entry.budget.expanded, size=MICRO)
 
 
 def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
-    """The sensor's own bias, and the arm's field in its axes as it was mounted first, in µT, with U."""
+    """Return the sensor's own bias and the arm's field in its axes, as first mounted, in µT with U."""
     scale = expanded(entry.scale_std, entry.scale_degrees_of_freedom).widths
     bias = expanded(entry.bias_std_t, entry.bias_degrees_of_freedom).widths
     field = expanded(entry.arm_field_std_t, entry.arm_field_degrees_of_freedom).widths
@@ -67,12 +70,12 @@ def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
 
 
 def drift_rows(entry: DriftEntry) -> list[DriftRow]:
-    """The rows of a drift, in its own unit, with U."""
-    bias, std = (np.array([getattr(each.scale_fixed, name) for each in entry.repeats]) for name in ("bias", "std"))
-    whole = np.hypot(std, entry.common_std)  # what all repeats share is no part of a change
-    changed, slope = largest_change_std(bias, std), entry.temperature_slope
+    """Return the rows of a drift in its own unit, with U."""
+    bias, std = (np.array([getattr(repeat.scale_fixed, name) for repeat in entry.repeats]) for name in ("bias", "std"))
+    total = np.hypot(std, entry.common_std)  # the common part cancels in a change
+    change_std, slope = largest_change_std(bias, std), entry.temperature_slope
     first, last, change = (
-        expanded(each.tolist(), entry.degrees_of_freedom).widths for each in (whole[0], whole[-1], changed)
+        expanded(stds.tolist(), entry.degrees_of_freedom).widths for stds in (total[0], total[-1], change_std)
     )
     per_c = () if isinstance(slope, ErrorEntry) else expanded(slope.std, slope.degrees_of_freedom).widths
     return [
@@ -88,5 +91,5 @@ def drift_rows(entry: DriftEntry) -> list[DriftRow]:
 
 
 def distance(vector: Sequence[float]) -> float:
-    """The length of it."""
+    """Return the length of a vector."""
     return math.hypot(*vector)

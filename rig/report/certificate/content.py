@@ -1,4 +1,4 @@
-"""What a certificate holds, from a result and from what the laboratory says: texts and numbers, no layout."""
+"""The content of a certificate, from a result and the laboratory's statements: texts and numbers, no layout."""
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +28,7 @@ from rig.report.certificate.statements import Stated
 from rig.report.entries.omitted import omitted_lines
 from rig.report.findings.characteristic import Term, terms
 from rig.report.findings.finding import Finding
-from rig.report.findings.kind import Standard, Without
+from rig.report.findings.kind import NoOutlet, Standard
 from rig.report.kinds.registry import kinds, outlets, shown
 from rig.report.words.mounts import mount_lines
 from rig.turners.kind import Wording
@@ -37,7 +37,7 @@ from rig.turners.registry import words_of
 
 @dataclass(frozen=True, slots=True)
 class Gyroscope:
-    """One calibrated gyroscope: its result, and its verification if there was one."""
+    """One calibrated gyroscope: its result, and its verification if there is one."""
 
     name: str
     sensor: GyroscopeEntry
@@ -46,9 +46,9 @@ class Gyroscope:
 
 @dataclass(frozen=True, slots=True)
 class HeldStill:
-    """The sensors of one `kind` that were calibrated at rest, and what their scale factors hang on.
+    """The sensors of one `kind` that were calibrated at rest, and the standard of their scale factors.
 
-    Of its size they took the `value`; `origin` is where the laboratory says that comes from.
+    `value` is the stated value of the standard, `origin` the laboratory's statement of its source.
     """
 
     kind: str
@@ -60,34 +60,35 @@ class HeldStill:
 
     @property
     def whose(self) -> str:
-        """The scale of one of them, in words."""
+        """The scale of such a sensor, in words."""
         return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind}'s scale"
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """What of a result a macro of a template prints, which `place` names: `template:macro`; then what is `beside`."""
+    """A finding that a macro of a template prints (`macro_path`, as `template:macro`), with further characteristics."""
 
-    place: str
-    found: Finding[Any]
-    beside: tuple[Term, ...]
+    macro_path: str
+    finding: Finding[Any]
+    terms: tuple[Term, ...]
 
     @property
     def template(self) -> str:
-        """The file beside this one."""
-        return self.place.partition(":")[0]
+        """The template's file."""
+        return self.macro_path.partition(":")[0]
 
     @property
     def macro(self) -> str:
-        """What of the file prints it."""
-        return self.place.partition(":")[2]
+        """The macro in that file."""
+        return self.macro_path.partition(":")[2]
 
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """All that a certificate says. `marks` must stand across every page; without any it is one to be signed.
+    """The content of a certificate.
 
-    `reversals` are what turning magnetometers over has told, by the magnetometer's name.
+    `marks` are printed across every page; a certificate without any is ready to be signed. `reversals` are results of
+    turning magnetometers over, by the magnetometer's name.
     """
 
     number: str
@@ -108,126 +109,128 @@ class Certificate:
 
     @property
     def elsewhere(self) -> bool:
-        """Whether the readings were recorded elsewhere, and a file tells the motion."""
+        """Whether the readings are external, with the motion given by a file."""
         return self.provenance.readings_file is not None
 
     @property
     def by_hand(self) -> bool:
         """Whether a hand turned the items on a table."""
-        return any(each.sensor.by_hand is not None for each in self.gyroscopes)
+        return any(gyroscope.sensor.by_hand is not None for gyroscope in self.gyroscopes)
 
     @property
     def levelled(self) -> bool:
-        """Whether an accelerometer told the faces on which a hand laid them."""
-        found = (each.sensor.by_hand for each in self.gyroscopes)
-        return any(size.name == "acceleration_m_s2" for each in found if each is not None for size in each.errors)
+        """Whether an accelerometer measured the faces on which the items lay."""
+        sessions = (gyroscope.sensor.by_hand for gyroscope in self.gyroscopes)
+        return any(
+            error.name == "acceleration_m_s2" for entry in sessions if entry is not None for error in entry.errors
+        )
 
     @property
     def turns(self) -> str:
-        """What the sweeps turned through, in words."""
+        """The angles of the sweeps, in words."""
         return f"turns by {' and '.join(self.arcs)}" if self.arcs else "whole turns"
 
     @property
     def arcs(self) -> tuple[str, ...]:
-        """How far sweeps went that were no whole turns."""
+        """The angles of sweeps that were not whole turns, in words."""
         return tuple(sorted({turn_words(angle) for angle in _angles_rad(self.result) if not closes(angle)}))
 
     @property
     def mounted(self) -> tuple[str, ...]:
-        """How the item sat in the stages for which it was mounted anew, in a line each."""
+        """The measured mounting of the item in each stage after the first, one line each."""
         return tuple(mount_lines(self.result))
 
     @property
     def arm(self) -> str:
-        """What turned the items, by what was found of it."""
-        found = self.provenance
-        if self.by_hand or (found.readings_file is not None and found.motion_file is None):
+        """The machine or hand that turned the items, by its recorded model."""
+        provenance = self.provenance
+        if self.by_hand or (provenance.readings_file is not None and provenance.motion_file is None):
             return "a hand, which turned the items on a table"
-        if found.motion_file is not None:
-            return f"whatever the file {_named(found.motion_file)} tells the motion of"
-        if found.arm_model is None:
+        if provenance.motion_file is not None:
+            return f"the body whose motion the file {_file_words(provenance.motion_file)} states"
+        if provenance.arm_model is None:
             return f"{self.words.name} whose model was not recorded"
-        return f"{self.words.name} {found.arm_maker} {found.arm_model}"
+        return f"{self.words.name} {provenance.arm_maker} {provenance.arm_model}"
 
     @property
     def words(self) -> Wording:
-        """How to speak of what turned the items; nothing did where the readings were recorded elsewhere."""
+        """The words for the turner; those of no arm for external readings."""
         return words_of(self.provenance.turner_kind or NO_ARM)
 
     @property
     def procedure(self) -> str:
         """The script that moved the arm, and its hash."""
         if self.provenance.readings_file is not None:
-            return f"readings of the file {_named(self.provenance.readings_file)}"
-        said = self.provenance.model_dump()
-        name, sha256 = said.get("script"), said.get("script_sha256")
+            return f"readings of the file {_file_words(self.provenance.readings_file)}"
+        fields = self.provenance.model_dump()
+        name, sha256 = fields.get("script"), fields.get("script_sha256")
         if name is None or sha256 is None:
             return "a script of the rig's own, whose hash was not recorded"
         return f"script {name}, SHA-256 {sha256}"
 
     @property
     def provenance(self) -> ProvenanceEntry:
-        """What was measured with what, and when."""
+        """The equipment and the times of the measurement."""
         return self.result.provenance
 
     @property
     def performed(self) -> tuple[date, date]:
         """The first and the last day of the measurement."""
         times = (self.provenance.started_utc, *self.provenance.resumed_utc, *self.provenance.verified_utc)
-        days = sorted(datetime.fromisoformat(each).date() for each in times)
+        days = sorted(datetime.fromisoformat(time).date() for time in times)
         return days[0], days[-1]
 
     @property
     def finds_attitudes(self) -> bool:
-        """Whether the readings told how far attitudes were off."""
-        return any(hasattr(entry, "attitude_error_rad") for each in self.held_still for entry in each.entries)
+        """Whether the attitude error was estimated from the readings."""
+        return any(hasattr(entry, "attitude_error_rad") for kind in self.held_still for entry in kind.entries)
 
     @property
     def temperature_source(self) -> str:
-        """What tells how warm the items were: nothing where a file told their motion."""
-        found = [each.sensor.bias_conditions for each in self.gyroscopes]
-        found += [getattr(entry, "conditions", None) for each in self.held_still for entry in each.entries]
-        dated = [when for when in found if when is not None]
-        known = [when for when in dated if when.temperature_c is not None]
-        if dated and not known:
+        """The source of the items' temperatures, in words."""
+        conditions = [gyroscope.sensor.bias_conditions for gyroscope in self.gyroscopes]
+        conditions += [getattr(entry, "conditions", None) for kind in self.held_still for entry in kind.entries]
+        dated = [when for when in conditions if when is not None]
+        measured = [when for when in dated if when.temperature_c is not None]
+        if dated and not measured:
             return "not known"
-        stated = bool(known) and all(when.temperature_stated for when in known)
+        stated = bool(measured) and all(when.temperature_stated for when in measured)
         return ("as stated" if stated else "the item's own thermometer") + "; not traceable"
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """What the page prints of each sensor, one after the other; of a reference nothing."""
-        asked = outlets(self.result, lambda kind: kind.block)
+        """The blocks of the page, sensor by sensor; references have none."""
+        printable = outlets(self.result, lambda kind: kind.block)
         blocks = [
-            Block(place, finding, (*terms(kind.characteristics, finding, "certificate"),))
-            for kind, place, finding in asked
-            if not finding.known
+            Block(macro_path, finding, (*terms(kind.characteristics, finding, "certificate"),))
+            for kind, macro_path, finding in printable
+            if not finding.is_reference
         ]
-        order = list(dict.fromkeys(block.found.sensor for block in blocks))
-        return tuple(sorted(blocks, key=lambda block: order.index(block.found.sensor)))
+        order = list(dict.fromkeys(block.finding.sensor for block in blocks))
+        return tuple(sorted(blocks, key=lambda block: order.index(block.finding.sensor)))
 
     @property
     def calibrates(self) -> bool:
-        """Whether anything was calibrated, and not verified alone."""
+        """Whether anything was calibrated, not only verified."""
         return _calibrates(self.result)
 
     @property
     def without_uncertainty(self) -> tuple[str, ...]:
-        """What was calibrated, and of whose uncertainty the solution's spread alone is known."""
-        return tuple(_without_uncertainty(self.result))
+        """The calibrated sensors of which only the noise part of the uncertainty is known."""
+        return tuple(_find_incomplete(self.result))
 
     @property
     def guarded(self) -> bool:
-        """Whether values had to stay below their limits by U."""
+        """Whether a guard band of U was applied to the limits."""
         return any(check.guard_band > 0 for check in self.conformity)
 
 
 def certificate_of(
     result: ResultDocument, stated: Stated, reversals: Mapping[str, ReversalEntry] = MappingProxyType({})
 ) -> Certificate:
-    """The certificate of a result. The same result and statements make the same certificate, its number too.
+    """Return the certificate of a result; it depends on its arguments alone, its number too.
 
-    Raises Refused `another_sensor` for reversals of magnetometers, or from runs, other than the result's.
+    Raise Refused `another_sensor` for reversals of magnetometers, or from runs, other than the result's.
     """
     _check_same(result, reversals)
     gyroscopes = tuple(
@@ -235,7 +238,7 @@ def certificate_of(
         for name, sensor in result.gyroscopes.items()
         if sensor.role == "calibrate"
     )
-    verified = {name: found for name, found in result.verification.items() if name not in result.gyroscopes}
+    verified = {name: entry for name, entry in result.verification.items() if name not in result.gyroscopes}
     conformity, fitness = (
         tuple(check for check in result.checks if check.means.kind == kind) for kind in ("conformity", "fitness")
     )
@@ -247,7 +250,7 @@ def certificate_of(
         stated=stated,
         result=result,
         gyroscopes=gyroscopes,
-        held_still=tuple(_held_still(result, stated)),
+        held_still=tuple(_find_held_still(result, stated)),
         verified=verified,
         conformity=conformity,
         fitness=fitness,
@@ -258,49 +261,49 @@ def certificate_of(
     )
 
 
-def _named(file: FileEntry) -> str:
+def _file_words(file: FileEntry) -> str:
     return f"{file.name}, SHA-256 {file.sha256}"
 
 
 def is_simulated(result: ResultDocument, stated: Stated) -> bool:
-    """Whether a simulated laboratory was measured in, by the configuration or by what the controller calls itself."""
+    """Return whether the laboratory was simulated, by the configuration or by the controller's own statement."""
     return stated.simulated or calls_itself_simulated(result.provenance.arm_software)
 
 
 def _number(result: ResultDocument, stated: Stated, reversals: Mapping[str, ReversalEntry]) -> str:
-    """The day, and a part of the SHA-256 of all the certificate is made of: another content, another number."""
-    said = f"{result.text()}\n{stated.site!r}\n{stated.certificate!r}\n{stated.simulated}"
-    said += "".join(f"\n{name}: {each.model_dump_json()}" for name, each in reversals.items())
+    """Return the day and a part of the SHA-256 of the content: another content, another number."""
+    content = f"{result.text()}\n{stated.site!r}\n{stated.certificate!r}\n{stated.simulated}"
+    content += "".join(f"\n{name}: {reversal.model_dump_json()}" for name, reversal in reversals.items())
     day = datetime.fromisoformat(result.provenance.started_utc)
-    return f"RIG-{day:%Y%m%d}-{hashlib.sha256(said.encode()).hexdigest()[:12].upper()}"
+    return f"RIG-{day:%Y%m%d}-{hashlib.sha256(content.encode()).hexdigest()[:12].upper()}"
 
 
 def _calibrates(result: ResultDocument) -> bool:
-    """Whether scale factors were found of anything."""
-    return any(each.scale is not None for each in shown(result))
+    """Return whether scale factors of any sensor were measured."""
+    return any(row.scale is not None for row in shown(result))
 
 
 def _title(result: ResultDocument) -> str:
     if not _calibrates(result):
         return "Verification report"
-    return "Calibration record" if any(_without_uncertainty(result)) else "Calibration certificate"
+    return "Calibration record" if any(_find_incomplete(result)) else "Calibration certificate"
 
 
-def _without_uncertainty(result: ResultDocument) -> Iterator[str]:
-    """Sensors of which noise alone is known, by estimators that have no budget."""
+def _find_incomplete(result: ResultDocument) -> Iterator[str]:
+    """Yield sensors of which only the noise is known, by estimators without a budget."""
     for _, show, finding in outlets(result, lambda kind: kind.shown):
-        if not finding.known and (row := show(finding)).scale is not None and not row.combined:
+        if not finding.is_reference and (row := show(finding)).scale is not None and not row.combined:
             yield finding.sensor
 
 
 def _check_same(result: ResultDocument, reversals: Mapping[str, ReversalEntry]) -> None:
-    for name, each in reversals.items():
-        here = result.magnetometers.get(name)
-        began = {run.started_utc for run in each.runs}
-        if not isinstance(here, MagnetometerEntry) or here.serial_number != each.serial_number:
-            why = f"magnetometer {name} {each.serial_number} was turned over, which this run did not calibrate"
-        elif result.provenance.started_utc not in began:
-            why = f"{name} was turned over between runs of {', '.join(sorted(began))}; this run is none of them"
+    for name, reversal in reversals.items():
+        entry = result.magnetometers.get(name)
+        starts = {run.started_utc for run in reversal.runs}
+        if not isinstance(entry, MagnetometerEntry) or entry.serial_number != reversal.serial_number:
+            why = f"the reversal is of magnetometer {name} {reversal.serial_number}, which this run did not calibrate"
+        elif result.provenance.started_utc not in starts:
+            why = f"the reversal of {name} is from runs of {', '.join(sorted(starts))}, and this run is not among them"
         else:
             continue
         raise Refused("another_sensor", why, "Give one of the runs that `rig reversal` was given")
@@ -309,77 +312,82 @@ def _check_same(result: ResultDocument, reversals: Mapping[str, ReversalEntry]) 
 def _marks(result: ResultDocument, stated: Stated, fitness: Sequence[CheckEntry]) -> Iterator[str]:
     if is_simulated(result, stated):
         yield "Simulated laboratory: no real item was calibrated"
-    if any(_without_uncertainty(result)):
+    if any(_find_incomplete(result)):
         yield "Not a certificate: the uncertainty is not known"
     if not all(check.passed for check in fitness):
         yield "Not valid: the measurement failed its own checks"
 
 
 def _angles_rad(result: ResultDocument) -> Iterator[float]:
-    """How far the sweeps went; of those of a file that tells speeds it is not known."""
+    """Yield the angles of the sweeps, as far as known: a file may state speeds only."""
     for sensor in result.gyroscopes.values():
-        yield from (each.angle_rad for each in sensor.observations if each.angle_rad is not None)
-    for found in result.verification.values():
-        yield from (each.angle_rad for each in found.after.revolutions)
+        yield from (turn.angle_rad for turn in sensor.observations if turn.angle_rad is not None)
+    for verification in result.verification.values():
+        yield from (turn.angle_rad for turn in verification.after.revolutions)
 
 
 def _traceable(result: ResultDocument, stated: Stated) -> bool:
-    """Whether the unit of time, the only standard of a gyroscope's scale, hangs on a named reference.
+    """Return whether time, the only standard of a gyroscope's scale, is traceable to a named reference.
 
-    Encoders, which tell how far an arc went, hang on none.
+    Arcs are not traceable: their angles are those of the encoders.
     """
-    compared = result.clock is not None and any(each.clock == BY_COMPUTER for each in result.clock.comparisons)
+    compared = result.clock is not None and any(
+        comparison.clock == BY_COMPUTER for comparison in result.clock.comparisons
+    )
     measured = bool(result.gyroscopes) and not is_simulated(result, stated)
     whole = all(map(closes, _angles_rad(result)))
     return measured and compared and whole and stated.where.time_reference is not None
 
 
-def _held_still(result: ResultDocument, stated: Stated) -> Iterator[HeldStill]:
-    """Traceable where the size of their only standard has an uncertainty and an origin, and was measured."""
+def _find_held_still(result: ResultDocument, stated: Stated) -> Iterator[HeldStill]:
+    """Yield the sensors measured at rest, kind by kind.
+
+    They are traceable if their standard was measured, with a stated uncertainty and origin.
+    """
     for kind in kinds():
-        entries = tuple(found.entry for found in kind.found(result))
-        if isinstance(kind.standard, Without) or not entries:
+        entries = tuple(finding.entry for finding in kind.find(result))
+        if isinstance(kind.standard, NoOutlet) or not entries:
             continue
-        origin, budgets = kind.standard.origin(stated.where), (getattr(each, "budget", None) for each in entries)
-        known = all(budget is not None and _size_stated(budget) for budget in budgets)
-        traceable = known and origin is not None and not is_simulated(result, stated)
+        origin, budgets = kind.standard.origin(stated.where), (getattr(entry, "budget", None) for entry in entries)
+        stated_size = all(budget is not None and _size_stated(budget) for budget in budgets)
+        traceable = stated_size and origin is not None and not is_simulated(result, stated)
         yield HeldStill(kind.name, kind.standard, entries, kind.standard.value(entries[0]), origin, traceable)
 
 
 def _size_stated(budget: BudgetEntry) -> bool:
-    """A stated uncertainty is that of a normal distribution, an assumed one a half-width."""
+    """Return whether the uncertainty of the standard is stated (normal) and not assumed (a half-width)."""
     return any(line.kind == "B" and line.distribution == "normal" for line in budget.contributors)
 
 
 def _deviations(result: ResultDocument) -> Iterator[str]:
     provenance = result.provenance
     if provenance.resumed_utc:
-        yield f"The measurement was interrupted and gone on with at {', '.join(provenance.resumed_utc)} (UTC)."
+        yield f"The measurement was interrupted and continued at {', '.join(provenance.resumed_utc)} (UTC)."
     for name, sensor in result.gyroscopes.items():
         lost = sum(turn.lost_samples for turn in sensor.observations)
         if lost:
             yield f"{name}: {lost} samples were lost within sweeps and left out."
         yield from (f"{name}: {warning}" for warning in getattr(sensor.vector_model, "warnings", ()))
     for _, _, finding in outlets(result, lambda kind: kind.standard):
-        said = getattr(finding.entry, "warnings", ())
-        yield from (f"{finding.quantity.label(finding.sensor)}: {warning}" for warning in said)
+        warnings = getattr(finding.entry, "warnings", ())
+        yield from (f"{finding.quantity.label(finding.sensor)}: {warning}" for warning in warnings)
     for name, magnetometer in result.magnetometers.items():
         if isinstance(magnetometer, ErrorEntry):
-            yield f"{FIELD.label(name)}, was recorded and not calibrated: {magnetometer.error}"
+            yield f"{FIELD.label(name)} was recorded and not calibrated: {magnetometer.error}"
     for name, faults in result.unsolved.items():
-        yield from (f"{name}, {what}, was recorded and not calibrated: {each.error}" for what, each in faults.items())
+        yield from (f"{name}, {what}, was recorded and not calibrated: {fault.error}" for what, fault in faults.items())
     yield from (f"{line[:1].upper()}{line[1:]}." for line in omitted_lines(result))
     if not provenance.model_dump().get("script_installed", True):
         yield f"The movement was that of a script of the laboratory's own, {provenance.model_dump().get('script')}."
 
 
 def _references(result: ResultDocument) -> Iterator[str]:
-    """Results that others had found: the calibration a reference came with."""
-    for found in {each.reference: each for each in result.verification.values()}.values():
-        serial = result.provenance.sensor_serial_numbers.get(found.reference, "not stated")
-        scale = ", ".join(f"{k:g}" for k in found.reference_scale)
-        bias = ", ".join(f"{b:g}" for b in found.reference_bias_rad_s)
+    """Yield results of others: the calibrations of the references."""
+    for entry in {entry.reference: entry for entry in result.verification.values()}.values():
+        serial = result.provenance.sensor_serial_numbers.get(entry.reference, "not stated")
+        scale = ", ".join(f"{k:g}" for k in entry.reference_scale)
+        bias = ", ".join(f"{b:g}" for b in entry.reference_bias_rad_s)
         yield (
-            f"Reference {found.reference}, serial number {serial}: scale factors {scale}, biases {bias} rad/s, as "
+            f"Reference {entry.reference}, serial number {serial}: scale factors {scale}, biases {bias} rad/s, as "
             "stated in the laboratory's configuration, without an uncertainty."
         )

@@ -1,7 +1,7 @@
 """The digital calibration certificate: PTB's DCC 3.2.1 over D-SI 2.1, with the full covariance.
 
-Numbers stand in full here; the page rounds them. What the laboratory has not stated reads so, but for the country,
-which PTB's rules want to be one of ISO 3166-1.
+Numbers have all digits here; the page rounds them. Missing statements of the laboratory read "not stated", except the
+country, for which PTB's rules require a code of ISO 3166-1.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,18 +15,18 @@ from rig.errors import Refused
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.method_words import method_in_short
 from rig.report.findings.characteristic import terms
-from rig.report.findings.kind import Measured
+from rig.report.findings.kind import CertifiedItem
 from rig.report.kinds.registry import outlets
 from rig.report.tables.certificate import kind as kind_of_part
-from rig.report.tables.dcc_results import beside
+from rig.report.tables.dcc_results import further_results
 from rig.report.tables.xml_parts import DCC as NAMESPACE
 from rig.report.tables.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
-from rig.report.words.validity_words import told_by
+from rig.report.words.validity_words import label_source
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
 DESCRIBED = "docs/method.md and docs/uncertainty.md of calibration-rig"
-# PTB's rules want a condition to each quantity.
+# PTB's rules require a condition for each quantity.
 UNKNOWN_AIR = dcc(
     "influenceConditions",
     dcc("influenceCondition", text("name", "ambient temperature"), dcc("data", text("text", None))),
@@ -34,9 +34,9 @@ UNKNOWN_AIR = dcc(
 
 
 def digital_certificate(certificate: Certificate) -> bytes:
-    """The digital calibration certificate as XML.
+    """Return the digital calibration certificate as XML.
 
-    Raises Refused `no_digital_certificate` where nothing was calibrated, an uncertainty or the country is not known.
+    Raise Refused `no_digital_certificate` if nothing was calibrated, or an uncertainty or the country is not known.
     """
     if not certificate.calibrates:
         raise Refused("no_digital_certificate", "the run calibrated nothing", "Give a run that calibrates")
@@ -53,24 +53,24 @@ def digital_certificate(certificate: Certificate) -> bytes:
             "the laboratory's country is not stated",
             "State site.country, for example with --set site.country=DE",
         )
-    measured = list(_measured(certificate))
+    items = list(_certified_items(certificate))
     root = dcc(
         "digitalCalibrationCertificate",
-        _administrative(certificate, measured),
-        dcc("measurementResults", *_results(certificate, measured)),
+        _administrative(certificate, items),
+        dcc("measurementResults", *_results(certificate, items)),
         schemaVersion=SCHEMA_VERSION,
     )
-    place = f"{NAMESPACE} {NAMESPACE}/v{SCHEMA_VERSION}/dcc.xsd"
-    root.set(f"{{{XSI}}}schemaLocation", place)
+    location = f"{NAMESPACE} {NAMESPACE}/v{SCHEMA_VERSION}/dcc.xsd"
+    root.set(f"{{{XSI}}}schemaLocation", location)
     return bytes(tostring(root, encoding="utf-8", xml_declaration=True))
 
 
-def _administrative(c: Certificate, measured: Sequence[Measured]) -> Element:
+def _administrative(c: Certificate, items: Sequence[CertifiedItem]) -> Element:
     return dcc(
         "administrativeData",
         dcc("dccSoftware", _software(c)),
         _core(c),
-        dcc("items", *_items(c, measured)),
+        dcc("items", *_items(c, items)),
         dcc("calibrationLaboratory", _contact("contact", c.stated.where.laboratory, c.stated.where.address)),
         dcc("respPersons", dcc("respPerson", dcc("person", text("name", c.stated.certificate.authorised_by)),
                                words("mainSigner", "true"))),
@@ -98,7 +98,7 @@ def _core(c: Certificate) -> Element:
         None if order.received is None else words("receiptDate", order.received),
         words("beginPerformanceDate", begin),
         words("endPerformanceDate", end),
-        words("performanceLocation", "other"),  # of the schema's words the one that states nothing
+        words("performanceLocation", "other"),  # the schema's value for a place that is not stated
         words("issueDate", c.issued),
         amended or None,
     )
@@ -108,28 +108,29 @@ def _contact(name: str, who: str | None, address: str | None) -> Element:
     return dcc(name, text("name", who), dcc("location", text("further", address)))
 
 
-def _measured(c: Certificate) -> Iterator[Measured]:
-    """Everything that was measured, kind by kind, and what was found beside."""
+def _certified_items(c: Certificate) -> Iterator[CertifiedItem]:
+    """Yield all measured items, kind by kind, with their further characteristics."""
     for kind, measure, finding in outlets(c.result, lambda kind: kind.measured):
-        if (each := measure(finding, c.reversals)) is not None:
-            more = beside(terms(kind.characteristics, finding, "digital certificate"))
-            yield replace(each, results=[*each.results, *more])
+        if (item := measure(finding, c.reversals)) is not None:
+            more = further_results(terms(kind.characteristics, finding, "digital certificate"))
+            yield replace(item, results=[*item.results, *more])
 
 
-def _keys(items: Iterable[Measured]) -> dict[tuple[str, str], str]:
-    """The key of every item, by what it is and its name: items of a kind are numbered."""
+def _keys(items: Iterable[CertifiedItem]) -> dict[tuple[str, str], str]:
+    """Return the key of each item by its kind and name; items of a kind are numbered."""
     keys: dict[tuple[str, str], str] = {}
-    for each in items:
-        of = each.item, each.sensor
-        keys.setdefault(of, f"{each.item}-{sum(item == each.item for item, _ in keys)}")
+    for certified in items:
+        kind_and_name = certified.item, certified.sensor
+        keys.setdefault(kind_and_name, f"{certified.item}-{sum(item == certified.item for item, _ in keys)}")
     return keys
 
 
-def _items(c: Certificate, measured: Sequence[Measured]) -> Iterator[Element]:
-    for (item, sensor), key in _keys(measured).items():
-        of_it = sorted((each for each in measured if each.sensor == sensor), key=lambda each: each.item != item)
-        part = next((each.part for each in of_it if each.part), UNSAID)
-        serial = next((each.serial_number for each in of_it if each.serial_number), None)
+def _items(c: Certificate, certified_items: Sequence[CertifiedItem]) -> Iterator[Element]:
+    for (item, sensor), key in _keys(certified_items).items():
+        entries = (entry for entry in certified_items if entry.sensor == sensor)
+        own_first = sorted(entries, key=lambda entry: entry.item != item)
+        part = next((entry.part for entry in own_first if entry.part), UNSAID)
+        serial = next((entry.serial_number for entry in own_first if entry.serial_number), None)
         serial = serial or c.provenance.sensor_serial_numbers.get(sensor, UNSAID)
         yield _item(key, f"{item} {sensor}", part, serial, c)
 
@@ -141,14 +142,14 @@ def _item(key: str, name: str, part: str, serial: str, c: Certificate) -> Elemen
         text("name", name),
         text("description", " ".join([*(f"{mark}." for mark in c.marks), condition])),
         words("model", kind_of_part(part)),
-        dcc("identifications", _identified("manufacturer", serial, "serial number"),
+        dcc("identifications", _identification("manufacturer", serial, "serial number"),
             None if c.elsewhere or has_own_port(part)
-            else _identified("other", c.provenance.board_unique_id, "board it is on")),
+            else _identification("other", c.provenance.board_unique_id, "board it is on")),
         id=key,
     )  # fmt: skip
 
 
-def _identified(issuer: str, value: str, name: str) -> Element:
+def _identification(issuer: str, value: str, name: str) -> Element:
     return dcc("identification", words("issuer", issuer), words("value", value), text("name", name))
 
 
@@ -156,13 +157,13 @@ def _statements(c: Certificate) -> Iterator[Element]:
     for mark in c.marks:
         yield dcc("statement", text("name", "validity"), text("declaration", f"{mark}."), words("valid", "false"))
     time = c.stated.where.time_reference
-    chain = f"The unit of time hangs on {time}." if c.traceable else "No metrological traceability is claimed."
+    chain = f"The unit of time is traceable to {time}." if c.traceable else "No metrological traceability is claimed."
     if c.gyroscopes:
         angles = "as a file states them" if c.elsewhere else _angles(c)
         yield _chain("gyroscopes", f"{chain} Angles are {angles}.", c.traceable)
-    for each in c.held_still:
-        said = f"{each.standard.size} is stated by the laboratory, its origin: {each.origin or UNSAID}."
-        yield _chain(f"{each.kind}s", f"{said} {_claimed(each.traceable)}", each.traceable)
+    for sensors in c.held_still:
+        origin = f"{sensors.standard.size} is stated by the laboratory, its origin: {sensors.origin or UNSAID}."
+        yield _chain(f"{sensors.kind}s", f"{origin} {_claim(sensors.traceable)}", sensors.traceable)
     relates = "The results relate only to the items calibrated. Not issued under an accreditation."
     yield dcc("statement", text("name", "scope"), text("declaration", " ".join([relates, *c.deviations])))
     rule = "guard band w = U (ILAC-G8:09/2019, 4.2.2)" if c.guarded else "simple acceptance (ILAC-G8:09/2019, 4.2.1)"
@@ -172,17 +173,17 @@ def _statements(c: Certificate) -> Iterator[Element]:
 
 def _angles(c: Certificate) -> str:
     if c.arcs:
-        return f"{' and '.join(c.arcs)} by the turner's encoders, whose error is a contributor of the uncertainty"
+        return f"{' and '.join(c.arcs)} by the turner's encoders, whose error is in the uncertainty budget"
     return "whole turns, 2π by closure of the circle"
 
 
-def _claimed(traceable: bool) -> str:
+def _claim(traceable: bool) -> str:
     return "Its uncertainty was stated too." if traceable else "No metrological traceability is claimed."
 
 
-def _chain(of: str, statement: str, traceable: bool) -> Element:
+def _chain(sensors: str, statement: str, traceable: bool) -> Element:
     flag = words("traceable", str(traceable).lower())
-    return dcc("statement", text("name", f"traceability of {of}"), flag, text("declaration", statement))
+    return dcc("statement", text("name", f"traceability of {sensors}"), flag, text("declaration", statement))
 
 
 def _conformity(check: CheckEntry, rule: str) -> Element:
@@ -196,17 +197,17 @@ def _conformity(check: CheckEntry, rule: str) -> Element:
     )
 
 
-def _results(c: Certificate, measured: Sequence[Measured]) -> Iterator[Element]:
-    keys = _keys(measured)
-    return (_result(c, keys[each.item, each.sensor], each) for each in measured)
+def _results(c: Certificate, items: Sequence[CertifiedItem]) -> Iterator[Element]:
+    keys = _keys(items)
+    return (_result(c, keys[item.item, item.sensor], item) for item in items)
 
 
-def _result(c: Certificate, item: str, measured: Measured) -> Element:
+def _result(c: Certificate, item: str, measured: CertifiedItem) -> Element:
     site = c.stated.where
     conditions = [
         *(
-            _condition(f"temperature of the item{told_by(of)}", each, r"\degreecelsius")
-            for of, each in measured.temperatures_c.items()
+            _condition(f"temperature of the item{label_source(use)}", temperature_c, r"\degreecelsius")
+            for use, temperature_c in measured.temperatures_c.items()
         ),
         _condition("ambient temperature", site.ambient_temperature_c, r"\degreecelsius"),
         _condition("ambient relative humidity", site.ambient_humidity_percent, r"\percent"),
@@ -219,29 +220,29 @@ def _result(c: Certificate, item: str, measured: Measured) -> Element:
                                words("norm", "JCGM 100:2008"))),
         dcc("usedSoftware", _software(c)),
         dcc("measuringEquipments", _arm(c)),
-        dcc("influenceConditions", *conditions) if any(each is not None for each in conditions) else UNKNOWN_AIR,
+        dcc("influenceConditions", *conditions) if any(part is not None for part in conditions) else UNKNOWN_AIR,
         dcc("results", *measured.results),
         refId=item,
     )  # fmt: skip
 
 
 def _arm(c: Certificate) -> Element:
-    """What turned the items, by the model that was found."""
-    found = c.provenance
-    known = found.arm_maker is not None and found.arm_model is not None
+    """Return the machine that turned the items, by its recorded model."""
+    provenance = c.provenance
+    identified = provenance.arm_maker is not None and provenance.arm_model is not None
     return dcc(
         "measuringEquipment",
         text("name", c.arm),
-        dcc("manufacturer", text("name", found.arm_maker)) if known else None,
-        words("model", found.arm_model) if known else None,
-        dcc("identifications", _identity(found)),
+        dcc("manufacturer", text("name", provenance.arm_maker)) if identified else None,
+        words("model", provenance.arm_model) if identified else None,
+        dcc("identifications", _identity(provenance)),
     )
 
 
 def _identity(entry: ProvenanceEntry) -> Element:
     if entry.motion_file is not None:
-        return _identified("other", entry.motion_file.sha256, "SHA-256 of the file")
-    return _identified("manufacturer", entry.arm_serial_number, "serial number")
+        return _identification("other", entry.motion_file.sha256, "SHA-256 of the file")
+    return _identification("manufacturer", entry.arm_serial_number, "serial number")
 
 
 def _condition(name: str, value: float | None, unit: str) -> Part:

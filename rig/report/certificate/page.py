@@ -14,21 +14,28 @@ from rig.report.kinds.registry import kinds
 from rig.report.tables import certificate as tables
 from rig.report.tables import coverage as coverage_words
 from rig.report.tables.certificate import DEG, JOINT_FACTOR
-from rig.report.words import expanded, printed_budget, rounding, temperature_words, told_words, validity_words
+from rig.report.words import (
+    detection_limit_words,
+    expanded,
+    printed_budget,
+    rounding,
+    temperature_words,
+    validity_words,
+)
 
 if TYPE_CHECKING:
     from jinja2 import Template
 
 MODULES = (
-    rounding, expanded, validity_words, told_words, printed_budget, tables, coverage_words, at_rest_tables, validity,
-    plots, temperature_curves, temperature_words, method_words,
+    rounding, expanded, validity_words, detection_limit_words, printed_budget, tables, coverage_words, at_rest_tables,
+    validity, plots, temperature_curves, temperature_words, method_words,
 )  # fmt: skip
 TEMPLATE = "certificate.html.j2"
 FOOTING = "Relates only to the items calibrated. Not issued under an accreditation."
 
 
 def certificate_page(certificate: Certificate) -> str:
-    """HTML that loads nothing from anywhere; every text of configuration, board or arm is escaped."""
+    """Return HTML that loads nothing from outside; every text of configuration, board or arm is escaped."""
     return _template().render(certificate=certificate, deg=DEG, joint=JOINT_FACTOR, footing=FOOTING)
 
 

@@ -1,4 +1,4 @@
-"""What the laboratory says beside the result: from the configuration that the run folder keeps."""
+"""The laboratory's statements in addition to the result, from the configuration in the run folder."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from rig.data.run_folder import CONFIG
 from rig.errors import Refused
 from rig.errors.quoting import quote
 
-# Keys of `site` that the result depends on.
+# Keys of `site` on which the result depends.
 MEASURED_BY = {
     *("latitude_deg", "heading_deg", "base_up", "gravity_m_s2", "gravity_uncertainty_m_s2"),
     *("magnetic_field_ut", "magnetic_field_uncertainty_ut", "magnetic_field_upwards"),
@@ -21,7 +21,7 @@ NOTHING = CertificateSection()
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """What the laboratory states; None is "not stated". `simulated` says that a simulated one stood at the far end."""
+    """The statements of the laboratory; None means "not stated". `simulated` is true for a simulated laboratory."""
 
     site: SiteSection | None = None
     certificate: CertificateSection = NOTHING
@@ -29,14 +29,14 @@ class Stated:
 
     @property
     def where(self) -> SiteSection:
-        """The site, nothing said of it where no configuration is kept."""
+        """The site, without statements if no configuration was kept."""
         return self.site or SiteSection()
 
 
 def stated_in(folder: Path, overrides: Sequence[str] = ()) -> Stated:
-    """What the run folder's configuration says, `overrides` laid over it; these alone where it keeps none.
+    """Return the statements of the run folder's configuration with `overrides`; of these alone if it has none.
 
-    Raises Refused `unknown_setting` for an override of what was measured, and as `load`.
+    Raise Refused `unknown_setting` for an override of a measured quantity, and the errors of `load`.
     """
     for override in overrides:
         section, _, key = override.partition("=")[0].strip().partition(".")
@@ -56,5 +56,5 @@ def stated_in(folder: Path, overrides: Sequence[str] = ()) -> Stated:
 
 
 def of_configuration(loaded: Loaded) -> Stated:
-    """What it says of site and certificate."""
+    """Return the statements on site and certificate of a configuration."""
     return Stated(loaded.config.site, loaded.config.certificate, loaded.simulated)

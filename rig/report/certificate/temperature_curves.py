@@ -1,4 +1,4 @@
-"""The certificate's picture and table of a calibration over temperature."""
+"""Picture and table of a calibration over temperature in the certificate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from rig.report.certificate.plots import HEIGHT, LEFT, RIGHT, TOP, WIDTH, reach_
 from rig.report.tables.certificate import Pair, pair
 from rig.report.words.temperature_words import shown_rows
 
-SHARES = (Unit("%", 1e-2), Unit("ppm", 1e-6))
+FRACTIONS = (Unit("%", 1e-2), Unit("ppm", 1e-6))
 
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """A picture: of each axis the band and the line as points of SVG; `ticks` are heights, `marks` temperatures."""
+    """A picture: band and line of each axis as points of SVG; `ticks` are heights, `marks` temperatures."""
 
     axes: tuple[tuple[str, str], ...]
     ticks: tuple[tuple[float, str], ...]
@@ -34,7 +34,7 @@ class TemperatureRow:
 
 
 def temperature_rows(entry: OverTemperatureEntry, unit: Unit) -> list[TemperatureRow]:
-    """The rows with U, biases in that unit."""
+    """Return the rows with U, biases in `unit`."""
     return [
         TemperatureRow(
             f"{row.temperature_c:.1f}",
@@ -48,14 +48,14 @@ def temperature_rows(entry: OverTemperatureEntry, unit: Unit) -> list[Temperatur
 
 
 def scale_curves(entry: OverTemperatureEntry) -> Curves:
-    """How the scale factors change from the reference."""
+    """Return the change of the scale factors from the reference temperature."""
     first = np.array(entry.scale[0])
     values = np.array([row.scale for row in entry.table]) / first - 1
-    return _curves(entry, values, np.array([row.expanded_scale for row in entry.table]) / first, SHARES)
+    return _curves(entry, values, np.array([row.expanded_scale for row in entry.table]) / first, FRACTIONS)
 
 
 def bias_curves(entry: OverTemperatureEntry, quantity: Quantity) -> Curves:
-    """How the biases change from the reference."""
+    """Return the change of the biases from the reference temperature."""
     values = np.array([row.bias for row in entry.table]) - np.array(entry.bias[0])
     return _curves(entry, values, np.array([row.expanded_bias for row in entry.table]), quantity.residuals)
 
@@ -66,19 +66,22 @@ def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Se
 
     def points(temperatures: Sequence[float], heights: Array) -> str:
         return " ".join(
-            f"{_across(at, low, high)},{_height(y, unit, reach)}" for at, y in zip(temperatures, heights, strict=True)
+            f"{_across(t, low, high)},{_height(y, unit, reach)}" for t, y in zip(temperatures, heights, strict=True)
         )
 
-    warm = [row.temperature_c for row in entry.table]
+    warm_c = [row.temperature_c for row in entry.table]
     axes = tuple(
         (
-            points([*warm, *reversed(warm)], np.r_[values[:, i] + widths[:, i], (values[:, i] - widths[:, i])[::-1]]),
-            points(warm, values[:, i]),
+            points(
+                [*warm_c, *reversed(warm_c)],
+                np.r_[values[:, i] + widths[:, i], (values[:, i] - widths[:, i])[::-1]],
+            ),
+            points(warm_c, values[:, i]),
         )
         for i in range(3)
     )
     ticks = tuple(
-        (_height(at * unit.size, unit, reach), f"{at:g}".replace("-", "−")) for at in (-reach / 1.1, 0.0, reach / 1.1)
+        (_height(y * unit.size, unit, reach), f"{y:g}".replace("-", "−")) for y in (-reach / 1.1, 0.0, reach / 1.1)
     )
     marks = tuple((_across(row.temperature_c, low, high), f"{row.temperature_c:.1f} °C") for row in shown_rows(entry))
     return Curves(axes, ticks, marks, unit.name)

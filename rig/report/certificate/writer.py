@@ -1,4 +1,4 @@
-"""`certificate.html` in every run folder."""
+"""Writes `certificate.html` into each run folder."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from rig.station.events import DocumentWritten, RunEvent
 
 
 def write_certificate(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write the certificate, whatever the verdict: what failed stands there too, across every page of one unfit."""
+    """Write the certificate for any verdict; failed checks are named, across every page if the run is unfit."""
     path = folder / CERTIFICATE
     write_new(path, certificate_page(certificate_of(document, stated_in(folder))))
     return (DocumentWritten(path),)

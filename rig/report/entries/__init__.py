@@ -1,1 +1,1 @@
-"""Entries of `result.json`, made from what the analysis found."""
+"""Entries of `result.json`, built from results of the analysis."""

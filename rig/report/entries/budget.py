@@ -19,10 +19,12 @@ HOUR_S = 3600.0
 
 
 def budget_entry(budget: Budget) -> BudgetEntry:
-    """The combined uncertainty and all it is made of."""
+    """Return the combined uncertainty and its contributors."""
     lines = [
-        entry(ContributorEntry, each, variance_fraction=share, degrees_of_freedom=_finite(each.freedom))
-        for each, share in zip(budget.contributors, budget.shares, strict=True)
+        entry(
+            ContributorEntry, contributor, variance_fraction=fraction, degrees_of_freedom=_finite(contributor.freedom)
+        )
+        for contributor, fraction in zip(budget.contributors, budget.shares, strict=True)
     ]
     factors = budget.coverage_factors
     return entry(
@@ -30,24 +32,26 @@ def budget_entry(budget: Budget) -> BudgetEntry:
         budget,
         contributors=lines,
         coverage_factor=float(factors.max()),
-        degrees_of_freedom=[_finite(each) for each in budget.freedom.tolist()],
+        degrees_of_freedom=[_finite(dof) for dof in budget.freedom.tolist()],
         coverage_probabilities=covered(factors, budget.freedom),
     )
 
 
-def bias_process_entry(explained: Explained) -> BiasProcessEntry:
-    """How the bias wandered, and for how long it was averaged."""
+def bias_process_entry(fit: Explained) -> BiasProcessEntry:
+    """Return the fitted bias process of the rests and the time over which the bias was averaged."""
     return entry(
         BiasProcessEntry,
-        explained.bias,
-        averaging_time_s=float(np.ptp(explained.seen.windows_s)),
-        hour_std_rad_s=explained.bias.wandered_rad_s(HOUR_S),
+        fit.bias,
+        averaging_time_s=float(np.ptp(fit.seen.windows_s)),
+        hour_std_rad_s=fit.bias.wandered_rad_s(HOUR_S),
     )
 
 
 def clock_entry(check: ClockCheck) -> ClockEntry:
-    """The controller's clock."""
-    return entry(ClockEntry, check, comparisons=[entry(ClockComparisonEntry, each) for each in check.comparisons])
+    """Return the error of the controller's clock and its comparisons with other clocks."""
+    return entry(
+        ClockEntry, check, comparisons=[entry(ClockComparisonEntry, comparison) for comparison in check.comparisons]
+    )
 
 
 def _finite(freedom: float) -> float | None:

@@ -1,4 +1,4 @@
-"""What `result.json` and the terminal say of a session by hand."""
+"""A session by hand in `result.json` and at the terminal."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from rig.estimation.by_hand import HandSolution
 
 WORDS = {
-    "face_repeatability_rad": "faces that are laid down again lie otherwise by {:.2f} mrad",
-    "closure_error_rad": "turns miss where they began by {:.1f} mrad",
-    "angle_fraction": "moves differ by {:.3f} % of a quarter turn",
-    "bias_random_walk_rad_s_sqrt_s": "the bias walks by {:.1e} rad/s/√s",
-    "level_m_s2": "the accelerometer's level is off by {:.4f} m/s²",
+    "face_repeatability_rad": "repeatability of faces {:.2f} mrad",
+    "closure_error_rad": "closure error of turns {:.1f} mrad",
+    "angle_fraction": "angle error of moves {:.3f} % of a quarter turn",
+    "bias_random_walk_rad_s_sqrt_s": "random walk of the bias {:.1e} rad/s/√s",
+    "level_m_s2": "level error of the accelerometer {:.4f} m/s²",
 }
-# What the solution calls the errors of a hand, and `result.json`.
+# Errors of handling: names of the solution → names of `result.json`.
 PUBLIC_NAMES = {
     "repeat_rad": "face_repeatability_rad",
     "closure_rad": "closure_error_rad",
@@ -30,10 +30,10 @@ UNITS = {"face_repeatability_rad": 1e3, "closure_error_rad": 1e3, "angle_fractio
 
 
 def by_hand_entry(solution: "HandSolution") -> ByHandEntry:
-    """The entry of a solution."""
+    """Return the entry of a solution by hand."""
     return ByHandEntry(
-        rests=tuple(entry(RestByHandEntry, each) for each in solution.rests),
-        moves=tuple(entry(MoveByHandEntry, each) for each in solution.moves),
+        rests=tuple(entry(RestByHandEntry, rest) for rest in solution.rests),
+        moves=tuple(entry(MoveByHandEntry, move) for move in solution.moves),
         errors=tuple(
             HandErrorEntry(name=PUBLIC_NAMES[name], estimate=size, stated=stated, limit=limit)
             for name, (size, stated, limit) in solution.stds.items()
@@ -45,29 +45,30 @@ def by_hand_entry(solution: "HandSolution") -> ByHandEntry:
 
 
 def by_hand_lines(entry: ByHandEntry) -> Iterator[str]:
-    """Faces, moves and sizes, in words."""
-    flips, turns = (sum(each.kind == kind for each in entry.moves) for kind in ("flip", "turn"))
+    """Yield faces, moves and error estimates in words."""
+    flips, turns = (sum(move.kind == kind for move in entry.moves) for kind in ("flip", "turn"))
     faces = " ".join(rest.face or "(none)" for rest in entry.rests)
     yield f"by hand: {len(entry.rests)} rests, {flips} flips, {turns} turns; faces upwards: {faces}"
     for number, move in enumerate(entry.moves, 1):
         if move.closure_error_rad is not None:
-            closure = f"{1e3 * move.closure_error_rad:+.1f} mrad off where it began"
+            closure = f"{1e3 * move.closure_error_rad:+.1f} mrad closure error"
             yield f"move {number}: {move.turns:+d} turns, {np.degrees(move.angle_rad):.2f}°, {closure}"
-    there = {size.name: size for size in entry.errors}
+    estimates = {size.name: size for size in entry.errors}
     used = {"closure_error_rad": any(move.closure_error_rad is not None for move in entry.moves)}
-    said = [
-        WORDS[name].format(UNITS.get(name, 1.0) * there[name].estimate)
+    phrases = [
+        WORDS[name].format(UNITS.get(name, 1.0) * estimates[name].estimate)
         for name in WORDS  # what a later version may add has no words here
-        if name in there and used.get(name, True)
+        if name in estimates and used.get(name, True)
     ]
-    yield f"as found (one standard deviation): {'; '.join(said)}"
+    yield f"estimated errors of handling (one standard deviation): {'; '.join(phrases)}"
     worst = max(
-        [*(each.normalised_residual for each in entry.rests), *(each.normalised_residual for each in entry.moves)],
+        [*(rest.normalised_residual for rest in entry.rests), *(move.normalised_residual for move in entry.moves)],
         default=0.0,
     )
-    yield f"χ²/dof {entry.chi_square / max(entry.degrees_of_freedom, 1.0):.2f}, the largest pull {worst:.1f}"
-    known = ", ".join(f"{2 * std:.1e}" for std in entry.session_std)
+    reduced = entry.chi_square / max(entry.degrees_of_freedom, 1.0)
+    yield f"χ²/dof {reduced:.2f}, the largest normalised residual {worst:.1f}"
+    expanded_scale = ", ".join(f"{2 * std:.1e}" for std in entry.session_std)
     yield (
-        f"U of k by this session and its clock alone: {known}; the table has beside it how real hands' recordings "
-        "disagree with themselves. Nothing shows an error of the clock but another clock"
+        f"U of k by this session and its clock alone: {expanded_scale}; the U of the table includes the scatter "
+        "between repeated sessions by hand. Only another clock shows an error of this clock"
     )

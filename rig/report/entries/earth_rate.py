@@ -1,4 +1,4 @@
-"""The Earth's rate that a gyroscope has found, as an entry of `result.json` and as a person reads it."""
+"""The Earth's rate as a gyroscope measured it: its entry of `result.json` and its words."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -17,29 +17,29 @@ if TYPE_CHECKING:
 
 def earth_rate_entry(earth_rate: "EarthRate") -> EarthRateEntry:
     """Return the entry of the Earth's rate; infinite degrees of freedom are null."""
-    known = earth_rate.freedom if np.isfinite(earth_rate.freedom) else None
-    return entry(EarthRateEntry, earth_rate, degrees_of_freedom=known)
+    dof = earth_rate.freedom if np.isfinite(earth_rate.freedom) else None
+    return entry(EarthRateEntry, earth_rate, degrees_of_freedom=dof)
 
 
 def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:
-    """The Earth's rate in words; None says nothing: it was not looked for."""
+    """Yield the Earth's rate in words; nothing if it was not estimated."""
     if earth is None:
         return
     if isinstance(earth, ErrorEntry):
         yield f"Earth's rate not found: {earth.error}"
         return
     (k,), words = expanded([1.0], earth.freedoms(1)).factors, factor_words(earth.freedoms(1))
-    rate = " ".join(f"{each:+.3f}" for each in np.divide(earth.rate_rad_s, DEG_H))
+    rate = " ".join(f"{component:+.3f}" for component in np.divide(earth.rate_rad_s, DEG_H))
     std = k * np.sqrt(np.diag(earth.covariance_rad2_s2)).max() / DEG_H
     yield (
         f"Earth's rate found: {earth.norm_rad_s / DEG_H:.3f} deg/h (± {k * earth.norm_std_rad_s / DEG_H:.3f}), "
         f"{EARTH_RATE_RAD_S / DEG_H:.3f} is right; in the arm's base {rate} deg/h (± {std:.3f}), {words}"
     )
-    where = [
+    bearings = [
         f"latitude {np.degrees(earth.latitude_rad):.2f}° (± {k * np.degrees(earth.latitude_std_rad):.2f})"
         + (", its vertical part as given" if earth.vertical_fixed else "")
     ]
     if earth.heading_rad is not None and earth.heading_std_rad is not None:
-        heading, off = np.degrees(earth.heading_rad) % 360, k * np.degrees(earth.heading_std_rad)
-        where.append(f"the base's x axis points {heading:.2f}° from north over east (± {off:.2f})")
-    yield "by that rate " + ", ".join(where)
+        heading, expanded_heading = np.degrees(earth.heading_rad) % 360, k * np.degrees(earth.heading_std_rad)
+        bearings.append(f"the base's x axis points {heading:.2f}° from north over east (± {expanded_heading:.2f})")
+    yield "by that rate " + ", ".join(bearings)

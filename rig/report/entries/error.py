@@ -1,9 +1,9 @@
-"""The entry of what has no solution."""
+"""The entry of a quantity without a solution."""
 
 from rig.data.entries.result_types import ErrorEntry
 from rig.errors import Fault
 
 
 def error_entry(fault: Fault) -> ErrorEntry:
-    """Return the entry of the Fault that an attempt ended in."""
+    """Return the entry of the Fault in which an attempt ended."""
     return ErrorEntry(error=str(fault))

@@ -1,4 +1,4 @@
-"""Entries of `result.json` for readings recorded elsewhere: what attitudes of a file told."""
+"""Entries of `result.json` for external readings, solved by the attitudes or angles of a file."""
 
 from typing import Any
 
@@ -38,7 +38,7 @@ ORDER = (
 
 
 def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
-    """The accelerometers that were calibrated in attitudes of a file."""
+    """Return the accelerometers that were calibrated in attitudes of a file, by name."""
     return {
         name: attitudes_entry(OF_ACCELEROMETERS, result, item,
             role="calibrate",
@@ -52,12 +52,12 @@ def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
             temperature_c=None,
             placement=_placement(result),
         )
-        for name, item, site, result in _placed(outcome, ACCELERATION)
+        for name, item, site, result in _attitude_results(outcome, ACCELERATION)
     }  # fmt: skip
 
 
 def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
-    """The magnetometers that were calibrated in attitudes of a file."""
+    """Return the magnetometers that were calibrated in attitudes of a file, by name."""
     return {
         name: attitudes_entry(OF_MAGNETOMETERS, result, item,
             model=magnetometer.MODEL,
@@ -67,22 +67,22 @@ def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
             hard_iron_t=magnetometer.hard_iron(result.solution),
             placement=_placement(result),
         )
-        for name, item, site, result in _placed(outcome, FIELD)
+        for name, item, site, result in _attitude_results(outcome, FIELD)
     }  # fmt: skip
 
 
-def unsolved(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
-    """Why quantities that were recorded have no solution, by sensor; those without any left out."""
-    told: dict[str, dict[str, ErrorEntry]] = {}
-    faults = [(name, *each) for name, found in outcome.elsewhere.items() for each in found.unsolved.items()]
+def unsolved_entries(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
+    """Return why recorded quantities have no solution, by sensor and quantity; solved sensors are left out."""
+    reasons: dict[str, dict[str, ErrorEntry]] = {}
+    faults = [(name, *failure) for name, sensor in outcome.elsewhere.items() for failure in sensor.unsolved.items()]
     faults += [(kind.name, kind.quantity, kind.fault) for kind in outcome.of_kinds if kind.fault is not None]
     for name, quantity, fault in faults:
-        told.setdefault(name, {})[quantity.name] = ErrorEntry(error=str(fault))
-    return told
+        reasons.setdefault(name, {})[quantity.name] = ErrorEntry(error=str(fault))
+    return reasons
 
 
 def rates_in_attitudes(sensor: OfSensor) -> AttitudesEntry | None:
-    """What attitudes tell of a gyroscope beside scale and bias; None where it was swept."""
+    """Return what known attitudes give of a gyroscope in addition to scale and bias; None if it was swept."""
     if sensor.rates is None:
         return None
     earth = _earth_rate(sensor.rates)
@@ -91,16 +91,16 @@ def rates_in_attitudes(sensor: OfSensor) -> AttitudesEntry | None:
             "earth_rate_rad_s": None if isinstance(earth, Fault) else earth.rate_rad_s.tolist(),
             "earth_rate_std_rad_s": None if isinstance(earth, Fault) else earth.std_rad_s.tolist(),
             "earth_rate_error": str(earth) if isinstance(earth, Fault) else None,
-            "by_increments": _followed(sensor.rates) if isinstance(sensor.rates, InIncrements) else None,
+            "by_increments": _increments_entry(sensor.rates) if isinstance(sensor.rates, InIncrements) else None,
             "covariance": sensor.rates.solution.covariance.tolist(),
             "covariance_order": ORDER[:15],
-            "other_methods": {} if isinstance(sensor.rates, InIncrements) else _rates_beside(sensor.rates),
+            "other_methods": {} if isinstance(sensor.rates, InIncrements) else _other_rates(sensor.rates),
         }
     )
 
 
-def turned(sensor: OfSensor) -> AnglesEntry | None:
-    """What the turns were taken for that a gyroscope was solved by; None where means of sweeps or attitudes told it."""
+def angles_entry(sensor: OfSensor) -> AnglesEntry | None:
+    """Return the stated accuracy of the turns by which a gyroscope was solved; None if it was solved by means."""
     if sensor.turned is None or sensor.gyroscope is None:
         return None
     turns = sensor.turned.turns
@@ -113,7 +113,7 @@ def turned(sensor: OfSensor) -> AnglesEntry | None:
 
 
 def _earth_rate(result: Result) -> EarthSeen | Fault:
-    """The Earth's rate in the axes of the table, or the Fault for which it is not known."""
+    """Return the Earth's rate in the axes of the table, or the Fault that explains why it is unknown."""
     if isinstance(result, InIncrements):
         return result.solution.earth
     if result.reference_fault is not None:
@@ -121,7 +121,7 @@ def _earth_rate(result: Result) -> EarthSeen | Fault:
     return EarthSeen(result.solution.reference, result.solution.covariance[REFERENCE, REFERENCE])
 
 
-def _followed(increments: InIncrements) -> IncrementsEntry:
+def _increments_entry(increments: InIncrements) -> IncrementsEntry:
     residuals = increments.solution.residuals_rad
     return entry(
         IncrementsEntry, increments.solution, increments,
@@ -134,19 +134,19 @@ def _followed(increments: InIncrements) -> IncrementsEntry:
     )  # fmt: skip
 
 
-def _rates_beside(attitudes: InAttitudes) -> dict[str, RateSolutionEntry | ErrorEntry]:
+def _other_rates(attitudes: InAttitudes) -> dict[str, RateSolutionEntry | ErrorEntry]:
     def solution_entry(other: TriaxialSolution) -> RateSolutionEntry:
         return entry(RateSolutionEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
 
-    return {str(method): made for method, made in attitudes.beside.by_key(solution_entry, error_entry).items()}
+    return {str(method): other for method, other in attitudes.beside.by_key(solution_entry, error_entry).items()}
 
 
-def _placed(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site, InAttitudes]]:
+def _attitude_results(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site, InAttitudes]]:
     site = outcome.settings.site
     return [
-        (name, found.item, site, found.at_rest[quantity])
-        for name, found in outcome.elsewhere.items()
-        if quantity in found.at_rest
+        (name, sensor.item, site, sensor.at_rest[quantity])
+        for name, sensor in outcome.elsewhere.items()
+        if quantity in sensor.at_rest
     ]
 
 

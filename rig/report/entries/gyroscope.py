@@ -1,4 +1,4 @@
-"""One sensor's entry in `result.json`."""
+"""The entry of one gyroscope in `result.json`."""
 
 from typing import Any
 
@@ -35,11 +35,12 @@ from rig.report.entry import counted, entry
 
 
 def sensor_entry(
-    result: SensorResult, role: Role = "calibrate", agreed: Agreement | None = None, **more: Any
+    result: SensorResult, role: Role = "calibrate", board: Agreement | None = None, **more: Any
 ) -> GyroscopeEntry:
-    """Scale, bias and covariance by the chosen estimator; beside them the others, or the error each ends in.
+    """Return scale, bias and covariance by the chosen estimator, and the other estimators' solutions or errors.
 
-    And what `more` there is to say. What a result does not have is left out.
+    `board` is the comparison with the board's own solution, `more` are further fields of the entry. Fields that the
+    result lacks are left out.
     """
     solution, turns = result.solution, result.observations
     return entry(
@@ -50,52 +51,52 @@ def sensor_entry(
         covariance_order=PARAMETERS,
         covariance_units=RATE.parameter_units,
         observations=[
-            entry(ObservationEntry, turn, turn.average, temperature_c=_warm(turn.average))
+            entry(ObservationEntry, turn, turn.average, temperature_c=_temperature(turn.average))
             for turn in turns
         ],
-        rests=[entry(AverageEntry, each, temperature_c=_warm(each)) for each in result.rests],
-        time_bases=[entry(TimeBaseEntry, each) for each in result.time_bases],
+        rests=[entry(AverageEntry, rest, temperature_c=_temperature(rest)) for rest in result.rests],
+        time_bases=[entry(TimeBaseEntry, time_base) for time_base in result.time_bases],
         vector_model=_vector_or_error(result),
         six_observation=_estimate_or_error(result.six_observation, result.faults.get(NEWTON)),
         algorithm_1=_estimate_or_error(result.algorithm_1, result.faults.get(ALGORITHM_1)),
         by_hand=None if result.by_hand is None else by_hand_entry(result.by_hand),
-        **({} if agreed is None else {"board": _board(agreed)}),
-        **_uncertain(result),
+        **({} if board is None else {"board": _board(board)}),
+        **_uncertainty_fields(result),
         **more,
     )  # fmt: skip
 
 
-def _warm(average: Average) -> float | None:
-    """How warm it was; None where no thermometer was read."""
+def _temperature(average: Average) -> float | None:
+    """Return the mean temperature, °C, or None if no thermometer was read."""
     return None if np.isnan(average.temperature_c) else average.temperature_c
 
 
-def _uncertain(result: SensorResult) -> dict[str, Any]:
-    """What is known of it beside the solution."""
-    found: dict[str, Any] = {}
+def _uncertainty_fields(result: SensorResult) -> dict[str, Any]:
+    """Return the fields of uncertainty, bias process, nonlinearity and Earth's rate that the result has."""
+    fields: dict[str, Any] = {}
     if result.uncertainty is not None:
         combined = result.uncertainty.covariance
-        found |= {"covariance_combined": combined, "budget": budget_entry(result.uncertainty)}
+        fields |= {"covariance_combined": combined, "budget": budget_entry(result.uncertainty)}
     if (explained := result.explained) is not None:
-        found["bias_process"] = bias_process_entry(explained)
-        found["speeds_rad_s"] = explained.seen.speeds_rad_s
-        found["axis_rate_ranges_rad_s"] = explained.loads_rad_s
+        fields["bias_process"] = bias_process_entry(explained)
+        fields["speeds_rad_s"] = explained.seen.speeds_rad_s
+        fields["axis_rate_ranges_rad_s"] = explained.loads_rad_s
         if explained.nonlinearity is not None:
-            found["nonlinearity"] = entry(NonlinearityEntry, explained.nonlinearity)
+            fields["nonlinearity"] = entry(NonlinearityEntry, explained.nonlinearity)
     if result.earth is not None:
-        found["earth_rate"] = earth_rate_entry(result.earth)
+        fields["earth_rate"] = earth_rate_entry(result.earth)
     elif EARTH_RATE in result.faults:
-        found["earth_rate"] = error_entry(result.faults[EARTH_RATE])
-    return found
+        fields["earth_rate"] = error_entry(result.faults[EARTH_RATE])
+    return fields
 
 
 def estimate_entry(solution: Estimate) -> EstimateEntry:
-    """What every estimator's solution has."""
+    """Return the fields that the solutions of all estimators have."""
     return entry(EstimateEntry, solution)
 
 
 def _estimate_or_error(solution: Estimate | None, fault: Fault | None) -> EstimateEntry | ErrorEntry:
-    """Return the entry of a solution that stands beside another, or of the error it ended in."""
+    """Return the entry of a solution, or of the error that took its place."""
     return ErrorEntry(error=str(fault)) if solution is None else estimate_entry(solution)
 
 
@@ -106,15 +107,18 @@ def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
     more: dict[str, Any] = {}
     if result.explained is not None:
         more["residuals_std_rad_s"] = residual_std_rad_s(result.explained)
-        if (angles := counted(of_angles(result))) is not None:
-            more |= {"non_orthogonality_degrees_of_freedom": angles[:3], "mounting_degrees_of_freedom": angles[3:]}
-        if (felt := counted(of_sensitivity(result))) is not None:
-            more["g_sensitivity_degrees_of_freedom"] = felt
+        if (angles_dof := counted(of_angles(result))) is not None:
+            more |= {
+                "non_orthogonality_degrees_of_freedom": angles_dof[:3],
+                "mounting_degrees_of_freedom": angles_dof[3:],
+            }
+        if (sensitivity_dof := counted(of_sensitivity(result))) is not None:
+            more["g_sensitivity_degrees_of_freedom"] = sensitivity_dof
     return vector_entry(outcome, **more)
 
 
 def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution, **more: Any) -> VectorEntry:
-    """The vector model's solution, how the axes lie to each other included, and what `more` is known of it."""
+    """Return the vector model's solution with the angles between the axes, and the fields of `more`."""
     angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
     sensitivity: dict[str, Any] = {}
     if outcome.g_sensitivity is not None and outcome.g_sensitivity_covariance is not None:
@@ -135,8 +139,6 @@ def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution, **more: 
     )  # fmt: skip
 
 
-def _board(agreed: Agreement) -> BoardEntry:
-    solutions = {
-        method: entry(BoardSolutionEntry, solved, solved.solution) for method, solved in agreed.solutions.items()
-    }
-    return entry(BoardEntry, agreed, solutions=solutions)
+def _board(board: Agreement) -> BoardEntry:
+    solutions = {method: entry(BoardSolutionEntry, event, event.solution) for method, event in board.solutions.items()}
+    return entry(BoardEntry, board, solutions=solutions)

@@ -1,4 +1,4 @@
-"""What a result leaves out of its recording, and how this was read and solved: entries, and lines for people."""
+"""Omitted parts of a recording, and notes on how it was read and solved: entries and lines."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -11,35 +11,35 @@ from rig.report.entry import entry
 if TYPE_CHECKING:
     from rig.estimation.by_hand import HandSolution
 
-LEFT_OUT = "omitted"  # a move by hand that tells nothing
+LEFT_OUT = "omitted"  # a move by hand that gives no information
 
 
-def omitted(outcome: Outcome) -> dict[str, tuple[OmittedEntry, ...]]:
-    """Return what was left out, by sensor; those of which all counts are not there."""
-    found = {
-        name: [entry(OmittedEntry, each, quantity=quantity and quantity.name) for quantity, each in of_files.omitted]
-        for name, of_files in outcome.elsewhere.items()
+def omitted_entries(outcome: Outcome) -> dict[str, tuple[OmittedEntry, ...]]:
+    """Return the omitted parts of the recording, by sensor; sensors without any are left out."""
+    by_sensor = {
+        name: [entry(OmittedEntry, part, quantity=quantity and quantity.name) for quantity, part in sensor.omitted]
+        for name, sensor in outcome.elsewhere.items()
     }
     for name, result in outcome.results.items():
         if result.by_hand is not None:
-            found.setdefault(name, []).extend([*_rests(result.by_hand), *_moves(result.by_hand)])
-    return {name: tuple(each) for name, each in found.items() if each}
+            by_sensor.setdefault(name, []).extend([*_rests(result.by_hand), *_moves(result.by_hand)])
+    return {name: tuple(parts) for name, parts in by_sensor.items() if parts}
 
 
 def notes(outcome: Outcome) -> dict[str, tuple[str, ...]]:
-    """Return how recordings were read and solved where that is no matter of course, by sensor."""
-    return {name: found.notes for name, found in outcome.elsewhere.items() if found.notes}
+    """Return remarks on how recordings were read and solved, by sensor; the usual way has none."""
+    return {name: sensor.notes for name, sensor in outcome.elsewhere.items() if sensor.notes}
 
 
 def omitted_lines(result: ResultDocument, sensor: str | None = None) -> Iterator[str]:
-    """Yield a line for all that was left out, and for each note; of one sensor alone if one is named."""
-    for name, left_out in result.omitted.items():
+    """Yield a line for each omission and each note, of one sensor alone if one is named."""
+    for name, parts in result.omitted.items():
         if sensor in (None, name):
-            of = f"{name}: " if len(result.omitted) > 1 else ""
-            yield from (f"{of}left out: {_words(each)}" for each in left_out)
-    for name, said in result.notes.items():
+            prefix = f"{name}: " if len(result.omitted) > 1 else ""
+            yield from (f"{prefix}left out: {_words(part)}" for part in parts)
+    for name, remarks in result.notes.items():
         if sensor in (None, name):
-            yield from said
+            yield from remarks
 
 
 def _words(entry: OmittedEntry) -> str:
@@ -60,13 +60,13 @@ def _rests(solution: "HandSolution") -> Iterator[OmittedEntry]:
 
 
 def _moves(solution: "HandSolution") -> Iterator[OmittedEntry]:
-    left_out = [number for number, move in enumerate(solution.moves, 1) if move.kind == LEFT_OUT]
-    if left_out:
+    omissions = [number for number, move in enumerate(solution.moves, 1) if move.kind == LEFT_OUT]
+    if omissions:
         yield OmittedEntry(
             quantity=None,
             what="moves",
-            count=len(left_out),
+            count=len(omissions),
             total=len(solution.moves),
             reason="; ".join(solution.turned.warnings) or ("too long" if solution.creeping_s else "taken back"),
-            first=f"move {left_out[0]}",
+            first=f"move {omissions[0]}",
         )

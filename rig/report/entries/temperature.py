@@ -1,4 +1,4 @@
-"""A calibration over temperature as `result.json` has it."""
+"""A calibration over temperature in `result.json`."""
 
 import numpy as np
 
@@ -9,16 +9,16 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.temperature.over_temperature import COEFFICIENTS, OverTemperature, powers_at
 from rig.report.entry import counted, entry
 
-ROWS = 17  # of the table: each fourth stands on a certificate
+ROWS = 17  # of the table; a certificate shows every fourth
 
 
 def temperature_entry(
     quantity: Quantity, polynomials: OverTemperature, sensor: RecordedSensor | Item
 ) -> OverTemperatureEntry:
-    """The polynomials of that sensor, in SI units; of a gyroscope b = −c, which g = K (m + b) adds."""
+    """Return a sensor's polynomials of temperature in SI units; for a gyroscope b = −c, as in g = K (m + b)."""
     signs = np.array(quantity.parameter_signs)
-    of_each = np.repeat(signs, COEFFICIENTS // len(signs))
-    at = powers_at(0.0)
+    of_coefficients = np.repeat(signs, COEFFICIENTS // len(signs))
+    powers = powers_at(0.0)
     return entry(
         OverTemperatureEntry, polynomials,
         part=sensor.part,
@@ -26,11 +26,11 @@ def temperature_entry(
         full_scale=None if isinstance(sensor, Item) else sensor.channel(quantity).range,
         unit=quantity.unit,
         bias=quantity.offset * polynomials.bias,
-        covariance=np.outer(of_each, of_each) * polynomials.covariance,
+        covariance=np.outer(of_coefficients, of_coefficients) * polynomials.covariance,
         contributors=[
             entry(TemperatureContributorEntry, line,
                   degrees_of_freedom=counted(np.array([line.freedom]))[0],  # type: ignore[index]  # of an array there are some
-                  std=np.sqrt(np.diag(at @ line.covariance @ at.T).clip(min=0.0)))
+                  std=np.sqrt(np.diag(powers @ line.covariance @ powers.T).clip(min=0.0)))
             for line in polynomials.lines
         ],
         table=[_row(quantity, polynomials, warm_c) for warm_c in np.linspace(*polynomials.range_c, ROWS).tolist()],
@@ -40,12 +40,12 @@ def temperature_entry(
 
 
 def _row(quantity: Quantity, polynomials: OverTemperature, temperature_c: float) -> AtTemperatureEntry:
-    held = polynomials.evaluate(temperature_c)
+    values_at = polynomials.evaluate(temperature_c)
     return entry(
         AtTemperatureEntry,
         temperature_c=temperature_c,
-        scale=held.values[:3],
-        bias=quantity.offset * held.values[3:],
-        expanded_scale=held.expanded[:3],
-        expanded_bias=held.expanded[3:],
+        scale=values_at.values[:3],
+        bias=quantity.offset * values_at.values[3:],
+        expanded_scale=values_at.expanded[:3],
+        expanded_bias=values_at.expanded[3:],
     )

@@ -1,4 +1,4 @@
-"""Entries of sensors of three axes that were held still in attitudes: by an arm, or in those that a file tells."""
+"""Entries of three-axis sensors that were measured at rest in attitudes, of an arm or of a file."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -29,12 +29,12 @@ from rig.report.entry import EntryT, entry
 
 @dataclass(frozen=True, slots=True)
 class Models(Generic[EntryT]):
-    """What is written of a kind of such sensors: the `sensor`, each `dwell`, the solution of a method `beside`."""
+    """Entry classes for one quantity: of the `sensor`, of a `dwell`, and of `other` methods' solutions."""
 
     quantity: Quantity
     sensor: type[EntryT]
     dwell: type[Entry]
-    beside: type[Entry]
+    other: type[Entry]
 
 
 OF_ACCELEROMETERS = Models(ACCELERATION, AccelerometerEntry, DwellEntry, AccelerationSolutionEntry)
@@ -45,12 +45,12 @@ def triad_entry(
     models: Models[EntryT],
     result: AccelerometerResult | MagnetometerResult | InAttitudes,
     sensor: RecordedSensor | Item,
-    left: tuple[Array, Array],
+    residuals: tuple[Array, Array],
     **more: Any,
 ) -> EntryT:
-    """Scale, bias and covariance, the other methods beside them, the dwells, and what `more` there is of the kind.
+    """Return scale, bias and covariance, the solutions of other methods, the dwells, and the fields of `more`.
 
-    `left` (N, 3) each is what the model leaves of the dwells, and what it is expected to leave.
+    `residuals` are two arrays (N, 3): the residuals of the dwells and their expected standard deviations.
     """
     budget, dwells = result.budget, tuple[DwellReading | StaticReading, ...](result.dwells)
     return entry(
@@ -60,8 +60,8 @@ def triad_entry(
         covariance_order=PARAMETERS,
         covariance_units=models.quantity.parameter_units,
         **_attitude_error(result.solution.attitude_error),
-        dwells=[_dwell_entry(models, *each) for each in zip(dwells, left[0], left[1], strict=True)],
-        other_methods=result.beside.by_key(partial(_beside_entry, models), error_entry),
+        dwells=[_dwell_entry(models, *row) for row in zip(dwells, *residuals, strict=True)],
+        other_methods=result.beside.by_key(partial(_other_entry, models), error_entry),
         **more,
     )  # fmt: skip
 
@@ -69,30 +69,30 @@ def triad_entry(
 def attitudes_entry(
     models: Models[EntryT], result: MagnetometerResult | InAttitudes, sensor: RecordedSensor | Item, **more: Any
 ) -> EntryT:
-    """The entry of a sensor that attitudes alone tell of."""
+    """Return the entry of a sensor that was calibrated by attitudes alone."""
     solution = result.solution
-    left = solution.residuals, attitude_residual_std(solution, result.seen)
+    residuals = solution.residuals, attitude_residual_std(solution, result.seen)
     bias = {models.quantity.named("bias"): solution.bias}
-    return triad_entry(models, result, sensor, left, estimator=solution.method, **bias, **more)
+    return triad_entry(models, result, sensor, residuals, estimator=solution.method, **bias, **more)
 
 
 def _attitude_error(error: AttitudeError | None) -> dict[str, float | None]:
-    """How far the attitudes are off about each axis, and how well that is known; none by a method that holds them."""
+    """Return the estimated error of the attitudes and its uncertainty, rad about each axis; None if it was fixed."""
     if error is None:
         return {"attitude_error_rad": None, "attitude_error_std_rad": None}
-    known = error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None
-    return {"attitude_error_rad": error.std_rad, "attitude_error_std_rad": known}
+    uncertainty_rad = error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None
+    return {"attitude_error_rad": error.std_rad, "attitude_error_std_rad": uncertainty_rad}
 
 
-def _beside_entry(models: Models[Any], other: TriaxialSolution) -> Entry:
+def _other_entry(models: Models[Any], other: TriaxialSolution) -> Entry:
     """Return the entry of another method's solution."""
-    return entry(models.beside, other, scale=scale_of(other.matrix), **{models.quantity.named("bias"): other.bias})
+    return entry(models.other, other, scale=scale_of(other.matrix), **{models.quantity.named("bias"): other.bias})
 
 
 def _dwell_entry(
     models: Models[Any], dwell: DwellReading | StaticReading, residual: Array, residual_std: Array
 ) -> Entry:
-    """A dwell: `residual` (3,) is what the model leaves, `residual_std` (3,) what it is expected to leave."""
+    """Return a dwell with its `residual` (3,) and the residual's expected standard deviation `residual_std` (3,)."""
     quantity, read = models.quantity, dwell.reading
     return entry(
         models.dwell, dwell, read,

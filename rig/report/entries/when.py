@@ -1,4 +1,4 @@
-"""When something was found, as an entry of `result.json`."""
+"""The conditions of a value as an entry of `result.json`."""
 
 from rig.analysis.read_when import When
 from rig.data.entries.result_types import ConditionsEntry
@@ -6,6 +6,6 @@ from rig.report.entry import entry
 
 
 def when_entry(when: When) -> ConditionsEntry:
-    """Times to the second."""
+    """Return time and temperature of a value, times to the second."""
     times = {name: getattr(when, name).isoformat(timespec="seconds") for name in ("from_utc", "to_utc", "mean_utc")}
     return entry(ConditionsEntry, when, **times)

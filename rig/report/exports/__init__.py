@@ -1,4 +1,4 @@
-"""What was calibrated and recorded, in the files of other programs.
+"""Calibrations and recordings in the file formats of other programs.
 
-Here g = K (m + b); every other program adds its bias or subtracts its offset the other way round, so theirs is −b.
+Here g = K (m + b); all other programs define the bias with the opposite sign, −b.
 """

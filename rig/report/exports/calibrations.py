@@ -1,4 +1,4 @@
-"""A run's calibrations as exports take them: the corrections of every kind, and IMUs of those that belong together."""
+"""A run's calibrations for exports: the corrections of all kinds, and IMUs of gyroscope and accelerometer."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -18,26 +18,26 @@ from rig.report.kinds.registry import outlets, terms_of
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """A gyroscope with the accelerometer beside it, if one was calibrated."""
+    """A gyroscope with the accelerometer of the same sensor, if one was calibrated."""
 
     gyroscope: Corrected
     accelerometer: Corrected | None
 
     @property
     def name(self) -> str:
-        """The sensor that both are part of."""
+        """The sensor of which both are parts."""
         return self.gyroscope.sensor
 
     @property
     def g_sensitivity(self) -> Array:
-        """(3, 3) what the gyroscope reads of a specific force, rad/s per m/s²; zero where that was not found."""
-        found = self.gyroscope.g_sensitivity
-        return np.zeros((3, 3)) if found is None else found
+        """The gyroscope's g-sensitivity (3, 3), rad/s per m/s²; zero if unknown."""
+        matrix = self.gyroscope.g_sensitivity
+        return np.zeros((3, 3)) if matrix is None else matrix
 
 
 @dataclass(frozen=True)
 class Calibrations:
-    """The `sensors` that a run calibrated, kind by kind, and the polynomials of those that have any, by sensor."""
+    """The `sensors` that a run calibrated, kind by kind, and polynomials of temperature by sensor and quantity."""
 
     result: ResultDocument
     sensors: tuple[Corrected, ...]
@@ -45,34 +45,37 @@ class Calibrations:
 
     @cached_property
     def imus(self) -> tuple[Imu, ...]:
-        """Every gyroscope, with the accelerometer beside it. Raises Refused `nothing_to_export`."""
-        beside = {each.sensor: each for each in self.sensors if each.quantity == ACCELERATION}
-        found = tuple(Imu(each, beside.get(each.sensor)) for each in self.sensors if each.quantity == RATE)
-        if not found:
+        """All gyroscopes, with their accelerometers. Raise Refused `nothing_to_export` if there are none."""
+        accelerometers = {triad.sensor: triad for triad in self.sensors if triad.quantity == ACCELERATION}
+        gyroscopes = [triad for triad in self.sensors if triad.quantity == RATE]
+        if not gyroscopes:
             raise Refused("nothing_to_export", "the run calibrated no gyroscope", "Give a run that calibrates one")
-        return found
+        return tuple(Imu(gyroscope, accelerometers.get(gyroscope.sensor)) for gyroscope in gyroscopes)
 
     @property
-    def elsewhere(self) -> tuple[str, ...]:
-        """What no file of an IMU has a place for: sensors that belong to none, and what is `beside`."""
-        held = [each for imu in self.imus for each in (imu.gyroscope, imu.accelerometer)]
-        return (*(each.name for each in self.sensors if each not in held), *self.beside)
+    def not_in_imus(self) -> tuple[str, ...]:
+        """Results that a file of an IMU cannot hold: sensors outside of an IMU, and `further_terms`."""
+        parts = [triad for imu in self.imus for triad in (imu.gyroscope, imu.accelerometer)]
+        return (*(triad.name for triad in self.sensors if triad not in parts), *self.further_terms)
 
     @property
-    def beside(self) -> tuple[str, ...]:
-        """What was found beside scale and bias, and no format knows."""
-        found = (term for term in terms_of(self.result, "exports") if not term.finding.known)
-        return tuple(printable(f"{term.whose}, {term.name}") for term in found)
+    def further_terms(self) -> tuple[str, ...]:
+        """Results other than scale and bias, which no format supports."""
+        terms = (term for term in terms_of(self.result, "exports") if not term.finding.is_reference)
+        return tuple(printable(f"{term.whose}, {term.name}") for term in terms)
 
     def origin(self, sensor: Corrected) -> Iterator[str]:
-        """Whose calibration it is, when and how warm it was found, and by what."""
-        made = self.result.provenance
-        warm = "" if sensor.temperature_c is None else f" at {sensor.temperature_c:.1f} degC,"
-        yield printable(f"{sensor.sensor}: {sensor.part} {sensor.serial_number},{warm} {made.started_utc}")
-        yield printable(f"by calibration-rig {made.rig_version}, configuration {made.configuration_sha256[:16]}")
+        """Yield the sensor, the time and temperature of its calibration, and the program."""
+        provenance = self.result.provenance
+        temperature = "" if sensor.temperature_c is None else f" at {sensor.temperature_c:.1f} degC,"
+        yield printable(f"{sensor.sensor}: {sensor.part} {sensor.serial_number},{temperature} {provenance.started_utc}")
+        yield printable(
+            f"by calibration-rig {provenance.rig_version}, configuration {provenance.configuration_sha256[:16]}"
+        )
 
 
 def calibrations(result: ResultDocument) -> Calibrations:
-    """What every kind of result says to other programs; nothing of references, which are known already."""
-    found = (correct(finding) for _, correct, finding in outlets(result, lambda kind: kind.corrected))
-    return Calibrations(result, tuple(each for each in found if each is not None), result.over_temperature)
+    """Return the corrections of all kinds of results; references are left out."""
+    corrections = (correct(finding) for _, correct, finding in outlets(result, lambda kind: kind.corrected))
+    sensors = tuple(correction for correction in corrections if correction is not None)
+    return Calibrations(result, sensors, result.over_temperature)

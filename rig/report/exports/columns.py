@@ -10,19 +10,19 @@ from rig.estimation.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Columns (n,) by name, which carries the unit, and what they mean."""
+    """Columns (n,) by name, which carries the unit, and their `meaning`."""
 
     name: str
     columns: Mapping[str, Array]
-    said: str
+    meaning: str
 
 
 def readings_table(run: RunData, sensor: str, channels: Sequence[Channel], time_s: Array, meaning: str) -> Table:
-    """What a sensor of a recording read by these of its channels, at times (n,), and the `meaning` of it."""
+    """Return the readings of a sensor by `channels`, at times (n,), with their `meaning`."""
     recorded, columns = run.sensors[sensor], {"time_s": time_s}
-    for each in channels:
-        values = each.values(run.samples[sensor])
-        columns |= split(each.measures.columns, values.reshape(len(time_s), -1))
+    for channel in channels:
+        values = channel.values(run.samples[sensor])
+        columns |= split(channel.measures.columns, values.reshape(len(time_s), -1))
     whose = f"{sensor}, {recorded.part} {recorded.serial_number}, {recorded.mode} readings"
     if recorded.has_axes:
         whose += " in the sensor's own axes"
@@ -30,5 +30,5 @@ def readings_table(run: RunData, sensor: str, channels: Sequence[Channel], time_
 
 
 def split(names: Sequence[str], columns: Array) -> dict[str, Array]:
-    """The columns of an array (n, k) by name."""
+    """Return the columns of an array (n, k) by name."""
     return {name: columns[:, i] for i, name in enumerate(names)}

@@ -1,4 +1,4 @@
-"""Which formats there are, and where each is written. A new one is a file with its writer, and its line here."""
+"""The formats and their writers. A new one is a file with its writer, and its line here."""
 
 import importlib
 from collections.abc import Callable, Mapping
@@ -28,13 +28,13 @@ OF_CALIBRATIONS: Final[Mapping[str, str]] = {
     "ardupilot": "rig.report.exports.autopilots:ardupilot_files",
     "kalibr": "rig.report.exports.kalibr:kalibr_files",
 }
-# What an optional part of the program brings: (library, part).
+# Formats that need an optional part of the program: (library, part).
 EXTRAS: Final = {"parquet": ("pyarrow", "parquet"), "ros2": ("rosbags", "ros2")}
 FORMATS: Final = (*OF_READINGS, *OF_CALIBRATIONS)
 
 
 def writer_of_readings(name: str) -> "ReadingsWriter":
-    """Loads what it needs, which may be an extra's. Raises Refused `missing_extra`."""
+    """Load and return the writer of a format of readings. Raise Refused `missing_extra`."""
     if name in EXTRAS:
         library, extra = EXTRAS[name]
         try:
@@ -43,17 +43,17 @@ def writer_of_readings(name: str) -> "ReadingsWriter":
             from rig.errors.extras import missing_extra
 
             raise missing_extra(error, extra) from error
-    found: ReadingsWriter = _named(OF_READINGS[name])
-    return found
+    writer: ReadingsWriter = _load(OF_READINGS[name])
+    return writer
 
 
 def texts_of_calibrations(name: str) -> "CalibrationTexts":
-    """What makes the texts of a format that takes calibrations."""
-    found: CalibrationTexts = _named(OF_CALIBRATIONS[name])
-    return found
+    """Load and return the function that builds the texts of a format of calibrations."""
+    builder: CalibrationTexts = _load(OF_CALIBRATIONS[name])
+    return builder
 
 
-def _named(place: str) -> Callable[..., Any]:
-    module, function = place.split(":")
-    found: Callable[..., Any] = getattr(importlib.import_module(module), function)
-    return found
+def _load(path: str) -> Callable[..., Any]:
+    module, function = path.split(":")
+    loaded: Callable[..., Any] = getattr(importlib.import_module(module), function)
+    return loaded

@@ -1,4 +1,4 @@
-"""imucal's JSON, version 2.0.0, of a turntable calibration: the one format that holds everything.
+"""imucal's JSON, version 2.0.0, of a turntable calibration: the one format that holds all corrections.
 
 imucal (2.6, ferraris_calibration_info.py): a = R_a⁻¹ K_a⁻¹ (m_a − b_a), ω = R_g⁻¹ K_g⁻¹ (m_g − K_ga a − b_g).
 """
@@ -14,8 +14,8 @@ FORMAT_VERSION = "2.0.0"
 
 
 def imucal_files(calibrations: Calibrations) -> Mapping[str, str]:
-    """One file for each IMU. Raises Refused `nothing_to_export`."""
-    documents = {each.name: _document(calibrations, each) for each in calibrations.imus}
+    """Return one file for each IMU. Raise Refused `nothing_to_export`."""
+    documents = {imu.name: _document(calibrations, imu) for imu in calibrations.imus}
     return {f"{name}_imucal.json": json.dumps(document, indent=2) + "\n" for name, document in documents.items()}
 
 
@@ -40,12 +40,14 @@ def _document(calibrations: Calibrations, imu: Imu) -> dict[str, object]:
 
 
 def _convention(calibrations: Calibrations, imu: Imu) -> list[str]:
-    said = ["w = R_g^-1 K_g^-1 (m - K_ga a - b_g), in the right-angled frame nearest to the gyroscope's axes; b_g = -b"]
+    sentences = [
+        "w = R_g^-1 K_g^-1 (m - K_ga a - b_g), in the right-angled frame nearest to the gyroscope's axes; b_g = -b"
+    ]
     if imu.accelerometer is None:
-        said.append("No accelerometer was calibrated: K_a, R_a, b_a are those of an ideal one")
+        sentences.append("No accelerometer was calibrated: K_a, R_a, b_a are those of an ideal one")
     if imu.gyroscope.g_sensitivity is None:
-        said.append("The g-sensitivity was not found: K_ga is zero")
+        sentences.append("The g-sensitivity is not known: K_ga is zero")
     if imu.accelerometer is not None and imu.accelerometer.second_order:
-        said.append("Left out: the accelerometer's second order")
-    said += [f"Left out: {name}, for which there is no place" for name in calibrations.elsewhere]
-    return [*said, "Left out: uncertainties, temperature, nonlinearity; they are in result.json"]
+        sentences.append("Left out: the accelerometer's second order")
+    sentences += [f"Left out: {name}, for which there is no place" for name in calibrations.not_in_imus]
+    return [*sentences, "Left out: uncertainties, temperature, nonlinearity; they are in result.json"]

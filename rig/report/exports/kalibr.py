@@ -1,4 +1,4 @@
-"""Kalibr's YAML: what its --imu wants to be told of noise, and intrinsics as its result has them.
+"""Kalibr's YAML: noise as its --imu option takes it, and intrinsics in the form of its results.
 
 Kalibr (IccSensors.py, "scale-misalignment"): m_a = M_a a + b_a, m_g = M_g C_g ω + A_g C_g a + b_g with lower triangular
 M, in the frame of the accelerometer's axes; without one, of the gyroscope's.
@@ -15,18 +15,21 @@ from rig.report.exports.names import plain_names
 
 
 def kalibr_files(calibrations: Calibrations) -> Mapping[str, str]:
-    """Kalibr's files: for each IMU `…_imu.yaml` (noise) and `…_intrinsics.yaml`. Raises Refused `nothing_to_export`."""
+    """Return for each IMU `…_imu.yaml` (noise) and `…_intrinsics.yaml`. Raise Refused `nothing_to_export`."""
     files = {}
-    names = plain_names(each.name for each in calibrations.imus)
-    for each in calibrations.imus:
-        topic = f"/{names[each.name]}/imu"  # as in the bag of `--format ros2`
-        files[f"{each.name}_imu.yaml"] = _noise(calibrations, each, topic)
-        files[f"{each.name}_intrinsics.yaml"] = _intrinsics(calibrations, each, topic)
+    names = plain_names(imu.name for imu in calibrations.imus)
+    for imu in calibrations.imus:
+        topic = f"/{names[imu.name]}/imu"  # as in the bag of `--format ros2`
+        files[f"{imu.name}_imu.yaml"] = _noise(calibrations, imu, topic)
+        files[f"{imu.name}_intrinsics.yaml"] = _intrinsics(calibrations, imu, topic)
     return files
 
 
 def triangular(matrix: Array) -> tuple[Array, Array]:
-    """(3, 3) = M · C with M lower triangular, positive on its diagonal, and C a rotation, of a right-handed matrix."""
+    """Return M, C (3, 3) with matrix = M · C, of a right-handed matrix.
+
+    M is lower triangular with a positive diagonal, C a rotation.
+    """
     q, r = np.linalg.qr(matrix.T)
     signs = np.sign(np.diag(r))
     return r.T * signs + 0.0, (q * signs).T  # no −0.0
@@ -34,20 +37,20 @@ def triangular(matrix: Array) -> tuple[Array, Array]:
 
 def _noise(calibrations: Calibrations, imu: Imu, topic: str) -> str:
     rates, forces = imu.gyroscope, imu.accelerometer
-    known = {
+    parameters = {
         "rostopic": topic,
         "update_rate": rates.noise.rate_hz,
         "gyroscope_noise_density": rates.noise.density,
         "accelerometer_noise_density": None if forces is None else forces.noise.density,
     }
-    unknown = [name for name, value in known.items() if value is None]
-    said = [
+    unknown = [name for name, value in parameters.items() if value is None]
+    comments = [
         *calibrations.origin(rates),
         "Noise densities in rad/s/sqrt(Hz), m/s^2/sqrt(Hz): of a sample at rest over the rate's root, worst axis.",
         "Lost: gyroscope_random_walk, accelerometer_random_walk, which take hours at rest; add your own.",
-        *(f"Lost: {name}, which this run does not tell" for name in unknown),
+        *(f"Lost: {name}, which this run did not measure" for name in unknown),
     ]
-    return _yaml(said, {name: value for name, value in known.items() if value is not None})
+    return _yaml(comments, {name: value for name, value in parameters.items() if value is not None})
 
 
 def _intrinsics(calibrations: Calibrations, imu: Imu, topic: str) -> str:
@@ -57,24 +60,28 @@ def _intrinsics(calibrations: Calibrations, imu: Imu, topic: str) -> str:
     if forces is not None:
         scaled, to_body = triangular(forces.matrix)
         intrinsics["accelerometers"] = {"M": scaled.tolist()}
-    scaled, turned = triangular(rates.matrix @ to_body.T)
+    scaled, rotation = triangular(rates.matrix @ to_body.T)
     in_body = imu.g_sensitivity @ to_body.T
-    intrinsics["gyroscopes"] = {"M": scaled.tolist(), "A": (in_body @ turned.T).tolist(), "C_gyro_i": turned.tolist()}
-    said = [
+    intrinsics["gyroscopes"] = {
+        "M": scaled.tolist(),
+        "A": (in_body @ rotation.T).tolist(),
+        "C_gyro_i": rotation.tolist(),
+    }
+    comments = [
         *calibrations.origin(rates),
-        "m = M C_gyro_i w + A C_gyro_i a + b: readings m in rad/s, w true, a in m/s^2. Kalibr keeps no bias here:",
+        "m = M C_gyro_i w + A C_gyro_i a + b: readings m in rad/s, w true, a in m/s^2. Kalibr has no bias here:",
         f"b = -b of result.json = {rates.offset.tolist()} rad/s",
     ]
     if forces is not None:
-        said.append(f"accelerometer: m = M a + b, b = {forces.offset.tolist()} m/s^2")
+        comments.append(f"accelerometer: m = M a + b, b = {forces.offset.tolist()} m/s^2")
     if rates.g_sensitivity is None:
-        said.append("A is zero: the g-sensitivity was not found.")
-    said.append("Lost: uncertainties, temperature, the accelerometer's second order and place.")
-    said += [f"Lost: {name}, for which there is no place" for name in calibrations.elsewhere]
-    return _yaml(said, {"imu0": intrinsics})
+        comments.append("A is zero: the g-sensitivity is not known.")
+    comments.append("Lost: uncertainties, temperature, the accelerometer's second order and position.")
+    comments += [f"Lost: {name}, for which there is no place" for name in calibrations.not_in_imus]
+    return _yaml(comments, {"imu0": intrinsics})
 
 
 def _yaml(lines: list[str], document: Mapping[str, object]) -> str:
     heading = "".join(f"# {line}\n" for line in lines)
-    nested = any(isinstance(value, dict) for value in document.values())  # matrices are written a row a line
+    nested = any(isinstance(value, dict) for value in document.values())  # one line for each row of a matrix
     return heading + yaml.safe_dump(document, sort_keys=False, default_flow_style=None if nested else False)

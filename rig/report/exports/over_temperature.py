@@ -1,10 +1,10 @@
-"""What PX4 and ArduPilot correct by temperature: offsets of gyroscopes and accelerometers, up to the third power.
+"""Temperature corrections of PX4 and ArduPilot: offsets of gyroscopes and accelerometers, to the third power.
 
-PX4 (temperature_compensation, sensor_calibration): data − (X0 + X1 d + X2 d² + X3 d³) − offset, d = T − TREF, T held
-between TMIN and TMAX. The offset at TREF is that of CAL_…, so X0 is 0.
+PX4 (temperature_compensation, sensor_calibration): data − (X0 + X1 d + X2 d² + X3 d³) − offset, d = T − TREF, T limited
+to TMIN … TMAX. The offset at TREF is that of CAL_…, so X0 is 0.
 
 ArduPilot (AP_InertialSensor_tempcal, AP_InertialSensor_Backend): data − P(T − 35 °C) + P(CALTEMP − 35 °C) − offset,
-P(u) = 10⁻⁶ (c₁ u + c₂ u² + c₃ u³), both temperatures held between TMIN and TMAX. Its 35 °C are fixed.
+P(u) = 10⁻⁶ (c₁ u + c₂ u² + c₃ u³), both temperatures limited to TMIN … TMAX. Its 35 °C are fixed.
 
 A gyroscope's bias b is added, g = K (m + b), so an offset is −b. Neither has a scale factor over temperature.
 """
@@ -23,52 +23,54 @@ Polynomials = Mapping[str, Mapping[str, OverTemperatureEntry]]  # by sensor and 
 
 
 def offset_of(quantity: str, entry: OverTemperatureEntry, order: int) -> tuple[float, ...]:
-    """(3,) what an autopilot subtracts for each Kⁿ of that order."""
-    return tuple(quantities()[quantity].offset * each for each in entry.bias[order])
+    """Return the coefficients (3,) of Kⁿ, n = `order`, that an autopilot subtracts."""
+    return tuple(quantities()[quantity].offset * bias for bias in entry.bias[order])
 
 
-def px4_parameters(polynomials: Polynomials, places: Mapping[str, int]) -> Parameters:
-    """The parameters TC_… of every sensor that was calibrated over temperature; nothing where none was."""
+def px4_parameters(polynomials: Polynomials, numbers: Mapping[str, int]) -> Parameters:
+    """Yield the parameters TC_… of all sensors that were calibrated over temperature."""
     enabled = set()
-    for name, number in places.items():
-        for quantity, found in polynomials.get(name, {}).items():
+    for name, number in numbers.items():
+        for quantity, entry in polynomials.get(name, {}).items():
             letter = LETTERS[quantity][0]
             enabled.add(letter)
-            yield f"TC_{letter}{number}_TREF", found.reference_c
-            yield f"TC_{letter}{number}_TMIN", found.range_c[0]
-            yield f"TC_{letter}{number}_TMAX", found.range_c[1]
+            yield f"TC_{letter}{number}_TREF", entry.reference_c
+            yield f"TC_{letter}{number}_TMIN", entry.range_c[0]
+            yield f"TC_{letter}{number}_TMAX", entry.range_c[1]
             for order in range(4):
-                offsets = (0.0,) * 3 if order == 0 else offset_of(quantity, found, order)
-                yield from ((f"TC_{letter}{number}_X{order}_{i}", each) for i, each in enumerate(offsets))
+                offsets = (0.0,) * 3 if order == 0 else offset_of(quantity, entry, order)
+                yield from ((f"TC_{letter}{number}_X{order}_{i}", offset) for i, offset in enumerate(offsets))
     for letter in sorted(enabled):
         yield f"TC_{letter}_ENABLE", 1
 
 
-def ardupilot_parameters(polynomials: Polynomials, places: Mapping[str, int]) -> Parameters:
-    """The parameters INS_TCAL… of every IMU of which a sensor was calibrated over temperature, of the other zeros."""
-    for name, number in places.items():
-        found = polynomials.get(name, {})
-        if not found:
+def ardupilot_parameters(polynomials: Polynomials, numbers: Mapping[str, int]) -> Parameters:
+    """Yield the parameters INS_TCAL… of IMUs with a polynomial; zeros for a sensor without one."""
+    for name, number in numbers.items():
+        entries = polynomials.get(name, {})
+        if not entries:
             continue
-        of = f"INS_TCAL{number + 1}"
-        yield f"{of}_ENABLE", 1
-        yield f"{of}_TMIN", max(each.range_c[0] for each in found.values())
-        yield f"{of}_TMAX", min(each.range_c[1] for each in found.values())
+        prefix = f"INS_TCAL{number + 1}"
+        yield f"{prefix}_ENABLE", 1
+        yield f"{prefix}_TMIN", max(entry.range_c[0] for entry in entries.values())
+        yield f"{prefix}_TMAX", min(entry.range_c[1] for entry in entries.values())
         for quantity, (_, letters) in LETTERS.items():
-            about = _about_35(quantity, found[quantity]) if quantity in found else ((0.0,) * 3,) * 3
-            for order, each in enumerate(about, start=1):
-                yield from ((f"{of}_{letters}{order}_{axis}", value) for axis, value in zip(AXES, each, strict=True))
-        if (accelerometer := found.get("acceleration")) is not None:
+            orders = _about_35(quantity, entries[quantity]) if quantity in entries else ((0.0,) * 3,) * 3
+            for order, biases in enumerate(orders, start=1):
+                yield from (
+                    (f"{prefix}_{letters}{order}_{axis}", value) for axis, value in zip(AXES, biases, strict=True)
+                )
+        if (accelerometer := entries.get("acceleration")) is not None:
             yield f"INS_ACC{number + 1}_CALTEMP", accelerometer.reference_c
 
 
 def _about_35(quantity: str, entry: OverTemperatureEntry) -> tuple[tuple[float, ...], ...]:
-    """Coefficients of orders 1 to 3 about ArduPilot's own reference, in its size."""
-    away = ARDUPILOT_REFERENCE_C - entry.reference_c
+    """Return the coefficients of orders 1 to 3 about ArduPilot's own reference, in its unit."""
+    shift_k = ARDUPILOT_REFERENCE_C - entry.reference_c
     orders = [offset_of(quantity, entry, order) for order in range(4)]
     return tuple(
         tuple(
-            ARDUPILOT_SIZE * sum(comb(m, n) * away ** (m - n) * orders[m][axis] for m in range(n, 4))
+            ARDUPILOT_SIZE * sum(comb(m, n) * shift_k ** (m - n) * orders[m][axis] for m in range(n, 4))
             for axis in range(3)
         )
         for n in range(1, 4)

@@ -1,7 +1,6 @@
-"""Readings and the motion beside them as tables: CSV, Parquet, MATLAB.
+"""Readings and motion as tables: CSV, Parquet, MATLAB.
 
-Readings are those that were recorded, in each sensor's own axes. `rig solve GYRO.csv --sweeps GYRO_sweeps.csv` reads
-the CSV files.
+Readings are as recorded, in each sensor's own axes. `rig solve GYRO.csv --sweeps GYRO_sweeps.csv` reads the CSV files.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,29 +17,29 @@ from rig.report.exports.recorded import Exported
 
 
 def tables_of(recordings: Sequence[Exported]) -> Iterator[Table]:
-    """The tables of each recording, those of the second and later ones with its number."""
+    """Yield the tables of each recording; the second and later ones have its number."""
     for number, recording in enumerate(recordings, start=1):
         for table in recording.tables():
             yield table if number == 1 else replace(table, name=f"{table.name}-{number}")
 
 
 def write_csv(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """A file for each table, and `README.txt`, since a table of numbers has no room for words."""
-    written, said = [], []
+    """Write a file for each table, and `README.txt` with their meanings."""
+    written, lines = [], []
     for table in tables_of(recordings):
         path = folder / f"{table.name}.csv"
         rows = np.column_stack(list(table.columns.values()))
         with new_file(path) as file:
             np.savetxt(file, rows, fmt="%.17g", delimiter=",", header=",".join(table.columns), comments="")
         written.append(path)
-        said.append(f"{path.name}: {table.said}\n")
+        lines.append(f"{path.name}: {table.meaning}\n")
     readme = folder / "README.txt"
-    write_new(readme, "".join(said))
+    write_new(readme, "".join(lines))
     return [*written, readme]
 
 
 def write_parquet(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """A file for each table, its meaning as metadata `convention`."""
+    """Write a file for each table, with its meaning as metadata `convention`."""
     import pyarrow
     import pyarrow.parquet
 
@@ -49,18 +48,18 @@ def write_parquet(recordings: Sequence[Exported], folder: Path) -> list[Path]:
         path = folder / f"{table.name}.parquet"
         columns = pyarrow.table({name: np.ascontiguousarray(column) for name, column in table.columns.items()})
         with new_file(path) as file:
-            pyarrow.parquet.write_table(columns.replace_schema_metadata({"convention": table.said}), file)
+            pyarrow.parquet.write_table(columns.replace_schema_metadata({"convention": table.meaning}), file)
         written.append(path)
     return written
 
 
 def write_mat(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """`run.mat`: a struct for each table, columns as fields (n, 1), its meaning as field `convention`."""
+    """Write `run.mat`: a struct for each table, columns as fields (n, 1), its meaning as field `convention`."""
     from scipy.io import savemat
 
     tables = tuple(tables_of(recordings))
     names = plain_names(table.name for table in tables)
-    structs = {names[table.name]: {**_columns(table), "convention": table.said} for table in tables}
+    structs = {names[table.name]: {**_columns(table), "convention": table.meaning} for table in tables}
     path = folder / "run.mat"
     with new_file(path) as file:
         savemat(file, structs, do_compression=True, long_field_names=True)  # type: ignore[arg-type]  # says scipy-stubs

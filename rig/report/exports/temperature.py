@@ -1,7 +1,7 @@
-"""A calibration's biases at another temperature, by the slopes that a run of `bias_drift` has found. Pure.
+"""A calibration's biases at another temperature, by the slopes of a run of `bias_drift`. Pure.
 
-A slope holds in the range it was seen in, and nowhere else: neither the calibration's temperature nor the one that is
-asked for may lie outside.
+A slope is valid only in the range in which it was measured: the calibration's temperature and the requested one must be
+inside.
 """
 
 from dataclasses import replace
@@ -16,45 +16,45 @@ from rig.estimation.arrays import Array
 from rig.report.exports.calibrations import Calibrations
 from rig.report.findings.corrected import Corrected
 
-WATCHED = (RATE, ACCELERATION)  # whose biases a run of `bias_drift` follows
+WATCHED = (RATE, ACCELERATION)  # a run of `bias_drift` measures their biases
 
 
 def at_temperature(calibrations: Calibrations, drift: ResultDocument, temperature_c: float) -> Calibrations:
-    """The calibrations with biases as they are at that temperature, by the slopes in `drift`.
+    """Return the calibrations with biases at `temperature_c`, by the slopes in `drift`.
 
-    Raises Refused `another_sensor`, `temperature_slope_unknown`, `temperature_outside`.
+    Raise Refused `another_sensor`, `temperature_slope_unknown`, `temperature_outside`.
     """
     _check_same(calibrations.result, drift)
     sensors = tuple(
-        replace(each, offset=each.offset + _change(drift, each, temperature_c), temperature_c=temperature_c)
-        if each.quantity in WATCHED
-        else each
-        for each in calibrations.sensors
+        replace(sensor, offset=sensor.offset + _change(drift, sensor, temperature_c), temperature_c=temperature_c)
+        if sensor.quantity in WATCHED
+        else sensor
+        for sensor in calibrations.sensors
     )
-    # Polynomials are about the temperature of the calibration.
+    # Polynomials start at the temperature of the calibration.
     return replace(calibrations, sensors=sensors, over_temperature={})
 
 
 def _change(drift: ResultDocument, sensor: Corrected, to_c: float) -> Array:
-    """(3,) change of the reading's bias."""
+    """Return the change (3,) of the reading's bias."""
     name, quantity, from_c = sensor.sensor, sensor.quantity.name, sensor.temperature_c
     if from_c is None:
         raise Refused(
             "temperature_slope_unknown",
-            f"the result does not say how warm {name} was",
+            f"the result does not state the temperature of {name}",
             "Leave out --at-temperature; calibrate it where its thermometer is read",
         )
     watched = drift.bias_drift.get(name, {}).get(quantity)
     slope = None if watched is None else watched.temperature_slope
     if not isinstance(slope, SlopeEntry):
-        why = "it did not watch that bias" if slope is None else slope.error
+        why = "it did not measure that bias" if slope is None else slope.error
         raise Refused(
             "temperature_slope_unknown",
-            f"the run of bias_drift did not find how {name}'s {quantity} changes with temperature: {why}",
+            f"the run of bias_drift did not measure how {name}'s {quantity} changes with temperature: {why}",
             "Give a run of bias_drift in which the sensor warmed and cooled, or export without --at-temperature",
         )
     low, high = slope.range_c
-    for what, temperature_c in (("the calibration was made at", from_c), ("its bias is wanted at", to_c)):
+    for what, temperature_c in (("the calibration was made at", from_c), ("its bias is requested at", to_c)):
         if not low <= temperature_c <= high:
             raise Refused(
                 "temperature_outside",
@@ -67,7 +67,7 @@ def _change(drift: ResultDocument, sensor: Corrected, to_c: float) -> Array:
 
 
 def _check_same(result: ResultDocument, drift: ResultDocument) -> None:
-    """Raises Refused `another_sensor`."""
+    """Raise Refused `another_sensor` if the drift is of another sensor."""
     watched = drift.provenance.sensor_serial_numbers
     for name, serial_number in result.provenance.sensor_serial_numbers.items():
         if name in watched and watched[name] != serial_number:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def write_drift_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """`bias_drift_<sensor>` of every sensor whose bias was watched, as PNG and SVG; none without matplotlib."""
+    """Write `bias_drift_<sensor>` for each sensor with biases by repeat, as PNG and SVG; none without matplotlib."""
     return write_pictures(
         [
             Picture(
@@ -44,18 +44,20 @@ def _draw_all(figure: "Figure", drifts: Mapping[Quantity, BiasDrift]) -> None:
 
 
 def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
-    """Draw the bias by repeat: dots with scale and axes held, crosses all found anew, lines where it moved."""
+    """Draw the bias by repeat: dots with scale and axes fixed, crosses with all solved, lines at its changes."""
     size = quantity.drift.size
     repeat = np.arange(1, len(drift.held.bias) + 1)
-    again = [(index + 1, anew) for index, anew in drift.anew.results.items()]
+    free_solutions = [(index + 1, solution) for index, solution in drift.anew.results.items()]
     factors = expanded((1.0, 1.0, 1.0), counted(drift.freedom)).factors
     for i, axis in enumerate("xyz"):
-        held, std = drift.held.bias[:, i] / size, drift.held.std[:, i] / size
-        axes.errorbar(repeat, held, factors[i] * std, fmt="o-", ms=3, lw=0.8, color=f"C{i}", label=axis)
-        if again:
-            biases, stds = ([getattr(found, of)[i] / size for _, found in again] for of in ("bias", "std"))
+        bias, std = drift.held.bias[:, i] / size, drift.held.std[:, i] / size
+        axes.errorbar(repeat, bias, factors[i] * std, fmt="o-", ms=3, lw=0.8, color=f"C{i}", label=axis)
+        if free_solutions:
+            biases, stds = (
+                [getattr(solution, name)[i] / size for _, solution in free_solutions] for name in ("bias", "std")
+            )
             axes.errorbar(
-                [number + 0.15 for number, _ in again],
+                [number + 0.15 for number, _ in free_solutions],
                 biases,
                 factors[i] * np.array(stds),
                 fmt="x",
@@ -70,6 +72,6 @@ def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
     axes.set(
         xlabel="repeat",
         ylabel=f"bias   {quantity.drift.name}",
-        title=f"{quantity.sensor}; ± U ({factor_words(counted(drift.freedom))}), × found anew",
+        title=f"{quantity.sensor}; ± U ({factor_words(counted(drift.freedom))}), × all solved again",
     )
     axes.legend(frameon=False, ncols=3, fontsize=8)

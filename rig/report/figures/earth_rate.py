@@ -1,4 +1,4 @@
-"""A gyroscope that has found the Earth's rate, drawn as in TRIAX, Figs. 2 and 3: how it was turned, what is left."""
+"""The Earth's rate of a gyroscope, drawn as in TRIAX, Figs. 2 and 3: the motion, and the residuals."""
 
 from functools import partial
 from pathlib import Path
@@ -19,13 +19,13 @@ from rig.station.events import RunEvent
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RATE_HZ = 25.0  # at which TRIAX samples
+RATE_HZ = 25.0  # the sample rate of TRIAX
 GAP_S = 1.0
 
 
 def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """`earth_rate_<sensor>` of every sensor that has found it, as PNG and SVG; none without matplotlib."""
-    found = {
+    """Write `earth_rate_<sensor>` for each sensor that measured it, as PNG and SVG; none without matplotlib."""
+    solved = {
         name: (result.explained, earth)
         for name, result in outcome.results.items()
         if result.explained is not None and (earth := result.earth) is not None
@@ -36,54 +36,54 @@ def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder:
                 f"earth_rate_{sensor}",
                 f"{sensor}: rate of the flange, and error of the calibrated gyroscope, at {RATE_HZ:g} Hz",
                 (11.0, 4.6),
-                partial(_draw, recording=outcome.recordings[0], sensor=sensor, explained=explained, earth=earth),
+                partial(_draw, recording=outcome.recordings[0], sensor=sensor, fit=fit, earth=earth),
             )
-            for sensor, (explained, earth) in found.items()
+            for sensor, (fit, earth) in solved.items()
         ],
         folder,
     )
 
 
-def _draw(figure: "Figure", recording: ObservedRun, sensor: str, explained: Explained, earth: EarthRate) -> None:
-    draw_errors(figure, *errors(recording, sensor, explained, earth))
+def _draw(figure: "Figure", recording: ObservedRun, sensor: str, fit: Explained, earth: EarthRate) -> None:
+    draw_errors(figure, *errors(recording, sensor, fit, earth))
 
 
-def errors(recording: ObservedRun, sensor: str, explained: Explained, earth: EarthRate) -> tuple[Array, Array, Array]:
-    """Times (n,), rates of the flange (n, 3), and calibrated readings less these and the Earth's rate (n, 3), rad/s.
+def errors(recording: ObservedRun, sensor: str, fit: Explained, earth: EarthRate) -> tuple[Array, Array, Array]:
+    """Return times (n,), rates of the flange (n, 3), and corrected readings minus flange and Earth (n, 3), rad/s.
 
-    Means over 1 / `RATE_HZ`, in the flange's frame, where the arm's states follow each other closely.
+    They are means over 1 / `RATE_HZ` in the flange's frame, at times that the arm's states cover.
     """
-    stream, motion, solution = recording.stream(sensor), recording.motion, explained.solution
-    many = max(1, round(stream.sensor.rate_hz / RATE_HZ))
-    count = len(stream.time_s) // many * many
-    time_s = stream.time_s[:count].reshape(-1, many).mean(axis=1)
-    known = motion.covered(time_s)
-    turned, readings = (
-        values[:count].reshape(-1, many, 3).mean(axis=1)[known]
+    stream, motion, solution = recording.stream(sensor), recording.motion, fit.solution
+    samples = max(1, round(stream.sensor.rate_hz / RATE_HZ))
+    count = len(stream.time_s) // samples * samples
+    time_s = stream.time_s[:count].reshape(-1, samples).mean(axis=1)
+    covered = motion.covered(time_s)
+    flange_rate, readings = (
+        values[:count].reshape(-1, samples, 3).mean(axis=1)[covered]
         for values in (motion.rate(stream.time_s), stream.readings_rad_s)
     )
-    felt = flange_attitude(motion.angles(time_s[known]), motion.kinematics) @ earth.rate_rad_s @ motion.mount.T
-    found = (readings + solution.bias_rad_s) @ np.linalg.inv(solution.matrix).T
-    return time_s[known] - time_s[known][0], turned, found - turned - felt
+    earth_rate = flange_attitude(motion.angles(time_s[covered]), motion.kinematics) @ earth.rate_rad_s @ motion.mount.T
+    corrected = (readings + solution.bias_rad_s) @ np.linalg.inv(solution.matrix).T
+    return time_s[covered] - time_s[covered][0], flange_rate, corrected - flange_rate - earth_rate
 
 
-def draw_errors(figure: "Figure", time_s: Array, turned: Array, error: Array) -> None:
-    """Draw the turned rate left as in Fig. 2, the error right as in Fig. 3, °/s."""
-    left, right = figure.subplots(1, 2)
+def draw_errors(figure: "Figure", time_s: Array, flange_rate: Array, error: Array) -> None:
+    """Draw the rate of the flange left as in Fig. 2, the error right as in Fig. 3, °/s."""
+    rates, residuals = figure.subplots(1, 2)
     for i, axis in enumerate("xyz"):
-        left.plot(*_curve(time_s, np.degrees(turned[:, i])), lw=0.7, color=f"C{i}", label=axis)
+        rates.plot(*_curve(time_s, np.degrees(flange_rate[:, i])), lw=0.7, color=f"C{i}", label=axis)
         std = np.degrees(error[:, i].std())
-        right.plot(
+        residuals.plot(
             *_curve(time_s, np.degrees(error[:, i])), lw=0.5, alpha=0.8, color=f"C{i}", label=f"{axis}, σ {std:.4f}"
         )
-    left.set(xlabel="time s", ylabel="°/s", title="rate of the flange in its own frame")
-    right.set(xlabel="time s", ylabel="°/s", title="corrected reading − rate of flange and Earth")
-    for panel in (left, right):
+    rates.set(xlabel="time s", ylabel="°/s", title="rate of the flange in its own frame")
+    residuals.set(xlabel="time s", ylabel="°/s", title="corrected reading − rate of flange and Earth")
+    for panel in (rates, residuals):
         panel.legend(frameon=False, ncols=3, fontsize=8)
 
 
 def _curve(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """A curve's points, without a line across what the arm's states do not cover."""
+    """Return a curve's points, without a line across gaps of the arm's states."""
     times, values = envelope(time_s, values)
     gaps = np.flatnonzero(np.diff(times) > GAP_S) + 1
     return np.insert(times, gaps, np.nan), np.insert(values, gaps, np.nan)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def write_temperature_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """`over_temperature_<sensor>` of every sensor calibrated so, as PNG and SVG; none without matplotlib."""
+    """Write `over_temperature_<sensor>` for each sensor calibrated so, as PNG and SVG; none without matplotlib."""
     return write_pictures(
         [
             Picture(
@@ -36,19 +36,19 @@ def write_temperature_figures(outcome: Outcome, document: ResultDocument, folder
 
 def _draw(figure: "Figure", entries: Mapping[str, OverTemperatureEntry]) -> None:
     panels = figure.subplots(len(entries), 2, squeeze=False)
-    for (left, right), (name, entry) in zip(panels, entries.items(), strict=True):
-        unit = quantities()[name].drift
-        warm = np.array([row.temperature_c for row in entry.table])
+    for (scale_axes, bias_axes), (quantity, entry) in zip(panels, entries.items(), strict=True):
+        unit = quantities()[quantity].drift
+        temperatures_c = np.array([row.temperature_c for row in entry.table])
         scales = np.array([row.scale for row in entry.table]) / np.array(entry.scale[0]) - 1
         biases = np.array([row.bias for row in entry.table]) - np.array(entry.bias[0])
-        widths = [np.array([getattr(row, of) for row in entry.table]) for of in ("expanded_scale", "expanded_bias")]
+        widths = [np.array([getattr(row, name) for row in entry.table]) for name in ("expanded_scale", "expanded_bias")]
         for axes, values, width, size, label in (
-            (left, scales, widths[0], 1e-6, "scale factor   ppm"),
-            (right, biases, widths[1], unit.size, f"bias   {unit.name}"),
+            (scale_axes, scales, widths[0], 1e-6, "scale factor   ppm"),
+            (bias_axes, biases, widths[1], unit.size, f"bias   {unit.name}"),
         ):
             for i, axis in enumerate("xyz"):
-                axes.plot(warm, values[:, i] / size, color=f"C{i}", lw=1.0, label=axis)
+                axes.plot(temperatures_c, values[:, i] / size, color=f"C{i}", lw=1.0, label=axis)
                 low, high = ((values[:, i] + sign * width[:, i]) / size for sign in (-1, 1))
-                axes.fill_between(warm, low, high, color=f"C{i}", alpha=0.25, lw=0)
-            axes.set(xlabel="°C", ylabel=label, title=f"{quantities()[name].sensor}; band: ± U")
-        left.legend(frameon=False, ncols=3, fontsize=8)
+                axes.fill_between(temperatures_c, low, high, color=f"C{i}", alpha=0.25, lw=0)
+            axes.set(xlabel="°C", ylabel=label, title=f"{quantities()[quantity].sensor}; band: ± U")
+        scale_axes.legend(frameon=False, ncols=3, fontsize=8)

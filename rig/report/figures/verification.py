@@ -1,4 +1,4 @@
-"""A verification's plots, in the manner of SIX, Figs. 7–10: sensor and reference over time, before and after."""
+"""Plots of a verification, as in SIX, Figs. 7–10: sensor and reference over time, before and after."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMNS = 600  # about as many as a panel has pixels across
-# Of the figure's width and height. Letting the layout find them takes as long as drawing does.
+# Fractions of the figure's width and height. An automatic layout takes as long as the drawing itself.
 MARGINS = {"left": 0.06, "right": 0.985, "bottom": 0.065, "top": 0.915, "wspace": 0.16, "hspace": 0.14}
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A figure for a run folder: its file's name, its heading, its width and height in inches, and what draws it."""
+    """A figure for a run folder: its file's name, its heading, its width and height in inches, its drawing function."""
 
     name: str
     title: str
@@ -37,7 +37,7 @@ class Picture:
 
 
 def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw each as PNG and SVG into `folder`, and say so; without matplotlib, which an extra brings, draw nothing."""
+    """Draw each picture as PNG and SVG into `folder`; return the event. Without matplotlib (an extra), draw nothing."""
     if not pictures:
         return ()
     try:
@@ -56,22 +56,27 @@ def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent,
 
 
 def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Draw `verification_<sensor>_before` (where there is one) and `…_after` of every verification of a run."""
+    """Draw `verification_<sensor>_before` (if there is one) and `…_after` of each verification of a run."""
     return draw_verifications(outcome.verifications.values(), folder)
 
 
 def draw_verifications(verifications: Iterable[Verification], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw those of these verifications, each as PNG and SVG, into `folder`."""
+    """Draw these verifications, each as PNG and SVG, into `folder`."""
     pictures = [
         Picture(
-            f"verification_{each.sensor}_{when}",
-            f"{each.sensor} {when} calibration, beside {each.reference.name}; RMS of sweeps and rests",
+            f"verification_{verification.sensor}_{when}",
+            f"{verification.sensor} {when} calibration, with {verification.reference.name}; RMS of sweeps and rests",
             (10.0, 7.5),
-            partial(draw_comparison, comparison=comparison, sensor=each.sensor, reference=each.reference.name),
+            partial(
+                draw_comparison,
+                comparison=comparison,
+                sensor=verification.sensor,
+                reference=verification.reference.name,
+            ),
             None,
         )
-        for each in verifications
-        for when, comparison in (("before", each.before), ("after", each.after))
+        for verification in verifications
+        for when, comparison in (("before", verification.before), ("after", verification.after))
         if comparison is not None
     ]
     return write_pictures(pictures, folder)
@@ -85,15 +90,15 @@ def save(figure: "Figure", folder: Path, name: str) -> None:
 
 
 def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
-    """Draw in rows x, y, z readings on the left, their difference on the right, enlarged."""
+    """Draw in rows x, y, z the readings on the left and their difference, enlarged, on the right."""
     rows = figure.subplots(3, 2, sharex=True, sharey="col", width_ratios=(3, 2), gridspec_kw=MARGINS)
-    since_s = comparison.time_s - comparison.time_s[0]
+    elapsed_s = comparison.time_s - comparison.time_s[0]
     error = comparison.reading_rad_s - comparison.reference_rad_s
     for i, (readings, difference) in enumerate(rows):
-        readings.plot(*envelope(since_s, comparison.reading_rad_s[:, i]), lw=0.7, color="C0", label=sensor)
-        readings.plot(*envelope(since_s, comparison.reference_rad_s[:, i]), lw=0.7, color="C1", label=reference)
+        readings.plot(*envelope(elapsed_s, comparison.reading_rad_s[:, i]), lw=0.7, color="C0", label=sensor)
+        readings.plot(*envelope(elapsed_s, comparison.reference_rad_s[:, i]), lw=0.7, color="C1", label=reference)
         readings.set_ylabel(f"{'xyz'[i]}   rad/s")
-        difference.plot(*envelope(since_s, error[:, i]), lw=0.5, color="C3")
+        difference.plot(*envelope(elapsed_s, error[:, i]), lw=0.5, color="C3")
         difference.set_title(f"RMS {comparison.movement.rms_rad_s[i]:.4f} rad/s", loc="right", fontsize=9)
     reach = 1.05 * float(np.abs(error).max())
     rows[0, 1].set_ylim(-reach, reach)
@@ -105,7 +110,7 @@ def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, refer
 
 
 def envelope(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """The curve (n,) by its lowest and highest value in each column of the panel: it looks the same, and is light."""
+    """Return the lowest and highest value of a curve (n,) in each column of the panel: a lighter curve, same look."""
     if len(values) <= 2 * COLUMNS:
         return time_s, values
     starts = np.linspace(0, len(values), COLUMNS, endpoint=False).astype(np.intp)

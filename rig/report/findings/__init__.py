@@ -1,1 +1,1 @@
-"""What any kind of result can say to every outlet, and the characteristics that it states."""
+"""Interfaces of kinds of results to every outlet, and the characteristics that entries state."""

@@ -1,4 +1,4 @@
-"""A characteristic of a sensor: what a result states of it beside scale factors and biases, for every outlet. Pure."""
+"""A characteristic of a sensor: a quantity other than scale factor and bias, for every outlet. Pure."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,8 +16,8 @@ OUTLETS: Final[tuple[Outlet, ...]] = get_args(Outlet)
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """Numbers of an entry in SI units, their standard uncertainties, and the degrees of freedom of these if counted."""
+class UncertainNumbers:
+    """Numbers of an entry in SI units, their standard uncertainties, and the degrees of freedom of these, if stated."""
 
     values: Sequence[float]
     stds: Sequence[float]
@@ -26,7 +26,7 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """The unit of such numbers: that of SI in print and as D-SI writes it, and the one that they are `shown` in."""
+    """The unit of such numbers: of the SI in print and in D-SI notation, and the one in which they are `shown`."""
 
     si: str
     d_si: str
@@ -35,9 +35,9 @@ class Units:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """How a history names numbers, by `prefix` and label, and what it calls each in `words`, by the label's letters.
+    """Names of such numbers in a history: `prefix` and label, with `words` that are formatted by the label's letters.
 
-    `drawn` among the pictures; `opposite` where it keeps the values with the other sign than the certificates.
+    `drawn` series are among the pictures; `opposite` ones are stored with the opposite sign of the certificates.
     """
 
     prefix: str
@@ -48,31 +48,32 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Characteristic:
-    """One quantity of a sensor beside scale and bias, as an entry states it by `labels`.
+    """A quantity of a sensor other than scale factor and bias, which an entry states for each of `labels`.
 
-    - `units` are those for what the sensor measures; `known` finds the numbers in the entry, None where there are none.
-    - `series` is how a history follows it; None where it does not, which `elsewhere` explains.
+    - `units`: the units, by the quantity that the sensor measures.
+    - `read`: reads the numbers from an entry; None if it has none.
+    - `series`: the names in a history; None if it stores none, which `elsewhere` explains.
     - `elsewhere`: the outlets that do not take it from here, each with the reason in a line.
-    - `remark` is what the digital certificate says of it before ± U, by its entry.
+    - `remark`: the digital certificate's remark before ± U, by the entry.
     """
 
     name: str
     labels: Sequence[str]
     units: Callable[[Quantity], Units]
-    known: Callable[[Any], Known | None]
+    read: Callable[[Any], UncertainNumbers | None]
     series: Series | None
     elsewhere: Mapping[Outlet, str] = field(default_factory=dict)
     remark: Callable[[Any], str] = lambda _: ""
 
     def of(self, finding: Finding[Any]) -> "Term":
-        """What an entry states of it. Raises ValueError where it states nothing."""
-        if (known := self.known(finding.entry)) is None:
+        """Return the term of an entry. Raise ValueError if the entry does not state it."""
+        if (numbers := self.read(finding.entry)) is None:
             raise ValueError(f"{finding.sensor} has no {self.name}")
-        return Term(finding, self, known)
+        return Term(finding, self, numbers)
 
     @property
     def opposite(self) -> bool:
-        """Whether a history keeps the values with the other sign."""
+        """Whether a history stores the values with the opposite sign."""
         return self.series is not None and self.series.opposite
 
     @property
@@ -89,69 +90,70 @@ class Term:
 
     finding: Finding[Any]
     characteristic: Characteristic
-    known: Known
+    numbers: UncertainNumbers
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The characteristic's name."""
         return self.characteristic.name
 
     @property
     def whose(self) -> str:
-        """How the sensor is called beside the others of its name."""
+        """The sensor's name among others of the same name."""
         return self.finding.quantity.label(self.finding.sensor)
 
     @property
     def units(self) -> Units:
-        """The unit of its numbers."""
+        """The unit of the numbers."""
         return self.characteristic.units(self.finding.quantity)
 
     @property
     def expanded(self) -> Expanded:
         """U of the numbers in SI units, with its coverage factors."""
-        return expanded(self.known.stds, self.known.freedom)
+        return expanded(self.numbers.stds, self.numbers.freedom)
 
     @property
     def printed(self) -> Iterator[tuple[str, float, float]]:
-        """Label, value and U of each number in the unit that they are shown in."""
+        """Label, value and U of each number, in the unit in which they are shown."""
         size, labels = self.units.shown.size, self.characteristic.labels
-        for label, value, width in zip(labels, self.known.values, self.expanded.widths, strict=True):
+        for label, value, width in zip(labels, self.numbers.values, self.expanded.widths, strict=True):
             yield label, value / size, width / size
 
 
 def terms(
     characteristics: Iterable[Characteristic], finding: Finding[Any], outlet: Outlet | None = None
 ) -> Iterator[Term]:
-    """The characteristics that an entry states; of those the ones that an outlet takes where one is named."""
-    for each in characteristics:
-        if outlet not in each.elsewhere and each.known(finding.entry) is not None:
-            yield each.of(finding)
+    """Yield the characteristics that an entry states, or those of them that `outlet` takes."""
+    for characteristic in characteristics:
+        if outlet not in characteristic.elsewhere and characteristic.read(finding.entry) is not None:
+            yield characteristic.of(finding)
 
 
-def named(what: str, suffix: str, sign: int = 1) -> Callable[[Any], Known | None]:
-    """Numbers of an entry, or of its vector model: `what_suffix`, `what_std_suffix`, `what_degrees_of_freedom`.
+def read_fields(what: str, suffix: str, sign: int = 1) -> Callable[[Any], UncertainNumbers | None]:
+    """Return a reader of an entry's fields `what_suffix`, `what_std_suffix` and `what_degrees_of_freedom`.
 
-    A matrix is read row by row. Values change by the `sign` where the entry has those of the opposite.
+    The reader also looks into the entry's vector model. It flattens a matrix row by row and multiplies values by
+    `sign`.
     """
 
-    def known(entry: Any) -> Known | None:
-        for held in (entry, getattr(entry, "vector_model", None)):
-            values, stds = (getattr(held, f"{name}_{suffix}", None) for name in (what, f"{what}_std"))
+    def read(entry: Any) -> UncertainNumbers | None:
+        for part in (entry, getattr(entry, "vector_model", None)):
+            values, stds = (getattr(part, f"{name}_{suffix}", None) for name in (what, f"{what}_std"))
             if values is not None and stds is not None:
-                freedom = getattr(held, f"{what}_degrees_of_freedom", None)
-                counted = None if freedom is None else _flat(freedom)
-                return Known([sign * each for each in _flat(values)], _flat(stds), counted)
+                freedom = getattr(part, f"{what}_degrees_of_freedom", None)
+                dof = None if freedom is None else _flat(freedom)
+                return UncertainNumbers([sign * value for value in _flat(values)], _flat(stds), dof)
         return None
 
-    return known
+    return read
 
 
 def _flat(numbers: Any) -> list[Any]:
-    """One number, those of a vector, or those of a matrix row by row."""
+    """Return one number, those of a vector, or those of a matrix row by row."""
     return list(np.ravel(numbers).tolist())
 
 
 def always(si: str, d_si: str, shown: Unit | None = None) -> Callable[[Quantity], Units]:
-    """A unit that is the same whatever the sensor measures, shown as it is unless another is given."""
+    """Return a unit that does not depend on the sensor's quantity; it is `shown` as it is unless another is given."""
     units = Units(si, d_si, shown or Unit(si, 1.0))
     return lambda _: units

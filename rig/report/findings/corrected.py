@@ -1,11 +1,12 @@
-"""How readings of a sensor are put right, as other programs want to be told: matrix, offset, noise. Pure.
+"""Corrections of a sensor's readings in the form of other programs: matrix, offset, noise. Pure.
 
-In SI units and the right-angled frame nearest to a gyroscope's axes, whose rotation is the vector model's `mounting`:
+All are in SI units and in the right-angled frame nearest to a gyroscope's axes, whose rotation is the vector model's
+`mounting`:
 
     gyroscope        m = F ω + G a + c,    c = −b, a the specific force, which at rest points upwards
     any other triad  m = F s + c
 
-Without a solution of the vector model a gyroscope's F is K⁻¹, and no g-sensitivity is known.
+Without a solution of the vector model a gyroscope's F is K⁻¹, and its g-sensitivity is unknown.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ from rig.estimation.arrays import Array
 
 
 class Averaged(Protocol):
-    """What one stretch of readings was averaged to."""
+    """The average of one interval of readings."""
 
     @property
     def samples(self) -> int: ...
@@ -29,7 +30,7 @@ class Averaged(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """How often samples came; `density` of white noise, unit/√Hz. None where the result does not tell it."""
+    """Sample rate and `density` of white noise, unit/√Hz. None if the result does not contain it."""
 
     rate_hz: float | None
     density: float | None
@@ -37,11 +38,12 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Corrected:
-    """One calibrated sensor: reading (3,) = `matrix` (3, 3) · true + `offset` (3,).
+    """The correction of one calibrated sensor: reading (3,) = `matrix` (3, 3) · true + `offset` (3,).
 
-    `scale` (3,) is what a reading along each axis is multiplied by where a program has no matrix. `full_scale` is None
-    where nobody stated it. A gyroscope may have a `g_sensitivity` (3, 3), rad/s per m/s²; `second_order` tells that an
-    accelerometer has terms that none of the programs knows.
+    - `full_scale` is None if it was not stated.
+    - `scale` (3,) is the factor along each axis, for programs that take no matrix.
+    - `g_sensitivity` (3, 3), rad/s per m/s², is that of a gyroscope.
+    - `second_order` is true if an accelerometer has quadratic terms, which no other program supports.
     """
 
     sensor: str
@@ -59,29 +61,29 @@ class Corrected:
 
     @property
     def name(self) -> str:
-        """How the sensor is called beside the others of its name."""
+        """The sensor's name among others of the same name."""
         return self.quantity.label(self.sensor)
 
     @property
     def gains(self) -> Array:
-        """(3, 3) diagonal matrix of what one unit reads as."""
+        """Diagonal matrix (3, 3) of the reading for one unit."""
         return np.diag(np.linalg.norm(self.matrix, axis=1))
 
     @property
     def axes(self) -> Array:
-        """(3, 3) unit vectors of the axes, in rows: matrix = gains · axes."""
+        """Unit vectors of the axes (3, 3), in rows: matrix = gains · axes."""
         axes: Array = self.matrix / np.linalg.norm(self.matrix, axis=1)[:, None]
         return axes
 
 
 def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float], int]]) -> Noise:
-    """Noise by what was averaged, and by σ of one sample and the count of samples of each rest.
+    """Return the noise by averages, and by σ of one sample and the number of samples of each rest.
 
-    The density is that of the noisiest axis: σ over √rate, as if it were white up to half the rate. Nothing is known of
-    attitudes that a file told.
+    The density is that of the noisiest axis, σ over √rate, as if it were white up to half the rate. It is None for
+    readings in attitudes of a file.
     """
-    lasted_s = sum(each.duration_s for each in means)
-    rate_hz = sum(each.samples for each in means) / lasted_s if lasted_s > 0 else None
+    duration_s = sum(mean.duration_s for mean in means)
+    rate_hz = sum(mean.samples for mean in means) / duration_s if duration_s > 0 else None
     if not at_rest or rate_hz is None:
         return Noise(rate_hz, None)
     counts = [count for _, count in at_rest]

@@ -1,4 +1,4 @@
-"""An entry of a result beside what it is of."""
+"""An entry of a result together with its sensor and quantity."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -11,13 +11,13 @@ EntryT = TypeVar("EntryT", bound=Entry)
 
 @dataclass(frozen=True, slots=True)
 class Finding(Generic[EntryT]):
-    """One entry of a result, the sensor it is of, and the quantity that sensor measures."""
+    """One entry of a result, its sensor, and the quantity that the sensor measures."""
 
     sensor: str
     quantity: Quantity
     entry: EntryT
 
     @property
-    def known(self) -> bool:
-        """Whether the sensor is a reference, which nothing was found of: its calibration was known before."""
+    def is_reference(self) -> bool:
+        """Whether the sensor is a reference: its calibration was given, not measured here."""
         return getattr(self.entry, "role", "calibrate") == "reference"

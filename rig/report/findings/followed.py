@@ -1,7 +1,7 @@
-"""What a history keeps of a result: parameters with their uncertainties, by sensor. Pure.
+"""The parameters of a result that a history stores, with their uncertainties, by sensor. Pure.
 
-Names: kx ky kz scale factors, k their mean, bx by bz biases; characteristics (`characteristics.py`) name the others.
-The mean is one of its own because a gyroscope's only standard of size, the clock, moves all alike.
+Names: kx ky kz scale factors, k their mean, bx by bz biases; `characteristics.py` names the others. The mean has a row
+of its own because an error of the clock, a gyroscope's only standard, changes all scale factors alike.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -24,10 +24,10 @@ SCALES, BIASES = ("k", "kx", "ky", "kz"), ("bx", "by", "bz")
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number of a calibration. `std_combined` is None where no more than noise is known of its uncertainty.
+    """One number of a calibration.
 
-    `max_deviation` from the nominal value is what the run's limits allowed, None without one. `coverage_factor` is that
-    of U by its degrees of freedom.
+    `std_combined` is None if only the noise is known of its uncertainty. `max_deviation` from the nominal value is the
+    run's limit, None without one. `coverage_factor` is that of U by its degrees of freedom.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Parameter:
 
     @property
     def std(self) -> float:
-        """The larger account of its standard uncertainty that there is."""
+        """The standard uncertainty: the combined one if it is known, else that of the noise."""
         return self.std_statistical if self.std_combined is None else self.std_combined
 
     @property
@@ -50,21 +50,21 @@ class Parameter:
 
     @property
     def freedom(self) -> float:
-        """The degrees of freedom of its standard uncertainty, by its coverage factor."""
+        """The degrees of freedom of the standard uncertainty, by its coverage factor."""
         return freedom_of(self.coverage_factor)
 
     @property
     def nominal(self) -> float:
-        """What an ideal sensor has."""
+        """The value of an ideal sensor."""
         return nominal(self.name)
 
 
 @dataclass(frozen=True, slots=True)
-class Followed:
-    """What one sensor's result in a run is followed by, under the name of a `quantity`.
+class HistoryRecord:
+    """The parameters of one sensor's result in a run, under the name of a `quantity`.
 
-    `full_scale` is in the unit of its biases, 0 where the result does not say it. Characteristics join the `parameters`
-    of the kind's own.
+    `full_scale` is in the unit of its biases, 0 if the result does not state it. Characteristics join the `parameters`
+    of the kind.
     """
 
     sensor: str
@@ -78,7 +78,7 @@ class Followed:
 
 
 class Calibrated(Protocol):
-    """Scale factors and biases in `result.json`, whatever the sensor."""
+    """Scale factors and biases of an entry of `result.json`, of any sensor."""
 
     @property
     def scale(self) -> Sequence[float]: ...
@@ -91,29 +91,31 @@ class Calibrated(Protocol):
 
 
 def nominal(name: str) -> float:
-    """1 for scale factors, else 0."""
+    """Return 1 for scale factors, else 0."""
     return float(is_scale(name))
 
 
 def is_scale(name: str) -> bool:
-    """Whether a parameter of this name is a scale factor, whose changes are fractions."""
+    """Return whether a parameter of this name is a scale factor, whose changes are fractions."""
     return name in SCALES
 
 
 def scale_and_bias(
     sensor: str, quantity: "Quantity", entry: Calibrated, bias: Sequence[float], document: "ResultDocument"
 ) -> Iterator[Parameter]:
-    """Scale and bias of each axis, and the mean scale factor by their covariance, with the largest k of theirs."""
+    """Yield scale factor and bias of each axis, and the mean scale factor by their covariance and largest k."""
     from rig.data.meaning import JUDGED_PARAMETERS, limit_held
 
-    axes, each_alone = len(entry.scale), np.eye(2 * len(entry.scale))
-    mean = each_alone[:axes].mean(axis=0)
+    axes, unit_rows = len(entry.scale), np.eye(2 * len(entry.scale))
+    mean = unit_rows[:axes].mean(axis=0)
     values, combined = np.array([*entry.scale, *bias]), entry.covariance_combined
     factors = np.full(2 * axes, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.coverage_factors)
-    scale_limit, bias_limit = (limit_held(document.checks, sensor, quantity.name, of) for of in JUDGED_PARAMETERS)
+    scale_limit, bias_limit = (
+        limit_held(document.checks, sensor, quantity.name, parameter) for parameter in JUDGED_PARAMETERS
+    )
     rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
-    rows += [(f"k{axis}", each_alone[i], "1", scale_limit) for i, axis in enumerate(quantity.axes)]
-    rows += [(f"b{axis}", each_alone[axes + i], quantity.unit, bias_limit) for i, axis in enumerate(quantity.axes)]
+    rows += [(f"k{axis}", unit_rows[i], "1", scale_limit) for i, axis in enumerate(quantity.axes)]
+    rows += [(f"b{axis}", unit_rows[axes + i], quantity.unit, bias_limit) for i, axis in enumerate(quantity.axes)]
     for name, row, unit, limit in rows:
         yield Parameter(
             name,
@@ -127,18 +129,18 @@ def scale_and_bias(
 
 
 def parameters(characteristics: "Iterable[Term]") -> Iterator[Parameter]:
-    """The parameters of characteristics, by their standard deviations and the degrees of freedom of these."""
-    for each in characteristics:
-        of, known = each.characteristic, each.known
-        sign = -1 if of.opposite else 1
-        rows = zip(of.parameters, known.values, known.stds, each.expanded.factors, strict=True)
+    """Yield the parameters of characteristics, by their standard deviations and degrees of freedom."""
+    for term in characteristics:
+        numbers = term.numbers
+        sign = -1 if term.characteristic.opposite else 1
+        rows = zip(term.characteristic.parameters, numbers.values, numbers.stds, term.expanded.factors, strict=True)
         for name, value, std, factor in rows:
-            yield Parameter(name, sign * value, std, None, each.units.si, coverage_factor=float(factor))
+            yield Parameter(name, sign * value, std, None, term.units.si, coverage_factor=float(factor))
 
 
-def known(parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
-    """The parameters with an uncertainty: of another, nothing can be said over time."""
-    return tuple(each for each in parameters if each.std_statistical > 0)
+def select_uncertain(parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
+    """Return the parameters that have an uncertainty; a history needs it to judge changes."""
+    return tuple(parameter for parameter in parameters if parameter.std_statistical > 0)
 
 
 def _std(row: Array, covariance: Sequence[Sequence[float]]) -> float:

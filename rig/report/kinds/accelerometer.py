@@ -17,8 +17,8 @@ from rig.report.findings.kind import Standard
 from rig.report.kinds.triad import Words, attitude_lines, method_lines, triad_kind
 from rig.report.tables import dcc_results
 from rig.report.tables.axes import line_of, triple
-from rig.report.tables.budget import assumed_lines
-from rig.report.words.told_words import told_from, told_lines
+from rig.report.tables.budget import list_assumptions
+from rig.report.words.detection_limit_words import detection_limit_field, detection_limit_lines
 from rig.report.words.validity_words import warmth, when_words
 
 if TYPE_CHECKING:
@@ -56,9 +56,9 @@ def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> Accele
         alignment=None if result.alignment is None else _alignment(result.alignment),
         non_orthogonality_degrees_of_freedom=counted(of_acceleration_angles(result)),
         second_order_degrees_of_freedom=counted(of_second_order(result)),
-        validation=None if result.held_out is None else _held_out(result.held_out),
+        validation=None if result.held_out is None else _validation(result.held_out),
         conditions=when_entry(of_accelerometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
-        **told_from(outcome.told_from_in_reference.get(name, ())),
+        **detection_limit_field(outcome.told_from_in_reference.get(name, ())),
     )  # fmt: skip
 
 
@@ -69,41 +69,43 @@ def _alignment(alignment: "Alignment") -> AlignmentEntry:
     )  # fmt: skip
 
 
-def _held_out(held: "HeldOut") -> ValidationEntry:
+def _validation(held_out: "HeldOut") -> ValidationEntry:
     return ValidationEntry(
-        dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max())
+        dwells=len(held_out.dwells),
+        rms_m_s2=held_out.rms_m_s2,
+        max_m_s2=float(np.abs(held_out.error_m_s2).max()),
     )
 
 
 def _lines(finding: Finding[AccelerometerEntry]) -> Iterator[str]:
-    """What stands below the table."""
+    """Yield the lines below the table."""
     entry = finding.entry
-    swept = "" if entry.placement is not None else f", {entry.sweeps} sweeps"
-    yield f"relative to gravity, {entry.gravity_m_s2:.6g} m/s²; {len(entry.dwells)} attitudes{swept}"
+    sweeps = "" if entry.placement is not None else f", {entry.sweeps} sweeps"
+    yield f"relative to gravity, {entry.gravity_m_s2:.6g} m/s²; {len(entry.dwells)} attitudes{sweeps}"
     if entry.conditions is not None:
         yield f"scale and bias: {when_words(entry.conditions)}"
     if entry.budget is not None and any(line.name == NONLINEARITY for line in entry.budget.contributors):
         yield "k by the readings at 1 g up and down, b at 0 g"
-    yield from assumed_lines(entry.budget)
-    yield from told_lines(entry.detection_limits)
+    yield from list_assumptions(entry.budget)
+    yield from detection_limit_lines(entry.detection_limits)
     yield from attitude_lines(finding)
     if entry.second_order_s2_m is not None and entry.second_order_std_s2_m is not None:
         yield line_of(SECOND_ORDER.of(finding), "second order", "+.2e", ".1e")
     if entry.lever_arm_m is not None and entry.lever_arm_std_m is not None:
         lever = triple(np.multiply(1e3, entry.lever_arm_m), "+.1f")
-        yield f"sits at {lever} mm from the wrists' axes (± {2e3 * max(entry.lever_arm_std_m):.1f})"
+        yield f"lever arm from the wrists' axes: {lever} mm (± {2e3 * max(entry.lever_arm_std_m):.1f})"
     if entry.delay_s is not None and entry.delay_std_s is not None:
-        yield f"lags its gyroscope by {1e3 * entry.delay_s:+.2f} ms (± {2e3 * entry.delay_std_s:.2f})"
+        yield f"delay behind its gyroscope: {1e3 * entry.delay_s:+.2f} ms (± {2e3 * entry.delay_std_s:.2f})"
     if entry.alignment is not None:
-        turned = triple(np.degrees(entry.alignment.rotation_rad), "+.4f")
+        rotation = triple(np.degrees(entry.alignment.rotation_rad), "+.4f")
         std_deg = 2 * np.degrees(max(entry.alignment.std_rad))
-        yield f"turned against its gyroscope by: {turned} ° (± {std_deg:.4f})"
+        yield f"rotation against its gyroscope: {rotation} ° (± {std_deg:.4f})"
     yield from method_lines(entry, ACCELERATION, ", attitudes alone")
     if entry.validation is not None:
-        held = entry.validation
+        validation = entry.validation
         yield (
-            f"gravity's size in {held.dwells} attitudes held out: RMS {held.rms_m_s2:.5f} m/s², "
-            f"at most {held.max_m_s2:.5f} off"
+            f"magnitude of gravity in {validation.dwells} validation attitudes: RMS {validation.rms_m_s2:.5f} m/s², "
+            f"largest error {validation.max_m_s2:.5f}"
         )
     yield from (f"warning: {warning}" for warning in entry.warnings)
 
@@ -117,9 +119,9 @@ def _temperatures_c(entry: AccelerometerEntry) -> dict[str, float | None]:
 
 
 def _method(swept: bool) -> str:
-    felt = ", and felt in the sweeps" if swept else ""
-    held = f"Accelerometers are held still in known attitudes to gravity{felt}"
-    return f"{held}, and solved for together with the arm's error of attitude."
+    sweeps = " and in the sweeps" if swept else ""
+    measured = f"Accelerometers are measured at rest in known attitudes to gravity{sweeps}"
+    return f"{measured}, and are solved for together with the arm's attitude error."
 
 
 ACCELEROMETER = triad_kind(
@@ -133,7 +135,7 @@ ACCELEROMETER = triad_kind(
         size="Gravity",
         value=lambda entry: f"{entry.gravity_m_s2:.6g} m/s²",
         origin=lambda site: site.gravity_reference,
-        known="gravity",
+        quantity="gravity",
         method=_method,
     ),
     characteristics=ACCELEROMETERS,

@@ -1,4 +1,4 @@
-"""Biases by repeat: attitudes that were gone through again and again (TRIAX, section IV)."""
+"""Biases by repeat: attitudes that were repeated (TRIAX, section IV)."""
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -18,9 +18,9 @@ from rig.report.entries.error import error_entry
 from rig.report.entry import counted
 from rig.report.findings.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import Followed
-from rig.report.findings.kind import Measured, ResultKind, Shown, Without, row_of
-from rig.report.findings.unexplained import of_repeats
+from rig.report.findings.followed import HistoryRecord
+from rig.report.findings.kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
+from rig.report.findings.unexplained import find_repeat_residuals
 from rig.report.tables import dcc_results
 from rig.report.tables.budget import heading_of
 from rig.report.words.expanded import expanded, factor_words
@@ -34,40 +34,40 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
     return {
         name: {
             quantity.name: drift_entry(quantity, drift, outcome.recordings[0].run.sensors[name])
-            for quantity, drift in each.items()
+            for quantity, drift in drifts.items()
         }
-        for name, each in outcome.drifts.items()
+        for name, drifts in outcome.drifts.items()
     }
 
 
 def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: RecordedSensor) -> DriftEntry:
-    """The bias of that sensor by repeat, in SI units."""
+    """Return the bias of a sensor by repeat, in SI units."""
     from rig.analysis.temperature.bias_drift import SLOPE
     from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM
 
-    held, slope = drift.held, drift.over_temperature
-    anew = drift.anew.by_key(_anew, error_entry)
+    scale_fixed, slope = drift.held, drift.over_temperature
+    scale_free = drift.anew.by_key(_bias_entry, error_entry)
     return DriftEntry(
         unit=quantity.unit,
         repeats=tuple(
             RepeatEntry(
                 time_s=float(drift.time_s[repeat]),
-                temperature_c=_known(float(drift.temperature_c[repeat])),
-                scale_fixed=BiasEntry(bias=_vector(held.bias[repeat]), std=_vector(held.std[repeat])),
-                scale_free=anew[repeat],
+                temperature_c=_nan_to_none(float(drift.temperature_c[repeat])),
+                scale_fixed=BiasEntry(bias=_vector(scale_fixed.bias[repeat]), std=_vector(scale_fixed.std[repeat])),
+                scale_free=scale_free[repeat],
             )
-            for repeat in range(len(held.bias))
+            for repeat in range(len(scale_fixed.bias))
         ),
         common_std=_vector(drift.common_std),
-        scatter_ratio=_vector(held.excess),
+        scatter_ratio=_vector(scale_fixed.excess),
         steps=tuple(
             BiasStepEntry(
                 repeat=move.repeat + 1, axis="xyz"[move.axis], change=_vector(move.change), std=_vector(move.std)
             )
-            for move in held.moves
+            for move in scale_fixed.moves
         ),
         false_alarm_probability=FALSE_ALARM,
-        largest_change=_vector(held.largest_change),
+        largest_change=_vector(scale_fixed.largest_change),
         temperature_slope=error_entry(drift.faults[SLOPE])
         if slope is None
         else SlopeEntry(
@@ -86,12 +86,12 @@ def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: RecordedSensor) 
     )
 
 
-def _known(temperature_c: float) -> float | None:
+def _nan_to_none(temperature_c: float) -> float | None:
     return None if np.isnan(temperature_c) else temperature_c
 
 
-def _anew(anew: "Anew") -> BiasEntry:
-    return BiasEntry(bias=_vector(anew.bias), std=_vector(anew.std))
+def _bias_entry(free: "Anew") -> BiasEntry:
+    return BiasEntry(bias=_vector(free.bias), std=_vector(free.std))
 
 
 def _vector(values: Array) -> Vector3:
@@ -99,50 +99,57 @@ def _vector(values: Array) -> Vector3:
     return x, y, z
 
 
-def _found(document: ResultDocument) -> Iterator[Finding[DriftEntry]]:
+def _find(document: ResultDocument) -> Iterator[Finding[DriftEntry]]:
     for name, drifts in document.bias_drift.items():
         yield from (Finding(name, quantities()[quantity], entry) for quantity, entry in drifts.items())
 
 
-def _printed(finding: Finding[DriftEntry]) -> Iterator[Table | str]:
+def _render(finding: Finding[DriftEntry]) -> Iterator[Table | str]:
     yield drift_table(finding.sensor, finding.quantity, finding.entry)
     yield from _lines(finding)
 
 
-def _shown(finding: Finding[DriftEntry]) -> Shown:
-    """The largest change that there was."""
+def _build_row(finding: Finding[DriftEntry]) -> DisplayRow:
+    """Return the largest change of the bias."""
     return row_of(LARGEST_CHANGE.of(finding), finding.quantity.full_label(finding.sensor))
 
 
-def _followed(finding: Finding[DriftEntry], document: ResultDocument) -> Followed:
-    """What is followed of a drift."""
+def _build_record(finding: Finding[DriftEntry], document: ResultDocument) -> HistoryRecord:
+    """Return the record of a drift for a history."""
     entry = finding.entry
-    warm = [repeat.temperature_c for repeat in entry.repeats if repeat.temperature_c is not None]
-    return Followed(
+    temperatures = [repeat.temperature_c for repeat in entry.repeats if repeat.temperature_c is not None]
+    return HistoryRecord(
         finding.sensor,
         f"{finding.quantity} bias drift",
         entry.part,
         entry.serial_number,
         entry.full_scale,
         "bias_by_repeat",
-        float(np.mean(warm)) if warm else None,
+        float(np.mean(temperatures)) if temperatures else None,
     )
 
 
-def _measured(finding: Finding[DriftEntry], _: object) -> Measured:
-    entry, of = finding.entry, finding.quantity
-    name, results = f"bias by repeat of {finding.sensor}, {of}", dcc_results.bias_drift(entry, of)
-    return Measured(of.sensor, finding.sensor, entry.part, entry.serial_number, name, results)
+def _describe_item(finding: Finding[DriftEntry], _: object) -> CertifiedItem:
+    entry, quantity = finding.entry, finding.quantity
+    name, results = f"bias by repeat of {finding.sensor}, {quantity}", dcc_results.bias_drift(entry, quantity)
+    return CertifiedItem(quantity.sensor, finding.sensor, entry.part, entry.serial_number, name, results)
 
 
-def drift_table(name: str, of: Quantity, entry: DriftEntry) -> Table:
-    """The bias of each repeat, scale and axes held, and its largest ± U; a mark where it moved."""
-    unit, size = of.drift.name, of.drift.size
-    known = expanded((1.0, 1.0, 1.0), entry.degrees_of_freedom)
-    table = Table(title=plain(f"{name}, {of.sensor}: bias by repeat, scale and axes held", "table.title"))
+def drift_table(name: str, quantity: Quantity, entry: DriftEntry) -> Table:
+    """Return the bias of each repeat, with scale and axes fixed, and its largest ± U; marks show its changes."""
+    unit, size = quantity.drift.name, quantity.drift.size
+    expansion = expanded((1.0, 1.0, 1.0), entry.degrees_of_freedom)
+    table = Table(title=plain(f"{name}, {quantity.sensor}: bias by repeat, scale and axes fixed", "table.title"))
     table.title_justify = "left"
-    moved = {move.repeat: move.axis for move in entry.steps}
-    for heading in ("repeat", "hours", "°C", *(f"{axis} {unit}" for axis in "xyz"), heading_of(known.factors), "moved"):
+    changed_axes = {move.repeat: move.axis for move in entry.steps}
+    for heading in (
+        "repeat",
+        "hours",
+        "°C",
+        *(f"{axis} {unit}" for axis in "xyz"),
+        heading_of(expansion.factors),
+        "changed",
+    ):
         table.add_column(heading, justify="right")
     for number, repeat in enumerate(entry.repeats, 1):
         table.add_row(
@@ -150,37 +157,38 @@ def drift_table(name: str, of: Quantity, entry: DriftEntry) -> Table:
             f"{repeat.time_s / 3600:.2f}",
             "" if repeat.temperature_c is None else f"{repeat.temperature_c:.1f}",
             *(f"{bias / size:+.4g}" for bias in repeat.scale_fixed.bias),
-            f"{max(np.multiply(known.factors, repeat.scale_fixed.std)) / size:.2g}",
-            moved.get(number, ""),
+            f"{max(np.multiply(expansion.factors, repeat.scale_fixed.std)) / size:.2g}",
+            changed_axes.get(number, ""),
         )
     return table
 
 
 def _lines(finding: Finding[DriftEntry]) -> Iterator[str]:
-    """What stands below the table."""
+    """Yield the lines below the table."""
     entry, quantity, shown = finding.entry, finding.quantity, finding.quantity.drift
     unit, size = shown.name, shown.size
     if entry.steps:
         for move in entry.steps:
-            change = " ".join(f"{each / size:+.3g}" for each in move.change)
-            yield f"moved before repeat {move.repeat}, most along {move.axis}: {change} {unit}"
+            change = " ".join(f"{component / size:+.3g}" for component in move.change)
+            yield f"changed before repeat {move.repeat}, most along {move.axis}: {change} {unit}"
     else:
-        yield "the bias did not move beyond its noise"
-    yield f"a steady one is said to have moved in {100 * entry.false_alarm_probability:g} % of runs"
+        yield "the bias did not change beyond its noise"
+    yield f"for a constant bias a change is reported in {100 * entry.false_alarm_probability:g} % of runs"
     if max(entry.scatter_ratio) > 1.5:
-        yield f"repeats scatter {max(entry.scatter_ratio):.1f} times as much as noise would have it; U allows for that"
-    anew = [repeat.scale_free for repeat in entry.repeats]
-    refused = [each for each in anew if isinstance(each, ErrorEntry)]
+        yield f"repeats scatter {max(entry.scatter_ratio):.1f} times as much as the noise explains; U includes this"
+    free_solutions = [repeat.scale_free for repeat in entry.repeats]
+    refused = [solution for solution in free_solutions if isinstance(solution, ErrorEntry)]
     if refused:
-        yield f"everything found anew: not in {len(refused)} of {len(anew)} repeats; {refused[0].error}"
+        number = f"{len(refused)} of {len(free_solutions)}"
+        yield f"all parameters solved in each repeat: not in {number} repeats; {refused[0].error}"
     else:
-        apart = [
-            np.subtract(each.bias, repeat.scale_fixed.bias)
-            for each, repeat in zip(anew, entry.repeats, strict=True)
-            if not isinstance(each, ErrorEntry)
+        differences = [
+            np.subtract(solution.bias, repeat.scale_fixed.bias)
+            for solution, repeat in zip(free_solutions, entry.repeats, strict=True)
+            if not isinstance(solution, ErrorEntry)
         ]
-        rms = float(np.sqrt(np.mean(np.square(apart)))) / size
-        yield f"everything found anew in each repeat: {rms:.3g} {unit} RMS from these"
+        rms = float(np.sqrt(np.mean(np.square(differences)))) / size
+        yield f"all parameters solved in each repeat: biases {rms:.3g} {unit} RMS from these"
     slope = entry.temperature_slope
     if isinstance(slope, ErrorEntry):
         yield f"over temperature: {slope.error}"
@@ -190,23 +198,23 @@ def _lines(finding: Finding[DriftEntry]) -> Iterator[str]:
         words = factor_words(slope.degrees_of_freedom)
         yield f"over temperature: {terms} {unit} per °C ({words}), from {low:.1f} to {high:.1f} °C only"
     if quantity == RATE and not entry.earth_rate_known:
-        yield "the Earth's rate is in these biases; site.latitude_deg and site.heading_deg take it out"
+        yield "these biases include the Earth's rate; give site.latitude_deg and site.heading_deg to correct for it"
 
 
 BIAS_DRIFT = ResultKind(
     name="bias drift",
     key="bias_drift",
     entries=_entries,
-    found=_found,
-    printed=_printed,
-    shown=_shown,
-    followed=_followed,
-    header=Without("firmware corrects by one bias; `rig export` makes that of a temperature"),
+    find=_find,
+    printed=_render,
+    shown=_build_row,
+    followed=_build_record,
+    header=NoOutlet("firmware corrects by one bias; `rig export` computes it for a temperature"),
     figures="rig.report.figures.drift:write_drift_figures",
     block="at_rest.html.j2:drift",
-    measured=_measured,
-    standard=Without("it hangs on that of the sensor whose bias it is"),
-    corrected=Without("it corrects nothing; `rig export --at-temperature` takes its slopes"),
-    unexplained=of_repeats,
+    measured=_describe_item,
+    standard=NoOutlet("it has the standard of its sensor"),
+    corrected=NoOutlet("it corrects nothing; `rig export --at-temperature` takes its slopes"),
+    unexplained=find_repeat_residuals,
     characteristics=DRIFTS,
 )

@@ -1,4 +1,4 @@
-"""The Earth's rate, where a gyroscope was to find it (TRIAX, section III-A)."""
+"""The Earth's rate, if a gyroscope was to measure it (TRIAX, section III-A)."""
 
 from collections.abc import Iterator
 
@@ -7,34 +7,34 @@ from rig.data.quantity import RATE
 from rig.data.result_file import GyroscopeEntry, ResultDocument
 from rig.report.findings.characteristics import EARTH_RATE, EARTHS_RATES
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import Followed
-from rig.report.findings.kind import Measured, ResultKind, Shown, Without, row_of
+from rig.report.findings.followed import HistoryRecord
+from rig.report.findings.kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
 from rig.report.kinds.gyroscope import temperatures_c
 from rig.report.tables import dcc_results
 
 
-def _found(document: ResultDocument) -> Iterator[Finding[GyroscopeEntry]]:
-    """Every sensor that has found it."""
+def _find(document: ResultDocument) -> Iterator[Finding[GyroscopeEntry]]:
+    """Yield the sensors that measured it."""
     for name, sensor in document.gyroscopes.items():
         if isinstance(sensor.earth_rate, EarthRateEntry):
             yield Finding(name, RATE, sensor)
 
 
-def _of(finding: Finding[GyroscopeEntry]) -> EarthRateEntry:
+def _rate_of(finding: Finding[GyroscopeEntry]) -> EarthRateEntry:
     rate = finding.entry.earth_rate
     if not isinstance(rate, EarthRateEntry):
         raise TypeError(f"{finding.sensor} has not found the Earth's rate")
     return rate
 
 
-def _shown(finding: Finding[GyroscopeEntry]) -> Shown:
-    """The Earth's rate in the axes of the arm's base."""
+def _build_row(finding: Finding[GyroscopeEntry]) -> DisplayRow:
+    """Return the Earth's rate in the axes of the arm's base."""
     return row_of(EARTH_RATE.of(finding))
 
 
-def _followed(finding: Finding[GyroscopeEntry], _: object) -> Followed:
+def _build_record(finding: Finding[GyroscopeEntry], _: object) -> HistoryRecord:
     sensor = finding.entry
-    return Followed(
+    return HistoryRecord(
         finding.sensor,
         "Earth's rate",
         sensor.part,
@@ -45,31 +45,31 @@ def _followed(finding: Finding[GyroscopeEntry], _: object) -> Followed:
     )
 
 
-def _measured(finding: Finding[GyroscopeEntry], _: object) -> Measured | None:
-    """The item is its gyroscope, as warm as that was; a reference is none."""
+def _describe_item(finding: Finding[GyroscopeEntry], _: object) -> CertifiedItem | None:
+    """Return the gyroscope as item, with its temperatures; None for a reference."""
     sensor = finding.entry
-    if finding.known:
+    if finding.is_reference:
         return None
-    name, results = f"the Earth's rate found by gyroscope {finding.sensor}", dcc_results.earth_rate(_of(finding))
-    warm = temperatures_c(sensor)
-    return Measured("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, warm)
+    name, results = f"the Earth's rate found by gyroscope {finding.sensor}", dcc_results.earth_rate(_rate_of(finding))
+    temperatures = temperatures_c(sensor)
+    return CertifiedItem("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, temperatures)
 
 
-AMONG = Without("it stands among the lines of its gyroscope")
+AMONG = NoOutlet("it is among the lines of its gyroscope")
 EARTHS_RATE = ResultKind(
     name="Earth's rate",
     key="gyroscopes",
-    entries=Without("it is part of its gyroscope's entry"),
-    found=_found,
+    entries=NoOutlet("it is part of its gyroscope's entry"),
+    find=_find,
     printed=AMONG,
-    shown=_shown,
-    followed=_followed,
-    header=Without("it is the place's, not the sensor's"),
+    shown=_build_row,
+    followed=_build_record,
+    header=NoOutlet("it is a property of the site, not of the sensor"),
     figures="rig.report.figures.earth_rate:write_earth_rate_figures",
-    block=Without("it stands in the block of its gyroscope"),
-    measured=_measured,
-    standard=Without("it hangs on that of its gyroscope"),
-    corrected=Without("it is the place's, not the sensor's"),
-    unexplained=Without("it is told by what its gyroscope's picture shows"),
+    block=NoOutlet("it is in the block of its gyroscope"),
+    measured=_describe_item,
+    standard=NoOutlet("it has the standard of its gyroscope"),
+    corrected=NoOutlet("it is a property of the site, not of the sensor"),
+    unexplained=NoOutlet("its gyroscope's picture shows its residuals"),
     characteristics=EARTHS_RATES,
 )

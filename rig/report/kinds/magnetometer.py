@@ -18,8 +18,8 @@ from rig.report.findings.kind import Standard
 from rig.report.kinds.triad import Words, attitude_lines, method_lines, triad_kind
 from rig.report.tables import dcc_results
 from rig.report.tables.axes import triple
-from rig.report.tables.budget import assumed_lines
-from rig.report.words.told_words import told_from, told_lines
+from rig.report.tables.budget import list_assumptions
+from rig.report.words.detection_limit_words import detection_limit_field, detection_limit_lines
 from rig.report.words.validity_words import when_words
 
 if TYPE_CHECKING:
@@ -57,24 +57,24 @@ def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> Magneto
         field_base_t=result.solution.reference,
         non_orthogonality_degrees_of_freedom=counted(of_field_angles(result)),
         conditions=when_entry(of_magnetometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
-        **told_from(outcome.told_from_in_reference.get(name, ())),
+        **detection_limit_field(outcome.told_from_in_reference.get(name, ())),
     )  # fmt: skip
 
 
 def _lines(finding: Finding[MagnetometerEntry]) -> Iterator[str]:
-    """What stands below the table."""
+    """Yield the lines below the table."""
     entry = finding.entry
     field_ut = entry.field_t / FIELD.bias.size
-    yield f"relative to a field of {field_ut:g} µT; {len(entry.dwells)} attitudes; no limit judges it"
+    yield f"relative to a field of {field_ut:g} µT; {len(entry.dwells)} attitudes; it has no limits"
     if entry.conditions is not None:
         yield f"scale and bias: {when_words(entry.conditions)}"
-    yield from assumed_lines(entry.budget)
-    yield from told_lines(entry.detection_limits)
-    yield "iron and currents that turn with it are part of what is found"
+    yield from list_assumptions(entry.budget)
+    yield from detection_limit_lines(entry.detection_limits)
+    yield "the field of iron and currents that turn with it is part of the result"
     base = "table's axes"
     if entry.arm_field_in_bias:
         base = "arm's base"
-        yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
+        yield "the bias includes the arm's own field; runs with the sensor turned over separate it: rig reversal"
         yield from _tests(entry)
     yield f"field in the {base}: {triple(np.divide(entry.field_base_t, FIELD.bias.size), '+.3f')} µT"
     yield from attitude_lines(finding)
@@ -83,18 +83,18 @@ def _lines(finding: Finding[MagnetometerEntry]) -> Iterator[str]:
 
 
 def _tests(entry: MagnetometerEntry) -> Iterator[str]:
-    """What shows, and what does not, that the field was the same everywhere and all the time."""
-    if (alike := entry.uniformity) is not None:
-        yield f"uniform field: χ² of the residuals {alike.chi_square:.1f}, at most {alike.limit:.1f}"
+    """Yield the tests of whether the field was uniform and constant."""
+    if (uniformity := entry.uniformity) is not None:
+        yield f"uniform field: χ² of the residuals {uniformity.chi_square:.1f}, at most {uniformity.limit:.1f}"
     if (drift := entry.drift) is not None:
-        change, std = (np.linalg.norm(each) / FIELD.bias.size for each in (drift.change_t, drift.std_t))
+        change, std = (np.linalg.norm(vector) / FIELD.bias.size for vector in (drift.change_t, drift.std_t))
         yield f"at home before and after: changed by {change:.3f} µT (± {2 * std:.3f})"
     else:
-        yield "no field test at home before and after: a field that drifts is not noticed (procedure.field_test_s)"
-    away_m = float(np.linalg.norm(entry.extension_m))
-    if away_m < FAR_ENOUGH_M:
+        yield "no field test at home before and after: a drift of the field is not detected (procedure.field_test_s)"
+    distance_m = float(np.linalg.norm(entry.extension_m))
+    if distance_m < FAR_ENOUGH_M:
         advised = f"{1e3 * FAR_ENOUGH_M:.0f} mm are advised (arm.extension_mm)"
-        yield f"it sits {1e3 * away_m:.0f} mm from the flange; {advised}"
+        yield f"{1e3 * distance_m:.0f} mm from the flange; {advised}"
 
 
 MAGNETOMETER = triad_kind(
@@ -108,8 +108,8 @@ MAGNETOMETER = triad_kind(
         size="The size of the magnetic field",
         value=lambda entry: f"{entry.field_t / FIELD.bias.size:.6g} {FIELD.bias.name}",
         origin=lambda site: site.magnetic_field_reference,
-        known="a field of stated size",
-        method=lambda _: "Magnetometers are held in known attitudes to a field of stated size.",
+        quantity="a field of stated size",
+        method=lambda _: "Magnetometers are measured in known attitudes to a field of stated size.",
     ),
     characteristics=MAGNETOMETERS,
 )

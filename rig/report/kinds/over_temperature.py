@@ -13,8 +13,8 @@ from rig.data.result_file import ResultDocument
 from rig.report.c_code.temperature import temperature_lines
 from rig.report.findings.characteristics import BIAS_SLOPE_AT_REFERENCE, POLYNOMIALS
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import Followed
-from rig.report.findings.kind import Measured, ResultKind, Shown, Without, row_of
+from rig.report.findings.followed import HistoryRecord
+from rig.report.findings.kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
 from rig.report.tables import dcc_results
 from rig.report.words.rounding import plus_minus
 from rig.report.words.temperature_words import about_lines, shown_rows
@@ -26,10 +26,10 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, OverTemperatureEntry
 
     return {
         name: {
-            quantity.name: temperature_entry(quantity, found, _sensor(outcome, name))
-            for quantity, found in each.items()
+            quantity.name: temperature_entry(quantity, polynomials, _sensor(outcome, name))
+            for quantity, polynomials in by_quantity.items()
         }
-        for name, each in outcome.polynomials.items()
+        for name, by_quantity in outcome.polynomials.items()
     }
 
 
@@ -39,12 +39,12 @@ def _sensor(outcome: Outcome, name: str) -> RecordedSensor | Item:
     return outcome.recordings[0].run.sensors[name]
 
 
-def _found(document: ResultDocument) -> Iterator[Finding[OverTemperatureEntry]]:
-    for name, each in document.over_temperature.items():
-        yield from (Finding(name, quantities()[quantity], entry) for quantity, entry in each.items())
+def _find(document: ResultDocument) -> Iterator[Finding[OverTemperatureEntry]]:
+    for name, entries in document.over_temperature.items():
+        yield from (Finding(name, quantities()[quantity], entry) for quantity, entry in entries.items())
 
 
-def _printed(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
+def _render(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
     entry, unit = finding.entry, finding.quantity.bias
     title = f"{finding.quantity.full_label(finding.sensor)}: over temperature, ± U"
     table = Table(title=plain(title, "table.title"))
@@ -59,16 +59,16 @@ def _printed(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
     yield from about_lines(entry, finding.quantity)
 
 
-def _shown(finding: Finding[OverTemperatureEntry]) -> Shown:
-    """The slopes of the bias at the reference."""
+def _build_row(finding: Finding[OverTemperatureEntry]) -> DisplayRow:
+    """Return the slopes of the bias at the reference temperature."""
     noun = f"change per kelvin at {finding.entry.reference_c:g} °C"
     return row_of(BIAS_SLOPE_AT_REFERENCE.of(finding), finding.quantity.full_label(finding.sensor), noun)
 
 
-def _followed(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> Followed | None:
-    """The slopes at the reference; scale and bias there are those of the sensor's calibration."""
+def _build_record(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> HistoryRecord | None:
+    """Return the slopes at the reference temperature; scale and bias there are those of the sensor's calibration."""
     entry = finding.entry
-    return Followed(
+    return HistoryRecord(
         finding.sensor,
         f"{finding.quantity} over temperature",
         entry.part,
@@ -79,26 +79,29 @@ def _followed(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> Foll
     )
 
 
-def _measured(finding: Finding[OverTemperatureEntry], _: object) -> Measured:
-    entry, of = finding.entry, finding.quantity
-    name, results = f"{of.full_label(finding.sensor)}, over temperature", dcc_results.over_temperature(entry, of)
-    return Measured(of.sensor, finding.sensor, entry.part, entry.serial_number, name, results)
+def _describe_item(finding: Finding[OverTemperatureEntry], _: object) -> CertifiedItem:
+    entry, quantity = finding.entry, finding.quantity
+    name, results = (
+        f"{quantity.full_label(finding.sensor)}, over temperature",
+        dcc_results.over_temperature(entry, quantity),
+    )
+    return CertifiedItem(quantity.sensor, finding.sensor, entry.part, entry.serial_number, name, results)
 
 
 OVER_TEMPERATURE = ResultKind(
     name="over temperature",
     key="over_temperature",
     entries=_entries,
-    found=_found,
-    printed=_printed,
-    shown=_shown,
-    followed=_followed,
+    find=_find,
+    printed=_render,
+    shown=_build_row,
+    followed=_build_record,
     header=temperature_lines,
     figures="rig.report.figures.temperature:write_temperature_figures",
     block="over_temperature.html.j2:over_temperature",
-    measured=_measured,
-    standard=Without("it hangs on that of the sensor whose curve it is"),
-    corrected=Without("exports that know polynomials take its entries as they are"),
-    unexplained=Without("its curves are drawn instead, with their points"),
+    measured=_describe_item,
+    standard=NoOutlet("it has the standard of its sensor"),
+    corrected=NoOutlet("exports that support polynomials take its entries as they are"),
+    unexplained=NoOutlet("its curves are drawn with their points instead"),
     characteristics=POLYNOMIALS,
 )

@@ -1,4 +1,4 @@
-"""Every kind of result, in the order in which they are shown: a new one is a file and a line here."""
+"""All kinds of results, in the order in which they are shown: a new one is a file and a line here."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -9,8 +9,8 @@ from rig.data.installed_kinds import installed_kinds
 from rig.data.result_file import ResultDocument
 from rig.report.findings.characteristic import Outlet, Term, terms
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import Followed, known, parameters
-from rig.report.findings.kind import ResultKind, Shown, Without, row_of
+from rig.report.findings.followed import HistoryRecord, parameters, select_uncertain
+from rig.report.findings.kind import DisplayRow, NoOutlet, ResultKind, row_of
 from rig.report.kinds.accelerometer import ACCELEROMETER
 from rig.report.kinds.bias_drift import BIAS_DRIFT
 from rig.report.kinds.earth_rate import EARTHS_RATE
@@ -27,39 +27,39 @@ OF_THE_RIG: Final[tuple[ResultKind[Any], ...]] = (
 
 @cache
 def kinds() -> tuple[ResultKind[Any], ...]:
-    """Every kind of result, those that packages add (`rig.data.installed_kinds`) after the rig's own."""
+    """Return all kinds of results; those of packages (`rig.data.installed_kinds`) follow the rig's own."""
     return (*OF_THE_RIG, *(kind.result for kind in installed_kinds()))
 
 
 def outlets(
-    document: ResultDocument, of: Callable[[ResultKind[Any]], OutletT | Without]
+    document: ResultDocument, outlet_of: Callable[[ResultKind[Any]], OutletT | NoOutlet]
 ) -> Iterator[tuple[ResultKind[Any], OutletT, Finding[Any]]]:
-    """Everything in a result that has an outlet `of` its kind: the kind, the outlet and what it is asked about."""
+    """Yield for everything in a result that has this outlet: the kind, the outlet and the finding."""
     for kind in kinds():
-        if not isinstance(outlet := of(kind), Without):
-            yield from ((kind, outlet, finding) for finding in kind.found(document))
+        if not isinstance(outlet := outlet_of(kind), NoOutlet):
+            yield from ((kind, outlet, finding) for finding in kind.find(document))
 
 
 def terms_of(document: ResultDocument, outlet: Outlet | None = None) -> Iterator[Term]:
-    """Every characteristic in a result, kind by kind; those that an outlet takes where one is named."""
+    """Yield all characteristics in a result, kind by kind, or those that `outlet` takes."""
     for kind in kinds():
-        for finding in kind.found(document):
+        for finding in kind.find(document):
             yield from terms(kind.characteristics, finding, outlet)
 
 
-def shown(document: ResultDocument) -> Iterator[Shown]:
-    """The rows of page and notebook: of every sensor what was found, kind by kind, then what stands beside."""
+def shown(document: ResultDocument) -> Iterator[DisplayRow]:
+    """Yield the rows of page and notebook: the kinds' rows of all sensors, then those of characteristics."""
     yield from (show(finding) for _, show, finding in outlets(document, lambda kind: kind.shown))
     yield from map(row_of, terms_of(document, "page"))
 
 
-def followed(document: ResultDocument) -> tuple[Followed, ...]:
-    """All that a result says of sensors for a history to keep, references too."""
-    return tuple(_followed(document))
+def followed(document: ResultDocument) -> tuple[HistoryRecord, ...]:
+    """Return the records of all sensors of a result for a history, references included."""
+    return tuple(_records(document))
 
 
-def _followed(document: ResultDocument) -> Iterator[Followed]:
+def _records(document: ResultDocument) -> Iterator[HistoryRecord]:
     for kind, follow, finding in outlets(document, lambda kind: kind.followed):
-        if (each := follow(finding, document)) is not None:
-            more = known([*parameters(terms(kind.characteristics, finding, "history"))])
-            yield replace(each, parameters=(*each.parameters, *more))
+        if (record := follow(finding, document)) is not None:
+            more = select_uncertain([*parameters(terms(kind.characteristics, finding, "history"))])
+            yield replace(record, parameters=(*record.parameters, *more))

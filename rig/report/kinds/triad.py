@@ -1,4 +1,4 @@
-"""What all sensors of three axes share in a result: scale factors, biases and axes by one account of uncertainty."""
+"""The common parts of three-axis sensors in a result: scale factors, biases and axes, by one uncertainty budget."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,18 +20,19 @@ from rig.report.findings.characteristic import Characteristic
 from rig.report.findings.characteristics import NON_ORTHOGONALITY
 from rig.report.findings.corrected import Corrected, noise_of
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import Calibrated, Followed, known, scale_and_bias
-from rig.report.findings.kind import Measured, ResultKind, Shown, Standard, Three
-from rig.report.findings.unexplained import of_attitudes
+from rig.report.findings.followed import Calibrated, HistoryRecord, scale_and_bias, select_uncertain
+from rig.report.findings.kind import AxisValues, CertifiedItem, DisplayRow, ResultKind, Standard
+from rig.report.findings.unexplained import find_attitude_residuals
 from rig.report.tables.axes import line_of, scale_and_bias_table, triple
-from rig.report.tables.budget import budget_table, expanded_heading
+from rig.report.tables.budget import budget_table, heading_for
 
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """What is said of one such sensor, by its entry: behind its name, its model, lines below its table.
+    """The texts of one such kind of sensor, by its entry.
 
-    Of the digital certificate its scale and bias, with what turning it over has told, and how warm it was.
+    Of the terminal: behind the sensor's name, its model, lines below the table. Of the digital certificate: scale and
+    bias with a reversal, and the temperatures.
     """
 
     title: str
@@ -42,72 +43,71 @@ class Words:
 
 
 def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
-    """The bias (3,) of an entry, in SI units."""
-    found: Sequence[float] = getattr(entry, quantity.named("bias"))
-    return found
+    """Return the bias (3,) of an entry, in SI units."""
+    bias: Sequence[float] = getattr(entry, quantity.named("bias"))
+    return bias
 
 
-def shown_of(finding: Finding[Any]) -> Shown:
-    """The row of page and notebook."""
+def shown_of(finding: Finding[Any]) -> DisplayRow:
+    """Return the row of page and notebook."""
     quantity, entry = finding.quantity, finding.entry
     expanded, size = expanded_uncertainties(entry.budget, entry.covariance), quantity.bias.size
-    axes = len(entry.scale)
-    bias = Three([each / size for each in bias_of(quantity, entry)], [each / size for each in expanded[axes:]])
-    scale, combined = Three(entry.scale, expanded[:axes]), entry.budget is not None
+    count = len(entry.scale)
+    bias = AxisValues(
+        [value / size for value in bias_of(quantity, entry)], [value / size for value in expanded[count:]]
+    )
+    scale, combined = AxisValues(entry.scale, expanded[:count]), entry.budget is not None
     name, unit = quantity.label(finding.sensor), quantity.bias
-    return Shown(finding.sensor, quantity, name, unit, bias, combined, scale, labels=quantity.axes)
+    return DisplayRow(finding.sensor, quantity, name, unit, bias, combined, scale, labels=quantity.axes)
 
 
-def followed_of(finding: Finding[Any], document: ResultDocument) -> Followed:
-    """Scale and bias as a history keeps them."""
+def followed_of(finding: Finding[Any], document: ResultDocument) -> HistoryRecord:
+    """Return scale and bias as a history stores them."""
     quantity, entry = finding.quantity, finding.entry
-    followed = [*scale_and_bias(finding.sensor, quantity, entry, bias_of(quantity, entry), document)]
+    parameters = [*scale_and_bias(finding.sensor, quantity, entry, bias_of(quantity, entry), document)]
     full_scale: float = getattr(entry, quantity.named("range")) or 0.0
     temperature_c: float | None = getattr(entry, "temperature_c", None)
-    of = entry.part, entry.serial_number, full_scale, entry.estimator, temperature_c
-    return Followed(finding.sensor, quantity.name, *of, known(followed))
+    about = entry.part, entry.serial_number, full_scale, entry.estimator, temperature_c
+    return HistoryRecord(finding.sensor, quantity.name, *about, select_uncertain(parameters))
 
 
 def tables(title: str, quantity: Quantity, entry: Calibrated) -> Iterator[Table]:
-    """Scale and bias of each axis ± U, and what makes U up."""
+    """Yield scale and bias of each axis ± U, and the uncertainty budget."""
     budget, expanded = entry.budget, expanded_uncertainties(entry.budget, entry.covariance)
     yield scale_and_bias_table(
-        title, quantity, entry.scale, bias_of(quantity, entry), expanded, heading=expanded_heading(budget)
+        title, quantity, entry.scale, bias_of(quantity, entry), expanded, heading=heading_for(budget)
     )
     if budget is not None:
         yield budget_table(budget, entry.scale, quantity.bias)
 
 
 def item_words(entry: Any) -> str:
-    """Part and serial number, as far as anybody said."""
-    told = [each for each in (entry.part, entry.serial_number) if each != NOT_STATED]
-    return " ".join(told) or "part and serial number not stated"
+    """Return part and serial number, as far as they are stated."""
+    names = [name for name in (entry.part, entry.serial_number) if name != NOT_STATED]
+    return " ".join(names) or "part and serial number not stated"
 
 
 def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
-    """How far the axes are from right angles, and the attitudes from what they were taken to be.
-
-    And, where a file told the attitudes, what laying down did and what was left out.
-    """
+    """Yield the non-orthogonality, the attitude error and, for attitudes of a file, the placement error."""
     entry, quantity = finding.entry, finding.quantity
     yield line_of(NON_ORTHOGONALITY.of(finding), "non-orthogonality yz zx xy", "+.4f")
     if entry.attitude_error_rad is not None:
-        known = "" if entry.attitude_error_std_rad is None else f" (± {2e3 * entry.attitude_error_std_rad:.2f})"
-        yield f"attitude error found: {1e3 * entry.attitude_error_rad:.2f} mrad about each axis{known}"
-    laid, unit = entry.placement, quantity.unit
-    if laid is None:
+        expanded = "" if entry.attitude_error_std_rad is None else f" (± {2e3 * entry.attitude_error_std_rad:.2f})"
+        yield f"estimated attitude error: {1e3 * entry.attitude_error_rad:.2f} mrad about each axis{expanded}"
+    placement, unit = entry.placement, quantity.unit
+    if placement is None:
         return
-    if laid.placement_std is not None:
-        told = f"{laid.placement_std:.2g} ± {2 * laid.placement_uncertainty:.2g} {unit}"
-        count = laid.rests_without_attitude
-        beside = f", {count} more rests have helped to find it" if count else ""
-        yield f"a placement found to change each reading by {told} beside its attitude{beside}"
-        if laid.placement_uncertainty > laid.placement_std / 2:
-            yield "this is hardly known: lay it down in the same attitudes again, and the uncertainty becomes smaller"
+    if placement.placement_std is not None:
+        size = f"{placement.placement_std:.2g} ± {2 * placement.placement_uncertainty:.2g} {unit}"
+        count = placement.rests_without_attitude
+        others = f", estimated with {count} more rests" if count else ""
+        yield f"laying it down again changes each reading by {size} in addition to the attitude{others}"
+        if placement.placement_uncertainty > placement.placement_std / 2:
+            yield "this estimate is poor: lay it down in the same attitudes again to reduce the uncertainty"
 
 
 def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
-    """What each of the other methods finds, or why it finds nothing."""
+    """Yield the solutions of the other methods, or why they have none."""
     for method, other in entry.other_methods.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}{from_what}: {other.error}"
@@ -117,14 +117,14 @@ def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterato
 
 
 def unsolved_lines(document: ResultDocument, quantity: Quantity) -> Iterator[str]:
-    """Why readings from elsewhere told nothing of a quantity."""
+    """Yield why external readings have no solution for a quantity."""
     for name, faults in document.unsolved.items():
         if (fault := faults.get(quantity.name)) is not None:
             yield f"{name}, {quantity.sensor}, not calibrated: {fault.error}"
 
 
-def _corrected(finding: Finding[Any]) -> Corrected:
-    """Readings to what they are of, in the right-angled frame that the entry's matrix leads to."""
+def _build_correction(finding: Finding[Any]) -> Corrected:
+    """Return the correction of readings, in the right-angled frame of the entry's matrix."""
     quantity, entry = finding.quantity, finding.entry
     noise = [(getattr(dwell, quantity.named("noise")), dwell.samples) for dwell in entry.dwells]
     return Corrected(
@@ -153,46 +153,49 @@ def triad_kind(
     standard: Standard,
     characteristics: tuple[Characteristic, ...],
 ) -> ResultKind[Any]:
-    """The kind of a sensor that attitudes calibrate, whose entries stand at `key`; its `words` are its own."""
+    """Return the kind of a sensor that is calibrated by attitudes, with its entries at `key` and its `words`."""
 
-    def found(document: ResultDocument) -> Iterator[Finding[Any]]:
-        of_all: Mapping[str, Any] = getattr(document, key)
-        return (Finding(name, quantity, each) for name, each in of_all.items() if not isinstance(each, ErrorEntry))
+    def find(document: ResultDocument) -> Iterator[Finding[Any]]:
+        all_entries: Mapping[str, Any] = getattr(document, key)
+        solved = ((name, entry) for name, entry in all_entries.items() if not isinstance(entry, ErrorEntry))
+        return (Finding(name, quantity, entry) for name, entry in solved)
 
-    def unsolved(document: ResultDocument) -> Iterator[str]:
-        of_all: Mapping[str, Any] = getattr(document, key)
-        for name, each in of_all.items():
-            if isinstance(each, ErrorEntry):
-                yield f"{quantity.label(name)}, not calibrated: {each.error}"
+    def explain_unsolved(document: ResultDocument) -> Iterator[str]:
+        all_entries: Mapping[str, Any] = getattr(document, key)
+        for name, entry in all_entries.items():
+            if isinstance(entry, ErrorEntry):
+                yield f"{quantity.label(name)}, not calibrated: {entry.error}"
         yield from unsolved_lines(document, quantity)
 
-    def printed(finding: Finding[Any]) -> Iterator[Table | str]:
+    def render(finding: Finding[Any]) -> Iterator[Table | str]:
         entry = finding.entry
         title = f"{quantity.label(finding.sensor)}{words.title}: {item_words(entry)}"
         yield from tables(f"{title}, {words.model(entry)}, {entry.estimator}", quantity, entry)
         yield from words.lines(finding)
 
-    def measured(finding: Finding[Any], turned: Mapping[str, ReversalEntry]) -> Measured:
+    def describe_item(finding: Finding[Any], reversals: Mapping[str, ReversalEntry]) -> CertifiedItem:
         entry, name = finding.entry, f"calibration of {quantity.sensor} {finding.sensor}"
-        results = words.digital(entry, turned.get(finding.sensor))
-        warm = words.temperatures_c(entry)
-        return Measured(quantity.sensor, finding.sensor, entry.part, entry.serial_number, name, results, warm)
+        results = words.digital(entry, reversals.get(finding.sensor))
+        temperatures = words.temperatures_c(entry)
+        return CertifiedItem(
+            quantity.sensor, finding.sensor, entry.part, entry.serial_number, name, results, temperatures
+        )
 
     return ResultKind(
         name=quantity.sensor,
         key=key,
         entries=entries,
-        found=found,
-        unsolved=unsolved,
-        printed=printed,
+        find=find,
+        unsolved=explain_unsolved,
+        printed=render,
         shown=shown_of,
         followed=followed_of,
         header=header,
         figures="rig.report.figures.attitudes:write_attitude_figures",
         block=block,
-        measured=measured,
+        measured=describe_item,
         standard=standard,
-        corrected=_corrected,
-        unexplained=of_attitudes,
+        corrected=_build_correction,
+        unexplained=find_attitude_residuals,
         characteristics=characteristics,
     )

@@ -1,4 +1,4 @@
-"""Verifications: calibrated readings against a reference (SIX, Tables IV and V)."""
+"""Verifications: calibrated readings compared with a reference (SIX, Tables IV and V)."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from rig.data.result_file import (
 )
 from rig.report.entry import entry
 from rig.report.findings.finding import Finding
-from rig.report.findings.kind import Measured, ResultKind, Without
+from rig.report.findings.kind import CertifiedItem, NoOutlet, ResultKind
 from rig.report.tables import dcc_results
 from rig.station.plain_text import plain
 
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 
 def _entries(outcome: Outcome) -> dict[str, VerificationEntry]:
-    return {name: verification_entry(found) for name, found in outcome.verifications.items()}
+    return {name: verification_entry(verification) for name, verification in outcome.verifications.items()}
 
 
-def verification_entry(verification: "Verification") -> VerificationEntry:
-    """The statistics of both comparisons, without their curves."""
+def verification_entry(verification: Verification) -> VerificationEntry:
+    """Return the statistics of both comparisons, without their curves."""
     before, reference = verification.before, verification.reference
     return entry(
         VerificationEntry, verification,
@@ -54,17 +54,17 @@ def _comparison(comparison: "Comparison") -> ComparisonEntry:
     )  # fmt: skip
 
 
-def _found(document: ResultDocument) -> Iterator[Finding[VerificationEntry]]:
-    return (Finding(name, RATE, each) for name, each in document.verification.items())
+def _find(document: ResultDocument) -> Iterator[Finding[VerificationEntry]]:
+    return (Finding(name, RATE, entry) for name, entry in document.verification.items())
 
 
-def _printed(finding: Finding[VerificationEntry]) -> Iterator[Table | str]:
+def _render(finding: Finding[VerificationEntry]) -> Iterator[Table | str]:
     yield verification_table(finding.sensor, finding.entry)
     yield from verification_lines(finding.entry)
 
 
 def verification_table(name: str, entry: VerificationEntry) -> Table:
-    """Error of each axis before and after, from a sensor's entry; a dash where there was no before."""
+    """Return a table of the errors of each axis before and after; a dash if there was no movement before."""
     table = Table(
         title=plain(f"{name} against {entry.reference}, sweeps and rests", "table.title"), title_justify="left"
     )
@@ -84,48 +84,49 @@ def verification_table(name: str, entry: VerificationEntry) -> Table:
 
 
 def verification_lines(entry: VerificationEntry) -> Iterator[str]:
-    """What stands below the table: how the two sensors sit to each other, the reference, whole turns, the delay."""
+    """Yield the lines below the table: relative mounting, the reference's error, whole turns, delays."""
     rotation = entry.rotation
-    turned = " ".join(f"{angle:+.3f}" for angle in np.degrees(rotation.from_nominal_rad))
-    yield f"mounted off nominal to the reference by: {turned} ° (± {np.degrees(max(rotation.std_rad)):.3f})"
+    angles = " ".join(f"{angle:+.3f}" for angle in np.degrees(rotation.from_nominal_rad))
+    std_deg = np.degrees(max(rotation.std_rad))
+    yield f"rotation from the nominal mounting to the reference: {angles} ° (± {std_deg:.3f})"
     errors = [turn.error_rad_s for turn in entry.after.revolutions]
     stds = [turn.std_rad_s for turn in entry.after.revolutions]
-    yield f"the reference itself, against the arm: at most {entry.reference_error_rad_s:.5f} rad/s off"
-    yield f"mean over a revolution after: at most {np.abs(errors).max():.5f} rad/s off (± {np.max(stds):.5f})"
-    held = [turn.gravity_rad_s for turn in entry.after.revolutions]
-    if None not in held:
-        without = np.abs(np.array(errors) - np.array(held)).max()
-        yield f"    of which gravity, which the board cannot see: without it at most {without:.5f}"
+    yield f"error of the reference itself, against the arm: at most {entry.reference_error_rad_s:.5f} rad/s"
+    yield f"mean error over a revolution, after: at most {np.abs(errors).max():.5f} rad/s (± {np.max(stds):.5f})"
+    gravity = [turn.gravity_rad_s for turn in entry.after.revolutions]
+    if None not in gravity:
+        remainder = np.abs(np.array(errors) - np.array(gravity)).max()
+        yield f"    without the effect of gravity, which the board cannot measure: at most {remainder:.5f}"
     for delay, std in zip(entry.after.delay_s, entry.after.delay_std_s, strict=True):
-        yield f"lags the reference by {1e3 * delay:.2f} ms (± {1e3 * std:.2f}), taken out"
+        yield f"delay behind the reference: {1e3 * delay:.2f} ms (± {1e3 * std:.2f}), corrected"
 
 
-def _in_short(finding: Finding[VerificationEntry]) -> Iterator[str]:
+def _summarize(finding: Finding[VerificationEntry]) -> Iterator[str]:
     before, after = finding.entry.before, max(finding.entry.after.movement.rms_rad_s)
     until = "" if before is None else f"{max(before.movement.rms_rad_s):.4f} rad/s before, "
     yield f"{finding.sensor} against {finding.entry.reference}: RMS at most {until}{after:.4f} rad/s after"
 
 
-def _measured(finding: Finding[VerificationEntry], _: object) -> Measured:
+def _describe_item(finding: Finding[VerificationEntry], _: object) -> CertifiedItem:
     name, results = f"verification of gyroscope {finding.sensor}", dcc_results.verification(finding.entry)
-    return Measured("gyroscope", finding.sensor, None, None, name, results)
+    return CertifiedItem("gyroscope", finding.sensor, None, None, name, results)
 
 
-NO_PARAMETER = Without("an error of readings is no parameter, and has no uncertainty of its own")
+NO_PARAMETER = NoOutlet("an error of readings is not a parameter and has no uncertainty of its own")
 VERIFICATION = ResultKind(
     name="verification",
     key="verification",
     entries=_entries,
-    found=_found,
-    printed=_printed,
+    find=_find,
+    printed=_render,
     shown=NO_PARAMETER,
     followed=NO_PARAMETER,
     header=NO_PARAMETER,
     figures="rig.report.figures.verification:write_figures",
-    block=Without("it stands in the block of its gyroscope, or alone where nothing was calibrated"),
-    measured=_measured,
-    standard=Without("it hangs on that of the reference beside it"),
-    corrected=Without("it changes nothing of what readings mean"),
-    unexplained=Without("the run draws its readings beside those of the reference"),
-    in_short=_in_short,
+    block=NoOutlet("it is in the block of its gyroscope, or alone if nothing was calibrated"),
+    measured=_describe_item,
+    standard=NoOutlet("it has the standard of its reference"),
+    corrected=NoOutlet("it does not correct readings"),
+    unexplained=NoOutlet("the run draws its readings together with those of the reference"),
+    in_short=_summarize,
 )

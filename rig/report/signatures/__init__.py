@@ -1,1 +1,1 @@
-"""Signatures on certificates: made by the laboratory's key, and looked at by anybody."""
+"""Signatures on certificates: made with the laboratory's key, verified by anyone."""

@@ -1,4 +1,4 @@
-"""What the container of a signature (CMS, RFC 5652) holds beside what is signed: nothing that nobody vouches for."""
+"""Content of a signature's container (CMS, RFC 5652) that the signature does not cover: none is allowed."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -10,17 +10,17 @@ from pyhanko.sign.general import extract_certificate_info
 from rig.report.signatures.signatory import DIGEST
 from rig.report.signatures.trust import chain_of
 
-DATA, STAMPED = "v1", "v3"  # versions of a container, by what is in it (RFC 5652, 5.1)
+DATA, STAMPED = "v1", "v3"  # versions of a container, by its content (RFC 5652, 5.1)
 METHODS = ("sha256_rsa", "rsassa_pkcs1v15", "sha256_ecdsa")
 WITH_PARAMETERS = "rsassa_pss"
 
 
-def uncovered_in_container(der: bytes) -> Iterator[str]:
-    """Yield what is in the container of a document's signature that it does not cover.
+def find_uncovered_in_container(der: bytes) -> Iterator[str]:
+    """Yield the content of a signature's container that the signature does not cover.
 
-    `der` is its ContentInfo. A signature covers its signed attributes alone. So the container must be, to the byte,
-    what can be rebuilt of these, of the signature's value, of the certificates of the signer's chain and of at most
-    one time stamp, to which the same applies. Whether the certificates are what was issued is not asked here.
+    `der` is the ContentInfo of a document's signature, which covers its signed attributes only. So the container must
+    equal, byte by byte, one rebuilt from these, the signature's value, the certificates of the signer's chain and at
+    most one time stamp, to which the same applies. Whether the certificates are genuine is not tested here.
     """
     content = cms.ContentInfo.load(der, strict=True)
     (info,) = content["content"]["signer_infos"]
@@ -28,20 +28,20 @@ def uncovered_in_container(der: bytes) -> Iterator[str]:
     if info["digest_algorithm"]["algorithm"].native != DIGEST or method not in METHODS:
         yield f"it is signed by a method that is not accepted: {method}"
     if "signing_certificate_v2" not in [attribute["type"].native for attribute in info["signed_attrs"]]:
-        yield "what is signed does not say whose certificate it is"
-    yield from _uncovered(content, der, DATA)
+        yield "its signed attributes do not name the signer's certificate"
+    yield from _find_uncovered(content, der, DATA)
     stamps = [(attribute["type"].native, list(attribute["values"])) for attribute in info["unsigned_attrs"] or ()]
     if [(kind, len(values)) for kind, values in stamps] not in ([], [("signature_time_stamp_token", 1)]):
-        yield "beside its signature there is more than a time stamp"
+        yield "its signature has more unsigned attributes than a time stamp"
         return
     for _, (stamp,) in stamps:
-        yield from _uncovered(stamp, stamp.dump(), STAMPED)
+        yield from _find_uncovered(stamp, stamp.dump(), STAMPED)
         if stamp["content"]["signer_infos"][0]["unsigned_attrs"]:
-            yield "its time stamp holds something that is not signed"
+            yield "its time stamp has unsigned attributes"
 
 
 def certificates_with(der: bytes) -> list[list[Certificate]]:
-    """Return the certificates that come with a signature, and those with its time stamp; of each its signer's first."""
+    """Return the certificates of a signature, and those of its time stamp; the signer's first in each list."""
     contents = [cms.ContentInfo.load(der)["content"]]
     for attribute in contents[0]["signer_infos"][0]["unsigned_attrs"] or ():
         contents += [stamp["content"] for stamp in attribute["values"]]
@@ -50,24 +50,24 @@ def certificates_with(der: bytes) -> list[list[Certificate]]:
 
 def _certificates(content: Any) -> list[Certificate]:
     signer = extract_certificate_info(content).signer_cert  # of two that claim to be the signer's, the last
-    found = (signer, *(choice.chosen for choice in content["certificates"]))
-    return [load_der_x509_certificate(one.dump()) for one in found]
+    certificates = (signer, *(choice.chosen for choice in content["certificates"]))
+    return [load_der_x509_certificate(one.dump()) for one in certificates]
 
 
-def _uncovered(content: Any, der: bytes, version: str) -> Iterator[str]:
+def _find_uncovered(content: Any, der: bytes, version: str) -> Iterator[str]:
     container = content["content"]
     (info,) = container["signer_infos"]
-    if _rebuilt(container, info, extract_certificate_info(container).signer_cert, version).dump() != der:
-        yield "in its signature's container there is something that is not signed"
+    if _rebuild(container, info, extract_certificate_info(container).signer_cert, version).dump() != der:
+        yield "its signature's container has content that is not signed"
     if any(choice.name != "certificate" for choice in container["certificates"]):
-        yield "with its signature comes something else than certificates of keys"
+        yield "its signature's container has other things than certificates of keys"
     certificates = _certificates(container)
     chain = chain_of(certificates)
-    for stranger in (certificate for certificate in certificates if certificate not in chain):
-        yield f"with its signature comes a certificate of {stranger.subject.rfc4514_string()}, which has issued none"
+    for unrelated in (certificate for certificate in certificates if certificate not in chain):
+        yield f"its signature's container has an unrelated certificate of {unrelated.subject.rfc4514_string()}"
 
 
-def _rebuilt(container: Any, info: Any, signer: Any, version: str) -> Any:
+def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
     digest = info["digest_algorithm"]
     digests = [one for one in container["digest_algorithms"] if one["algorithm"].native == digest["algorithm"].native]
     who = {"issuer": signer.issuer, "serial_number": signer.serial_number}
@@ -92,7 +92,7 @@ def _rebuilt(container: Any, info: Any, signer: Any, version: str) -> Any:
 
 
 def _plain(algorithm: Any) -> Any:
-    """The algorithm without parameters, or with none (NULL), as it is; nothing else may stand there."""
+    """Return the algorithm as it is, without parameters or with NULL; other parameters are removed."""
     name = algorithm["algorithm"].native
     if name == WITH_PARAMETERS:
         return algorithm

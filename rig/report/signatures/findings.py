@@ -1,4 +1,4 @@
-"""What a look at a signed file found: its signatures, and the names of what is wrong with it."""
+"""Results of the inspection of a signed file: its signatures, and its problems by name."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,11 +9,11 @@ from rig.report.signatures.reason import Reason
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """One signature: `signer` the name in its certificate, and `certificate_sha256` what tells that from others.
+class SignatureReport:
+    """One signature: `signer` is the name in its certificate, `certificate_sha256` the certificate's fingerprint.
 
-    `when` is by the clock of `time_server` or, where that is None, what the signer's own says. `trusted` is None where
-    nobody said whom to trust. `long_term`: its certificate was not revoked then, by the authorities' lists inside.
+    `when` is by the clock of `time_server`, or the signer's own if that is None. `trusted` is None if no trusted
+    certificate was given. `long_term`: the certificate was not revoked then, by the revocation lists in the file.
     """
 
     signer: str
@@ -27,43 +27,43 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Looked:
-    """All of a file: its signatures, the files attached to what is signed, and what is wrong, by the errors' names."""
+    """The inspection of a file: its signatures, the files attached to the signed one, and problems by name."""
 
-    signatures: tuple[Seen, ...] = ()
+    signatures: tuple[SignatureReport, ...] = ()
     attached: Mapping[str, bytes] = field(default_factory=dict)
     problems: tuple[Refused, ...] = ()
 
 
 def not_signed(name: str) -> Refused:
-    """The problem of a file without a signature."""
+    """Return the problem of a file without a signature."""
     return Refused(
         "not_signed",
         f"{name} has no signature",
-        "Give the signed certificate.pdf that it is attached to beside it, or a history that knows it: --history",
+        "Give the signed certificate.pdf to which it is attached as well, or a history that has it: --history",
     )
 
 
 def not_as_signed(name: str, why: str) -> Refused:
-    """The problem of a file that was altered, or never was what is signed."""
+    """Return the problem of a file that was altered, or is not the signed one."""
     return Refused(
-        "not_as_signed", f"{name} is not what was signed: {why}", "Do not rely on it; ask the laboratory for it"
+        "not_as_signed", f"{name} is not as it was signed: {why}", "Do not rely on it; ask the laboratory for it"
     )
 
 
 def signer_not_trusted(name: str, signer: str, why: str) -> Refused:
-    """Return the problem of a file that is unaltered, and signed by somebody else than was expected."""
+    """Return the problem of an unaltered file with another signer than expected."""
     return Refused(
         "signer_not_trusted",
         f"{name} is signed by {signer}, who is not trusted: {why}",
-        "Compare the SHA-256 of the certificate with what the laboratory says, and give the right one with --trust",
+        "Compare the certificate's SHA-256 with the one that the laboratory publishes; give the right one by --trust",
     )
 
 
 def stamp_not_trusted(name: str, server: str) -> Refused:
-    """Return the problem of a file whose time stamp anybody may have made."""
+    """Return the problem of a file whose time stamp is from an unknown server."""
     return Refused(
         "signer_not_trusted",
-        f"{name} has a time stamp by {server}, who is not trusted",
+        f"{name} has a time stamp by {server}, which is not trusted",
         "Give the certificate of the time server, or of the authority that issued it, with --trust too",
     )
 
@@ -72,15 +72,15 @@ def authority_not_trusted(name: str, authority: str) -> Refused:
     """Return the problem of a file with an authority's certificate that may have been altered."""
     return Refused(
         "signer_not_trusted",
-        f"{name} brings a certificate of {authority} that nobody who is trusted has issued",
+        f"{name} contains a certificate of {authority} that no trusted authority has issued",
         "Give the certificate of this authority, or of the one above it, with --trust too",
     )
 
 
 def signer_unknown(name: str, signer: str) -> Refused:
-    """Return the problem of a file that is unaltered, by a verifier who trusts nobody."""
+    """Return the problem of an unaltered file if no trusted certificate was given."""
     return Refused(
         "signer_unknown",
-        f"{name} is signed by {signer}, and anybody may have made a key of that name",
+        f"{name} is signed by {signer}, but anyone can create a key with that name",
         "Give the certificate of the laboratory's key, or of the authority that issued it, with --trust",
     )

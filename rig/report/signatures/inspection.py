@@ -1,4 +1,4 @@
-"""What is seen of a file's signatures: who, when, why, and what is wrong; nothing is signed here."""
+"""Inspection of a file's signatures: signer, time, reason, and problems; nothing is signed here."""
 
 import warnings
 from collections.abc import Sequence
@@ -11,53 +11,53 @@ from rig.report.signatures.findings import Looked, not_as_signed, not_signed
 from rig.report.signatures.signatory import EXTRA, SIZE_MAX_BYTES
 from rig.report.signatures.trust import Trust
 
-HEAD_BYTES = 200  # in which it shows what a file is
+HEAD_BYTES = 200  # enough to detect the type of a file
 
 
 def looked_at(name: str, content: bytes, trust: Trust) -> Looked:
-    """Look at a file by its content: PDF, XML, or one that has no signature of its own.
+    """Inspect a file by its content: PDF, XML, or one without a signature of its own.
 
-    Raises Refused `missing_extra`.
+    Raise Refused `missing_extra`.
     """
     try:
-        from rig.report.signatures.pdf_signatures import seen_pdf
-        from rig.report.signatures.xml_signature import seen_xml
+        from rig.report.signatures.pdf_signatures import inspect_pdf
+        from rig.report.signatures.xml_signature import inspect_xml
     except ImportError as error:
         raise missing_extra(error, EXTRA) from error
     if content.startswith(b"%PDF-"):
-        look = seen_pdf
+        inspect = inspect_pdf
     elif _is_xml(content):
-        look = seen_xml
+        inspect = inspect_xml
     else:
         return Looked(problems=(not_signed(name),))
     try:
-        with warnings.catch_warnings(action="ignore"):  # the libraries' own, about what such a file holds
-            return look(name, content, trust)
-    except Exception as error:  # of a file that anybody may have made the libraries raise whatever they meet
+        with warnings.catch_warnings(action="ignore"):  # warnings of the libraries about the file's content
+            return inspect(name, content, trust)
+    except Exception as error:  # the libraries raise any error for a crafted file
         why = str(error).strip().splitlines()
         return Looked(problems=(not_as_signed(name, f"it cannot be read: {why[0] if why else type(error).__name__}"),))
 
 
 def _is_xml(content: bytes) -> bool:
-    """Whether the file begins as XML does, in an encoding of one or two bytes a character, and not as HTML."""
+    """Return whether the file begins like XML, in one or two bytes a character, and not like HTML."""
     head = content[:HEAD_BYTES].lstrip(b"\xef\xbb\xbf\xfe\xff").replace(b"\0", b"").lstrip().lower()
     return head.startswith(b"<") and not head.startswith(b"<!doctype html")
 
 
 def trusted_in(files: Sequence[Path]) -> tuple[bytes, ...]:
-    """Return the certificates in these files, PEM or DER, as DER. Raises Refused `trust_file`, `missing_extra`."""
+    """Return the certificates in these files, PEM or DER, as DER. Raise Refused `trust_file`, `missing_extra`."""
     try:
         from cryptography.hazmat.primitives.serialization import Encoding
         from cryptography.x509 import load_der_x509_certificate, load_pem_x509_certificates
     except ImportError as error:
         raise missing_extra(error, EXTRA) from error
-    found = []
+    certificates = []
     for file in files:
         try:
             content = read_regular_file(file, SIZE_MAX_BYTES)
             pem = b"-----BEGIN" in content
-            found += load_pem_x509_certificates(content) if pem else [load_der_x509_certificate(content)]
+            certificates += load_pem_x509_certificates(content) if pem else [load_der_x509_certificate(content)]
         except (UnfitFile, OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
-            raise Refused("trust_file", f"{file} is no certificate: {why}", "Give it as PEM or DER") from None
-    return tuple(each.public_bytes(Encoding.DER) for each in found)
+            raise Refused("trust_file", f"{file} is not a certificate: {why}", "Give it as PEM or DER") from None
+    return tuple(certificate.public_bytes(Encoding.DER) for certificate in certificates)

@@ -1,4 +1,4 @@
-"""What makes a signature checkable long after (PAdES B-LT): lists of revoked certificates, from the authorities."""
+"""Long-term validation of signatures (PAdES B-LT): the authorities' lists of revoked certificates."""
 
 import re
 from collections.abc import Sequence
@@ -19,13 +19,13 @@ _LIST = re.compile(rb"-----BEGIN X509 CRL-----.*?-----END X509 CRL-----", re.DOT
 
 @dataclass(frozen=True, slots=True)
 class Authorities:
-    """Certificates of authorities, and their lists of what they have revoked (CRL, RFC 5280), in DER."""
+    """Certificates of authorities, and their revocation lists (CRL, RFC 5280), in DER."""
 
     roots: tuple[bytes, ...]
     lists: tuple[bytes, ...]
 
     def context(self, by: Signatory) -> "ValidationContext":
-        """The context of a check that trusts these authorities alone, and nothing that no list clears."""
+        """Return the context of a check that trusts only these authorities and needs a list for each certificate."""
         from asn1crypto.crl import CertificateList
         from asn1crypto.x509 import Certificate
         from cryptography.hazmat.primitives.serialization import Encoding
@@ -33,7 +33,7 @@ class Authorities:
 
         return ValidationContext(
             trust_roots=list(map(Certificate.load, self.roots)),
-            other_certs=[Certificate.load(each.public_bytes(Encoding.DER)) for each in by.certificates],
+            other_certs=[Certificate.load(one.public_bytes(Encoding.DER)) for one in by.certificates],
             crls=list(map(CertificateList.load, self.lists)),
             revocation_mode="require",
             allow_fetching=False,
@@ -41,7 +41,7 @@ class Authorities:
 
 
 def authorities_in(files: Sequence[Path]) -> Authorities:
-    """The certificates and lists in these files: PEM, or a list alone as DER. Raises Refused `revocation_list`."""
+    """Return certificates and lists in these files: PEM, or a list alone as DER. Raise Refused `revocation_list`."""
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_crl, load_pem_x509_certificates, load_pem_x509_crl
 
@@ -51,20 +51,20 @@ def authorities_in(files: Sequence[Path]) -> Authorities:
             content = read_regular_file(file, LIST_MAX_BYTES)
             pem = b"-----BEGIN" in content
             certificates = load_pem_x509_certificates(content) if b"-----BEGIN CERTIFICATE" in content else []
-            found = list(map(load_pem_x509_crl, _LIST.findall(content))) if pem else [load_der_x509_crl(content)]
+            file_lists = list(map(load_pem_x509_crl, _LIST.findall(content))) if pem else [load_der_x509_crl(content)]
         except (UnfitFile, OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or str(error)
             raise unfit(f"{file} cannot be read as one: {why}") from None
-        roots += [each.public_bytes(Encoding.DER) for each in certificates]
-        lists += [each.public_bytes(Encoding.DER) for each in found]
+        roots += [certificate.public_bytes(Encoding.DER) for certificate in certificates]
+        lists += [revoked.public_bytes(Encoding.DER) for revoked in file_lists]
     return Authorities(tuple(roots), tuple(lists))
 
 
 def unfit(why: str) -> Refused:
-    """The refusal of a signature whose certificates nobody could check later."""
+    """Return the refusal of a signature whose certificates cannot be checked later."""
     return Refused(
         "revocation_list",
-        f"the revocation lists do not do: {why}",
+        f"the revocation lists are not sufficient: {why}",
         "Give with --long-term the newest list and the certificate of each authority, of the key and of the time "
         "server, or leave it out",
     )

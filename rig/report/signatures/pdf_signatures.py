@@ -1,4 +1,4 @@
-"""The signatures of a PDF: every byte of it must be signed, but for the signature itself."""
+"""The signatures of a PDF: every byte of it must be signed, except the signature itself."""
 
 import io
 import logging
@@ -17,10 +17,10 @@ from pyhanko.sign.validation import validate_pdf_signature
 from pyhanko_certvalidator import ValidationContext
 
 from rig.errors import Refused
-from rig.report.signatures.cms_coverage import certificates_with, uncovered_in_container
+from rig.report.signatures.cms_coverage import certificates_with, find_uncovered_in_container
 from rig.report.signatures.findings import (
     Looked,
-    Seen,
+    SignatureReport,
     authority_not_trusted,
     not_as_signed,
     not_signed,
@@ -29,13 +29,13 @@ from rig.report.signatures.findings import (
     stamp_not_trusted,
 )
 from rig.report.signatures.reason import Reason
-from rig.report.signatures.trust import Trust, unvouched, why_untrusted
+from rig.report.signatures.trust import Trust, find_unvouched, why_untrusted
 
 
-def seen_pdf(name: str, content: bytes, trust: Trust) -> Looked:
-    """Return what a PDF's signature shows. Raises whatever its reader does of a damaged one."""
+def inspect_pdf(name: str, content: bytes, trust: Trust) -> Looked:
+    """Return the inspection of a PDF's signature. Raise the errors of its reader for a damaged file."""
     for library in ("pyhanko", "pyhanko_certvalidator"):
-        logging.getLogger(library).setLevel(logging.CRITICAL)  # whom they do not trust is said here, by name
+        logging.getLogger(library).setLevel(logging.CRITICAL)  # problems are named here
     reader = PdfFileReader(io.BytesIO(content), strict=True)
     if not reader.embedded_regular_signatures:
         return Looked(problems=(not_signed(name),))
@@ -43,81 +43,81 @@ def seen_pdf(name: str, content: bytes, trust: Trust) -> Looked:
         return Looked(problems=(not_as_signed(name, "it has several signatures"),))
     (signature,) = reader.embedded_signatures
     status = _status(signature, trust)
-    attached = list(_attached(reader))
-    altered = [not_as_signed(name, why) for why in _altered(signature, status, content, attached)]
-    seen, unsure = _seen(name, signature, status, trust, _lists(reader))
-    if altered:
-        return Looked((seen,), {}, (*altered, *unsure))
-    return Looked((seen,), dict(attached), (*unsure, *_of_authorities(name, signature, trust)))
+    attachments = list(_attachments(reader))
+    alterations = [not_as_signed(name, why) for why in _alterations(signature, status, content, attachments)]
+    report, doubts = _inspect_signature(name, signature, status, trust, _lists(reader))
+    if alterations:
+        return Looked((report,), {}, (*alterations, *doubts))
+    return Looked((report,), dict(attachments), (*doubts, *_check_authorities(name, signature, trust)))
 
 
 def _status(signature: Any, trust: Trust) -> Any:
-    """pyHanko's, which trusts no signer here, and time servers as `trust` says."""
-    nobody = ValidationContext(trust_roots=[], allow_fetching=False)
+    """Return pyHanko's status, which here trusts no signer, and the time servers of `trust`."""
+    no_signers = ValidationContext(trust_roots=[], allow_fetching=False)
     roots = list(map(Certificate.load, trust.certificates))
     servers = ValidationContext(trust_roots=roots, allow_fetching=False)
-    return validate_pdf_signature(signature, nobody, servers)
+    return validate_pdf_signature(signature, no_signers, servers)
 
 
-def _altered(signature: Any, status: Any, content: bytes, attached: Sequence[tuple[str, bytes]]) -> Iterator[str]:
-    """Why the file is not what was signed: every byte of it must be signed, but for the signature itself."""
+def _alterations(signature: Any, status: Any, content: bytes, attached: Sequence[tuple[str, bytes]]) -> Iterator[str]:
+    """Yield why the file is not as it was signed: every byte of it must be signed, except the signature itself."""
     if not status.intact:
-        yield "bytes that are signed have changed"
+        yield "signed bytes have changed"
     elif not status.valid:
         yield "its signature is not by the key of its certificate"
     stamp = status.timestamp_validity
     if stamp is not None and not (stamp.intact and stamp.valid):
-        yield "its time stamp is of something else"
+        yield "its time stamp belongs to other content"
     written = signature.pkcs7_content
     begin = int(signature.byte_range[1])
     end = begin + 2 * len(written) + 2
     if list(map(int, signature.byte_range)) != [0, begin, end, len(content) - end]:
-        yield "its signature is not over all of it"
+        yield "its signature does not cover the whole file"
     elif content[begin:end] not in (f"<{written.hex()}>".encode(), f"<{written.hex().upper()}>".encode()):
-        yield "beside its signature there is something else"
+        yield "the gap for its signature has other content"
     container = written[: parser.peek(written)]
     if written[len(container) :].strip(b"\0"):
-        yield "behind its signature there is something else"
+        yield "other content follows its signature"
     if signature.sig_object.get("/SubFilter") != SigSeedSubFilter.PADES.value:
         yield "its signature is of another kind than PAdES"
-    yield from uncovered_in_container(container)
+    yield from find_uncovered_in_container(container)
     if len(dict(attached)) < len(attached):
-        yield "two files of one name are attached to it"
+        yield "two attached files have the same name"
 
 
-def _seen(
+def _inspect_signature(
     name: str, signature: Any, status: Any, trust: Trust, lists: Sequence[CertificateList]
-) -> tuple[Seen, list[Refused]]:
-    """The signature, and why its signer, or who stamped it, is not to be relied on, or nothing."""
+) -> tuple[SignatureReport, list[Refused]]:
+    """Return the signature, and problems of its signer or of its time stamp."""
     stamp = status.timestamp_validity
-    whole = stamp is not None and stamp.intact and stamp.valid
-    stamped = whole and stamp.trusted
+    is_intact = stamp is not None and stamp.intact and stamp.valid
+    stamped = is_intact and stamp.trusted
     chain = [one.dump() for one in (signature.signer_cert, *signature.other_embedded_certs)]
-    lists = lists if stamped else ()  # without a time that is certain they clear nothing
+    lists = lists if stamped else ()  # without a trusted time the lists prove nothing
     moment = stamp.timestamp if stamped else datetime.now(UTC)
     why = why_untrusted(chain, trust, moment, lists) if trust.certificates else ""
-    seen = Seen(
+    report = SignatureReport(
         signer=_name(chain[0]),
         certificate_sha256=sha256(chain[0]).hexdigest(),
         when=stamp.timestamp if stamped else signature.self_reported_timestamp,
         time_server=_name(stamp.signing_cert.dump()) if stamped else None,
         reason=Reason(str(signature.sig_object.get("/Reason", ""))),
         trusted=not why if trust.certificates else None,
-        # who is trusted himself is not asked
+        # a certificate that is trusted itself is not looked up in lists
         long_term=bool(lists and trust.certificates) and not why and chain[0] not in trust.certificates,
     )
     if not trust.certificates:
-        return seen, [signer_unknown(name, seen.signer)]
-    unsure = [signer_not_trusted(name, seen.signer, why)] if why else []
-    if whole and not stamped:
-        unsure.append(stamp_not_trusted(name, _name(stamp.signing_cert.dump())))
-    return seen, unsure
+        return report, [signer_unknown(name, report.signer)]
+    doubts = [signer_not_trusted(name, report.signer, why)] if why else []
+    if is_intact and not stamped:
+        doubts.append(stamp_not_trusted(name, _name(stamp.signing_cert.dump())))
+    return report, doubts
 
 
-def _of_authorities(name: str, signature: Any, trust: Trust) -> Iterator[Refused]:
-    """The problems of the authorities' certificates that come with the signature, which it does not cover."""
+def _check_authorities(name: str, signature: Any, trust: Trust) -> Iterator[Refused]:
+    """Yield problems of the authorities' certificates in the signature's container, which it does not cover."""
     for certificates in certificates_with(signature.pkcs7_content) if trust.certificates else ():
-        for authority in unvouched(certificates, trust):
+        for authority in find_unvouched(certificates, trust):
             yield authority_not_trusted(name, authority.subject.rfc4514_string())
 
 
@@ -126,16 +126,16 @@ def _name(certificate: bytes) -> str:
 
 
 def _lists(reader: PdfFileReader) -> list[CertificateList]:
-    """The authorities' lists of revoked certificates in the document, which its signature covers as all else."""
+    """Return the revocation lists in the document, which its signature covers."""
     try:
-        found = reader.root["/DSS"]["/CRLs"]
+        streams = reader.root["/DSS"]["/CRLs"]
     except KeyError:
         return []
-    return [CertificateList.load(found[number].data) for number in range(len(found))]
+    return [CertificateList.load(streams[number].data) for number in range(len(streams))]
 
 
-def _attached(reader: PdfFileReader) -> Iterator[tuple[str, bytes]]:
-    """The files attached to the document."""
+def _attachments(reader: PdfFileReader) -> Iterator[tuple[str, bytes]]:
+    """Yield the files attached to the document."""
     try:
         names = reader.root["/Names"]["/EmbeddedFiles"]["/Names"]
     except KeyError:

@@ -1,4 +1,4 @@
-"""A certificate signed: the PDF by PAdES (ETSI EN 319 142-1), the digital certificate by XAdES (ETSI EN 319 132-1)."""
+"""Signing of a certificate: the PDF by PAdES (ETSI EN 319 142-1), the digital one by XAdES (ETSI EN 319 132-1)."""
 
 import io
 import logging
@@ -10,16 +10,16 @@ from rig.report.signatures.long_term import Authorities, unfit
 from rig.report.signatures.reason import Reason
 from rig.report.signatures.signatory import DIGEST, Signatory
 
-FIELD = "Laboratory"  # of the form, as readers show it
+FIELD = "Laboratory"  # the form field that readers show
 
 
 def signed_pdf(
     pdf: bytes, by: Signatory, reason: Reason, time_server: str | None = None, authorities: Authorities | None = None
 ) -> bytes:
-    """The PDF with a certification signature, after which no change is permitted: B-B, or B-T by a time server's URL.
+    """Return the PDF with a certification signature that permits no changes: B-B, or B-T with a time server's URL.
 
-    With `authorities` it is B-LT: their lists are in the same revision, under the signature. Raises Refused
-    `time_server` where that gives no time stamp, `revocation_list` where the lists do not clear every certificate.
+    With `authorities` it is B-LT: their lists are in the same revision, under the signature. Raise Refused
+    `time_server` if that gives no time stamp, `revocation_list` if the lists do not cover every certificate.
     """
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
     from pyhanko.sign.fields import MDPPerm, SigSeedSubFilter
@@ -29,7 +29,7 @@ def signed_pdf(
     from pyhanko.sign.timestamps import HTTPTimeStamper, TimestampRequestError
     from pyhanko_certvalidator.errors import PathError, ValidationError
 
-    logging.getLogger("pyhanko").setLevel(logging.CRITICAL)  # what it refuses is said here, by name
+    logging.getLogger("pyhanko").setLevel(logging.CRITICAL)  # problems are named here
     about = PdfSignatureMetadata(
         field_name=FIELD,
         md_algorithm=DIGEST,
@@ -43,7 +43,7 @@ def signed_pdf(
     )
     stamper = None if time_server is None else HTTPTimeStamper(time_server)
     try:
-        made = sign_pdf(IncrementalPdfFileWriter(io.BytesIO(pdf)), about, by.signer, timestamper=stamper)
+        output = sign_pdf(IncrementalPdfFileWriter(io.BytesIO(pdf)), about, by.signer, timestamper=stamper)
     except (SigningError, PathError, ValidationError) as error:
         if authorities is None:
             raise
@@ -56,11 +56,11 @@ def signed_pdf(
             f"{time_server} gives no time stamp: {error}",
             "Give the URL of a server of RFC 3161 with --time-server, or leave it out",
         ) from error
-    return bytes(made.getbuffer())
+    return bytes(output.getbuffer())
 
 
 def signed_xml(xml: bytes, by: Signatory, reason: Reason) -> bytes:
-    """The document with an enveloped signature over its canonical form (C14N 1.1), its time and reason under it."""
+    """Return the document with an enveloped signature over its canonical form (C14N 1.1), with time and reason."""
     from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey
     from lxml import etree
     from signxml.algorithms import SignatureMethod
@@ -75,13 +75,13 @@ def signed_xml(xml: bytes, by: Signatory, reason: Reason) -> bytes:
     )
     key = cast(Any, _Key(by, cast(Any, public).key_size))
     signed = signer.sign(etree.fromstring(xml), key=key, cert=list(by.certificates), always_add_key_value=False)
-    made: bytes = etree.tostring(signed, xml_declaration=True, encoding="UTF-8")
-    return made
+    text: bytes = etree.tostring(signed, xml_declaration=True, encoding="UTF-8")
+    return text
 
 
 @dataclass(frozen=True, slots=True)
 class _Key:
-    """A private key as signxml uses one; it may be in a token, and cannot be had."""
+    """A private key in the form that signxml uses; it may be in a token, without access to its value."""
 
     by: Signatory
     key_size: int

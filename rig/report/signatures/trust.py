@@ -1,4 +1,4 @@
-"""Whom a verifier trusts, and whether a certificate of a key is theirs and is made for signing documents (RFC 5280)."""
+"""Trusted certificates of a verifier, and the check of a signer's certificate for signing documents (RFC 5280)."""
 
 import asyncio
 from collections.abc import Iterator, Sequence
@@ -10,19 +10,19 @@ if TYPE_CHECKING:
     from asn1crypto.crl import CertificateList
     from cryptography.x509 import Certificate
 
-RSA_MIN_BITS, EC_MIN_BITS = 2048, 256  # ETSI TS 119 312, clause 6.2: what is to be used today
+RSA_MIN_BITS, EC_MIN_BITS = 2048, 256  # ETSI TS 119 312, clause 6.2: recommended today
 DOCUMENT_PURPOSES = {
     "1.3.6.1.5.5.7.3.36": "documents (RFC 9336)",
     "1.3.6.1.4.1.311.10.3.12": "documents (Microsoft)",
     "1.2.840.113583.1.1.5": "documents (Adobe)",
-    "1.3.6.1.5.5.7.3.4": "e-mail",  # what authorities gave to who signs documents before RFC 9336
+    "1.3.6.1.5.5.7.3.4": "e-mail",  # issued to signers of documents before RFC 9336
     "2.5.29.37.0": "any purpose",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """Certificates that are trusted (DER), of signers or of their authorities, and the name the signer must have."""
+    """Trusted certificates (DER), of signers or of their authorities, and the required name of the signer."""
 
     certificates: tuple[bytes, ...] = ()
     signer: str | None = None
@@ -34,15 +34,17 @@ def why_untrusted(
     """Return why the signer whose certificate begins this `chain` (DER) is not trusted; empty if it is.
 
     The certificate must be valid at the `moment`, lead to a trusted one, be made for signing documents and bear the
-    expected name. Where there are `lists` of revoked certificates, they have to clear all of the way.
+    expected name. Revocation `lists`, if given, must cover the whole chain.
     """
     from cryptography.x509 import load_der_x509_certificate
 
-    own = load_der_x509_certificate(chain[0])
-    begin, end = own.not_valid_before_utc, own.not_valid_after_utc
-    if not begin <= moment <= end:  # path validation does not ask this of a certificate that is trusted itself
-        return f"the certificate is valid from {begin:%Y-%m-%d} to {end:%Y-%m-%d}, and not on {moment:%Y-%m-%d}"
-    return _no_path(chain, trust, moment, lists) or next(unfit_for_documents(own), "") or _other_name(own, trust.signer)
+    leaf = load_der_x509_certificate(chain[0])
+    begin, end = leaf.not_valid_before_utc, leaf.not_valid_after_utc
+    if not begin <= moment <= end:  # path validation does not test this for a certificate that is trusted itself
+        return f"the certificate is valid from {begin:%Y-%m-%d} to {end:%Y-%m-%d}, not on {moment:%Y-%m-%d}"
+    return (
+        _no_path(chain, trust, moment, lists) or next(unfit_for_documents(leaf), "") or _other_name(leaf, trust.signer)
+    )
 
 
 def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Sequence[CertificateList]") -> str:
@@ -50,7 +52,7 @@ def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Seq
     from pyhanko_certvalidator import CertificateValidator, ValidationContext
     from pyhanko_certvalidator.errors import PathError, ValidationError
 
-    own, *others = map(Certificate.load, chain)
+    certificate, *others = map(Certificate.load, chain)
     context = ValidationContext(
         trust_roots=list(map(Certificate.load, trust.certificates)),
         other_certs=others,
@@ -60,17 +62,17 @@ def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Seq
         allow_fetching=False,
     )
     try:
-        asyncio.run(CertificateValidator(own, validation_context=context).async_validate_usage(set()))
+        asyncio.run(CertificateValidator(certificate, validation_context=context).async_validate_usage(set()))
     except (PathError, ValidationError) as error:
         return " ".join(str(error).split())
     return ""
 
 
 def unfit_for_documents(certificate: "Certificate") -> Iterator[str]:
-    """Yield why a key with this certificate may not sign documents: its key usage, its purposes, a key too short.
+    """Yield why a key with this certificate may not sign documents: its key usage, its purposes, its length.
 
-    An absent key usage permits nothing here, though RFC 5280 (4.2.1.3) lets it permit all: certificates of web servers
-    that small authorities issue often have none.
+    A certificate without key usage is not accepted, although RFC 5280 (4.2.1.3) permits it all usages: certificates of
+    web servers from small authorities often have none.
     """
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
     from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey
@@ -107,10 +109,11 @@ def _other_name(certificate: "Certificate", expected: str | None) -> str:
     return f"the name that --signer expects is {expected}"
 
 
-def unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
-    """Return those of a signer's `chain` but the first, which the signature itself names, whose content may be altered.
+def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
+    """Return certificates of a signer's `chain`, except the first, whose content may have been altered.
 
-    Somebody vouches for one that is trusted itself, or was issued by another of the chain or a trusted one.
+    The signature itself identifies the first. The others must be trusted, or issued by one of the chain or a trusted
+    one.
     """
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_certificate
@@ -121,20 +124,20 @@ def unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate
         for one in chain
         if one != chain[0]
         and one.public_bytes(Encoding.DER) not in trust.certificates
-        and not any(_issued(issuer, one) for issuer in issuers)
+        and not any(_has_issued(issuer, one) for issuer in issuers)
     ]
 
 
 def chain_of(certificates: "Sequence[Certificate]") -> list["Certificate"]:
-    """Return the first of the certificates, and those of the others that lead from it upwards."""
+    """Return the first of the certificates, and those of the others that lead from it to its root."""
     chain, rest = [certificates[0]], [other for other in certificates if other != certificates[0]]
-    while issuers := [other for other in rest if any(_issued(other, one) for one in chain)]:
+    while issuers := [other for other in rest if any(_has_issued(other, one) for one in chain)]:
         chain += issuers
         rest = [other for other in rest if other not in issuers]
     return chain
 
 
-def _issued(issuer: "Certificate", certificate: "Certificate") -> bool:
+def _has_issued(issuer: "Certificate", certificate: "Certificate") -> bool:
     from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 
     try:

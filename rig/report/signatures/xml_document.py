@@ -1,4 +1,4 @@
-"""A signed digital certificate as text and tree: how it is read, and what it must be if nothing of it is unsigned."""
+"""A signed digital certificate as text and tree: how it is read, and its form if all of it is signed."""
 
 import re
 from base64 import b64decode, b64encode
@@ -10,8 +10,8 @@ from signxml.algorithms import CanonicalizationMethod, DigestAlgorithm, Signatur
 from signxml.util import namespaces
 
 NAMES = {"ds": namespaces.ds, "xades": namespaces.xades}
-BEFORE_PROPERTIES = "-SignedProperties"  # in the Id of the signed properties: what stands before it is the signature's
-_ENCODINGS = {  # by the first bytes: how to decode the text, and the names that its declaration may give this
+BEFORE_PROPERTIES = "-SignedProperties"  # suffix of the Id of the signed properties, after the signature's Id
+_ENCODINGS = {  # by the first bytes: the codec, and its names in the declaration
     b"\xff\xfe": ("utf-16", {"utf-16", "utf-16le"}),
     b"\xfe\xff": ("utf-16", {"utf-16", "utf-16be"}),
     b"<\0": ("utf-16-le", {"utf-16", "utf-16le"}),
@@ -27,10 +27,10 @@ _DECLARATION = re.compile(
 
 
 def read_xml(content: bytes) -> Any:
-    """Return the root of a document in UTF-8 or UTF-16, with its declaration or without one.
+    """Return the root of a document in UTF-8 or UTF-16, with or without a declaration.
 
-    The bytes decide about the encoding, so that no two readers take them for different texts. Raises ValueError for
-    another encoding, for a declaration that contradicts the bytes and for a document type, and as lxml does.
+    The bytes decide on the encoding, so that all readers see the same text. Raise ValueError for another encoding, a
+    declaration that contradicts the bytes or a document type, and the errors of lxml.
     """
     codec, names = _ENCODINGS.get(content[:2], _UTF_8)
     text = content.decode(codec)
@@ -38,7 +38,7 @@ def read_xml(content: bytes) -> Any:
     if declaration is not None:
         encoding = declaration["encoding"]
         if encoding is not None and encoding.lower() not in names:
-            raise ValueError(f"it says that its encoding is {encoding}, and it is {codec}")
+            raise ValueError(f"it declares the encoding {encoding}, but is {codec}")
         text = text[declaration.end() :]
     elif re.match(r"<\?xml\s", text):
         raise ValueError("its declaration is not one of XML 1.0 in UTF-8 or UTF-16")
@@ -50,17 +50,17 @@ def read_xml(content: bytes) -> Any:
 
 
 def canonical(root: Any) -> bytes:
-    """Return all that a reader of the document could read: its canonical form (C14N) with comments, from end to end."""
-    made: bytes = etree.tostring(root.getroottree(), method="c14n", with_comments=True)
-    return made
+    """Return all content of the document that a reader can see: its canonical form (C14N) with comments."""
+    text: bytes = etree.tostring(root.getroottree(), method="c14n", with_comments=True)
+    return text
 
 
-def rebuilt(verified: tuple[bytes, bytes, bytes], method: str, value: str) -> Any:
-    """Return the root of the one document that this signature makes whole, built of what is verified and nothing else.
+def rebuild_document(verified: tuple[bytes, bytes, bytes], method: str, value: str) -> Any:
+    """Return the root of the only document that this signature validates, built from verified content alone.
 
-    `verified` are the canonical forms whose digests are signed, of the document without its signature, of the signed
-    properties (XAdES) and of the key's certificates; `method` is that of the signature and `value` its value in base64.
-    All else in it follows from these: the names from the signed properties, the rest from how the rig signs.
+    `verified` are the signed canonical forms: of the document without its signature, of the signed properties (XAdES)
+    and of the key's certificates. `method` is the signature's method and `value` its value in base64. All else follows
+    from these: the names from the signed properties, the rest from the rig's way of signing.
     """
     document, properties, key_info = verified
     root, signed_properties, certificates = map(etree.fromstring, verified)

@@ -1,4 +1,4 @@
-"""The signature of a digital certificate (XAdES): the document must be what can be rebuilt of what is verified."""
+"""The signature of a digital certificate (XAdES): the document must equal one rebuilt from verified content."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -15,7 +15,7 @@ from signxml.xades.xades import XAdESSignatureConfiguration, XAdESVerifier
 
 from rig.report.signatures.findings import (
     Looked,
-    Seen,
+    SignatureReport,
     not_as_signed,
     not_signed,
     signer_not_trusted,
@@ -23,13 +23,13 @@ from rig.report.signatures.findings import (
 )
 from rig.report.signatures.reason import Reason
 from rig.report.signatures.trust import Trust, why_untrusted
-from rig.report.signatures.xml_document import NAMES, canonical, read_xml, rebuilt
+from rig.report.signatures.xml_document import NAMES, canonical, read_xml, rebuild_document
 
 DCC = "{https://ptb.de/dcc}"
 
 
-def seen_xml(name: str, content: bytes, trust: Trust) -> Looked:
-    """Return what an XML document's signature shows. Raises whatever its reader does of a damaged one."""
+def inspect_xml(name: str, content: bytes, trust: Trust) -> Looked:
+    """Return the inspection of an XML document's signature. Raise the errors of its reader for a damaged file."""
     root = read_xml(content)
     signature = root.find("ds:Signature", NAMES)
     if signature is None:
@@ -38,57 +38,57 @@ def seen_xml(name: str, content: bytes, trust: Trust) -> Looked:
     chain = [load_pem_x509_certificate(add_pem_header(text)) for text in texts]
     method = _method(chain[0])
     try:
-        signed = _signed(root, chain[0], method)
+        signed = _verify(root, chain[0], method)
     except SignXMLException as error:
         return Looked(problems=(not_as_signed(name, " ".join(str(error).split())),))
     document, properties, key_info = signed  # in this order
     value = signature.findtext("ds:SignatureValue", "", NAMES)
     verified = (document.signed_data, properties.signed_data, key_info.signed_data)
-    if canonical(root) != canonical(rebuilt(verified, method.value, value)):
-        return Looked(problems=(not_as_signed(name, "it holds something that its signature does not cover"),))
+    if canonical(root) != canonical(rebuild_document(verified, method.value, value)):
+        return Looked(problems=(not_as_signed(name, "it has content that its signature does not cover"),))
     if not _is_one_certificate(document.signed_xml):
-        why = "what is signed is no digital certificate with one set of results"
+        why = "the signed document is not a digital certificate with one set of results"
         return Looked(problems=(not_as_signed(name, why),))
-    seen, problems = _seen(name, chain, properties.signed_xml, trust)
-    return Looked((seen,), {}, problems)
+    report, problems = _inspect(name, chain, properties.signed_xml, trust)
+    return Looked((report,), {}, problems)
 
 
-def _method(own: Certificate) -> SignatureMethod:
-    """The method by which the rig signs with a key of this kind."""
-    rsa = isinstance(own.public_key(), RSAPublicKey)
+def _method(certificate: Certificate) -> SignatureMethod:
+    """Return the method by which the rig signs with a key of this kind."""
+    rsa = isinstance(certificate.public_key(), RSAPublicKey)
     return SignatureMethod.RSA_SHA256 if rsa else SignatureMethod.ECDSA_SHA256
 
 
-def _signed(root: Any, own: Certificate, method: SignatureMethod) -> Any:
-    """What the key of this certificate has signed. Raises SignXMLException."""
+def _verify(root: Any, certificate: Certificate, method: SignatureMethod) -> Any:
+    """Return the content signed by the key of this certificate. Raise SignXMLException."""
     form = XAdESSignatureConfiguration(
         location="./",
         expect_references=3,
         signature_methods=frozenset({method}),
         digest_algorithms=frozenset({DigestAlgorithm.SHA256}),
-        verification_time=own.not_valid_after_utc,  # whether it is valid is asked later, of the moment that counts
+        verification_time=certificate.not_valid_after_utc,  # its validity is tested later, for the relevant moment
     )
-    return XAdESVerifier().verify(root, x509_cert=own, expect_config=form)
+    return XAdESVerifier().verify(root, x509_cert=certificate, expect_config=form)
 
 
 def _is_one_certificate(root: Any) -> bool:
     results = list(root.iter(f"{DCC}measurementResults"))
-    return root.tag == f"{DCC}digitalCalibrationCertificate" and [each.getparent() for each in results] == [root]
+    return root.tag == f"{DCC}digitalCalibrationCertificate" and [element.getparent() for element in results] == [root]
 
 
-def _seen(name: str, chain: Sequence[Certificate], properties: Any, trust: Trust) -> tuple[Seen, Any]:
-    """The signature, and why its signer is not to be relied on, or nothing."""
-    said = properties.findtext(".//xades:SigningTime", None, NAMES)
-    der = [each.public_bytes(Encoding.DER) for each in chain]
+def _inspect(name: str, chain: Sequence[Certificate], properties: Any, trust: Trust) -> tuple[SignatureReport, Any]:
+    """Return the signature, and the problem of its signer, if any."""
+    time = properties.findtext(".//xades:SigningTime", None, NAMES)
+    der = [certificate.public_bytes(Encoding.DER) for certificate in chain]
     why = why_untrusted(der, trust, datetime.now(UTC)) if trust.certificates else ""
-    seen = Seen(
+    report = SignatureReport(
         signer=chain[0].subject.rfc4514_string(),
         certificate_sha256=chain[0].fingerprint(SHA256()).hex(),
-        when=None if said is None else datetime.fromisoformat(said),
+        when=None if time is None else datetime.fromisoformat(time),
         time_server=None,
         reason=Reason(properties.findtext(".//xades:DataObjectFormat/xades:Description", "", NAMES)),
         trusted=not why if trust.certificates else None,
     )
     if not trust.certificates:
-        return seen, (signer_unknown(name, seen.signer),)
-    return seen, (signer_not_trusted(name, seen.signer, why),) if why else ()
+        return report, (signer_unknown(name, report.signer),)
+    return report, (signer_not_trusted(name, report.signer, why),) if why else ()

@@ -1,1 +1,1 @@
-"""The numbers of a result as terminal, certificate and digital certificate state them."""
+"""The numbers of a result for terminal, certificate and digital certificate."""

@@ -1,4 +1,4 @@
-"""What tables of all three kinds of sensors share: three numbers in a line, three axes in a table."""
+"""The common parts of tables of all kinds of sensors: three numbers in a line, three axes in a table."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,7 +17,7 @@ FEWEST_DECIMALS = 5
 
 
 def triple(values: Iterable[float], form: str) -> str:
-    """Three numbers, each formatted so, with spaces between."""
+    """Return three formatted numbers with spaces between."""
     return " ".join(f"{value:{form}}" for value in values)
 
 
@@ -30,51 +30,51 @@ def scale_and_bias_table(
     *,
     heading: str,
 ) -> Table:
-    """Scale factor and bias (SI) of each axis, ± their expanded uncertainties, which are headed so.
+    """Return scale factor and bias (SI) of each axis with their expanded uncertainties under `heading`.
 
-    With as many decimals as the smallest uncertainty warrants.
+    The number of decimals follows from the smallest uncertainty.
     """
     unit, size, axes = quantity.bias.name, quantity.bias.size, len(scale)
     table = Table(title=plain(title, "table.title"), title_justify="left")
-    for each in ("axis", "scale factor", heading, f"bias {unit}", f"± U {unit}"):
-        table.add_column(each, justify="left" if each == "axis" else "right")
-    biases, widths = ([float(each) / size for each in values] for values in (bias, expanded[axes:]))
-    of_scale, of_bias = decimals(expanded[:axes]), decimals(widths, quantity.decimals)
+    for name in ("axis", "scale factor", heading, f"bias {unit}", f"± U {unit}"):
+        table.add_column(name, justify="left" if name == "axis" else "right")
+    biases, widths = ([float(value) / size for value in values] for values in (bias, expanded[axes:]))
+    scale_decimals, bias_decimals = decimals(expanded[:axes]), decimals(widths, quantity.decimals)
     for i, axis in enumerate(quantity.axes):
         table.add_row(
             axis,
-            f"{scale[i]:.{of_scale}f}",
-            f"{expanded[i]:.{of_scale}f}",
-            f"{biases[i]:+.{of_bias}f}",
-            f"{widths[i]:.{of_bias}f}",
+            f"{scale[i]:.{scale_decimals}f}",
+            f"{expanded[i]:.{scale_decimals}f}",
+            f"{biases[i]:+.{bias_decimals}f}",
+            f"{widths[i]:.{bias_decimals}f}",
         )
     return table
 
 
 def decimals(uncertainties: Sequence[float], fewest: int = FEWEST_DECIMALS) -> int:
-    """How many the smallest of them warrants, which is printed with two digits; so many at least."""
+    """Return the decimals of values whose smallest uncertainty is printed with two digits, at least `fewest`."""
     smallest = min(uncertainties)
     return max(fewest, 1 - math.floor(math.log10(smallest))) if smallest > 0 else fewest
 
 
 def line_of(term: Term, lead: str, form: str, width: str = ".2g") -> str:
-    """A characteristic's numbers in a line behind what it is called there, with the largest U."""
+    """Return a characteristic's numbers in a line behind `lead`, with the largest U."""
     _, values, widths = zip(*term.printed, strict=True)
-    unit, words = term.units.shown.name, factor_words(term.known.freedom)
+    unit, words = term.units.shown.name, factor_words(term.numbers.freedom)
     return f"{lead}: {triple(values, form)} {unit} (± {max(widths):{width}}, {words})"
 
 
 def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:
-    """F row by row and the angles between its axes, ± U; `covariance` (9, 9) is that of F, row by row.
+    """Yield F row by row and the angles between its axes, ± U; `covariance` (9, 9) is that of F, row by row.
 
-    The coverage `factor` is that of the scale factors, the largest of them.
+    `factor` is the coverage factor, the largest of the scale factors'.
     """
-    spread = factor * np.sqrt(np.diag(covariance)).reshape(3, 3)
-    for axis, row, known in zip("xyz", matrix.tolist(), spread.tolist(), strict=True):
-        elements = (f"{element:+.6f} ± {each:.1e}" for element, each in zip(row, known, strict=True))
+    widths = factor * np.sqrt(np.diag(covariance)).reshape(3, 3)
+    for axis, row, row_widths in zip("xyz", matrix.tolist(), widths.tolist(), strict=True):
+        elements = (f"{element:+.6f} ± {width:.1e}" for element, width in zip(row, row_widths, strict=True))
         yield f"F {axis}: " + "  ".join(elements)
     axes = SensorAxes.of(matrix)
     stds = axes.non_orthogonality_std_rad(covariance)
     angles = zip(1e3 * axes.non_orthogonality_rad, 1e3 * factor * stds, strict=True)
-    told = "  ".join(f"{angle:+.3f} ± {known:.2g}" for angle, known in angles)
-    yield f"non-orthogonality yz zx xy: {told} mrad (U, k = {factor:.3g})"
+    printed = "  ".join(f"{angle:+.3f} ± {width:.2g}" for angle, width in angles)
+    yield f"non-orthogonality yz zx xy: {printed} mrad (U, k = {factor:.3g})"

@@ -1,4 +1,4 @@
-"""The numbers of a certificate as they are printed: rounded, with their signs and units."""
+"""The numbers of a certificate in print: rounded, with their signs and units."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -29,7 +29,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class AxisRow:
-    """One axis: scale factor and bias, the latter in two units where there is another."""
+    """One axis: scale factor and bias, the bias in a second unit if there is one."""
 
     axis: str
     scale: Pair
@@ -39,7 +39,7 @@ class AxisRow:
 
 @dataclass(frozen=True, slots=True)
 class CheckRow:
-    """One limit, and what was found."""
+    """One limit and the value compared with it."""
 
     name: str
     value: str
@@ -51,66 +51,66 @@ class CheckRow:
 
 
 def kind(part: str) -> str:
-    """What the maker calls it."""
+    """Return the maker's name of a part."""
     return part if part == NOT_STATED else part.removesuffix("_magnetometer").upper()
 
 
 def pair(value: float, uncertainty: float) -> Pair:
-    """Rounded together; a value that has no uncertainty at all is printed with nine digits."""
+    """Return a value and its uncertainty, rounded together; without an uncertainty the value has nine digits."""
     if not uncertainty > 0:
         return Pair(f"{value:.9g}".replace("-", "−"), "0")
-    found = rounded(value, uncertainty)
-    return Pair(found.value_text, found.uncertainty_text)
+    rounded_pair = rounded(value, uncertainty)
+    return Pair(rounded_pair.value_text, rounded_pair.uncertainty_text)
 
 
 def axis_rows(sensor: GyroscopeEntry) -> list[AxisRow]:
-    """A gyroscope's axes with U of the budget; without one, with the noise's deviation, as the page then says."""
-    return rows_of(sensor.scale, sensor.bias_rad_s, _spread(sensor), too=degrees_of(sensor)[1])
+    """Return a gyroscope's axes with U of the budget; without one, with the standard deviation of the noise."""
+    return rows_of(sensor.scale, sensor.bias_rad_s, _widths(sensor), too=degrees_of(sensor)[1])
 
 
 def rows_of(
     scale: Sequence[float],
     bias: Sequence[float],
-    spread: Sequence[float],
+    widths: Sequence[float],
     *,
     size: float = 1.0,
     too: float | None = None,
 ) -> list[AxisRow]:
-    """Each axis with U, the `spread` of scale factors and biases; the bias times `size`, and times `too`."""
+    """Return each axis with U from `widths` of scale factors and biases; the bias times `size`, and times `too`."""
 
     def bias_in(unit: float, i: int) -> Pair:
-        return pair(unit * bias[i], unit * spread[3 + i])
+        return pair(unit * bias[i], unit * widths[3 + i])
 
     return [
-        AxisRow(axis, pair(scale[i], spread[i]), bias_in(size, i), None if too is None else bias_in(too, i))
+        AxisRow(axis, pair(scale[i], widths[i]), bias_in(size, i), None if too is None else bias_in(too, i))
         for i, axis in enumerate(AXES)
     ]
 
 
 def degrees_of(sensor: GyroscopeEntry) -> tuple[str, float]:
-    """The unit that biases are printed in beside rad/s, and what takes rad/s there: hours where it is a fine one."""
-    return ("°/s", DEG) if DEG * max(_spread(sensor)[3:]) >= FINE_DEG_S else ("°/h", 3600 * DEG)
+    """Return the unit in which biases are printed in addition to rad/s, and its factor: °/h if U is small."""
+    return ("°/s", DEG) if DEG * max(_widths(sensor)[3:]) >= FINE_DEG_S else ("°/h", 3600 * DEG)
 
 
-def _spread(sensor: GyroscopeEntry) -> Sequence[float]:
+def _widths(sensor: GyroscopeEntry) -> Sequence[float]:
     if sensor.budget is None:
         return [sensor.covariance[i][i] ** 0.5 for i in range(6)]
     return sensor.budget.expanded
 
 
 def check_row(check: CheckEntry) -> CheckRow:
-    """What was not measured or not limited reads so."""
+    """Return a check in print; missing values and limits read so."""
     value, uncertainty = ("not measured" if check.value is None else f"{check.value:.4g}"), "not stated"
     if check.value is not None and check.uncertainty:
-        found = pair(check.value, check.uncertainty)
-        value, uncertainty = found.value, found.uncertainty
+        printed = pair(check.value, check.uncertainty)
+        value, uncertainty = printed.value, printed.uncertainty
     limit = "not set" if check.limit is None else f"{check.limit:g}"
     risk = "–" if check.false_acceptance_probability is None else percent(check.false_acceptance_probability)
     return CheckRow(check.name, value, uncertainty, limit, risk, check.passed, check.unit)
 
 
 def verification_rows(entry: VerificationEntry) -> Iterator[tuple[str, ...]]:
-    """A verification's axes: RMS as found and as left; largest mean over a revolution as found and as left; rad/s."""
+    """Yield a verification's axes: RMS as found and left; largest mean over a revolution as found and left; rad/s."""
     for i, axis in enumerate(AXES):
         yield (
             axis,
@@ -126,12 +126,12 @@ def _largest_turn(errors: Sequence[Sequence[float]], axis: int) -> str:
 
 
 def pairs(term: Term) -> list[tuple[str, Pair]]:
-    """A characteristic's numbers by their labels, in the unit that they are shown in, with U."""
+    """Return a characteristic's numbers by their labels, in the unit in which they are shown, with U."""
     return [(label, pair(value, width)) for label, value, width in term.printed]
 
 
 def earth_rate_rows(entry: EarthRateEntry) -> list[tuple[str, str, Pair]]:
-    """Name, unit, and value with U."""
+    """Return name, unit, and value with U."""
     (k,) = expanded([1.0], entry.freedoms(1)).factors
     std = np.sqrt(np.diag(entry.covariance_rad2_s2))
     rows = [("size", "rad/s", pair(entry.norm_rad_s, k * entry.norm_std_rad_s))]

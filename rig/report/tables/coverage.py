@@ -1,4 +1,4 @@
-"""What a certificate says of coverage: k beside the values, and the sentence of EA-4/02 below them."""
+"""The coverage statements of a certificate: k with the values, and the sentence of EA-4/02 below them."""
 
 import math
 from collections.abc import Sequence
@@ -12,18 +12,18 @@ QUANTITIES = ("scale factors", "biases")
 
 
 def factor_note(budget: BudgetEntry) -> str:
-    """What stands beside ± U: k where it is one number for all values, as it is printed."""
-    printed = {f"{each:.2f}" for each in budget.coverage_factors}
+    """Return the note on U: k if it is one number for all values in print."""
+    printed = {f"{factor:.2f}" for factor in budget.coverage_factors}
     return f"k\u00a0=\u00a0{_short(printed.pop())}" if len(printed) == 1 else "k as stated below"
 
 
 def coverage_sentence(budget: BudgetEntry) -> str:
-    """What k stands for: the sentence of EA-4/02 M:2022, 6.4, or that of its annex E where freedom is scarce."""
+    """Return the statement on k: the sentence of EA-4/02 M:2022, 6.4, or of its annex E for few degrees of freedom."""
     begins = (
         "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
         "coverage factor k"
     )
-    factors = [f"{each:.2f}" for each in budget.coverage_factors]
+    factors = [f"{factor:.2f}" for factor in budget.coverage_factors]
     covers = min(budget.coverage_probabilities)
     if len(set(factors)) > 1:
         groups = [_group(budget, factors, 3 * i, name) for i, name in enumerate(QUANTITIES)]
@@ -45,16 +45,16 @@ def coverage_sentence(budget: BudgetEntry) -> str:
 
 
 def _group(budget: BudgetEntry, factors: Sequence[str], first: int, name: str) -> str:
-    """k of the three axes, once where it is the same."""
-    own, known = factors[first : first + 3], budget.effective_dof[first : first + 3]
-    if len(set(own)) == 1:
-        return f"{name} k\u00a0=\u00a0{own[0]} (ν_eff\u00a0≥\u00a0{freedom_text(min(known))})"
-    each = (f"{axis} {k} ({freedom_text(freedom)})" for axis, k, freedom in zip(AXES, own, known, strict=True))
-    return f"{name} k (ν_eff): {', '.join(each)}"
+    """Return k of the three axes, once if they are the same."""
+    axis_factors, dofs = factors[first : first + 3], budget.effective_dof[first : first + 3]
+    if len(set(axis_factors)) == 1:
+        return f"{name} k\u00a0=\u00a0{axis_factors[0]} (ν_eff\u00a0≥\u00a0{freedom_text(min(dofs))})"
+    texts = (f"{axis} {k} ({freedom_text(dof)})" for axis, k, dof in zip(AXES, axis_factors, dofs, strict=True))
+    return f"{name} k (ν_eff): {', '.join(texts)}"
 
 
 def _percent(probability: float) -> str:
-    """Whole, and in full where it is what the coverage factor was chosen for."""
+    """Return whole percent; in full for the probability that defines the coverage factor."""
     full = f" ({100 * PROBABILITY:.2f} %)" if math.isclose(probability, PROBABILITY, abs_tol=5e-5) else ""
     return f"{100 * probability:.0f} %{full}"
 

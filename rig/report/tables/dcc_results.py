@@ -1,4 +1,4 @@
-"""The results of a digital certificate: values in full, with U or with their covariance, quantity by quantity."""
+"""The results of a digital certificate: values with all digits, with U or their covariance, by quantity."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from xml.etree.ElementTree import Element
@@ -19,118 +19,126 @@ from rig.report.findings.characteristic import Term
 from rig.report.tables.certificate import AXES, JOINT_FACTOR
 from rig.report.tables.coverage import coverage_sentence
 from rig.report.tables.xml_parts import dcc, real_list, text
+from rig.report.words.detection_limit_words import list_limits
 from rig.report.words.expanded import Expanded, expanded, factor_words
-from rig.report.words.told_words import told_words
 from rig.report.words.validity_words import load_words, speed_words, when_words
 
 ONE, ANGLE = r"\one", r"\radian"
-Known = tuple[Sequence[float], Sequence[float], Sequence[Freedom] | None]
+ValuesAndStds = tuple[Sequence[float], Sequence[float], Sequence[Freedom] | None]
 # Of three values at once: √χ² of three degrees of freedom at 95 %.
 JOINT_FACTOR_3 = 2.795
 SOLUTION = "± U of the solution"
 
 
 def gyroscope(sensor: GyroscopeEntry) -> Iterator[Element]:
-    """Scale factors and biases with U of the budget, and with the combined covariance; what else was found of it."""
-    budget, covariance = _known_whole(sensor)
-    covered, (scale, bias) = coverage_sentence(budget), _expanded(budget)
+    """Yield scale factors and biases with U of the budget, and with the combined covariance."""
+    budget, covariance = _full_uncertainty(sensor)
+    covered, (scale, bias) = coverage_sentence(budget), _widths(budget)
     model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
-    yield _result("scale factor", f"{model} {_speed(sensor)}{_at(sensor.scale_conditions)}"
-                  f"{_told(sensor.detection_limits)}{covered}",
+    yield _result("scale factor", f"{model} {_speed(sensor)}{_conditions(sensor.scale_conditions)}"
+                  f"{_detection_limits(sensor.detection_limits)}{covered}",
                   real_list(AXES, sensor.scale, [ONE], expanded=scale))  # fmt: skip
-    yield _result("bias", f"{model} {_at(sensor.bias_conditions)}{covered}",
+    yield _result("bias", f"{model} {_conditions(sensor.bias_conditions)}{covered}",
                   real_list(AXES, sensor.bias_rad_s, [RATE.d_si], expanded=bias))  # fmt: skip
     yield _joint([*sensor.scale, *sensor.bias_rad_s], covariance, RATE.d_si)
 
 
 def accelerometer(entry: AccelerometerEntry) -> Iterator[Element]:
-    """Relative to the stated gravity, with U of the budget and the combined covariance."""
-    said = f"{entry.model}: specific force s, reading a, k = 1/‖row of F‖, gravity {entry.gravity_m_s2!r} m/s²."
-    yield from _relative(entry, [*entry.scale, *entry.bias_m_s2], ACCELERATION.d_si, said)
+    """Yield scale factors and biases relative to the stated gravity, with U and the combined covariance."""
+    statement = f"{entry.model}: specific force s, reading a, k = 1/‖row of F‖, gravity {entry.gravity_m_s2!r} m/s²."
+    yield from _relative(entry, [*entry.scale, *entry.bias_m_s2], ACCELERATION.d_si, statement)
 
 
-def magnetometer(entry: MagnetometerEntry, turned: ReversalEntry | None) -> Iterator[Element]:
-    """Relative to the stated field, as mounted, with U of the budget and the combined covariance.
+def magnetometer(entry: MagnetometerEntry, reversal: ReversalEntry | None) -> Iterator[Element]:
+    """Yield scale factors and biases relative to the stated field, as mounted, with U and the combined covariance.
 
-    First, of a sensor that was turned over, its own bias.
+    If the sensor was turned over, its own bias comes first.
     """
-    if turned is not None:
-        yield from _reversed(turned)
-    said = f"{entry.model}: magnetic flux density B, reading m, k = 1/‖row of F‖, for a field of {entry.field_t!r} T."
+    if reversal is not None:
+        yield from _reversal(reversal)
+    remark = f"{entry.model}: magnetic flux density B, reading m, k = 1/‖row of F‖, field {entry.field_t!r} T."
     if entry.arm_field_in_bias:
-        said += " As mounted in this run: the field of the arm is in the bias, and the uncertainty does not cover it."
-    yield from _relative(entry, [*entry.scale, *entry.bias_t], FIELD.d_si, said, ", as mounted")
+        remark += " As mounted in this run: the bias includes the arm's field, which the uncertainty does not cover."
+    yield from _relative(entry, [*entry.scale, *entry.bias_t], FIELD.d_si, remark, ", as mounted")
 
 
-def beside(characteristics: Iterable[Term]) -> Iterator[Element]:
-    """What was found of a sensor beside scale and bias, with U by its standard deviations."""
-    for each in characteristics:
-        of, known = each.characteristic, each.known
-        said = f"{remark} {SOLUTION}" if (remark := of.remark(each.finding.entry)) else SOLUTION
-        yield _spread(each.name, said, of.labels, (known.values, known.stds, known.freedom), each.units.d_si)
+def further_results(characteristics: Iterable[Term]) -> Iterator[Element]:
+    """Yield quantities other than scale and bias, with U by their standard deviations."""
+    for term in characteristics:
+        characteristic, numbers = term.characteristic, term.numbers
+        remark = characteristic.remark(term.finding.entry)
+        statement = f"{remark} {SOLUTION}" if remark else SOLUTION
+        values = numbers.values, numbers.stds, numbers.freedom
+        yield _wide_result(term.name, statement, characteristic.labels, values, term.units.d_si)
 
 
-def _reversed(entry: ReversalEntry) -> Iterator[Element]:
-    """A turned magnetometer's own bias and the arm's field, with the covariance of both."""
-    mixed = [axis for axis, held in zip(AXES, entry.arm_field_in_bias, strict=True) if held]
-    began = ", ".join(run.started_utc for run in entry.runs)
-    said = f"From runs of {began}, between which it was turned over. ± U"
+def _reversal(entry: ReversalEntry) -> Iterator[Element]:
+    """Yield a turned magnetometer's own bias and the arm's field, with the covariance of both."""
+    mixed = [axis for axis, is_mixed in zip(AXES, entry.arm_field_in_bias, strict=True) if is_mixed]
+    starts = ", ".join(run.started_utc for run in entry.runs)
+    statement = f"From runs of {starts}, between which it was turned over. ± U"
     if mixed:
-        said += f" Along {', '.join(mixed)} it was never turned over: there the arm's field is in the bias."
-    yield _spread("scale factor", said, AXES, (entry.scale, entry.scale_std, entry.scale_degrees_of_freedom), ONE)
-    yield _spread("own bias", said, AXES, (entry.bias_t, entry.bias_std_t, entry.bias_degrees_of_freedom), FIELD.d_si)
+        statement += f" Along {', '.join(mixed)} it was not turned over: there the bias includes the arm's field."
+    yield _wide_result(
+        "scale factor", statement, AXES, (entry.scale, entry.scale_std, entry.scale_degrees_of_freedom), ONE
+    )
+    yield _wide_result(
+        "own bias", statement, AXES, (entry.bias_t, entry.bias_std_t, entry.bias_degrees_of_freedom), FIELD.d_si
+    )
     names = ("bx", "by", "bz", "arm x", "arm y", "arm z")
     values = [*entry.bias_t, *entry.arm_field_t]
     yield _result(
         "own bias and the arm's field in the axes of the first run with their covariance",
-        f"{said} The ellipsoid holds all six values at once with a probability of 95 %.",
+        f"{statement} The ellipsoid holds all six values at once with a probability of 95 %.",
         real_list(
             [name.replace(" ", "_") for name in names], values, [FIELD.d_si], region=(entry.covariance, JOINT_FACTOR)
         ),
     )
 
 
-def bias_drift(entry: DriftEntry, of: Quantity) -> Iterator[Element]:
-    """The bias of each repeat."""
+def bias_drift(entry: DriftEntry, quantity: Quantity) -> Iterator[Element]:
+    """Yield the bias of each repeat."""
     labels = [str(number) for number in range(1, len(entry.repeats) + 1)]
     for i, axis in enumerate(AXES):
         values, stds = zip(
-            *((each.scale_fixed.bias[i], each.scale_fixed.std[i]) for each in entry.repeats), strict=True
+            *((repeat.scale_fixed.bias[i], repeat.scale_fixed.std[i]) for repeat in entry.repeats), strict=True
         )
-        said = f"What the reading adds, scale and axes held; beside what differs between repeats all share a standard \
-deviation of {entry.common_std[i]!r} {entry.unit}. ± U of what differs"
+        remark = (
+            f"Bias of the reading, scale and axes fixed; all repeats have a common standard deviation of "
+            f"{entry.common_std[i]!r} {entry.unit} in addition. ± U of the differences"
+        )
         freedom = [entry.degrees_of_freedom[i]] * len(labels)
-        yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds, freedom), of.d_si)
+        yield _wide_result(f"bias along {axis} by repeat", remark, labels, (values, stds, freedom), quantity.d_si)
 
 
-def over_temperature(entry: OverTemperatureEntry, of: Quantity) -> Iterator[Element]:
-    """Scale and bias of each axis at the temperatures of the table, with U."""
+def over_temperature(entry: OverTemperatureEntry, quantity: Quantity) -> Iterator[Element]:
+    """Yield scale and bias of each axis at the temperatures of the table, with U."""
     low, high = entry.range_c
     labels = [f"{row.temperature_c:.6g}_degC" for row in entry.table]
-    held = f"At temperatures of the item's own thermometer; holds from {low!r} to {high!r} °C only"
+    statement = f"At temperatures of the item's own thermometer; valid from {low!r} to {high!r} °C only"
     for i, axis in enumerate(AXES):
-        for name, which, units in (("scale factor", "scale", ONE), ("bias", "bias", of.d_si)):
+        for name, which, units in (("scale factor", "scale", ONE), ("bias", "bias", quantity.d_si)):
             values = [getattr(row, which)[i] for row in entry.table]
             widths = [getattr(row, f"expanded_{which}")[i] for row in entry.table]
-            stated = Expanded(widths, *([each] * len(labels) for each in (COVERAGE_FACTOR, PROBABILITY)))
-            yield _result(f"{name} along {axis} over temperature", f"{held}. ± U, about 95 %.",
+            stated = Expanded(widths, *([number] * len(labels) for number in (COVERAGE_FACTOR, PROBABILITY)))
+            yield _result(f"{name} along {axis} over temperature", f"{statement}. ± U, about 95 %.",
                           real_list(labels, values, [units], expanded=stated))  # fmt: skip
 
 
 def verification(entry: VerificationEntry) -> Iterator[Element]:
-    """RMS against a reference, as found and as left."""
-    said = f"RMS of reading less reference {entry.reference}; holds the noise of both, no uncertainty was evaluated."
+    """Yield the RMS against a reference, as found and as left."""
+    statement = f"RMS of reading minus reference {entry.reference}; includes the noise of both, without uncertainty."
     if entry.before is not None:
-        yield _result("as found", said, real_list(AXES, entry.before.movement.rms_rad_s, [RATE.d_si]))
-    yield _result("as left", said, real_list(AXES, entry.after.movement.rms_rad_s, [RATE.d_si]))
+        yield _result("as found", statement, real_list(AXES, entry.before.movement.rms_rad_s, [RATE.d_si]))
+    yield _result("as left", statement, real_list(AXES, entry.after.movement.rms_rad_s, [RATE.d_si]))
 
 
 def earth_rate(entry: EarthRateEntry) -> Iterator[Element]:
-    """The rate with its covariance, and the place by that rate."""
-    said = "As found in the frame of the arm's base. The ellipsoid holds all three values with a probability of 95 %."
+    """Yield the rate with its covariance, and the site by that rate."""
+    statement = "In the frame of the arm's base. The ellipsoid holds all three values with a probability of 95 %."
     rate = real_list(AXES, entry.rate_rad_s, [RATE.d_si], region=(entry.covariance_rad2_s2, JOINT_FACTOR_3))
-    yield _result("Earth's rate", said, rate)
-    yield _spread(
+    yield _result("Earth's rate", statement, rate)
+    yield _wide_result(
         "latitude by that rate",
         SOLUTION,
         ["latitude"],
@@ -138,23 +146,23 @@ def earth_rate(entry: EarthRateEntry) -> Iterator[Element]:
         ANGLE,
     )
     if entry.heading_rad is not None and entry.heading_std_rad is not None:
-        said = f"Where the x axis of the arm's base points, from north over east. {SOLUTION}"
+        statement = f"Direction of the x axis of the arm's base, from north over east. {SOLUTION}"
         heading = [entry.heading_rad], [entry.heading_std_rad], entry.freedoms(1)
-        yield _spread("heading by that rate", said, ["heading"], heading, ANGLE)
+        yield _wide_result("heading by that rate", statement, ["heading"], heading, ANGLE)
 
 
 def _relative(
     entry: AccelerometerEntry | MagnetometerEntry, numbers: list[float], unit: str, statement: str, how: str = ""
 ) -> Iterator[Element]:
-    covered, (scale, bias) = coverage_sentence(entry.budget), _expanded(entry.budget)
-    statement = f"{statement} {_at(entry.conditions)}{_told(entry.detection_limits)}{covered}"
+    covered, (scale, bias) = coverage_sentence(entry.budget), _widths(entry.budget)
+    statement = f"{statement} {_conditions(entry.conditions)}{_detection_limits(entry.detection_limits)}{covered}"
     yield _result(f"scale factor{how}", statement, real_list(AXES, numbers[:3], [ONE], expanded=scale))
     yield _result(f"bias{how}", statement, real_list(AXES, numbers[3:], [unit], expanded=bias))
     yield _joint(numbers, entry.covariance_combined, unit, how)
 
 
-def _known_whole(entry: GyroscopeEntry) -> tuple[BudgetEntry, Matrix6]:
-    """The budget and the covariance that combines it. Raises Refused `no_digital_certificate` where one is missing."""
+def _full_uncertainty(entry: GyroscopeEntry) -> tuple[BudgetEntry, Matrix6]:
+    """Return the budget and the combined covariance. Raise Refused `no_digital_certificate` if one is missing."""
     if entry.budget is None or entry.covariance_combined is None:
         raise Refused(
             "no_digital_certificate",
@@ -164,28 +172,28 @@ def _known_whole(entry: GyroscopeEntry) -> tuple[BudgetEntry, Matrix6]:
     return entry.budget, entry.covariance_combined
 
 
-def _at(when: ConditionsEntry | None) -> str:
-    """When it was read, and how warm it was; nothing of readings of a file, whose times nobody knows."""
+def _conditions(when: ConditionsEntry | None) -> str:
+    """Return time and temperature of the readings as a sentence; nothing for files without them."""
     words = "" if when is None else f"{when_words(when)}. "
     return words[:1].upper() + words[1:]
 
 
-def _told(damages: Sequence[DetectionLimitEntry]) -> str:
-    """What would have contradicted itself."""
-    return f"Told in 95 of 100 measurements: {told_words(damages)}. " if damages else ""
+def _detection_limits(limits: Sequence[DetectionLimitEntry]) -> str:
+    """Return the detection limits as a sentence."""
+    return f"Detected in 95 of 100 measurements: {list_limits(limits)}. " if limits else ""
 
 
 def _speed(sensor: GyroscopeEntry) -> str:
-    """The rates at which a gyroscope was calibrated, in words."""
+    """Return the rates at which a gyroscope was calibrated, in words."""
     loads = load_words(sensor)
-    along = "" if loads is None else f"; along the item's own axes the sweeps turned it by {loads} °/s"
-    return f"At {speed_words(sensor)} °/s{along}. " if sensor.speeds_rad_s else ""
+    axis_rates = "" if loads is None else f"; along the item's own axes {loads} °/s"
+    return f"At {speed_words(sensor)} °/s{axis_rates}. " if sensor.speeds_rad_s else ""
 
 
-def _expanded(budget: BudgetEntry) -> tuple[Expanded, Expanded]:
-    """The expanded uncertainties of scale factors and of biases."""
-    of = budget.expanded, budget.coverage_factors, budget.coverage_probabilities
-    return Expanded(*(each[:3] for each in of)), Expanded(*(each[3:] for each in of))
+def _widths(budget: BudgetEntry) -> tuple[Expanded, Expanded]:
+    """Return the expanded uncertainties of scale factors and of biases."""
+    columns = budget.expanded, budget.coverage_factors, budget.coverage_probabilities
+    return Expanded(*(column[:3] for column in columns)), Expanded(*(column[3:] for column in columns))
 
 
 def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: str, how: str = "") -> Element:
@@ -196,9 +204,11 @@ def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: st
     )
 
 
-def _spread(name: str, statement: str, labels: Sequence[str], known: Known, unit: str) -> Element:
-    """Values with U, from these, their standard deviations and the degrees of freedom."""
-    numbers, stds, freedom = known
+def _wide_result(
+    name: str, statement: str, labels: Sequence[str], values_and_stds: ValuesAndStds, unit: str
+) -> Element:
+    """Return values with U, by their standard deviations and degrees of freedom."""
+    numbers, stds, freedom = values_and_stds
     words = f"{statement}, {factor_words(freedom)}."
     return _result(name, words, real_list(labels, numbers, [unit], expanded=expanded(stds, freedom)))
 

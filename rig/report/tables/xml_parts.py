@@ -1,4 +1,4 @@
-"""The pieces of PTB's digital certificate: elements of DCC 3.2.1 and of D-SI 2.1, nothing about this rig."""
+"""Building blocks of PTB's digital certificate: elements of DCC 3.2.1 and of D-SI 2.1, nothing about this rig."""
 
 from collections.abc import Iterable, Sequence
 from datetime import date
@@ -19,48 +19,48 @@ Part = Element | None
 
 
 def dcc(name: str, *parts: Part, **attributes: str) -> Element:
-    """An element of the certificate with what is there of its parts."""
-    return _with(Element(f"{{{DCC}}}{name}", attributes), parts)
+    """Return an element of the certificate with those of its parts that are not None."""
+    return _extend(Element(f"{{{DCC}}}{name}", attributes), parts)
 
 
 def si(name: str, *parts: Part) -> Element:
-    """An element of a quantity."""
-    return _with(Element(f"{{{SI}}}{name}"), parts)
+    """Return an element of a quantity."""
+    return _extend(Element(f"{{{SI}}}{name}"), parts)
 
 
-def _with(element: Element, parts: Iterable[Part]) -> Element:
+def _extend(element: Element, parts: Iterable[Part]) -> Element:
     element.extend([part for part in parts if part is not None])
     return element
 
 
 def words(name: str, text: str | date | None) -> Element:
-    """An element that holds a text; what is not known reads "not stated"."""
+    """Return an element with a text; an unknown one reads "not stated"."""
     element = dcc(name)
     element.text = _plain(text)
     return element
 
 
 def text(name: str, statement: str | None) -> Element:
-    """An element with a text, where the schema wants it in a language."""
+    """Return an element with a text that the schema requires in a language."""
     content = dcc("content", lang="en")
     content.text = _plain(statement)
     return dcc(name, content)
 
 
 def _plain(statement: str | date | None) -> str:
-    """Printable, since XML knows no control characters; with one blank for any, those that do not break among them."""
+    """Return printable text, since XML allows no control characters, with one space for any white space."""
     return UNSAID if statement is None else printable(" ".join(str(statement).split())) or UNSAID
 
 
 def values(name: str, numbers: Iterable[object]) -> Element:
-    """A list of numbers or units; floating-point numbers in full."""
+    """Return a list of numbers or units; floating-point numbers with all digits."""
     element = si(name)
     element.text = " ".join(str(number) for number in numbers)
     return element
 
 
 def real(value: float, unit: str) -> Element:
-    """One value without an uncertainty."""
+    """Return one value without an uncertainty."""
     return si("real", values("value", [value]), values("unit", [unit]))
 
 
@@ -72,9 +72,9 @@ def real_list(
     expanded: Expanded | None = None,
     region: tuple[Sequence[Sequence[float]], float] | None = None,
 ) -> Element:
-    """Values with U and its coverage, or with a covariance matrix and the factor of their joint region.
+    """Return values with U and its coverage, or with a covariance matrix and the factor of their joint region.
 
-    One unit stands for all values if there is but one.
+    A single unit is that of all values.
     """
     uncertainty = covered = None
     if expanded is not None:
@@ -82,7 +82,10 @@ def real_list(
             "expandedUncXMLList",
             values("uncertaintyXMLList", expanded.widths),
             values("coverageFactorXMLList", _shortest(expanded.factors)),
-            values("coverageProbabilityXMLList", _shortest([round(each, DIGITS) for each in expanded.probabilities])),
+            values(
+                "coverageProbabilityXMLList",
+                _shortest([round(p, DIGITS) for p in expanded.probabilities]),
+            ),
         )
     if region is not None:
         covariance, factor = region
@@ -103,7 +106,7 @@ def real_list(
 
 
 def _shortest(numbers: Sequence[float]) -> Sequence[float]:
-    """One number stands for as many that are the same."""
+    """Return one number if all are the same."""
     return numbers[:1] if len(set(numbers)) == 1 else numbers
 
 
@@ -117,7 +120,7 @@ def _covariance(matrix: Sequence[Sequence[float]], units: Sequence[str]) -> Elem
 
 
 def product(first: str, second: str) -> str:
-    """The product of two units as D-SI writes them, `\\one` among them."""
+    """Return the product of two units in D-SI notation, `\\one` among them."""
     if r"\one" in (first, second):
         return second if first == r"\one" else first
     if first != second:

@@ -1,1 +1,1 @@
-"""What commands print for people: results, plans, devices."""
+"""Output of commands for people: results, plans, devices."""

@@ -1,4 +1,4 @@
-"""What a plan's attitudes will tell of each accelerometer, for people and for machines."""
+"""The expected accuracy of a plan's attitudes for each accelerometer, for people and for machines."""
 
 import math
 from dataclasses import asdict
@@ -14,7 +14,10 @@ from rig.station.plain_text import plain
 
 
 def account_document(account: AttitudeAccount) -> dict[str, Any]:
-    """What attitudes tell, in SI units; the condition number of those that do not tell the second order is null."""
+    """Return the expected accuracy in SI units.
+
+    The condition number of attitudes that do not determine the second order is null.
+    """
     return {
         "count": account.count,
         "order": account.order,
@@ -29,7 +32,7 @@ def account_document(account: AttitudeAccount) -> dict[str, Any]:
 
 
 def print_account(console: Console, account: AttitudeAccount) -> None:
-    """A line on the attitudes, a table of what is expected of each sensor."""
+    """Print a line on the attitudes and a table of the accuracy of each sensor."""
     second = f"{account.second.condition:.2f}" if math.isfinite(account.second.condition) else "not determined"
     console.print(
         f"{account.count} attitudes: rank {account.chosen.rank} of {account.chosen.needed}, condition "

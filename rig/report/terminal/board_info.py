@@ -1,4 +1,4 @@
-"""What `rig board` prints: the board's health and what it has stored."""
+"""Output of `rig board`: the board's health and its stored calibrations."""
 
 import json
 from collections.abc import Mapping
@@ -20,12 +20,12 @@ from firmware_host.answers import (
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.station.plain_text import plain
 
-NOBODY = (0x00, 0xFF, 0xFFFF)  # what a bus reads where nobody answers, of one byte and of two
+NO_ANSWER = (0x00, 0xFF, 0xFFFF)  # readings of a bus without an answer, of one byte and of two
 
 
 @dataclass(frozen=True, slots=True)
 class BoardSensor:
-    """A sensor the firmware knows: its name in the configuration, if it has one, and what is stored for it."""
+    """A sensor that the firmware supports: its name in the configuration, if any, and its stored calibration."""
 
     info: SensorInfo
     configured_as: str | None
@@ -35,7 +35,7 @@ class BoardSensor:
 
 @dataclass(frozen=True, slots=True)
 class BoardInfo:
-    """Everything about the board at `port`."""
+    """The board at `port`."""
 
     port: str
     identity: BoardIdentity
@@ -44,7 +44,7 @@ class BoardInfo:
 
 
 def print_info(board: BoardInfo, *, as_json: bool) -> None:
-    """The board on stdout: a table for people, JSON of schema "rig.board/1" for machines."""
+    """Print the board on stdout: a table for people, JSON of schema "rig.board/1" for machines."""
     if as_json:
         print(json.dumps(_info_document(board), indent=2))
     else:
@@ -52,7 +52,7 @@ def print_info(board: BoardInfo, *, as_json: bool) -> None:
 
 
 def print_stored(stored: Mapping[str, StoredCalibration | None], *, as_json: bool) -> None:
-    """Stored calibrations by sensor name: tables for people, JSON of schema "rig.board_calibration/1" for machines."""
+    """Print stored calibrations by sensor: tables for people, JSON of schema "rig.board_calibration/1" for machines."""
     if as_json:
         print(json.dumps({"schema": "rig.board_calibration/1", "sensors": _documents(stored)}, indent=2))
     else:
@@ -60,12 +60,12 @@ def print_stored(stored: Mapping[str, StoredCalibration | None], *, as_json: boo
 
 
 def _documents(stored: Mapping[str, StoredCalibration | None]) -> dict[str, Any]:
-    return {name: None if each is None else each.document() for name, each in stored.items()}
+    return {name: None if record is None else record.document() for name, record in stored.items()}
 
 
 def _info_document(board: BoardInfo) -> dict[str, Any]:
     health = asdict(board.status)
-    del health["sensors"]  # each stands with its sensor
+    del health["sensors"]  # listed with the sensors
     return {
         "schema": "rig.board/1",
         "port": board.port,
@@ -97,12 +97,12 @@ def _print_info(board: BoardInfo) -> None:
         "board": f"{identity.unique_id} at {board.port}",
         "firmware": f"{identity.firmware}, protocol {identity.protocol}"
         + ("" if flashed else f"; this program comes with {FIRMWARE_VERSION}: `rig board flash`"),
-        "up": f"{health.uptime_s:.1f} s, last started by: {health.reset_cause}",
+        "uptime": f"{health.uptime_s:.1f} s, last reset: {health.reset_cause}",
         "clock": "follows the crystal"
         if health.clock_locked
         else "NOT locked to the crystal: time stamps drift (docs/board.md, Clock)",
         "link": f"{health.rx_errors} damaged requests, {health.tx_overruns} frames without room, "
-        f"{health.frames_lost} lost on the way, {health.frames_repeated} came twice",
+        f"{health.frames_lost} lost, {health.frames_repeated} repeated",
         "sensor bus": f"{health.bus_errors} failed reads",
         "stack": f"{health.stack_high_water_bytes} bytes at most",
         "last fault": f"0x{health.fault_pc:08x}" if health.fault_pc else "none",
@@ -117,7 +117,7 @@ def _print_info(board: BoardInfo) -> None:
             plain(sensor.info.part),
             sensor.info.quantity,
             "yes" if sensor.info.present else "not fitted",
-            "" if sensor.info.who_am_i in NOBODY and not sensor.info.present else f"0x{sensor.info.who_am_i:02x}",
+            "" if sensor.info.who_am_i in NO_ANSWER and not sensor.info.present else f"0x{sensor.info.who_am_i:02x}",
             plain(sensor.configured_as or ""),
             plain(
                 "none"
@@ -143,12 +143,12 @@ def _print_stored(stored: Mapping[str, StoredCalibration | None]) -> None:
             soft_wrap=True,
         )
         table = Table(box=SIMPLE)
-        whole = calibration.model == "matrix_times_m_plus_b"
-        for heading in ("axis", "scale factor", "bias rad/s", *(("matrix", "", "") if whole else ())):
+        has_matrix = calibration.model == "matrix_times_m_plus_b"
+        for heading in ("axis", "scale factor", "bias rad/s", *(("matrix", "", "") if has_matrix else ())):
             table.add_column(heading, justify="left" if heading == "axis" else "right")
         rows = zip("xyz", calibration.scale, calibration.bias_rad_s, calibration.matrix, strict=True)
         for axis, scale, bias, row in rows:
-            elements = (f"{element:+.6f}" for element in row) if whole else ()
+            elements = (f"{element:+.6f}" for element in row) if has_matrix else ()
             table.add_row(axis, f"{scale:.6f}", f"{bias:+.6f}", *elements)
         console.print(table)
         if calibration.polynomials is not None:
@@ -157,13 +157,13 @@ def _print_stored(stored: Mapping[str, StoredCalibration | None]) -> None:
 
 def _print_polynomials(console: Console, polynomials: StoredPolynomials) -> None:
     low, high = polynomials.range_c
-    words = "for each power of kelvins, as a share of the scale, and rad/s"
+    words = "for each power of kelvins, as a fraction of the scale, and rad/s"
     console.print(f"corrected by temperature from {low:.1f} to {high:.1f} °C; {words}:", soft_wrap=True)
     table = Table(box=SIMPLE)
     for heading in ("power", "scale x", "scale y", "scale z", "bias x", "bias y", "bias z"):
         table.add_column(heading, justify="right")
     for power, rows in enumerate(zip(polynomials.scale_change, polynomials.bias_change_rad_s, strict=True), start=1):
-        table.add_row(str(power), *(f"{each:+.2e}" for row in rows for each in row))
+        table.add_row(str(power), *(f"{value:+.2e}" for row in rows for value in row))
     console.print(table)
 
 

@@ -1,4 +1,4 @@
-"""What a run amounts to, in few lines: each sensor's values ± U, what failed or nearly did, where the rest is. Pure."""
+"""The end of a run in few lines: each sensor's values ± U, failed and nearly failed checks, further files. Pure."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,28 +8,28 @@ from typing import Any
 from rig.data.recording.motion_file import NOT_STATED
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.entries.omitted import omitted_lines
-from rig.report.findings.kind import Shown, Three
+from rig.report.findings.kind import AxisValues, DisplayRow
 from rig.report.kinds.registry import kinds, outlets
 from rig.report.words.check_words import what_failed, words_of
 from rig.report.words.mounts import farthest_off
 from rig.report.words.rounding import in_print, plus_minus
 from rig.station.plain_text import INDENT, wrapped
 
-NEAR = 0.9  # of its limit, from where on a check that passed is named
+NEAR = 0.9  # of its limit: above it a passed check is named
 MOST_NEAR = 2
-CAUSES = ("stuck_axis", "repeated_readings")  # of which other checks fail: such readings are none of the motion
-ONE_SENSOR, MANY = 12, 25  # lines at most, of one sensor and of six, on
-LEAST_WIDTH = 80  # columns: a narrower screen says the same in more lines
+CAUSES = ("stuck_axis", "repeated_readings")  # these make other checks fail: such readings do not follow the motion
+ONE_SENSOR, MANY = 12, 25  # lines at most, of one sensor and of six, in
+LEAST_WIDTH = 80  # columns: a narrower screen gets more lines
 
 
 @dataclass(frozen=True, slots=True)
 class _Item:
-    """What was calibrated, what it is called, and its values."""
+    """A calibrated sensor, its label, and its values."""
 
     kind: str
     label: str
     entry: Any
-    shown: Shown
+    shown: DisplayRow
 
 
 def ending(
@@ -41,27 +41,27 @@ def ending(
     since: Sequence[str],
     width: int,
 ) -> Iterator[str]:
-    """The lines of the end of a run, the verdict last; none is longer than `width`, but for paths and commands.
+    """Yield the lines of the end of a run, the verdict last, at most `width` long except paths and commands.
 
-    `since` says how it compares with the last calibrations; `folder` is the run's, if there is one, of which what to do
-    is said; `everything` is how all the rest is printed.
+    `since` compares with the last calibrations; `folder` is the run's, if there is one, for remedies; `everything` is
+    the command that prints all details.
     """
     items = [*_items(result)]
-    summary = "; ".join([*_what_the_values_are(items), _passed(result)])
+    summary = "; ".join([*_describe_values(items), _count_passed(result)])
     unsolved = (line for kind in kinds() for line in kind.unsolved(result))
     needed = [*unsolved, *omitted_lines(result)], [*since]
-    in_short = [line for kind in kinds() for found in kind.found(result) for line in kind.in_short(found)]
+    in_short = [line for kind in kinds() for finding in kind.find(result) for line in kind.in_short(finding)]
     files = [] if certificate is None else [f"certificate: {certificate}"]
-    files.append(f"everything: {everything}")
-    broken = _failed(result, folder)
+    files.append(f"all details: {everything}")
+    broken = _explain_failures(result, folder)
 
     def lines_of(*texts: str) -> int:
-        return sum(len([*_wrapped(text, max(width, LEAST_WIDTH))]) for text in texts)
+        return sum(len([*_wrap(text, max(width, LEAST_WIDTH))]) for text in texts)
 
     room = (ONE_SENSOR if len(items) == 1 else MANY) - len([*_values(items, max(width, LEAST_WIDTH))])
     room -= lines_of(*_first(broken, 1), summary, *needed[0], *needed[1]) + len(files) + 1
     spare = []
-    for text in (*in_short, *farthest_off(result), *_near(result)):
+    for text in (*in_short, *farthest_off(result), *_name_near(result)):
         if lines_of(text) <= room:
             spare.append(text)
             room -= lines_of(text)
@@ -70,7 +70,7 @@ def ending(
     brief = [text for text in in_short if text in spare]
     yield from _values(items, width)
     for text in (*_first(broken, count), summary, *brief, *needed[0], *spare[len(brief) :], *needed[1]):
-        yield from _wrapped(text, width)
+        yield from _wrap(text, width)
     yield from files
     yield f"verdict: {result.verdict.upper()}"
 
@@ -82,7 +82,7 @@ def _values(items: Sequence[_Item], width: int) -> Iterator[str]:
 def _items(result: ResultDocument) -> Iterator[_Item]:
     """What has values of its own: a reference is known already."""
     for kind, show, finding in outlets(result, lambda kind: kind.shown):
-        if finding.known:
+        if finding.is_reference:
             continue
         serial = getattr(finding.entry, "serial_number", None)
         label = finding.sensor if serial in (None, NOT_STATED) else f"{finding.sensor} {serial}"
@@ -90,7 +90,7 @@ def _items(result: ResultDocument) -> Iterator[_Item]:
 
 
 def _one(item: _Item, width: int) -> Iterator[str]:
-    """One sensor's values, an axis a line."""
+    """Yield one sensor's values, one line for each axis."""
     shown, part = item.shown, getattr(item.entry, "part", None)
     columns = [[_heading(item), *_plus_minus(shown.numbers)]]
     if shown.scale is not None:
@@ -108,8 +108,8 @@ def _one(item: _Item, width: int) -> Iterator[str]:
 
 
 def _several(items: Sequence[_Item], width: int) -> Iterator[str]:
-    """Many sensors' values, kind by kind, a line each; two where the screen is narrow."""
-    blocks: dict[str, list[tuple[str, Three]]] = {}
+    """Yield many sensors' values, kind by kind, one line each, or two on a narrow screen."""
+    blocks: dict[str, list[tuple[str, AxisValues]]] = {}
     for item in items:
         scaled = item.shown.scale is not None
         if item.shown.scale is not None:
@@ -121,86 +121,86 @@ def _several(items: Sequence[_Item], width: int) -> Iterator[str]:
     table: list[tuple[str, Sequence[str]]] = []
     for heading, rows in blocks.items():
         table.append((heading, [*"xyz"[: len(rows[0][1].values)], "± U"]))
-        table += [(f"{INDENT}{label}", _with_largest(three)) for label, three in rows]
+        table += [(f"{INDENT}{label}", _add_largest(three)) for label, three in rows]
     number = max(len(cell) for _, cells in table for cell in cells)
     columns = max(len(cells) for _, cells in table)
     name = max(len(label) for label, _ in table)
-    if name + (number + 1) * columns > width:  # the longest headings stand alone, where that is enough
+    if name + (number + 1) * columns > width:  # the longest headings get lines of their own, if that is enough
         name = max(len(label) for label, _ in table if label.startswith(INDENT))
     gap = next((gap for gap in (3, 2, 1) if name + (number + gap) * columns <= width), 2)
     number += gap
-    wide = name + number * columns <= width
+    fits = name + number * columns <= width
     for label, cells in table:
         numbers = "".join(f"{cell:>{number}}" for cell in cells)
-        if wide and len(label) <= name:
+        if fits and len(label) <= name:
             yield f"{label:{name}}{numbers}"
         else:
-            yield from (label, f"{'':{name}}{numbers}" if wide else f"{INDENT}{numbers}")
+            yield from (label, f"{'':{name}}{numbers}" if fits else f"{INDENT}{numbers}")
 
 
 def _heading(item: _Item) -> str:
-    """What the numbers are that are no scale factors, with their unit."""
+    """Return what the numbers other than scale factors are, with their unit."""
     return f"{item.shown.noun}, {item.shown.unit.name}"
 
 
-def _plus_minus(three: Three) -> list[str]:
+def _plus_minus(three: AxisValues) -> list[str]:
     return [plus_minus(value, u) for value, u in zip(three.values, three.expanded, strict=True)]
 
 
-def _with_largest(three: Three) -> list[str]:
-    """The values, and the largest of their U."""
-    found = [in_print(value, max(three.expanded)) for value in three.values]
-    return [*(value for value, _ in found), found[0][1]]
+def _add_largest(three: AxisValues) -> list[str]:
+    """Return the values, and the largest of their U."""
+    cells = [in_print(value, max(three.expanded)) for value in three.values]
+    return [*(value for value, _ in cells), cells[0][1]]
 
 
-def _what_the_values_are(items: Sequence[_Item]) -> Iterator[str]:
+def _describe_values(items: Sequence[_Item]) -> Iterator[str]:
     if not items:
         return
     combined = all(item.shown.combined for item in items)
     yield "± U, about 95 %" if combined else "± 2 standard deviations of the noise"
-    held = {(item.kind, item.shown.held_at) for item in items if item.shown.held_at}
-    if len(held) == 1:
-        (kind, held_at) = held.pop()
+    conditions = {(item.kind, item.shown.held_at) for item in items if item.shown.held_at}
+    if len(conditions) == 1:
+        (kind, held_at) = conditions.pop()
         yield f"{kind}s {held_at}" if len(items) > 1 else held_at
     if len(items) == 1 and items[0].shown.model:
         yield items[0].shown.model
 
 
-def _passed(result: ResultDocument) -> str:
-    passed = sum(each.passed for each in result.checks)
+def _count_passed(result: ResultDocument) -> str:
+    passed = sum(check.passed for check in result.checks)
     return f"{passed} of {len(result.checks)} checks passed"
 
 
-def _failed(result: ResultDocument, folder: Path | None) -> list[tuple[str, str]]:
-    """What failed and was measured, causes first, then farthest beyond its limit, and what that means with what to do.
+def _explain_failures(result: ResultDocument, folder: Path | None) -> list[tuple[str, str]]:
+    """Return failed checks with their meaning and remedy: causes first, then those farthest beyond their limits.
 
-    What was not measured comes last: mostly because something else had failed before.
+    Checks without a value come last: most have none because another check failed.
     """
-    failed = sorted((each for each in result.checks if not each.passed), key=_over, reverse=True)
-    failed.sort(key=lambda each: (each.value is None, each.means.what not in CAUSES))
+    failed = sorted((check for check in result.checks if not check.passed), key=_over, reverse=True)
+    failed.sort(key=lambda check: (check.value is None, check.means.what not in CAUSES))
     words = [what_failed(check, folder) for check in failed]
     return [
-        (f"FAILED {_measured(check)}", "" if said is None else f": {said}")
-        for check, said in zip(failed, words, strict=True)
+        (f"FAILED {_value_and_limit(check)}", "" if meaning is None else f": {meaning}")
+        for check, meaning in zip(failed, words, strict=True)
     ]
 
 
 def _first(broken: Sequence[tuple[str, str]], count: int) -> Iterator[str]:
-    """So many of what failed; the last one says how many more there are."""
+    """Yield the first `count` failures; the last one states the number of further ones."""
     more = len(broken[count:])
     for number, (measured, words) in enumerate(broken[:count], 1):
         yield measured + (f" ({more} more failed)" if more and number == count else "") + words
 
 
-def _near(result: ResultDocument) -> Iterator[str]:
-    """What passed, and came near its limit."""
-    near = sorted((each for each in result.checks if each.passed and _over(each) >= NEAR), key=_over, reverse=True)
+def _name_near(result: ResultDocument) -> Iterator[str]:
+    """Yield passed checks that are near their limits."""
+    near = sorted((check for check in result.checks if check.passed and _over(check) >= NEAR), key=_over, reverse=True)
     for check in near[:MOST_NEAR]:
         words = words_of(check)
-        yield f"near its limit: {_measured(check)}" + ("" if words is None else f" (beyond it: {words.means})")
+        yield f"near its limit: {_value_and_limit(check)}" + ("" if words is None else f" (beyond it: {words.means})")
 
 
-def _measured(check: CheckEntry) -> str:
+def _value_and_limit(check: CheckEntry) -> str:
     unit = "" if check.unit == "1" else f" {check.unit}"
     value = "not measured" if check.value is None else f"{check.value:.3g}{unit}"
     return f"{check.name}: {value}, " + (
@@ -209,7 +209,7 @@ def _measured(check: CheckEntry) -> str:
 
 
 def _over(check: CheckEntry) -> float:
-    """The value over what its limit leaves; infinite where there is nothing to divide."""
+    """Return the value over its limit; infinite if one is missing."""
     if check.value is None or check.limit is None:
         return float("inf")
     if check.value == 0:
@@ -217,7 +217,7 @@ def _over(check: CheckEntry) -> float:
     return check.value / check.limit if check.limit > 0 else float("inf")
 
 
-def _wrapped(text: str, width: int) -> Iterator[str]:
-    """The text in lines; a command, which stands between backticks, is not broken."""
+def _wrap(text: str, width: int) -> Iterator[str]:
+    """Yield the text in lines; a command between backticks is not broken."""
     for line in wrapped(text, width):
         yield line.replace("`", "")

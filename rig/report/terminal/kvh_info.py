@@ -1,4 +1,4 @@
-"""What `rig kvh info` prints: the instrument's settings, its test, and what it sends."""
+"""Output of `rig kvh info`: the instrument's settings, its built-in test, and its stream."""
 
 import json
 from collections.abc import Mapping
@@ -11,10 +11,13 @@ from rig.station.plain_text import plain
 
 @dataclass(frozen=True, slots=True)
 class KvhInfo:
-    """A KVH 1775 at `port`: the settings in its memory, its built-in test, and a look at its stream.
+    """A KVH 1775 at `port`.
 
-    `rotation` and `acceleration_g` are means over `messages` as the instrument sends them; `problem` is what kept it
-    from being looked at so far.
+    - `sensor`, `port`, `baud`, `serial_number`: the instrument and its line.
+    - `settings`: the settings in its memory. `built_in_test`: the result, None without one.
+    - `messages`, `lost`, `status`: a look at its stream.
+    - `rotation`, `acceleration_g`: means over `messages`, in the instrument's units.
+    - `problem`: what prevented the look.
     """
 
     sensor: str
@@ -32,7 +35,7 @@ class KvhInfo:
 
 
 def print_kvh_info(info: KvhInfo, *, as_json: bool) -> None:
-    """Print what the instrument says on stdout: lines for people, JSON of schema "rig.kvh/1" for machines."""
+    """Print the instrument on stdout: lines for people, JSON of schema "rig.kvh/1" for machines."""
     if as_json:
         print(json.dumps({"schema": "rig.kvh/1", **asdict(info)}, indent=2))
         return
@@ -46,8 +49,8 @@ def print_kvh_info(info: KvhInfo, *, as_json: bool) -> None:
         unit = info.settings["ROTUNITS"].lower() + ("" if info.settings["ROTFMT"] == "DELTA" else "/s")
         facts |= {
             "stream": f"{info.messages} messages, {info.lost} lost; status {info.status}",
-            "rotation": f"{_vector(info.rotation)} {unit}, the mean",
-            "acceleration": f"{_vector(info.acceleration_g)} g, the mean",
+            "rotation": f"{_vector(info.rotation)} {unit} (mean)",
+            "acceleration": f"{_vector(info.acceleration_g)} g (mean)",
         }
     for name, value in facts.items():
         console.print(plain(f"{name + ':':15}{value}"), soft_wrap=True)

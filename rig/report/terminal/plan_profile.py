@@ -1,4 +1,4 @@
-"""The sweeps of a plan as a profile for each axis of the item: what a rate table's own editor is to be given."""
+"""The sweeps of a plan as a profile for each axis of the item, for the editor of a rate table."""
 
 import math
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ SAME = 1e-6  # of directions, which are rounded
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Where a profile changes: about which axis of the item, after which time, at which angle and rate, and why."""
+    """A corner of a profile: the item's axis, the time, the angle, the rate, and what begins."""
 
     axis: str
     at_s: float
@@ -23,54 +23,54 @@ class Point:
 
 
 def profile(plan: Plan) -> list[Point]:
-    """The corners of each axis' rate over time, axis after axis; each begins at 0 s and 0°, and rests after a sweep.
+    """Return the corners of each axis's rate over time, axis after axis, from 0 s and 0°; rests follow sweeps.
 
-    Ways between sweeps are left out: a table has others. Angles grow by the right-hand rule about the axis named.
+    Motions between sweeps are left out: a table has its own. Angles grow by the right-hand rule about the named axis.
     """
     by_axis: dict[str, list[tuple[Sweep, float]]] = {}
-    for place, step in enumerate(plan.steps):
+    for index, step in enumerate(plan.steps):
         if isinstance(step, Sweep):
-            after = plan.steps[place + 1] if place + 1 < len(plan.steps) else None
+            after = plan.steps[index + 1] if index + 1 < len(plan.steps) else None
             by_axis.setdefault(_axis(step.axis_flange), []).append(
                 (step, after.duration_s if isinstance(after, Rest) else 0.0)
             )
-    return [point for axis, sweeps in by_axis.items() for point in _of_axis(axis, sweeps)]
+    return [point for axis, sweeps in by_axis.items() for point in _corners(axis, sweeps)]
 
 
-def _of_axis(axis: str, sweeps: list[tuple[Sweep, float]]) -> Iterator[Point]:
+def _corners(axis: str, sweeps: list[tuple[Sweep, float]]) -> Iterator[Point]:
     at_s, angle_deg = 0.0, 0.0
     for sweep, rest_s in sweeps:
-        sign = 1 if _leading(sweep.axis_flange) > 0 else -1
+        sign = 1 if _leading_component(sweep.axis_flange) > 0 else -1
         rate_deg_s = sign * math.degrees(sweep.speed_rad_s)
         ramp_s = sweep.speed_rad_s / sweep.acceleration_rad_s2
-        even_s = sweep.duration_s - 2 * ramp_s
-        for for_s, turned_deg, rate, what in (
+        constant_s = sweep.duration_s - 2 * ramp_s
+        for lasts_s, turned_deg, rate, what in (
             (0.0, 0.0, 0.0, "at rest"),
             (ramp_s, rate_deg_s * ramp_s / 2, rate_deg_s, "constant rate begins"),
-            (even_s, rate_deg_s * even_s, rate_deg_s, "constant rate ends"),
+            (constant_s, rate_deg_s * constant_s, rate_deg_s, "constant rate ends"),
             (ramp_s, rate_deg_s * ramp_s / 2, 0.0, "at rest"),
         ):
-            at_s, angle_deg = at_s + for_s, angle_deg + turned_deg
+            at_s, angle_deg = at_s + lasts_s, angle_deg + turned_deg
             yield Point(axis, at_s, angle_deg, rate, what)
         at_s += rest_s
 
 
-def _axis(along: Vector3) -> str:
-    """The name of an axis whichever way it turns: `x`, `y`, `z`, or the direction in the frame of what is turned."""
-    leading = _leading(along)
-    upright = [component / math.copysign(1.0, leading) for component in along]
+def _axis(axis: Vector3) -> str:
+    """Return the name of an axis for both directions: `x`, `y`, `z`, or a direction in the frame of the flange."""
+    leading = _leading_component(axis)
+    upright = [component / math.copysign(1.0, leading) for component in axis]
     if abs(leading) > 1 - SAME:
-        return "xyz"[max(range(3), key=lambda each: abs(along[each]))]
+        return "xyz"[max(range(3), key=lambda i: abs(axis[i]))]
     return " ".join(f"{component:.4f}" for component in upright)
 
 
-def _leading(along: Vector3) -> float:
-    """The component that decides which way is positive: the largest, the first of those alike."""
-    return max(along, key=lambda each: (round(abs(each), 6), 0))
+def _leading_component(axis: Vector3) -> float:
+    """Return the component that defines the positive direction: the largest, the first among equal ones."""
+    return max(axis, key=lambda component: (round(abs(component), 6), 0))
 
 
 def profile_csv(plan: Plan) -> Iterator[str]:
-    """The lines of the profile as CSV, the headings first."""
+    """Yield the lines of the profile as CSV, headings first."""
     yield ",".join(HEADINGS)
     for point in profile(plan):
         yield f"{point.axis},{point.at_s:.4f},{round(point.angle_deg, 4) + 0.0:.4f},{point.rate_deg_s:.6g},{point.what}"

@@ -1,4 +1,4 @@
-"""The dry run: every motion the plan holds, with its time and its margin to the limits."""
+"""The dry run: every motion of the plan, with its time and limits."""
 
 import json
 import math
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class DryRun:
-    """A plan by its configuration, `repeated` if it is done once more, to verify; what it tells is found when asked.
+    """A plan with its configuration, `repeated` if a verification follows; its predictions are computed on demand.
 
-    `model` is what the turner is called that it is for; None where its section does not say.
+    `model` is the name of the turner, None if its section does not state it.
     """
 
     model: str | None
@@ -40,14 +40,14 @@ class DryRun:
 
     @cached_property
     def account(self) -> "AttitudeAccount | None":
-        """What the attitudes tell, None where nothing is asked of them. Raises Refused as `attitude_account`."""
+        """The expected accuracy by attitudes, None without any. Raise the errors of `attitude_account`."""
         from rig.analysis.design.attitude_account import attitude_account
 
         return attitude_account(self.config, self.plan)
 
     @cached_property
-    def told(self) -> "DetectionLimits":
-        """From what sizes on the checks tell that something happened."""
+    def detection_limits(self) -> "DetectionLimits":
+        """The smallest faults that the checks detect."""
         from rig.analysis.design.planned import predict_limits
         from rig.turners.registry import kind_of
 
@@ -61,23 +61,23 @@ class DryRun:
 
     @property
     def duration_s(self) -> float:
-        """How long the movement takes, without settling and without what repeats it."""
+        """The duration of the movement, without settling and without its repetition."""
         return self.plan.duration_s
 
     def to_dict(self) -> dict[str, Any]:
-        """The plan as `rig plan --json` says it: plain numbers, lists and texts in SI units."""
+        """Return the plan as `rig plan --json` prints it: plain numbers, lists and texts in SI units."""
         return plan_document(self)
 
     def __repr__(self) -> str:
-        return f"<plan: {_measured(self.plan)}{len(self.plan.motions)} motions, {self.duration_s:.1f} s>"
+        return f"<plan: {_counts(self.plan)}{len(self.plan.motions)} motions, {self.duration_s:.1f} s>"
 
 
 def plan_document(planned: DryRun) -> dict[str, Any]:
-    """The plan for machines: SI units, every field of every step."""
+    """Return the plan for machines: SI units, every field of every step."""
     from rig.report.terminal.attitude_account import account_document
-    from rig.report.words.told_words import told_from_entries
+    from rig.report.words.detection_limit_words import detection_limit_entries
 
-    plan, account, told = planned.plan, planned.account, planned.told
+    plan, account, predicted = planned.plan, planned.account, planned.detection_limits
     steps = [{"kind": type(step).__name__.lower(), **asdict(step)} for step in plan.steps]
     document: dict[str, Any] = {
         "schema": "rig.plan/1",
@@ -91,98 +91,99 @@ def plan_document(planned: DryRun) -> dict[str, Any]:
         document["stages"] = [{**asdict(stage), "indices": sorted(stage.indices)} for stage in plan.stages]
     if account is not None:
         document |= {"settling_s": plan.settling_s, "attitudes": account_document(account)}
-    for key, by_sensor in (("detection_limits", told.rates), ("acceleration_detection_limits", told.accelerations)):
+    for key, by_sensor in (
+        ("detection_limits", predicted.rates),
+        ("acceleration_detection_limits", predicted.accelerations),
+    ):
         if by_sensor:
-            found = {name: told_from_entries(each) for name, each in by_sensor.items()}
-            document[key] = {name: [each.model_dump() for each in entries] for name, entries in found.items()}
+            entries = {name: detection_limit_entries(limits) for name, limits in by_sensor.items()}
+            document[key] = {name: [limit.model_dump() for limit in limits] for name, limits in entries.items()}
     return document
 
 
 def print_plan(planned: DryRun, *, as_json: bool) -> None:
-    """The plan on stdout: a table in degrees for people, JSON in SI units for machines."""
+    """Print the plan on stdout: a table in degrees for people, JSON in SI units for machines."""
     if as_json:
         print(json.dumps(plan_document(planned), indent=2, allow_nan=False))
         return
     console = Console(highlight=False)
     _print_steps(planned, console)
-    _print_told(planned, console)  # which takes longer to find than the steps
+    _print_predictions(planned, console)  # these take longer to compute than the steps
 
 
 def _print_steps(planned: DryRun, console: Console) -> None:
-    """Every step, how long it all takes, and what is doubtful about it."""
+    """Print every step, the total time, and doubts about the plan."""
     plan = planned.plan
     table = Table(
         title=f"plan{'' if planned.model is None else f' for a {planned.model}'}, from the home pose",
         title_justify="left",
         box=SIMPLE,
     )
-    for heading in ("at s", "step", "for s", "joints °", "°/s", "°/s²"):
-        left, folds = heading in ("step", "joints °"), heading == "joints °"  # where a stage's instruction stands too
-        table.add_column(heading, justify="left" if left else "right", no_wrap=not folds)
+    for heading in ("start s", "step", "duration s", "joints °", "°/s", "°/s²"):
+        is_text, folds = heading in ("step", "joints °"), heading == "joints °"  # a stage's instruction is there too
+        table.add_column(heading, justify="left" if is_text else "right", no_wrap=not folds)
     at_s = 0.0
-    begins = {stage.begins: (number, stage) for number, stage in enumerate(plan.stages, start=1)}
-    for place, step in enumerate(plan.steps):
-        if place in begins:
-            number, stage = begins[place]
+    stages = {stage.begins: (number, stage) for number, stage in enumerate(plan.stages, start=1)}
+    for index, step in enumerate(plan.steps):
+        if index in stages:
+            number, stage = stages[index]
             table.add_row("", f"stage {number}", "", plain(stage.instruction), "", "")
         name = step.name if isinstance(step, (Sweep, Dwell)) else _name(step)
         table.add_row(f"{at_s:.1f}", name, f"{step.duration_s:.2f}", *_motion(step))
         at_s += step.duration_s
     console.print(table)
     long = f" ({duration_words(plan.duration_s)})" if plan.duration_s >= LONG_S else ""
-    console.print(f"{_measured(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s{long}; all within limits")
+    console.print(f"{_counts(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s{long}; all within limits")
     if isinstance(section := planned.config.procedure, SixObservationSection) and (wanted := target_of(section)):
         repeats = f"of {section.repeats} repeats, each of about {plan.duration_s / section.repeats:.1f} s"
         console.print(plain(f"It ends after the first {repeats}, with {wish_words(wanted)}"))
     if arcs := {turn_words(sweep.angle_rad) for sweep in plan.sweeps if not closes(sweep.angle_rad)}:
-        console.print(f"Sweeps are averaged over {', '.join(sorted(arcs))}, as far as the encoders show this angle")
+        console.print(f"Sweeps are averaged over {', '.join(sorted(arcs))}, the angle of the encoders")
     if plan.dwells:
         whole_s = plan.duration_s + plan.settling_s
         console.print(
             f"Before each dwell the sensors may take {plan.dwells[0].settle_s:g} s to settle: {whole_s:.1f} s at most"
         )
     if planned.repeated:
-        console.print(f"If the calibration passes, the same once more to verify it: {2 * plan.duration_s:.1f} s in all")
+        console.print(f"If the calibration passes, it is repeated to verify it: {2 * plan.duration_s:.1f} s in all")
     for doubt in doubts(plan):
         console.print(f"Note: {doubt}")
 
 
-def _print_told(planned: DryRun, console: Console) -> None:
-    """What the attitudes tell of accelerometers, and the checks of damage."""
+def _print_predictions(planned: DryRun, console: Console) -> None:
+    """Print the accuracy by attitudes of accelerometers, and the detection limits of the checks."""
     from rig.report.terminal.attitude_account import print_account
 
-    account, told = planned.account, planned.told
+    account, detection_limits = planned.account, planned.detection_limits
     if account is not None:
         print_account(console, account)
-    if told.rates or told.accelerations:
-        console.print(
-            "The smallest disturbance that the checks notice in 95 of 100 runs, for parts as in their data sheets:"
-        )
-    for what, by_sensor in (("to gyroscopes", told.rates), ("to accelerometers", told.accelerations)):
+    if detection_limits.rates or detection_limits.accelerations:
+        console.print("The smallest fault that the checks detect in 95 of 100 runs, for parts as in their data sheets:")
+    for what, by_sensor in (("gyroscopes", detection_limits.rates), ("accelerometers", detection_limits.accelerations)):
         if by_sensor:
-            console.print(_told_table(what, by_sensor))
+            console.print(_limits_table(what, by_sensor))
 
 
-def _measured(plan: Plan) -> str:
-    """How many sweeps and dwells, before what else there is to count."""
+def _counts(plan: Plan) -> str:
+    """Return the numbers of sweeps and dwells, before other counts."""
     sweeps = f"{len(plan.sweeps)} sweeps, " if plan.sweeps or not plan.dwells else ""
     return sweeps + (f"{len(plan.dwells)} dwells, " if plan.dwells else "")
 
 
-def _told_table(what: str, by_sensor: "Mapping[str, Sequence[DetectionLimit]]") -> Table:
-    """A row for each thing that may happen, a column for each sensor; a dash where nothing checks it of this sensor."""
-    from rig.report.words.told_words import size_words, told_from_entries
+def _limits_table(what: str, by_sensor: "Mapping[str, Sequence[DetectionLimit]]") -> Table:
+    """Return a row for each fault, a column for each sensor; a dash if no check of the sensor detects it."""
+    from rig.report.words.detection_limit_words import detection_limit_entries, size_words
 
     table = Table(box=SIMPLE)
-    table.add_column(f"what happens {what}")
+    table.add_column(f"fault of {what}")
     for name in by_sensor:
         table.add_column(plain(name), justify="right")
     sizes = [
-        {each.fault: size_words(each.size, each.unit) for each in told_from_entries(found)}
-        for found in by_sensor.values()
+        {limit.fault: size_words(limit.size, limit.unit) for limit in detection_limit_entries(limits)}
+        for limits in by_sensor.values()
     ]
-    for happens in dict.fromkeys(happens for found in sizes for happens in found):
-        table.add_row(happens, *(found.get(happens, "–") for found in sizes))
+    for fault in dict.fromkeys(fault for by_fault in sizes for fault in by_fault):
+        table.add_row(fault, *(by_fault.get(fault, "–") for by_fault in sizes))
     return table
 
 
@@ -204,5 +205,5 @@ def _motion(step: Step) -> tuple[str, str, str]:
 
 
 def _names(q_rad: Joints) -> Sequence[str]:
-    """The names of joints as far as a plan tells them: an arm's, of others their numbers."""
+    """Return the names of joints: an arm's, or numbers for other turners."""
     return JOINT_NAMES if len(q_rad) == len(JOINT_NAMES) else [f"joint {i + 1}" for i in range(len(q_rad))]

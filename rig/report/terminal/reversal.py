@@ -1,4 +1,4 @@
-"""What turning a magnetometer over tells, for people and for machines."""
+"""Results of turning a magnetometer over, for people and for machines."""
 
 from collections.abc import Iterator, Mapping
 
@@ -17,8 +17,8 @@ from rig.station.plain_text import plain
 
 
 def reversal_document(reversals: Mapping[str, MagnetometerReversal]) -> ReversalDocument:
-    """What turning magnetometers over has told, in SI units."""
-    entries = {name: _entry(each) for name, each in reversals.items()}
+    """Return the results of turning magnetometers over, in SI units."""
+    entries = {name: _entry(reversal) for name, reversal in reversals.items()}
     return ReversalDocument.model_validate({"schema": "rig.reversal/1", "magnetometers": entries})
 
 
@@ -28,25 +28,25 @@ def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
         print(document.text())
         return
     console = Console(highlight=False)
-    for name, found in document.magnetometers.items():
-        title = f"{name}, magnetometer turned over: {found.part} {found.serial_number}, {len(found.runs)} runs"
-        scale = expanded(found.scale_std, found.scale_degrees_of_freedom)
-        own = expanded(found.bias_std_t, found.bias_degrees_of_freedom)
-        heading, widths = heading_of([*scale.factors, *own.factors]), [*scale.widths, *own.widths]
-        console.print(scale_and_bias_table(title, FIELD, found.scale, found.bias_t, widths, heading=heading))
-        for line in _lines(found):
+    for name, reversal in document.magnetometers.items():
+        title = f"{name}, magnetometer turned over: {reversal.part} {reversal.serial_number}, {len(reversal.runs)} runs"
+        scale = expanded(reversal.scale_std, reversal.scale_degrees_of_freedom)
+        bias = expanded(reversal.bias_std_t, reversal.bias_degrees_of_freedom)
+        heading, widths = heading_of([*scale.factors, *bias.factors]), [*scale.widths, *bias.widths]
+        console.print(scale_and_bias_table(title, FIELD, reversal.scale, reversal.bias_t, widths, heading=heading))
+        for line in _lines(reversal):
             console.print(plain(line))
 
 
 def _lines(reversal: ReversalEntry) -> Iterator[str]:
-    mixed = [axis for axis, held in zip("xyz", reversal.arm_field_in_bias, strict=True) if held]
+    mixed = [axis for axis, is_mixed in zip("xyz", reversal.arm_field_in_bias, strict=True) if is_mixed]
     if mixed:
-        yield f"{' '.join(mixed)}: never turned over, so the arm's field is in the bias there, as mounted"
+        yield f"{' '.join(mixed)}: not turned over, so the bias there includes the arm's field, as mounted"
     else:
-        yield "the sensor's own on all axes: it is separated from the arm's field"
-    felt = triple(np.divide(reversal.arm_field_t, FIELD.bias.size), "+.3f")
-    field = max(expanded(reversal.arm_field_std_t, reversal.arm_field_degrees_of_freedom).widths) / FIELD.bias.size
-    yield f"arm's field in its axes in the first run: {felt} µT (± {field:.3f})"
+        yield "the sensor's own bias on all axes, separated from the arm's field"
+    arm_field = triple(np.divide(reversal.arm_field_t, FIELD.bias.size), "+.3f")
+    width = max(expanded(reversal.arm_field_std_t, reversal.arm_field_degrees_of_freedom).widths) / FIELD.bias.size
+    yield f"arm's field in its axes in the first run: {arm_field} µT (± {width:.3f})"
     yield f"the runs agree: χ² {reversal.chi_square:.1f}, at most {reversal.limit:.1f}"
     for run in reversal.runs:
         yield f"as mounted in {run.run}: b {triple(np.divide(run.bias_t, FIELD.bias.size), '+.3f')} µT"
@@ -62,11 +62,11 @@ def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
         scale_degrees_of_freedom=counted(scale),
         bias_degrees_of_freedom=counted(both[:3]),
         arm_field_degrees_of_freedom=counted(both[3:]),
-        runs=tuple(map(_as_mounted, reversal.runs)),
+        runs=tuple(map(_run_entry, reversal.runs)),
     )  # fmt: skip
 
 
-def _as_mounted(run: AsMounted) -> AsMountedEntry:
+def _run_entry(run: AsMounted) -> AsMountedEntry:
     solution = run.result.solution
     return entry(
         AsMountedEntry, run, run.result.sensor,

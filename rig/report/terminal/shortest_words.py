@@ -1,4 +1,4 @@
-"""The shortest run in words: how long it is, what it reaches, what limits it, and what no run reaches."""
+"""The shortest run in words: its duration, its uncertainties, their main contributors, and what no run reaches."""
 
 import json
 from collections.abc import Iterator
@@ -20,39 +20,39 @@ from rig.station.plain_text import plain
 if TYPE_CHECKING:
     from rig.estimation.arrays import Array
 
-TOLD = 3  # of what limits it, as many lines
-# What may be wanted, by its name in `SIZES`: unit and words.
+LINES = 3  # of contributors, for each sensor
+# Possible targets by their names in `SIZES`: unit and words.
 SHOWN = {
     "scale": ("", "the scale factors"),
     "bias_rad_s": (" rad/s", "the biases"),
     "acceleration_scale": ("", "the accelerometers' scale factors"),
     "acceleration_bias_m_s2": (" m/s²", "the accelerometers' biases"),
 }
-WORTH_TELLING = 0.05  # of the variance
-MANY = 8  # more than speeds
+SIGNIFICANT = 0.05  # of the variance
+MANY = 8  # a longer list than one of speeds
 ASSUMED = (
-    "Predicted for parts as in their data sheets, at one temperature, with a bias that flickers and does nothing else, "
-    "off the nominal mounting by 5° (in stages by uncertainty.mount_deg). A sensor that sits straighter does better, "
+    "Predicted for parts as in their data sheets, at one temperature, with flicker noise as the only bias drift, "
+    "and a mounting error of 5° (in stages uncertainty.mount_deg). A sensor that is mounted more exactly does better, "
     "one that warms up does worse."
 )
 
 
 def changed_keys(before: ProcedureSection, after: ProcedureSection) -> dict[str, Any]:
-    """The keys of the procedure that differ, with what they are now; of sets of attitudes that have one, the name."""
-    was, now = _said(before), _said(after)
-    return {key: value for key, value in now.items() if was.get(key) != value}
+    """Return the changed keys of the procedure with their new values; known sets of attitudes by name."""
+    old, new = _values(before), _values(after)
+    return {key: value for key, value in new.items() if old.get(key) != value}
 
 
-def _said(section: ProcedureSection) -> dict[str, Any]:
-    said = section.model_dump(mode="json")
+def _values(section: ProcedureSection) -> dict[str, Any]:
+    values = section.model_dump(mode="json")
     if isinstance(section, AttitudesSection):
-        named = {attitudes: name for name, attitudes in SETS.items()}
-        said["attitudes"] = named.get(section.attitudes, said["attitudes"])
-    return said
+        names = {attitudes: name for name, attitudes in SETS.items()}
+        values["attitudes"] = names.get(section.attitudes, values["attitudes"])
+    return values
 
 
 def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bool) -> None:
-    """What was found, on stdout: tables for people, JSON in SI units for machines."""
+    """Print the shortest run on stdout: tables for people, JSON in SI units for machines."""
     if as_json:
         print(json.dumps(shortest_document(shortest, section), indent=2, allow_nan=False))
         return
@@ -61,15 +61,15 @@ def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bo
     shown = shortest.best or shortest.nearest
     if shown is not None:
         console.print(_plans(shortest, shown, section))
-        console.print(_limits("What limits it, as shares of the variance:", shown.budgets))
+        console.print(_limits("Main contributors, as fractions of the variance:", shown.budgets))
     console.print(plain(_floor(shortest)))
     if shortest.directions is not None:
         console.print(_optimality(shortest.directions))
-    console.print(plain(f"{shortest.tried} of {shortest.candidates_count} plans were looked at. {ASSUMED}"))
+    console.print(plain(f"{shortest.tried} of {shortest.candidates_count} plans were compared. {ASSUMED}"))
 
 
 def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str, Any]:
-    """What was found, for machines; null where there is no such plan or no such wish."""
+    """Return the shortest run for machines; null if there is no such plan or no such target."""
     shown = shortest.best or shortest.nearest
     return {
         "schema": "rig.shortest/1",
@@ -95,13 +95,13 @@ def _plan_entry(planned: Planned, section: ProcedureSection) -> dict[str, Any]:
         "changed": changed_keys(section, planned.candidate.procedure),
         "limits": {
             name: [{"contributor": line, "scale_share": scale, "bias_share": bias} for line, scale, bias in lines]
-            for name, lines in _shares(planned.budgets).items()
+            for name, lines in _main_contributors(planned.budgets).items()
         },
     }
 
 
 def _sizes_entry(reached: ReachedUncertainty) -> dict[str, float | None]:
-    """What is reached; null of a kind of sensor that is not calibrated."""
+    """Return the uncertainties; null for sensors that are not calibrated."""
     return {size: getattr(reached, size) or None for size in SIZES}
 
 
@@ -111,12 +111,12 @@ def _verdict(shortest: Shortest) -> str:
     if shortest.best is not None:
         return f"The shortest run for {wish} takes {shortest.best.candidate.duration_s:.1f} s."
     if shortest.unreachable:
-        return f"No run of this kind reaches {wish}, however long it is."
-    return f"No plan that was looked at reaches {wish}{within}; this one comes nearest."
+        return f"No run of this kind reaches {wish}, of any duration."
+    return f"No examined plan reaches {wish}{within}; this one comes nearest."
 
 
 def wish_words(wanted: TargetUncertainty) -> str:
-    """What is wanted, as `U ≤ 0.0005 of the scale factors`."""
+    """Return the target as `U ≤ 0.0005 of the scale factors`."""
     sizes = {size: getattr(wanted, size) for size in SIZES}
     return " and ".join(
         f"U ≤ {value:.3g}{SHOWN[size][0]} of {SHOWN[size][1]}" for size, value in sizes.items() if value < inf
@@ -124,21 +124,21 @@ def wish_words(wanted: TargetUncertainty) -> str:
 
 
 def _plans(shortest: Shortest, shown: Planned, section: ProcedureSection) -> Table:
-    """The plan beside the file's own."""
+    """Return the plan in comparison with the file's own."""
     table = Table(box=SIMPLE)
     for heading in ("", "as in the file", "shortest" if shortest.best else "nearest"):
         table.add_column(heading, justify="right" if heading else "left")
     before = shortest.before
-    was = _said(section)
+    old = _values(section)
     for key, value in changed_keys(section, shown.candidate.procedure).items():
-        table.add_row(f"procedure.{key}", plain(_shown(was.get(key))), plain(_shown(value)))
+        table.add_row(f"procedure.{key}", plain(_shown(old.get(key))), plain(_shown(value)))
     for size, (unit, what) in SHOWN.items():
         if getattr(shown.reached, size) > 0:
-            own = "–" if before is None else f"{getattr(before.reached, size):.3g}"
+            own_value = "–" if before is None else f"{getattr(before.reached, size):.3g}"
             name = f"U of {what}" + unit.replace(" ", ", ")
-            table.add_row(name, own, f"{getattr(shown.reached, size):.3g}")
-    own = "–" if before is None else f"{before.candidate.duration_s:.1f}"
-    table.add_row("duration, s", own, f"{shown.candidate.duration_s:.1f}")
+            table.add_row(name, own_value, f"{getattr(shown.reached, size):.3g}")
+    own_value = "–" if before is None else f"{before.candidate.duration_s:.1f}"
+    table.add_row("duration, s", own_value, f"{shown.candidate.duration_s:.1f}")
     return table
 
 
@@ -152,51 +152,53 @@ def _limits(title: str, budgets: Budgets) -> Table:
     table = Table(title=title, title_justify="left", box=SIMPLE)
     for heading in ("sensor", "contributor", "of the scale factors", "of the biases"):
         table.add_column(heading, justify="right" if heading.startswith("of") else "left")
-    for name, lines in _shares(budgets).items():
+    for name, lines in _main_contributors(budgets).items():
         for contributor, scale, bias in lines:
             table.add_row(plain(name), contributor, f"{100 * scale:.0f} %", f"{100 * bias:.0f} %")
     return table
 
 
-def _shares(budgets: Budgets) -> dict[str, list[tuple[str, float, float]]]:
-    """The largest contributors of each sensor: shares of the variance of its worst scale factor and its worst bias."""
-    found = {}
-    kinds = {**budgets.rates, **{f"{name}, acceleration": each for name, each in budgets.accelerations.items()}}
+def _main_contributors(budgets: Budgets) -> dict[str, list[tuple[str, float, float]]]:
+    """Return the main contributors of each sensor: fractions of the variance of its worst scale factor and bias."""
+    lines_by_sensor = {}
+    kinds = {**budgets.rates, **{f"{name}, acceleration": budget for name, budget in budgets.accelerations.items()}}
     for name, budget in kinds.items():
         scale, bias = int(np.argmax(budget.std[:3])), 3 + int(np.argmax(budget.std[3:]))
-        shares = [
-            (each.name, _share(each.std[scale], budget.std[scale]), _share(each.std[bias], budget.std[bias]))
-            for each in budget.contributors
+        lines = [
+            (part.name, _fraction(part.std[scale], budget.std[scale]), _fraction(part.std[bias], budget.std[bias]))
+            for part in budget.contributors
         ]
-        largest = sorted(shares, key=lambda each: -max(each[1:]))[:TOLD]
-        found[name] = [each for each in largest if max(each[1:]) >= WORTH_TELLING]
-    return found
+        largest = sorted(lines, key=lambda line: -max(line[1:]))[:LINES]
+        lines_by_sensor[name] = [line for line in largest if max(line[1:]) >= SIGNIFICANT]
+    return lines_by_sensor
 
 
-def _share(part: float, whole: float) -> float:
+def _fraction(part: float, whole: float) -> float:
     return float((part / whole) ** 2) if whole > 0 else 0.0
 
 
 def _floor(shortest: Shortest) -> str:
-    """What no run of this kind gets below, and why."""
+    """Return the lowest uncertainties that a run of this kind can reach, and their contributors."""
     parts = []
-    for place, (size, (unit, what)) in enumerate(SHOWN.items()):
+    for index, (size, (unit, what)) in enumerate(SHOWN.items()):
         least = shortest.least(size)
-        of_kind = Budgets(least.rates) if place < len(SIZES) // 2 else Budgets({}, least.accelerations)
-        lines = [each for each in _shares(of_kind).values() if each]
-        largest = sorted({max(each, key=lambda line: line[1 + place % 2])[0] for each in lines})
+        of_kind = Budgets(least.rates) if index < len(SIZES) // 2 else Budgets({}, least.accelerations)
+        by_sensor = [lines for lines in _main_contributors(of_kind).values() if lines]
+        largest = sorted({max(lines, key=lambda line: line[1 + index % 2])[0] for lines in by_sensor})
         value = getattr(least.reached, size)
         if value > 0:
             parts.append(f"U = {value:.2g}{unit} of {what} ({', '.join(largest)})")
-    return f"However long it is, no run of this kind gets below {' and '.join(parts)}."
+    return f"Whatever its duration, no run of this kind gets below {' and '.join(parts)}."
 
 
 def _efficiencies(directions: "Array") -> dict[str, dict[str, float]]:
-    """The design's efficiencies beside those of the six directions of SIX."""
-    return {name: dict(_of_design(each)) for name, each in (("plan", directions), ("six", list_designs()["six"]))}
+    """Return the design's efficiencies and those of the six directions of SIX."""
+    return {
+        name: dict(_design_efficiencies(axes)) for name, axes in (("plan", directions), ("six", list_designs()["six"]))
+    }
 
 
-def _of_design(directions: "Array") -> Iterator[tuple[str, float]]:
+def _design_efficiencies(directions: "Array") -> Iterator[tuple[str, float]]:
     yield "g", g_efficiency(directions, "vector")
     yield "g_squared", g_efficiency(directions, "squared")
     yield "c_scale", c_efficiency(directions, "scale")
@@ -204,12 +206,12 @@ def _of_design(directions: "Array") -> Iterator[tuple[str, float]]:
 
 
 def _optimality(directions: "Array") -> Table:
-    table = Table(title="How good the directions of the sweeps are (1: none are better):", box=SIMPLE)
+    table = Table(title="Efficiency of the directions of the sweeps (1: the optimum):", box=SIMPLE)
     table.title_justify = "left"
     names = {"g": "G", "g_squared": "G, speeds alone", "c_scale": "c, scale", "c_bias": "c, bias"}
     table.add_column("")
-    for each in names.values():
-        table.add_column(each, justify="right")
+    for heading in names.values():
+        table.add_column(heading, justify="right")
     words = {"plan": "this plan", "six": "the paper's six"}
     for name, values in _efficiencies(directions).items():
         table.add_row(words[name], *(f"{values[key]:.2f}" for key in names))

@@ -1,4 +1,4 @@
-"""The result as a person reads it in the terminal: whole, or what of it is asked for."""
+"""The result at the terminal: all of it, or selected parts."""
 
 import shlex
 import sys
@@ -12,7 +12,7 @@ from rig.data.result_file import CheckEntry, ResultDocument
 from rig.data.run_folder import CERTIFICATE
 from rig.report.entries.omitted import omitted_lines
 from rig.report.findings.characteristic import Term, terms
-from rig.report.findings.kind import said
+from rig.report.findings.kind import outlet_items
 from rig.report.kinds.registry import kinds
 from rig.report.terminal.ending import ending
 from rig.report.words.expanded import factor_words
@@ -25,9 +25,9 @@ ALL_OF_IT = "the same command with --all"
 
 
 def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = False, folder: Path | None = None) -> None:
-    """Print what was solved and is not kept: the document for machines, else its ending or, as a `whole`, all tables.
+    """Print a result that is not stored: as JSON for machines, else as its ending or, if `whole`, as all tables.
 
-    `folder` is that of the run it was recorded in, which what to do is said of.
+    `folder` is the folder of its run, for remedies.
     """
     console = Console(highlight=False)
     if as_json:
@@ -40,10 +40,10 @@ def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = Fals
 
 
 def print_kept(folder: Path, document: ResultDocument, since: Sequence[str] = (), *, as_json: bool = False) -> None:
-    """Print what the finished run in a `folder` amounts to; `since` says how it compares with the last calibrations."""
+    """Print the end of the finished run in `folder`; `since` compares it with the last calibrations."""
     if as_json:
         print(document.text())
-        for line in since:  # which no ending says then
+        for line in since:  # the JSON does not contain it
             say(line.replace("`", ""), sys.stderr)
         return
     console, certificate = Console(highlight=False), folder / CERTIFICATE
@@ -65,35 +65,38 @@ def _print_ending(lines: Sequence[str], document: ResultDocument, console: Conso
 
 
 def print_result(result: ResultDocument, console: Console) -> None:
-    """Print what was found of each sensor with its uncertainty, kind by kind, then checks and verdict."""
+    """Print the results of each sensor with their uncertainties, kind by kind, then checks and verdict."""
     print_values(result, console)
     print_checks(result, console)
     print_verdict(result, console)
 
 
 def print_values(result: ResultDocument, console: Console, sensor: str | None = None) -> None:
-    """Print what was found, of one sensor alone if one is named: values, budgets, and what stands beside."""
+    """Print values, budgets and further results, of one sensor alone if one is named."""
     for kind in kinds():
-        for found in kind.found(result):
-            if sensor not in (None, found.sensor):
+        for finding in kind.find(result):
+            if sensor not in (None, finding.sensor):
                 continue
-            for each in (*said(kind.printed, found), *map(_beside, terms(kind.characteristics, found, "terminal"))):
-                console.print(plain(each) if isinstance(each, str) else each)
+            for item in (
+                *outlet_items(kind.printed, finding),
+                *map(_term_line, terms(kind.characteristics, finding, "terminal")),
+            ):
+                console.print(plain(item) if isinstance(item, str) else item)
         for line in kind.unsolved(result):
             console.print(plain(line))
     for line in (*mount_lines(result), *omitted_lines(result, sensor)):
         console.print(plain(line))
 
 
-def _beside(term: Term) -> str:
-    """A characteristic in a line: each of its numbers ± U."""
+def _term_line(term: Term) -> str:
+    """Return a characteristic in a line: each of its numbers ± U."""
     unit = "" if term.units.shown.name == "1" else f" {term.units.shown.name}"
     numbers = "  ".join(f"{label} {plus_minus(value, u)}".lstrip() for label, value, u in term.printed)
-    return f"{term.name}: {numbers}{unit} (U, {factor_words(term.known.freedom)})"
+    return f"{term.name}: {numbers}{unit} (U, {factor_words(term.numbers.freedom)})"
 
 
 def print_checks(result: ResultDocument, console: Console, sensor: str | None = None) -> None:
-    """Print the checks sensor by sensor, those that failed first; of one sensor alone if one is named."""
+    """Print the checks sensor by sensor, failed ones first; of one sensor alone if one is named."""
     by_sensor: dict[str | None, list[CheckEntry]] = {}
     for check in result.checks:
         by_sensor.setdefault(check.means.sensor, []).append(check)
@@ -103,7 +106,7 @@ def print_checks(result: ResultDocument, console: Console, sensor: str | None = 
 
 
 def print_verdict(result: ResultDocument, console: Console) -> None:
-    """Print the verdict, which is the last line of whatever ends with it."""
+    """Print the verdict, the last line."""
     console.print(f"verdict: {result.verdict.upper()}", style="bold green" if result.verdict == "pass" else "bold red")
 
 
@@ -111,7 +114,7 @@ def _checks(sensor: str | None, checks: Sequence[CheckEntry]) -> Table:
     table = Table(title=plain("checks" if sensor is None else f"checks of {sensor}"), title_justify="left")
     for heading in ("check", "value", "limit", "unit", "result"):
         table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
-    for check in sorted(checks, key=lambda each: each.passed):
+    for check in sorted(checks, key=lambda check: check.passed):
         name = check.name if sensor is None else check.name.removeprefix(f"{sensor}.")
         value = "not measured" if check.value is None else _number(check.value, check.limit)
         limit = "not set" if check.limit is None else f"{check.limit:.4g}"
@@ -121,5 +124,5 @@ def _checks(sensor: str | None, checks: Sequence[CheckEntry]) -> Table:
 
 
 def _number(value: float, limit: float | None) -> str:
-    """The value in print: what is below all digits of its limit is rounding, and none."""
+    """Return the value in print; values below the digits of the limit are rounding errors and read 0."""
     return "0" if limit is not None and abs(value) < ROUNDING * limit else f"{value:.4g}"

@@ -1,4 +1,4 @@
-"""What the checks of a verdict mean, and what to do when one failed: the table checks.txt."""
+"""Meanings and remedies of the checks of a verdict: the table checks.txt."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from rig.data.result_file import CheckEntry
 from rig.errors import Refused
 
 TABLE = Path(__file__).with_name("checks.txt")
-ALLOWING = ", or allow it"  # from here on a row says how to set another limit
+ALLOWING = ", or allow it"  # begins the advice to set another limit
 
 
 @dataclass(frozen=True, slots=True)
 class CheckWords:
-    """A check's name without sensor and quantity, what it means that it failed, and what to do."""
+    """A check's name without sensor and quantity, the meaning of its failure, and what to do."""
 
     name: str
     means: str
@@ -27,37 +27,37 @@ class CheckWords:
 
 @cache
 def check_words() -> Mapping[str, CheckWords]:
-    """The table, by name. Raises ValueError for a line of another form than `name | means | what to do`."""
-    found = {}
+    """Return the table by name. Raise ValueError for a line of another form than `name | means | what to do`."""
+    by_name = {}
     for number, line in enumerate(TABLE.read_text(encoding="utf-8").splitlines(), 1):
         if line.startswith("#"):
             continue
         cells = line.split(" | ")
         if len(cells) != 3:
             raise ValueError(f"{TABLE.name}, line {number}: not `name | what it means | what to do`")
-        found[cells[0]] = CheckWords(*cells)
-    return found
+        by_name[cells[0]] = CheckWords(*cells)
+    return by_name
 
 
 def words_of(check: CheckEntry) -> CheckWords | None:
-    """What a check of a result means; None of what only an installed kind of sensor knows."""
+    """Return the words of a check of a result; None for checks of installed kinds."""
     return check_words().get(check.means.what or "")
 
 
 def words_of_name(name: str) -> CheckWords | None:
-    """What a check means that somebody calls so, with its sensor, quantity and sweep or without them.
+    """Return the words of a check by its name, with or without sensor, quantity and sweep.
 
-    A sensor may be called as a check is, so the last part that is one counts.
+    A sensor may have the name of a check, so the last part that is a check counts.
     """
-    of = [f"{quantity}_" for quantity in _quantities()]
-    told = (part.removeprefix(each) for part in reversed(name.split(".")) for each in ("", *of))
-    return next((check_words()[what] for what in told if what in check_words()), None)
+    prefixes = ["", *(f"{quantity}_" for quantity in _quantities())]
+    candidates = (part.removeprefix(prefix) for part in reversed(name.split(".")) for prefix in prefixes)
+    return next((check_words()[candidate] for candidate in candidates if candidate in check_words()), None)
 
 
 def what_failed(check: CheckEntry, folder: Path | None) -> str | None:
-    """What it means that a check failed, and what to do, with the run's folder and the limit's key in the commands.
+    """Return the meaning of a failed check and what to do, with run folder and limit key in the commands.
 
-    Nobody is told to allow more by a limit that no configuration has.
+    The advice to raise a limit is left out if no configuration has that limit.
     """
     if (words := words_of(check)) is None:
         return None
@@ -71,5 +71,5 @@ def what_failed(check: CheckEntry, folder: Path | None) -> str | None:
 def _quantities() -> Iterable[str]:
     try:
         return quantities()
-    except Refused:  # a package that cannot be loaded must not keep anybody from asking what that means
-        return [each.name for each in OF_THE_RIG]
+    except Refused:  # a package that cannot be loaded must not prevent an explanation of that error
+        return [quantity.name for quantity in OF_THE_RIG]

@@ -4,7 +4,7 @@ from rig.report.words.check_words import check_words
 
 
 def page_text() -> str:
-    """The table as Markdown."""
+    """Return the table as Markdown."""
     lines = [
         "# Checks of the verdict",
         "",
@@ -13,13 +13,13 @@ def page_text() -> str:
         "",
         "A run passes when every check passes. The name of a check begins with the sensor's name:",
         "`gyro.scale_changed`. For an accelerometer `acceleration_` follows, for a magnetometer `field_`. How each",
-        "check works, and how large a change it notices, is explained in",
+        "check works, and how large a change it detects, is explained in",
         "[method](method.md#what-contradicts-itself). `rig explain NAME` prints a row of",
         "this table. What to do after a FAIL, step by step: [FAIL: what now](how-to/start/failed.md).",
         "",
         "| check | it fails when | what to do |",
         "| --- | --- | --- |",
-        *(f"| `{each.name}` | {each.means} | {each.remedy} |" for each in check_words().values()),
+        *(f"| `{row.name}` | {row.means} | {row.remedy} |" for row in check_words().values()),
     ]
     return "\n".join(lines) + "\n"
 

@@ -1,4 +1,4 @@
-"""U of what has no budget: from standard deviations and their degrees of freedom, and what U is, in words."""
+"""U of values without a budget, by standard deviations and degrees of freedom, and its coverage factor in words."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from rig.estimation.statistics.coverage import COVERAGE_FACTOR, coverage_factors
 
 @dataclass(frozen=True, slots=True)
 class Expanded:
-    """Expanded uncertainties U with coverage factors and probabilities: one of these for each U, or one for all."""
+    """Expanded uncertainties U with coverage factors and probabilities, one for each U or one for all."""
 
     widths: Sequence[float]
     factors: Sequence[float]
@@ -19,14 +19,14 @@ class Expanded:
 
 
 def expanded(stds: Sequence[float], freedom: Sequence[Freedom] | None) -> Expanded:
-    """U = k u of each by Student's t; two standard deviations where nobody counted."""
-    known = [np.inf if each is None else each for each in freedom or [None] * len(stds)]
-    factors = coverage_factors(known)
-    return Expanded((factors * np.array(stds)).tolist(), factors.tolist(), covered(factors, known).tolist())
+    """Return U = k u by Student's t; two standard deviations if the degrees of freedom are unknown."""
+    dofs = [np.inf if dof is None else dof for dof in freedom or [None] * len(stds)]
+    factors = coverage_factors(dofs)
+    return Expanded((factors * np.array(stds)).tolist(), factors.tolist(), covered(factors, dofs).tolist())
 
 
 def factor_words(freedom: Sequence[Freedom] | None) -> str:
-    """What k is, one for all or from the smallest to the largest, as it is printed."""
+    """Return k in print: one for all, or the smallest and the largest."""
     if freedom is None:
         return f"k = {COVERAGE_FACTOR:g}, degrees of freedom not counted"
     factors = expanded([1.0] * len(freedom), freedom).factors

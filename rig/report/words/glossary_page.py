@@ -20,8 +20,8 @@ def page_text() -> str:
         "project, [`words.toml`](../rig/report/words/words.toml) by `python -m rig.report.words.glossary_page >",
         "docs/glossary.md`: change these tables, not this page.",
         "",
-        "Words that the pages, the terminal and the certificate use. For people of other fields, and for readers whose",
-        "second language is English. `rig explain WORD` says what stands here.",
+        "Words of the pages, the terminal and the certificate, for people of other fields and for readers whose second",
+        "language is English. `rig explain WORD` prints a row of this table.",
     ]
     for owner, (title, heading) in SECTIONS.items():
         lines += ["", f"## {title}", "", f"| word | {heading} |", "| --- | --- |", *_rows(owner)]

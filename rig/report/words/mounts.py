@@ -1,6 +1,6 @@
-"""How the item was found to sit in each stage of a run, in words for screens and certificates. Pure.
+"""The measured mounting of the item in each stage of a run, in words. Pure.
 
-Turns about one axis of the item for each stage tell nothing of that: then there are no words.
+If each stage turns the item about one axis only, its mounting is not measured, and there are no words.
 """
 
 from collections.abc import Iterator
@@ -10,25 +10,25 @@ from rig.data.result_file import MountEntry, ResultDocument
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.report.words.rounding import plus_minus
 
-ROUNDING = 1e-6  # of its uncertainty: a turn that is smaller was not found but is what was assumed
+ROUNDING = 1e-6  # of its uncertainty: a smaller rotation is the assumed one, not a measured one
 
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:
-    """A line for each stage but the first, against which the others are told; none where the item stayed mounted."""
-    yield from map(_line, _found(result))
+    """Yield a line for each stage after the first, relative to the first; none if the item stayed mounted."""
+    yield from map(_line, _measured_mounts(result))
 
 
 def farthest_off(result: ResultDocument) -> Iterator[str]:
-    """The line of the stage whose mount was farthest off, and how many there are beside it."""
-    found = _found(result)
-    if not found:
+    """Yield the line of the stage with the largest mounting error, and the number of other stages."""
+    mounts = _measured_mounts(result)
+    if not mounts:
         return
-    others = len(found) - 1
-    farthest = _line(max(found, key=lambda mount: hypot(*mount.rotation_rad)))
+    others = len(mounts) - 1
+    farthest = _line(max(mounts, key=lambda mount: hypot(*mount.rotation_rad)))
     yield farthest if not others else f"{farthest}; less in {others} other stage{'s' if others > 1 else ''}"
 
 
-def _found(result: ResultDocument) -> list[MountEntry]:
+def _measured_mounts(result: ResultDocument) -> list[MountEntry]:
     return [mount for mount in result.mounts if hypot(*mount.rotation_rad) > ROUNDING * hypot(*mount.std_rad)]
 
 
@@ -38,4 +38,4 @@ def _line(mount: MountEntry) -> str:
         for angle, std in zip(mount.rotation_rad, mount.std_rad, strict=True)
     )
     x, y, z = angles
-    return f"mounted anew: in stage {mount.stage} the item sat off its mount by {x} about x, {y} about y, {z} about z"
+    return f"mounting error in stage {mount.stage}: {x} about x, {y} about y, {z} about z"

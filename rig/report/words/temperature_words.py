@@ -1,4 +1,4 @@
-"""What is said of a calibration over temperature wherever it is shown."""
+"""A calibration over temperature in words, for all outlets."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,29 +7,29 @@ from rig.data.quantity import Quantity
 from rig.estimation.temperature.over_temperature import GRADIENT, HYSTERESIS, LAG, NOISE, ORDER
 from rig.report.words.rounding import plus_minus
 
-EACH = 4  # of the table's rows are shown
+STEP = 4  # every fourth row of the table is shown
 
 
 def shown_rows(entry: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
-    """The rows of both ends of the range, of its middle, and half-way between."""
-    return entry.table[::EACH]
+    """Return the rows of both ends of the range, of its middle, and half-way between."""
+    return entry.table[::STEP]
 
 
 def own_contributors(entry: OverTemperatureEntry) -> Sequence[TemperatureContributorEntry]:
-    """What is uncertain about the polynomials alone, not about the calibration at the reference."""
+    """Return the contributors of the polynomials alone, not of the calibration at the reference."""
     return [line for line in entry.contributors if line.name in (NOISE, ORDER, LAG, HYSTERESIS, GRADIENT)]
 
 
 def about_lines(entry: OverTemperatureEntry, quantity: Quantity) -> Iterator[str]:
-    """Lines that say by what the polynomials are known, and what is not in their uncertainty."""
+    """Yield the validity of the polynomials and what their uncertainty does not include."""
     low, high = entry.range_c
     scale, bias = entry.orders
-    yield f"it holds from {low:.1f} to {high:.1f} °C only; the readings call for order {scale} of k and {bias} of b"
-    yield f"the part's thermometer is {plus_minus(entry.lag_s, 2 * entry.lag_std_s)} s behind"
+    yield f"it is valid from {low:.1f} to {high:.1f} °C only; polynomials of order {scale} for k and {bias} for b"
+    yield f"delay of the part's thermometer: {plus_minus(entry.lag_s, 2 * entry.lag_std_s)} s"
     if entry.hysteresis is None or entry.hysteresis_std is None:
-        yield "warming and cooling were not told apart: it went one way only, and a hysteresis is not in U"
+        yield "the temperature changed in one direction only: hysteresis was not measured and is not in U"
         return
     unit, size = quantity.bias.name, quantity.bias.size
-    each = zip("xyz", entry.hysteresis[3:], entry.hysteresis_std[3:], strict=True)
-    terms = "  ".join(f"{axis} {plus_minus(value / size, 2 * std / size)}" for axis, value, std in each)
-    yield f"warming less the middle of both ways, at most: {terms} {unit}; U allows for it"
+    rows = zip("xyz", entry.hysteresis[3:], entry.hysteresis_std[3:], strict=True)
+    terms = "  ".join(f"{axis} {plus_minus(value / size, 2 * std / size)}" for axis, value, std in rows)
+    yield f"hysteresis, warming minus the mean of warming and cooling, at most: {terms} {unit}; included in U"

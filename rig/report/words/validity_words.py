@@ -1,4 +1,4 @@
-"""When a value holds, how warm it was, and at what rates, in words: the same at the terminal and on certificates."""
+"""Time, temperature and rates at which a value is valid, in words for terminal and certificates."""
 
 import math
 from collections.abc import Sequence
@@ -10,62 +10,62 @@ from rig.data.result_file import GyroscopeEntry
 DEG = math.degrees(1)
 AS_STATED = ", as stated"
 UNKNOWN = "a temperature that is not known"
-ALIKE = 0.005  # of a rate: what the arm's timing and a sensor that leans by 5° make of one speed
+ALIKE = 0.005  # of a rate: the effect of the arm's timing and of a sensor tilted by 5° on one speed
 
 
 def when_words(when: ConditionsEntry) -> str:
-    """The temperature at which, and the time over which, a value is a mean, in words."""
-    began, ended = (datetime.fromisoformat(each) for each in (when.from_utc, when.to_utc))
-    day = f"{began:%Y-%m-%d} "
-    until = f"{ended:%H:%M:%S}" if ended.date() == began.date() else f"{ended:%Y-%m-%d %H:%M:%S}"
-    over = f"mean over {day}{began:%H:%M:%S} to {until} UTC"
+    """Return the mean temperature and the time of a value, in words."""
+    start, end = (datetime.fromisoformat(time) for time in (when.from_utc, when.to_utc))
+    day = f"{start:%Y-%m-%d} "
+    until = f"{end:%H:%M:%S}" if end.date() == start.date() else f"{end:%Y-%m-%d %H:%M:%S}"
+    over = f"mean over {day}{start:%H:%M:%S} to {until} UTC"
     if when.temperature_c is None:
         return f"at {UNKNOWN}, {over}"
     if when.temperature_range_c is None:
         return f"at {when.temperature_c:.1f} °C, as stated, {over}"
-    low, high = (f"{each:.2f}" for each in when.temperature_range_c)
-    went = f"stayed at {low} °C" if low == high else f"was between {low} and {high} °C"
-    return f"at {when.temperature_c:.1f} °C, {over}, in which it {went}"
+    low, high = (f"{temperature_c:.2f}" for temperature_c in when.temperature_range_c)
+    limits = f"constant at {low} °C" if low == high else f"between {low} and {high} °C"
+    return f"at {when.temperature_c:.1f} °C, {over}, {limits}"
 
 
 def warmth_words(when: ConditionsEntry | None) -> str:
-    """What tells a temperature, in words; where nobody knows when, the item's thermometer did if anything."""
+    """Return the source of a temperature in words."""
     if when is not None and when.temperature_c is None:
-        return "of which the item provided no temperature, and nobody stated one"
+        return "temperature neither measured by the item nor stated"
     if when is not None and when.temperature_stated:
-        return "as stated, for the item provided no temperature"
+        return "as stated; the item measured no temperature"
     return "by the item's own thermometer, which is not calibrated"
 
 
-def warmth(when: ConditionsEntry, of: str = "") -> dict[str, float | None]:
-    """A temperature, by what was read `of` the sensor then."""
-    return {f"{of}{AS_STATED}" if when.temperature_stated else of: when.temperature_c}
+def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
+    """Return a temperature by the use of the readings (`use`), " at the biases" for example."""
+    return {f"{use}{AS_STATED}" if when.temperature_stated else use: when.temperature_c}
 
 
-def told_by(of: str) -> str:
-    """What tells a temperature of `warmth`, behind what it is of."""
-    return of if of.endswith(AS_STATED) else f"{of}, by its own thermometer"
+def label_source(use: str) -> str:
+    """Return the label of a temperature of `warmth` with its source."""
+    return use if use.endswith(AS_STATED) else f"{use}, by its own thermometer"
 
 
 def speed_words(sensor: GyroscopeEntry) -> str:
-    """The speeds of the sweeps, °/s, either way."""
+    """Return the speeds of the sweeps, °/s, in both directions."""
     return ", ".join(f"±{DEG * speed:.1f}" for speed in sensor.speeds_rad_s)
 
 
 def load_words(sensor: GyroscopeEntry) -> str | None:
-    """The rates with which a gyroscope's own axes were loaded, °/s; None where these are the speeds of the sweeps."""
+    """Return the rates about a gyroscope's own axes, °/s; None if they equal the speeds of the sweeps."""
     loads, speeds = sensor.axis_rate_ranges_rad_s, sensor.speeds_rad_s
     if loads is None or not speeds:
         return None
-    if all(_alike(low, speeds[0]) and _alike(high, speeds[-1]) for low, high in loads):
+    if all(_is_close(low, speeds[0]) and _is_close(high, speeds[-1]) for low, high in loads):
         return None
-    return ", ".join(f"{axis} {_between(load)}" for axis, load in zip("xyz", loads, strict=True))
+    return ", ".join(f"{axis} {_range_words(load)}" for axis, load in zip("xyz", loads, strict=True))
 
 
-def _between(load: Sequence[float]) -> str:
+def _range_words(load: Sequence[float]) -> str:
     low, high = load
-    return f"{DEG * high:.1f}" if _alike(low, high) else f"{DEG * low:.1f} to {DEG * high:.1f}"
+    return f"{DEG * high:.1f}" if _is_close(low, high) else f"{DEG * low:.1f} to {DEG * high:.1f}"
 
 
-def _alike(one: float, other: float) -> bool:
+def _is_close(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=ALIKE)

@@ -71,14 +71,14 @@ def refusals(sensor: str, stored: Mapping[str, str]) -> Iterable[SensorError]:
         yield SensorError(
             "kvh_axes_not_identity",
             f"{sensor}: its memory holds axes {stored['AXES']}, by which it multiplies every reading",
-            "If nobody needs them, set them back in its configuration mode: =AXES,1,0,0,0,1,0,0,0,1",
+            "If they are not needed, reset them in its configuration mode: =AXES,1,0,0,0,1,0,0,0,1",
         )
     for triad, name in (("gyroscope", "FILTTYPE,G"), ("accelerometer", "FILTTYPE,A")):
         if stored[name] not in ("CHEBY", "BUTTER", "AVE"):
             yield SensorError(
                 "kvh_custom_filter",
-                f"{sensor}: the filter of its {triad} is {stored[name]}, somebody's own",
-                f"If nobody needs it, set it back in its configuration mode: ={name},{USUAL_FILTER}",
+                f"{sensor}: the filter of its {triad} is {stored[name]}, a custom one",
+                f"If it is not needed, reset it in its configuration mode: ={name},{USUAL_FILTER}",
             )
 
 

@@ -130,7 +130,7 @@ class AutopilotLink:
         raise SensorError(
             "autopilot_not_set",
             f"{self._where} does not answer that {parameter.name} was set",
-            "Check the cable. What was written so far is in the journal; the same command goes on from there",
+            "Check the cable. What was written so far is in the journal; the same command continues from there",
         )
 
     def ask_for(self, message: str, interval_us: float) -> None:

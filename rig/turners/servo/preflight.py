@@ -152,8 +152,8 @@ def hardware_problem(bits: int) -> Problem:
     """Return the problem of a hardware error, by its worst bit."""
     what = f"the servo reports {error_words(bits)}"
     if bits & BY_LOAD:
-        remedy = "Look for what held the shaft; hold the board, and switch the servo off and on"
+        remedy = "Find what blocked the shaft; hold the board, and switch the servo off and on"
         return Problem("servo_overload", what, remedy)
     if bits & BY_HEAT:
         return Problem("servo_overheated", what, "Let it cool; hold the board, and switch the servo off and on")
-    return Problem("servo_hardware_error", what, "Look at its supply; hold the board, and switch the servo off and on")
+    return Problem("servo_hardware_error", what, "Check its supply; hold the board, and switch the servo off and on")

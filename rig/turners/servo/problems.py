@@ -33,7 +33,7 @@ def servo_restarted() -> Problem:
     """Describe a servo that lost its supply meanwhile."""
     return Problem(
         "servo_restarted",
-        "the servo's clock began anew: it was switched off, or started again, and has forgotten its goal and its turns",
+        "the servo's clock started again from zero: it was switched off or restarted, and has lost its goal and turns",
         "Look at its supply; hold the board, and start again",
     )
 
@@ -80,7 +80,7 @@ def move_unsupervised(for_s: float, doing: str) -> Problem:
     return Problem(
         "servo_unwatched",
         f"nobody has looked at the servo for {for_s:.0f} s during {doing}",
-        "See the log for what held the program up, then start again",
+        "See the log for what delayed the program, then start again",
     )
 
 

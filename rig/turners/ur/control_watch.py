@@ -161,5 +161,5 @@ def _no_port_to_stop(host: str, ports: str) -> Problem:
     return Problem(
         "stop_ports_closed",
         f"{ports} of the arm at {host} no longer answer: without the client nothing could stop it any more",
-        "Look whether somebody has changed the services in the security settings, or a firewall; then start again",
+        "Check whether the services in the security settings, or a firewall, were changed; then start again",
     )

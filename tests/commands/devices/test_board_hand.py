@@ -43,8 +43,8 @@ def test_the_board_calibrates_asks_again_agrees_and_stores(tmp_path: Path) -> No
     assert found["matrix_difference"] <= SCALE_LIMIT
     assert np.max(np.abs(np.array(found["scale"]) / truth["scale"] - 1)) < found["expanded_scale"]
     assert np.max(np.abs(np.array(found["bias_rad_s"]) - truth["bias_rad_s"])) < 5e-4
-    assert "taken: from +z to +x" in ended.stderr
-    assert "not taken: clipping" in ended.stderr
+    assert "accepted: from +z to +x" in ended.stderr
+    assert "not accepted: clipping" in ended.stderr
     assert "again: it was turned faster than the sensor's range" in ended.stderr
     read = rig("board", "calibration", "read", path, "--json")
     stored = json.loads(read.stdout)["sensors"]["gyro"]

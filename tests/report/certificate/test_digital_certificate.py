@@ -158,7 +158,7 @@ def test_a_magnetometer_s_covariance_is_the_result_s_as_mounted_and_turned_over(
     assert widths is not None
     np.testing.assert_allclose(numbers(widths), 2 * np.sqrt(np.diag(combined))[3:], rtol=1e-9)
     mounted = of_everything(turned=False).decode()
-    assert "own bias" not in mounted and "the field of the arm is in the bias" in mounted
+    assert "own bias" not in mounted and "the bias includes the arm's field" in mounted
 
 
 def test_the_earth_s_rate_and_gravity_s_part_are_the_result_s() -> None:

@@ -10,7 +10,7 @@ from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.result_file import ResultDocument
 from rig.page.rows import parameter_rows
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.findings.kind import ResultKind, Without
+from rig.report.findings.kind import NoOutlet, ResultKind
 from rig.report.header import calibration_header
 from rig.report.kinds.registry import followed, kinds
 from rig.report.terminal.table import print_result
@@ -29,12 +29,12 @@ def test_a_kind_has_every_outlet_or_says_in_a_line_why_not(kind: ResultKind) -> 
     for outlet in fields(kind):
         said = getattr(kind, outlet.name)
         assert said is not None
-        if isinstance(said, Without):
+        if isinstance(said, NoOutlet):
             assert len(said.why.split()) > 4 and "\n" not in said.why
 
 
 def test_there_is_something_of_every_kind_in_the_result(document: ResultDocument) -> None:
-    there = {kind.name for kind in kinds() if list(kind.found(document))}
+    there = {kind.name for kind in kinds() if list(kind.find(document))}
     assert there >= set(NAMES) - {"verification"}
 
 

@@ -29,9 +29,9 @@ from rig.report.certificate.dcc import digital_certificate
 from rig.report.exports.calibrations import calibrations
 from rig.report.exports.formats import OF_CALIBRATIONS, texts_of_calibrations
 from rig.report.findings import characteristics
-from rig.report.findings.characteristic import OUTLETS, Characteristic, Series, Units, named
+from rig.report.findings.characteristic import OUTLETS, Characteristic, Series, Units, read_fields
 from rig.report.findings.followed import BIASES, SCALES
-from rig.report.findings.kind import ResultKind, Without
+from rig.report.findings.kind import NoOutlet, ResultKind
 from rig.report.kinds import registry
 from rig.report.kinds.registry import followed, kinds
 from rig.report.terminal.table import print_result
@@ -50,7 +50,7 @@ DENSITY = Characteristic(
     "density of noise",
     ("x", "y", "z"),
     units,
-    named("noise_density", "rad_sqrt_s"),
+    read_fields("noise_density", "rad_sqrt_s"),
     Series("bow_", "the density of noise along {}", drawn=True),  # begins as biases do, and is none
 )
 
@@ -190,5 +190,5 @@ def test_no_two_characteristics_of_a_kind_share_a_name(kind: ResultKind[Any]) ->
 @pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.name)
 def test_an_outlet_that_a_kind_has_not_tells_none_of_its_characteristics(kind: ResultKind[Any]) -> None:
     through = {"certificate": kind.block, "digital certificate": kind.measured, "history": kind.followed}
-    for outlet in [outlet for outlet, of in through.items() if isinstance(of, Without)]:
+    for outlet in [outlet for outlet, of in through.items() if isinstance(of, NoOutlet)]:
         assert all(outlet in each.elsewhere for each in kind.characteristics)

@@ -20,7 +20,7 @@ from support.paths import DOCS, RECORDINGS
 FROZEN = sorted(path.parent for path in RECORDINGS.glob("*/result.json"))
 RUN = Path("runs/2026-11-25T10-00-00Z-imu")
 SINCE = ("since 2026-11-23 (no. 1): scale factor of x changed by +0.4 %, 12 U; 3 more", "else nothing changed")
-COPYABLE = ("certificate: ", "everything: ")
+COPYABLE = ("certificate: ", "all details: ")
 
 
 def ended(result: ResultDocument, width: int = 80) -> list[str]:
@@ -86,7 +86,7 @@ def test_every_result_fits_the_width_and_ends_with_its_verdict(folder: Path, wid
     for lines in (ended(result, width), ended(failed(result, *(each.name for each in result.checks)), width)):
         assert max(len(line) for line in lines if not line.startswith(COPYABLE) and "rig " not in line) <= width
         assert lines[-1] in {"verdict: PASS", "verdict: FAIL"}
-        assert f"everything: rig show {RUN} --all" in lines
+        assert f"all details: rig show {RUN} --all" in lines
         assert not any("verdict" in line for line in lines[:-1])
 
 
@@ -102,8 +102,10 @@ def test_a_check_of_another_quantity_has_the_same_words_and_no_limit_that_nobody
     for quantity in ("inclination", "field"):
         beyond, unlike = (fitness("tilt", quantity, what, 2.0, 1.0) for what in ("bias", "residuals"))
         said = what_failed(entry_of(beyond), Path("run"))
-        assert said == "a bias is beyond its limit; the measurement is sound. Use another part"
-        assert (what_failed(entry_of(unlike), None) or "").startswith("an axis in a sweep or dwell has other readings")
+        assert said == "a bias is beyond its limit; the measurement is valid. Use another part"
+        assert (what_failed(entry_of(unlike), None) or "").startswith(
+            "the readings of an axis in a sweep or dwell contradict"
+        )
     as_spelt = fitness("gyro.bias", "inclination", "scale_std", 2.0, 1.0)
     assert (what_failed(entry_of(as_spelt), None) or "").startswith("the uncertainty of a scale factor is above")
 
@@ -192,7 +194,7 @@ def test_a_recording_that_is_solved_again_ends_as_a_run_does(capsys: pytest.Capt
     assert main(again) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("gyroscope gyro ") and len(lines) <= 12 and lines[-1] == "verdict: PASS"
-    assert "everything: the same command with --all" in lines
+    assert "all details: the same command with --all" in lines
     assert main([*again, "--all"]) == 0
     whole = capsys.readouterr().out
     assert "checks of gyro" in whole and "non-orthogonality" in whole and whole.splitlines()[-1] == "verdict: PASS"

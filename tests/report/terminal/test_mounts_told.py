@@ -17,7 +17,7 @@ from support.documents.certified import certificate, compared, read, result
 from support.documents.dcc_rules import schema_faults
 from support.page.told_runs import ABOUT
 
-LINE = "mounted anew: in stage {} the item sat off its mount by {}° about x, {}° about y, {}° about z"
+LINE = "mounting error in stage {}: {}° about x, {}° about y, {}° about z"
 TOLD = [
     LINE.format(2, "0.401 ± 0.012", "−0.600 ± 0.020", "0.500 ± 0.012"),
     LINE.format(3, "0.0 ± 1.2", "0.100 ± 0.012", "0.000 ± 0.012"),  # what its sweeps do not tell about x
@@ -38,9 +38,9 @@ def in_stages() -> ResultDocument:
 def test_the_terminal_tells_every_stage_and_the_end_of_a_run_the_farthest() -> None:
     console = Console(width=200, record=True, file=StringIO())
     print_values(in_stages(), console)
-    assert [line.rstrip() for line in console.export_text().splitlines() if "mounted anew" in line] == TOLD
+    assert [line.rstrip() for line in console.export_text().splitlines() if "mounting error" in line] == TOLD
     said = ending(in_stages(), folder=None, everything="all", certificate=None, since=(), width=200)
-    assert [line for line in said if "mounted anew" in line] == [f"{TOLD[0]}; less in 1 other stage"]
+    assert [line for line in said if "mounting error" in line] == [f"{TOLD[0]}; less in 1 other stage"]
 
 
 def test_nothing_is_said_where_the_turns_tell_nothing_of_the_mounts() -> None:
@@ -55,7 +55,7 @@ def test_certificates_tell_every_stage() -> None:
     found = certificate(in_stages())
     text, xml = read(found).text, digital_certificate(found)
     told = "; ".join(TOLD)
-    assert f"The item was mounted in 3 stages. Against the first it was found, with U (k = 2): {told}." in text
+    assert f"The item was mounted in 3 stages. Relative to the first, with U (k = 2): {told}." in text
     assert told in xml.decode()
     assert schema_faults(xml) == []
 

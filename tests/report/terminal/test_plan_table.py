@@ -4,7 +4,7 @@ import pytest
 from rich.console import Console
 
 from rig.analysis.consistency.detection_limits import DetectionLimit
-from rig.report.terminal.plan_table import _told_table
+from rig.report.terminal.plan_table import _limits_table
 from support.laboratories.commands import rig_here
 from support.paths import CONFIGS
 
@@ -12,8 +12,8 @@ from support.paths import CONFIGS
 def test_a_long_instruction_leaves_every_step_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     said = rig_here("plan", CONFIGS / "servo.yaml").stdout
-    assert "at s" in said and "for s" in said and "…" not in said
-    assert said.count("sweep shaft ccw    8.10") == 3
+    assert "start s" in said and "duration s" in said and "…" not in said
+    assert said.count("sweep shaft ccw        8.10") == 3
     assert max(map(len, said.splitlines())) <= 80
 
 
@@ -24,7 +24,7 @@ def test_what_is_not_checked_of_a_sensor_is_a_dash_in_its_column() -> None:
     )
     console = Console(width=80)
     with console.capture() as shown:
-        console.print(_told_table("to accelerometers", {"a": (scale, bias), "b": (scale,)}))
+        console.print(_limits_table("to accelerometers", {"a": (scale, bias), "b": (scale,)}))
     rows = [line.split() for line in shown.get().splitlines()]
     assert ["the", "scale", "changes", "0.10", "%", "0.10", "%"] in rows
     assert ["a", "jump", "2.0e+06", "µT", "–"] in rows

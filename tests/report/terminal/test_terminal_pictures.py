@@ -25,7 +25,7 @@ SIX = of_three_parts()
 RESULTS = {"one": ONE, "six": SIX}
 NAMES = {"one": ["gyro"], "six": [*SIX.gyroscopes]}
 MOST = {"one": {60: 17, 80: 12, 120: 12}, "six": {60: 44, 80: 25, 120: 25}}  # lines, by width
-COPYABLE = ("certificate: ", "everything: ")
+COPYABLE = ("certificate: ", "all details: ")
 STATUS = {"pass": 0, "fail": 0, "stopped": 3, "refused": 2}
 
 
@@ -112,7 +112,7 @@ def test_how_a_run_ends_is_kept_as_a_picture(
         assert len(rows) <= MOST[sensors][width]
         return
     assert rows[-1] == f"verdict: {how.upper()}" and "verdict" not in "".join(rows[:-1])
-    assert f"everything: rig show {RUN} --all" in lines
+    assert f"all details: rig show {RUN} --all" in lines
     assert ("FAILED" in said) == (how == "fail")
     assert len(lines) <= MOST[sensors][width]
     assert all(len(line) <= width for line in lines if not line.startswith(COPYABLE) and "rig " not in line)

@@ -43,7 +43,7 @@ def test_a_run_with_mistakes_asks_again_and_passes_and_solves_again_to_the_same(
     done = rig("run", path, "--out", out, "--set", "procedure.flips=8")
     assert done.returncode == 0, done.stderr + done.stdout
     assert "again: " in done.stderr
-    assert "not taken: turn_not_closed" in done.stderr
+    assert "not accepted: turn_not_closed" in done.stderr
     held(out)
     again = rig_here("solve", out, "--json")
     first, second = json.loads((out / "result.json").read_text()), json.loads(again.stdout)

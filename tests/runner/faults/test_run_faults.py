@@ -343,7 +343,7 @@ def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
 
     resumed = command("resume", rig.out, "--yes")
     assert resumed.returncode == 0, resumed.stderr
-    assert "resuming: 5 of 6 sweeps and dwells are recorded and sound" in resumed.stderr
+    assert "resuming: 5 of 6 sweeps and dwells are recorded and valid" in resumed.stderr
     assert resumed.stderr.count("done: sweep") == 1
     result = json.loads((rig.out / "result.json").read_text(encoding="utf-8"))
     observations = result["gyroscopes"]["gyro"]["observations"]

@@ -206,7 +206,7 @@ def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> No
     config, out = hardware(laboratory.config_path, tmp_path), tmp_path / "run"
     command = ("run", config, "--out", out, "--yes")
     with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
-        wait_for_log(out, "to do: warm the board until it is at")
+        wait_for_log(out, "your turn: warm the board until it is at")
         laboratory.control({"do": "air", "temperature_c": 41})
         said = run.communicate(timeout=PATIENCE_S)[1]
     assert run.returncode in (0, 1), said
@@ -218,7 +218,7 @@ def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
     config, out = configuration(tmp_path, LABORATORY, PROCEDURE), tmp_path / "run"
     command = ("run", config, "--out", out, "--yes")
     with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
-        wait_for_log(out, "set made")
+        wait_for_log(out, "set measured")
         wait_for_log(out, "done: sweep", times=8)
         run.send_signal(signal.SIGINT)
     first = of_events(read_run(out / "run.h5"), SetMeasured)

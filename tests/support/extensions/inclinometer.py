@@ -25,8 +25,8 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.external.placements import Placements
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import Followed, known, scale_and_bias
-from rig.report.findings.kind import Measured, ResultKind, Shown, Standard, Without
+from rig.report.findings.followed import HistoryRecord, scale_and_bias, select_uncertain
+from rig.report.findings.kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, Standard
 from rig.report.findings.unexplained import Unexplained
 from rig.report.kinds.triad import shown_of, tables
 from rig.report.tables.xml_parts import dcc, real_list, text
@@ -124,15 +124,15 @@ def _printed(found: Finding[InclinometerEntry]) -> Iterator[Table | str]:
     yield from tables(f"{found.sensor}: inclinometer, m = φ / k + b", INCLINATION, found.entry)
 
 
-def _shown(found: Finding[InclinometerEntry]) -> Shown:
+def _shown(found: Finding[InclinometerEntry]) -> DisplayRow:
     return replace(shown_of(found), combined=found.entry.covariance_combined is not None)
 
 
-def _followed(found: Finding[InclinometerEntry], document: ResultDocument) -> Followed:
+def _followed(found: Finding[InclinometerEntry], document: ResultDocument) -> HistoryRecord:
     entry = found.entry
     rows = list(scale_and_bias(found.sensor, INCLINATION, entry, entry.bias_rad, document))
     of = entry.part, entry.serial_number, 0.0, entry.estimator, None
-    return Followed(found.sensor, INCLINATION.name, *of, known(rows))
+    return HistoryRecord(found.sensor, INCLINATION.name, *of, select_uncertain(rows))
 
 
 def _unexplained(found: Finding[InclinometerEntry]) -> Unexplained:
@@ -146,34 +146,34 @@ def _header(found: Finding[InclinometerEntry], _: Mapping[str, Array]) -> Iterat
     yield f"static const float {found.sensor}_inclination_scale[2] = {{{x}f, {y}f}};"
 
 
-def _measured(found: Finding[InclinometerEntry], _: Any) -> Measured:
+def _measured(found: Finding[InclinometerEntry], _: Any) -> CertifiedItem:
     entry, spread = found.entry, [found.entry.covariance[i][i] ** 0.5 for i in range(2)]
     listed = real_list("xy", entry.scale, [r"\one"], expanded=expanded(spread, None))
     result: Element = dcc("result", text("name", "scale factor"), dcc("data", listed))
     name = "calibration of inclinometer"
-    return Measured("inclinometer", found.sensor, entry.part, entry.serial_number, name, [result])
+    return CertifiedItem("inclinometer", found.sensor, entry.part, entry.serial_number, name, [result])
 
 
 RESULT = ResultKind(
     name="inclinometer",
     key=KEY,
     entries=_entries,
-    found=_found,
+    find=_found,
     printed=_printed,
     shown=_shown,
     followed=_followed,
     header=_header,
-    figures=Without("two lines are told by their residuals, which are in the result"),
+    figures=NoOutlet("two lines are told by their residuals, which are in the result"),
     block="inclinometer.html.j2:inclinometer",
     templates=Path(__file__).parent,
     measured=_measured,
     unexplained=_unexplained,
-    corrected=Without("no autopilot and no library that takes exports knows two lines"),
+    corrected=NoOutlet("no autopilot and no library that takes exports knows two lines"),
     standard=Standard(
         size="The rise of its axes above the horizontal",
         value=lambda _: "as the attitudes give it",
         origin=lambda _: None,
-        known="the rise of an axis above the horizontal",
+        quantity="the rise of an axis above the horizontal",
         method=lambda _: "Inclinometers are held still in known attitudes.",
     ),
 )

@@ -45,7 +45,7 @@ def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
     from rig.commands.history.remember import remember
     from rig.config.load import load
     from rig.floor.heartbeat import heartbeat
-    from rig.history.storage.address import place
+    from rig.history.storage.address import resolve_address
     from rig.station.events import Remembered
 
     drawn, config, over = random.Random(seed), load(CONFIGS / "ci.yaml").config, threading.Event()
@@ -56,7 +56,7 @@ def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
 
     threading.Thread(target=listen, daemon=True).start()
     now = Now(rig=rig)
-    with heartbeat(rig, place(os.environ["RIG_HISTORY"]), now) as heart:
+    with heartbeat(rig, resolve_address(os.environ["RIG_HISTORY"]), now) as heart:
         tell(state="begun")
         for number in range(PARTS):
             if number == PARTS - 1:

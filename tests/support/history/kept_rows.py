@@ -35,4 +35,4 @@ def forge(file: str, *statements: str, values: Sequence[str] = ()) -> None:
 
 def as_of_another_process() -> None:
     """Forget what this process has seen of histories, as one that is started later has seen nothing."""
-    continuity._known.clear()
+    continuity._identities.clear()

@@ -1,4 +1,4 @@
-// The floor: several rigs, as a shared history tells of them. It decides nothing.
+// The floor: several rigs, as a shared history records them. It decides nothing.
 
 import { live, SIGNS, silent, up, WORDS } from "./live.js";
 
@@ -56,11 +56,11 @@ const SHOW = {
   rigs({ count, more }) {
     $("no-rigs").hidden = count > 0;
     $("more-rigs").hidden = !more;
-    $("more-rigs").textContent = `and ${more} more, which were heard before these`;
+    $("more-rigs").textContent = `and ${more} more, heard from earlier than these`;
   },
   unread(why) {
     $("unread").hidden = !why;
-    $("unread").textContent = `What was calibrated cannot be read: ${why}`;
+    $("unread").textContent = `The calibrations cannot be read: ${why}`;
   },
   today: (list) => rows("today", list, (each) => [
     [each.time], [each.rig], [each.serial], [each.sensor + (each.simulated ? " (simulated)" : "")], [each.verdict.toUpperCase(), each.verdict], [each.number],

@@ -8,7 +8,7 @@ const $ = (id) => document.getElementById(id);
 const ANSWERS = {
   mount: [["", "It is mounted"], ["no", "Put it aside"]],
   go: [["go", "Go"], ["no", "Do not start"]],
-  doubt: [["yes", "Go on all the same"], ["no", "No"]],
+  doubt: [["yes", "Continue anyway"], ["no", "No"]],
   again: [["yes", "Again"], ["no", "Put it aside"]],
 };
 let asked = null;
