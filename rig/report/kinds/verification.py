@@ -31,7 +31,7 @@ def _entries(outcome: Outcome) -> dict[str, VerificationEntry]:
     return {name: verification_entry(verification) for name, verification in outcome.verifications.items()}
 
 
-def verification_entry(verification: Verification) -> VerificationEntry:
+def verification_entry(verification: "Verification") -> VerificationEntry:
     """Return the statistics of both comparisons, without their curves."""
     before, reference = verification.before, verification.reference
     return entry(
