@@ -15,14 +15,14 @@ from rig.history.store import History
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class FileEntries:
     """The entries of a file in words, and its problems by name."""
 
     entries: tuple[str, ...]
     problems: tuple[Refused, ...]
 
 
-def known(history: History, name: str, content: bytes, anchor: tuple[int, str] | None) -> Known:
+def find_file_entries(history: History, name: str, content: bytes, anchor: tuple[int, str] | None) -> FileEntries:
     """Return the entries of a file in the history, by its bytes or by the values of a result.json.
 
     `anchor` is the journal's entry that its signature names. Problems are `unknown_to_history` if the history does not
@@ -32,7 +32,7 @@ def known(history: History, name: str, content: bytes, anchor: tuple[int, str] |
     with history.engine.connect() as connection:
         rows = list(_entries(connection, content))
         if not rows:
-            return Known((), (_unknown(name),))
+            return FileEntries((), (_unknown(name),))
         problems = [
             _not_as_entered(name, broken)
             for table, key, _ in rows
@@ -40,7 +40,7 @@ def known(history: History, name: str, content: bytes, anchor: tuple[int, str] |
         ]
         if anchor is not None and not journal.holds(connection, Head(*anchor)):
             problems.append(_rewritten(name, anchor))
-    return Known(tuple(words for _, _, words in rows if words), tuple(problems))
+    return FileEntries(tuple(words for _, _, words in rows if words), tuple(problems))
 
 
 def _entries(connection: Connection, content: bytes) -> Iterator[tuple[Table, tuple[int | str, ...], str]]:

@@ -94,12 +94,12 @@ def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
 
 
 def _files(
-    run: Kept, folder: Path | None, here: str, entered: Mapping[str, set[tuple[str, str]]]
+    run: Kept, folder: Path | None, this_computer: str, entered: Mapping[str, set[tuple[str, str]]]
 ) -> Iterator[EntryState]:
     if not run.recordings and not run.documents:
         return
     if folder is None:
-        other_computers = [name for name, _ in run.places if name != here]
+        other_computers = [name for name, _ in run.places if name != this_computer]
         state: State = "elsewhere" if other_computers else "missing"
         why = f"on {other_computers[0]}" if other_computers else "the folder no longer exists"
         yield EntryState(run.places[0][1] if run.places else f"the folder of run {run.run_id}", state, why)

@@ -12,7 +12,7 @@ import pytest
 
 from rig.page.about import About
 from rig.page.page_state import Shown
-from rig.page.server.connections import KNOWN, STRANGERS, Connections
+from rig.page.server.connections import STRANGERS, TRUSTED, Connections
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
 from rig.page.server.serving import Address, serving
@@ -64,7 +64,7 @@ def test_a_stream_with_the_token_outlives_any_number_of_strangers(tmp_path: Path
         operator = held.enter_context(opened(url, "/events", token))
         operator.settimeout(PATIENCE_S)
         assert b" 200 " in operator.recv(4096)
-        many = [held.enter_context(half_a_request(url)) for _ in range(2 * STRANGERS + KNOWN)]
+        many = [held.enter_context(half_a_request(url)) for _ in range(2 * STRANGERS + TRUSTED)]
         wait_for(lambda: sum(map(alive, many)) <= STRANGERS, "that only so many are left")
         assert alive(operator)
 

@@ -105,7 +105,7 @@ def _content(file: Path) -> bytes:
 def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Looked]") -> dict[Path, Any]:
     """What the history says of each file."""
     from rig.commands.history.waiting import answer_of
-    from rig.history.entered_file import known
+    from rig.history.entered_file import find_file_entries
     from rig.history.storage.address import resolve_address
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
@@ -120,7 +120,10 @@ def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Loo
                 file: next((each.reason.anchor for each in look.signatures if each.reason.anchor), None)
                 for file, look in looks.items()
             }
-            return {file: known(history, file.name, each, anchors[file]) for file, each in contents.items()}
+            return {
+                file: find_file_entries(history, file.name, content, anchors[file])
+                for file, content in contents.items()
+            }
 
     return answer_of(asked)
 

@@ -16,34 +16,36 @@ ROUNDING = 1e-15  # of values that are zero except for rounding: no quantity of 
 AS_IT_COMES = ("iterations", "solved_utc")
 
 
-def not_given(claimed: ResultDocument, given: ResultDocument) -> list[str]:
+def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
     """Return parts of a `claimed` result that its recordings do not give, beyond a processor's rounding.
 
-    `given` is solved from the recordings. Calibrations agree within 1e-6 of their standard uncertainty, other numbers
-    within 1e-6 of the largest in their list. Texts are not compared, and fields that the claim lacks are not required:
-    both change from version to version.
+    `recomputed` is solved from the recordings. Calibrations agree within 1e-6 of their standard uncertainty, other
+    numbers within 1e-6 of the largest in their list. Texts are not compared, and fields that the claim lacks are not
+    required: both change from version to version.
     """
-    origin = _origin(given)
+    origin = _origin(recomputed)
     rows = [f"provenance.{name}" for name, value in _origin(claimed).items() if value != origin.get(name)]
-    rows += ["verdict"] if claimed.verdict != given.verdict else []
-    checks = {check.name: _check_values(check) for check in given.checks}
+    rows += ["verdict"] if claimed.verdict != recomputed.verdict else []
+    checks = {check.name: _check_values(check) for check in recomputed.checks}
     rows += [check.name for check in claimed.checks if checks.get(check.name) != _check_values(check)]
-    numbers = _differences(_numbers_of(claimed), _numbers_of(given), "")
+    numbers = _differences(_numbers_of(claimed), _numbers_of(recomputed), "")
     stated = {(record.sensor, record.quantity): record for record in followed(claimed)}
     records = []
-    for record in followed(given):
+    for record in followed(recomputed):
         key = record.sensor, record.quantity
         if record.quantity in quantities() or key in stated:
             records.append(_without_later_parameters(record, stated.get(key)))
     return [*rows, *unlike(claimed, records), *numbers]
 
 
-def _without_later_parameters(given: HistoryRecord, claimed: HistoryRecord | None) -> HistoryRecord:
+def _without_later_parameters(recomputed: HistoryRecord, claimed: HistoryRecord | None) -> HistoryRecord:
     """Return a record without characteristics that the claim lacks: later versions have more of them."""
     if claimed is None:
-        return given
+        return recomputed
     names = {*SCALES, *BIASES, *(parameter.name for parameter in claimed.parameters)}
-    return replace(given, parameters=tuple(parameter for parameter in given.parameters if parameter.name in names))
+    return replace(
+        recomputed, parameters=tuple(parameter for parameter in recomputed.parameters if parameter.name in names)
+    )
 
 
 def _check_values(check: CheckEntry) -> tuple[bool, str, Kind]:
@@ -62,24 +64,24 @@ def _numbers_of(document: ResultDocument) -> dict[str, object]:
     return {**{name: value for name, value in fields.items() if name != "provenance"}, "checks": checks}
 
 
-def _differences(claimed: object, given: object, where: str, scale: float = 0.0) -> Iterator[str]:
-    if isinstance(claimed, Mapping) and isinstance(given, Mapping):
+def _differences(claimed: object, recomputed: object, where: str, scale: float = 0.0) -> Iterator[str]:
+    if isinstance(claimed, Mapping) and isinstance(recomputed, Mapping):
         for name, item in claimed.items():
-            if name not in given:
+            if name not in recomputed:
                 yield f"{where}{name}"
             elif name not in AS_IT_COMES:
-                yield from _differences(item, given[name], f"{where}{name}.")
-    elif isinstance(claimed, Sequence) and isinstance(given, Sequence) and not isinstance(claimed, str):
-        if len(claimed) != len(given):
+                yield from _differences(item, recomputed[name], f"{where}{name}.")
+    elif isinstance(claimed, Sequence) and isinstance(recomputed, Sequence) and not isinstance(claimed, str):
+        if len(claimed) != len(recomputed):
             yield where.rstrip(".")
             return
-        largest = scale or _largest(given)
-        for number, (item, other) in enumerate(zip(claimed, given, strict=True)):
+        largest = scale or _largest(recomputed)
+        for number, (item, other) in enumerate(zip(claimed, recomputed, strict=True)):
             yield from _differences(item, other, f"{where}{number}.", largest)
-    elif isinstance(claimed, float | int) and isinstance(given, float | int):
-        if abs(claimed - given) > max(SAME * max(scale, abs(given)), ROUNDING):
-            yield f"{where.rstrip('.')} {claimed:.9g}, which is {given:.9g}"
-    elif type(claimed) is not type(given):
+    elif isinstance(claimed, float | int) and isinstance(recomputed, float | int):
+        if abs(claimed - recomputed) > max(SAME * max(scale, abs(recomputed)), ROUNDING):
+            yield f"{where.rstrip('.')} {claimed:.9g}, which is {recomputed:.9g}"
+    elif type(claimed) is not type(recomputed):
         yield where.rstrip(".")
 
 

@@ -36,9 +36,9 @@ def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
         if not door.may_look(request.headers):
             return _token_needed()
         has_token = door.may_act(request.headers)
-        if broadcast.full(known=has_token):
+        if broadcast.full(has_token=has_token):
             return PlainTextResponse("too many browsers are connected\n", 503)
-        streaming = StreamingResponse(broadcast.frames(known=has_token), media_type="text/event-stream")
+        streaming = StreamingResponse(broadcast.frames(has_token=has_token), media_type="text/event-stream")
         if door.looking_needs_token:
             streaming.set_cookie(COOKIE, door.pass_to_look, path=f"/{CERTIFICATE}", httponly=True, samesite="strict")
         return streaming

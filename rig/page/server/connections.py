@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from uvicorn.protocols.http.h11_impl import H11Protocol
 
 STRANGERS = 96  # connections that have not shown the token
-KNOWN = 64  # connections that have
+TRUSTED = 64  # connections that have
 REQUEST_S = 5.0  # for the complete headers of a request
 Client = tuple[str, int]  # address and port
 
@@ -46,11 +46,11 @@ class Connections:
             deadline.cancel()
 
     @contextmanager
-    def answering(self, client: Client, *, known: bool) -> Iterator[None]:
+    def answering(self, client: Client, *, has_token: bool) -> Iterator[None]:
         """Mark a complete request of a client, which is answered in this block."""
         if (deadline := self._deadlines.pop(client, None)) is not None:
             deadline.cancel()
-        if known and len(self._trusted) < KNOWN and client in self._strangers:
+        if has_token and len(self._trusted) < TRUSTED and client in self._strangers:
             self._trusted[client] = self._strangers.pop(client)
         try:
             yield

@@ -126,9 +126,11 @@ class Broadcast:
         self._mailboxes: dict[Mailbox, bool] = {}  # whether its browser has the token
         self._closing = False
 
-    def full(self, *, known: bool) -> bool:
+    def full(self, *, has_token: bool) -> bool:
         """Return whether there is no room for another browser with the token, or without: their limits are separate."""
-        return sum(has_token == known for has_token in self._mailboxes.values()) >= (CLIENTS if known else STRANGERS)
+        return sum(trusted == has_token for trusted in self._mailboxes.values()) >= (
+            CLIENTS if has_token else STRANGERS
+        )
 
     @property
     def over(self) -> bool:
@@ -163,10 +165,10 @@ class Broadcast:
         while self._mailboxes and asyncio.get_running_loop().time() < deadline_s:
             await asyncio.sleep(FRAME_S / 4)
 
-    async def frames(self, *, known: bool = True) -> AsyncGenerator[bytes, None]:
+    async def frames(self, *, has_token: bool = True) -> AsyncGenerator[bytes, None]:
         """Yield the frames for one browser: the complete state, then changes."""
         mailbox = Mailbox()
-        self._mailboxes[mailbox] = known
+        self._mailboxes[mailbox] = has_token
         if self._closing:
             mailbox.close()
         try:

@@ -109,5 +109,5 @@ class Guard:
         refusal = self._door.refusal(scope["path"], dict(scope["headers"]))
         app = self._app if refusal is None else PlainTextResponse(f"{refusal[1]}\n", refusal[0])
         has_token = refusal is None and self._door.may_act(Headers(scope=scope))
-        with self._connections.answering(client_of(scope.get("client")), known=has_token):
+        with self._connections.answering(client_of(scope.get("client")), has_token=has_token):
             await app(scope, receive, with_headers)

@@ -20,7 +20,7 @@ export function hear() {
   heard = now();
 }
 
-/** A frame came: it says how old the arm's newest state and the newest readings are, s, if there are any. */
+/** Take from a frame the ages of the newest state of the arm and of the newest readings, s, null without any. */
 export function take({ age_s: ages }) {
   for (const what of Object.keys(came)) came[what] = typeof ages[what] === "number" ? now() - 1000 * ages[what] : null;
 }

@@ -46,7 +46,7 @@ export function drawArm(canvas, arm) {
   }
 }
 
-/** Frames, the base's and one after each joint: origin, axes x, y, z in the base's frame. */
+/** Return the frames of the base and after each joint: origin and axes x, y, z in the base's frame. */
 export function framesOf(geometry, q) {
   let frame = { origin: [0, 0, 0], x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
   const frames = [frame];

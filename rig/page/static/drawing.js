@@ -1,4 +1,4 @@
-// What the canvases share.
+// Helpers of all canvases.
 
 /** The drawing context of a canvas at the screen's own resolution, cleared, in CSS pixels. */
 export function fresh(canvas) {

@@ -12,7 +12,7 @@ let lying = null; // the side that is up
 /** A text whose sides have a minus sign, at which no line is broken. */
 const signed = (text) => text.replace(/-(?=[xyz]\b)/g, "−");
 
-/** Show the section; nothing when there is no session. */
+/** Show the section; hide it without a session. */
 export function hand(section) {
   $("hand").hidden = !section?.asked;
   if (!section?.asked) return;
@@ -41,8 +41,8 @@ function live(section) {
   const fast = section.range_deg_s > 0 && section.peak_deg_s > section.red_deg_s;
   $("hand-peak").textContent = `${section.peak_deg_s} of ${section.range_deg_s} °/s${fast ? " – too fast" : ""}`;
   $("hand-peak").className = fast ? "bad" : "";
-  const share = section.range_deg_s ? Math.min(1, section.peak_deg_s / section.range_deg_s) : 0;
-  $("hand-gauge-part").setAttribute("width", 300 * share);
+  const fraction = section.range_deg_s ? Math.min(1, section.peak_deg_s / section.range_deg_s) : 0;
+  $("hand-gauge-part").setAttribute("width", 300 * fraction);
   $("hand-gauge-part").setAttribute("class", fast ? "part over" : "part");
   const u = section.scale_u;
   $("hand-u").textContent = u === null || u === undefined ? "not yet" : u >= 0.001 ? `${(100 * u).toFixed(u < 0.01 ? 2 : 1)} %` : `${Math.round(1e6 * u)} ppm`;
@@ -88,9 +88,9 @@ $("hand-sound").addEventListener("click", async () => {
 // -- the drawing ------------------------------------------------------------------------------------------------
 
 const cross = ([a, b, c], [d, e, f]) => [b * f - c * e, c * d - a * f, a * e - b * d];
-const dot = (one, other) => one.reduce((sum, each, i) => sum + each * other[i], 0);
+const dot = (one, other) => one.reduce((sum, value, i) => sum + value * other[i], 0);
 const axisOf = (face) => [0, 1, 2].map((i) => ("xyz"[i] === face[1] ? (face[0] === "+" ? 1 : -1) : 0));
-/** Where a direction of the body points in the room, from where each of its axes points. */
+/** Return the room's components of a body direction; the rows are the body's axes in the room. */
 const inRoom = (rows, [a, b, c]) => [0, 1, 2].map((i) => rows[0][i] * a + rows[1][i] * b + rows[2][i] * c);
 /** On the screen: seen from above, with the room's x axis to the left in front and its y axis to the right in front. */
 const flat = ([x, y, z]) => [(y - x) * 0.866, (x + y) * 0.5 - z];
@@ -98,25 +98,25 @@ const flat = ([x, y, z]) => [(y - x) * 0.866, (x + y) * 0.5 - z];
 /** The body with a side up and another one (where it is at right angles) to the left in front: its axes in the room. */
 function upright(face, left = null) {
   const up = axisOf(face);
-  const beside = left && left[1] !== face[1] ? axisOf(left) : axisOf(face[1] === "x" ? "+y" : "+x");
-  const third = cross(up, beside);
-  return [0, 1, 2].map((i) => [beside[i], third[i], up[i]]);
+  const side = left && left[1] !== face[1] ? axisOf(left) : axisOf(face[1] === "x" ? "+y" : "+x");
+  const third = cross(up, side);
+  return [0, 1, 2].map((i) => [side[i], third[i], up[i]]);
 }
 
 /** The body after it was tipped over an edge, or over two, so that another side comes up. */
 function tipped(rows, face) {
-  const there = inRoom(rows, axisOf(face));
-  const about = there[2] < -0.5 ? [0, 1, 0] : cross(there, [0, 0, 1]);
+  const direction = inRoom(rows, axisOf(face));
+  const about = direction[2] < -0.5 ? [0, 1, 0] : cross(direction, [0, 0, 1]);
   const quarter = (v) => { const along = dot(about, v); const turned = cross(about, v); return about.map((a, i) => a * along + turned[i]); };
   const once = rows.map(quarter);
-  return there[2] < -0.5 ? once.map(quarter) : once;
+  return direction[2] < -0.5 ? once.map(quarter) : once;
 }
 
 function part(name, attributes, words) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (words !== undefined) made.textContent = words;
-  return made;
+  const node = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  if (words !== undefined) node.textContent = words;
+  return node;
 }
 
 /** A box as it lies, its three visible sides with their names; `scale` in pixels, its middle on the table at (x, y). */
@@ -131,10 +131,10 @@ function box(rows, [x, y], scale, topFace) {
     top: [[-a, -b, 2 * c], [a, -b, 2 * c], [a, b, 2 * c], [-a, b, 2 * c]],
   };
   const outwards = { side0: [1, 0, 0], side1: [0, 1, 0], top: [0, 0, 1] };
-  for (const [place, points] of Object.entries(corners)) {
-    group.append(part("polygon", { class: `box ${place}`, points: points.map((p) => at(p).map((n) => n.toFixed(1)).join(",")).join(" ") }));
-    const towards = rows.map((axis) => dot(axis, outwards[place]));
-    const axis = towards.findIndex((each) => Math.abs(each) > 0.5);
+  for (const [side, points] of Object.entries(corners)) {
+    group.append(part("polygon", { class: `box ${side}`, points: points.map((p) => at(p).map((n) => n.toFixed(1)).join(",")).join(" ") }));
+    const towards = rows.map((axis) => dot(axis, outwards[side]));
+    const axis = towards.findIndex((cosine) => Math.abs(cosine) > 0.5);
     const name = `${towards[axis] > 0 ? "+" : "-"}${"xyz"[axis]}`;
     const [u, v] = at([0, 1, 2].map((i) => points.reduce((sum, p) => sum + p[i] / 4, 0)));
     const shown = name !== topFace ? "named" : scale < 60 ? "named wanted small" : "named wanted";

@@ -54,17 +54,17 @@ const SHOW = {
     $("missed").textContent = arm.missed ?? "not recorded";
     $("missed").className = arm.missed ? "odd-number" : "";
     if (!arm.q_rad) return;
-    const known = arm.let_go || !past; // of one that moved when it was seen last, nobody knows what it does now
+    const current = arm.let_go || !past; // without news of an arm that moved, its present state is unknown
     const fast = Math.max(0, ...arm.qd_rad_s.map(Math.abs)) * 180 / Math.PI;
-    const normal = (value, usual) => (known ? [value, value !== usual] : ["–", false]);
-    const share = (value) => (known ? [`${Math.round(100 * value)} %`, value < 0.995] : ["–", false]);
+    const normal = (value, usual) => (current ? [value, value !== usual] : ["–", false]);
+    const percentage = (value) => (current ? [`${Math.round(100 * value)} %`, value < 0.995] : ["–", false]);
     const ofController = arm.mode === undefined ? [] : [
-      ["slider", share(arm.slider)], ["scaling", share(arm.scaling)], ["mode", normal(arm.mode, "running")],
-      ["safety", normal(arm.safety, "normal")], ["program", [known ? arm.program : "–", arm.program === "paused"]],
+      ["slider", percentage(arm.slider)], ["scaling", percentage(arm.scaling)], ["mode", normal(arm.mode, "running")],
+      ["safety", normal(arm.safety, "normal")], ["program", [current ? arm.program : "–", arm.program === "paused"]],
     ];
-    facts([["speed", [known ? `${fast.toFixed(1)} °/s` : "–", false]], ...ofController]);
-    tables.joints(arm, known);
-    drawArm($("arm"), known ? arm : { ...arm, qd_rad_s: arm.q_rad.map(() => 0) });
+    facts([["speed", [current ? `${fast.toFixed(1)} °/s` : "–", false]], ...ofController]);
+    tables.joints(arm, current);
+    drawArm($("arm"), current ? arm : { ...arm, qd_rad_s: arm.q_rad.map(() => 0) });
   },
   sensors: tables.samples,
   observations: tables.observations,
@@ -79,9 +79,9 @@ const SHOW = {
   },
   prompt: (asked) => prompt(asked, shown.about.may_answer),
   certificate: light,
-  outcome: found,
+  outcome: showOutcome,
   mounts: (lines) => $("mounts").replaceChildren(...lines.map((text) => Object.assign(document.createElement("li"), { textContent: text }))),
-  since: found,
+  since: showOutcome,
   next(step) {
     $("next").hidden = !step?.command;
     if (!step) return;
@@ -92,10 +92,10 @@ const SHOW = {
     const list = $("lines");
     const before = [...list.children];
     let gone = 0;
-    while (before.slice(gone).some((each, i) => each.textContent !== lines[i])) gone += 1;
-    for (const each of before.slice(0, gone)) each.remove();
-    const said = lines.slice(before.length - gone);
-    list.append(...said.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+    while (before.slice(gone).some((item, i) => item.textContent !== lines[i])) gone += 1;
+    for (const item of before.slice(0, gone)) item.remove();
+    const added = lines.slice(before.length - gone);
+    list.append(...added.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
     list.scrollTop = list.scrollHeight;
   },
 };
@@ -108,7 +108,7 @@ function failed(checks) {
   $("failed").replaceChildren(...[...said, ...more].map((text) => Object.assign(document.createElement("li"), { textContent: text })));
 }
 
-function found() {
+function showOutcome() {
   outcome($("found"), shown.outcome ?? [], shown.since);
   $("key").hidden = !shown.outcome?.length;
 }
@@ -166,7 +166,7 @@ function tell() {
   past = lost && !words ? `${lost} s ago` : words;
   if (past === was) return;
   document.body.dataset.past = past ? "yes" : "no";
-  for (const each of document.querySelectorAll(".age")) each.textContent = past;
+  for (const node of document.querySelectorAll(".age")) node.textContent = past;
   if (!past === !was) return;
   if (shown.arm) SHOW.arm(shown.arm);
   redraw();

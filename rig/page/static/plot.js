@@ -61,7 +61,7 @@ export function plot(canvas, times, values, newest) {
   letters(pen, paint, values.findLast((value) => value), up, width, height);
 }
 
-/** The letters at the right end, moved apart where they would cover each other. */
+/** Draw the letters of the axes at the right end, moved apart if they overlap. */
 function letters(pen, paint, last, up, width, height) {
   if (!last || last.length === 1) return;
   const places = [..."xyz"].map((axis, i) => ({ axis, at: up(last[i]) })).sort((a, b) => a.at - b.at);

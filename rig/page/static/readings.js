@@ -11,7 +11,7 @@ const UNITS = { rate_rad_s: ["rate", "rad/s", 3], acceleration_m_s2: ["accelerat
 let sensors = []; // as the rig has them
 let past = ""; // how old the readings are, in words; "" while they are of now
 
-/** Points that came with a frame. They are counted, so that none is taken twice; what the rig has forgotten is forgotten here. */
+/** Points that came with a frame. They are counted, so that none is taken twice; points that the rig has dropped are dropped. */
 export function add(frame, news) {
   if (frame === "all") Object.assign(points, { first: news.first, times: [], lines: {} });
   const end = points.first + points.times.length;
@@ -47,7 +47,7 @@ export function redraw(of, old) {
 
 /** By sensor as the rig has them, then rate before acceleration before field. */
 function inOrder(one, other) {
-  const order = sensors.map((each) => each.name);
+  const order = sensors.map((sensor) => sensor.name);
   const [a, b] = [one, other].map((name) => [order.indexOf(name.slice(0, name.lastIndexOf("."))), Object.keys(UNITS).indexOf(name.slice(name.lastIndexOf(".") + 1))]);
   return a[0] - b[0] || a[1] - b[1];
 }
@@ -55,7 +55,7 @@ function inOrder(one, other) {
 function draw(name, values) {
   const id = `plot-${name.replaceAll(/[^A-Za-z0-9_-]/g, "-")}`;
   const [sensor, quantity] = [name.slice(0, name.lastIndexOf(".")), name.slice(name.lastIndexOf(".") + 1)];
-  const about = sensors.find((each) => each.name === sensor);
+  const about = sensors.find((candidate) => candidate.name === sensor);
   const [title, unit, digits] = UNITS[quantity] ?? [...(about?.units?.[quantity] ?? [quantity, ""]), 2];
   if (!$(id)) $("readings").append(panel(id, sensor, title, unit));
   $(`${id}-about`).textContent = [about?.part, about?.mode === "calibrated" ? "corrected by the board" : ""].filter(Boolean).join(" · ");
@@ -71,9 +71,9 @@ function draw(name, values) {
 
 function panel(id, sensor, title, unit) {
   const make = (tag, fields, ...children) => {
-    const made = Object.assign(document.createElement(tag), fields);
-    made.append(...children);
-    return made;
+    const node = Object.assign(document.createElement(tag), fields);
+    node.append(...children);
+    return node;
   };
   const now = make("span", { className: "now" }, ...[..."xyz"].map((axis) => make("span", { id: `${id}-${axis}`, className: axis })), make("span", { className: "unit", textContent: unit }));
   const head = make("h2", {}, make("span", { textContent: `${sensor}, ${title}` }), make("small", { id: `${id}-about` }), make("small", { className: "age", textContent: past }), now);

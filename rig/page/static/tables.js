@@ -39,13 +39,13 @@ export function samples(sensors) {
     row([s.name, count(s.samples), [count(s.lost) + (s.lost ? " ⚠" : ""), s.lost ? "odd-number" : ""], fixed(s.temperature_c, 1)])));
 }
 
-/** Angles and, where they are `known`, speeds. */
-export function joints(arm, known) {
+/** Show the joints' angles and, if they are `current`, speeds. */
+export function joints(arm, current) {
   const fastest = Math.max(0, ...arm.qd_rad_s.map(Math.abs));
   fill("joints", arm.joints.map((name, i) => {
-    const turning = known && fastest > 0.02 && Math.abs(arm.qd_rad_s[i]) === fastest;
+    const turning = current && fastest > 0.02 && Math.abs(arm.qd_rad_s[i]) === fastest;
     return row(
-      [(turning ? "▸ " : "") + name, minus(((arm.q_rad[i] * 180) / Math.PI).toFixed(1)), known ? signed((arm.qd_rad_s[i] * 180) / Math.PI, 1) : "–"],
+      [(turning ? "▸ " : "") + name, minus(((arm.q_rad[i] * 180) / Math.PI).toFixed(1)), current ? signed((arm.qd_rad_s[i] * 180) / Math.PI, 1) : "–"],
       turning ? "turning" : "",
     );
   }));
@@ -53,9 +53,9 @@ export function joints(arm, known) {
 
 export function observations(rows) {
   const sweeps = new Map();
-  for (const each of rows) sweeps.set(each.sweep, { ...sweeps.get(each.sweep), ...(each.joint ? each : {}) });
-  dwells(rows.filter((each) => each.dwell !== undefined));
-  const turns = rows.filter((each) => each.dwell === undefined);
+  for (const row of rows) sweeps.set(row.sweep, { ...sweeps.get(row.sweep), ...(row.joint ? row : {}) });
+  dwells(rows.filter((row) => row.dwell !== undefined));
+  const turns = rows.filter((row) => row.dwell === undefined);
   fill("observations", turns.map((o, i) => {
     const turn = sweeps.get(o.sweep);
     const words = turn?.joint ? `${turn.joint} ${turn.direction}` : "";
@@ -76,7 +76,7 @@ export function observations(rows) {
   }));
 }
 
-/** What was read in attitudes: the size of it beside that of gravity or of the field, and the axis nearest to it. */
+/** Show the dwells: the magnitude of the reading, that of gravity or of the field, and the nearest axis. */
 function dwells(rows) {
   fill("dwells", rows.map((d, i) => {
     const kind = i && rows[i - 1].sweep !== d.sweep ? "new-sensor" : "";
@@ -92,7 +92,7 @@ function dwells(rows) {
 const largest = (vector) => Math.max(...vector.map(Math.abs));
 
 /** As many decimals as the smallest U warrants, which is shown with two digits; five at least. */
-const warranted = (u) => (u ? Math.min(12, Math.max(5, ...u.filter((each) => each > 0).map((each) => 1 - Math.floor(Math.log10(each))))) : 5);
+const warranted = (u) => (u ? Math.min(12, Math.max(5, ...u.filter((value) => value > 0).map((value) => 1 - Math.floor(Math.log10(value))))) : 5);
 
 export function parameters(rows) {
   fill("parameters", rows.flatMap((p) => {
@@ -115,8 +115,8 @@ function spanning(tr, columns) {
 }
 
 export function checks(rows) {
-  const held = rows.filter((c) => c.passed).length;
-  document.getElementById("checks-held").textContent = rows.length ? `${held} of ${rows.length} passed` : "";
+  const passed = rows.filter((c) => c.passed).length;
+  document.getElementById("checks-held").textContent = rows.length ? `${passed} of ${rows.length} passed` : "";
   fill("checks", [...rows].sort((a, b) => a.passed - b.passed).map((c) =>
     row([c.name, plain(c.value) + (c.uncertainty ? ` ± ${plain(c.uncertainty)}` : ""), plain(c.limit), c.unit, c.passed ? ["✓ passed", "good"] : ["✗ failed", "bad"]])));
 }

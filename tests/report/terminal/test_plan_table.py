@@ -13,7 +13,7 @@ def test_a_long_instruction_leaves_every_step_its_time(monkeypatch: pytest.Monke
     monkeypatch.setenv("COLUMNS", "80")
     said = rig_here("plan", CONFIGS / "servo.yaml").stdout
     assert "start s" in said and "duration s" in said and "…" not in said
-    assert said.count("sweep shaft ccw        8.10") == 3
+    assert said.count("sweep shaft ccw         8.10") == 3
     assert max(map(len, said.splitlines())) <= 80
 
 

@@ -8,27 +8,27 @@ const RIG = "rig "; // how the section of a rig begins
 const CONTROL = { in: "✓ in control", out: "✗ OUT OF CONTROL", "too few": "too few calibrations" };
 
 const element = (name, text, data = {}) => {
-  const made = document.createElement(name);
-  if (text !== undefined) made.textContent = text;
-  Object.assign(made.dataset, data);
-  return made;
+  const node = document.createElement(name);
+  if (text !== undefined) node.textContent = text;
+  Object.assign(node.dataset, data);
+  return node;
 };
 
 function row(cells) {
-  const made = element("tr");
-  made.append(...cells.map(([text, is]) => element("td", text, is ? { is } : {})));
-  return made;
+  const node = element("tr");
+  node.append(...cells.map(([text, is]) => element("td", text, is ? { is } : {})));
+  return node;
 }
 
 const rows = (id, list, cells, none) => {
   const empty = element("tr");
   empty.append(element("td", none));
-  $(id).replaceChildren(...(list.length ? list.map((each) => row(cells(each))) : [empty]));
+  $(id).replaceChildren(...(list.length ? list.map((item) => row(cells(item))) : [empty]));
 };
 
 function rig(of) {
-  const made = element("article", undefined, { state: of.state });
-  made.className = "rig";
+  const node = element("article", undefined, { state: of.state });
+  node.className = "rig";
   const head = element("h3");
   head.append(element("span", of.rig), element("span", WORDS[of.state] ?? of.state));
   const part = element("p", of.part || "–");
@@ -47,8 +47,8 @@ function rig(of) {
     cell.setAttribute("aria-label", `${at + 1}, ${serial}: ${state}`);
     return cell;
   }));
-  made.append(head, part, doing, element("small", `${age}${[counts, who].filter(Boolean).join(" · ")}`), tray);
-  return made;
+  node.append(head, part, doing, element("small", `${age}${[counts, who].filter(Boolean).join(" · ")}`), tray);
+  return node;
 }
 
 const SHOW = {
@@ -62,19 +62,19 @@ const SHOW = {
     $("unread").hidden = !why;
     $("unread").textContent = `The calibrations cannot be read: ${why}`;
   },
-  today: (list) => rows("today", list, (each) => [
-    [each.time], [each.rig], [each.serial], [each.sensor + (each.simulated ? " (simulated)" : "")], [each.verdict.toUpperCase(), each.verdict], [each.number],
+  today: (list) => rows("today", list, (item) => [
+    [item.time], [item.rig], [item.serial], [item.sensor + (item.simulated ? " (simulated)" : "")], [item.verdict.toUpperCase(), item.verdict], [item.number],
   ], "Nothing was calibrated today."),
-  standards: (list) => rows("standards", list, (each) => [
-    [each.rig], [CONTROL[each.control], each.control], [each.out.join(", ")], [each.standards.join(", ")],
+  standards: (list) => rows("standards", list, (item) => [
+    [item.rig], [CONTROL[item.control], item.control], [item.out.join(", ")], [item.standards.join(", ")],
   ], "No rig has a check standard."),
-  recalls: (list) => rows("recalls", list, (each) => [
-    [each.day + (each.overdue ? " overdue" : ""), each.overdue ? "overdue" : ""], [each.serial], [each.sensor + (each.simulated ? " (simulated)" : "")], [each.parameter],
+  recalls: (list) => rows("recalls", list, (item) => [
+    [item.day + (item.overdue ? " overdue" : ""), item.overdue ? "overdue" : ""], [item.serial], [item.sensor + (item.simulated ? " (simulated)" : "")], [item.parameter],
   ], "None."),
 };
 
-/** A rig's card, in its place among the others; null where there is none any more. */
-function place(section, of) {
+/** Insert or replace a rig's card in the order of the rigs; remove it if the content is null. */
+function updateCard(section, of) {
   const number = Number(section.slice(RIG.length));
   while ($("rigs").children.length <= number) $("rigs").append(element("div"));
   $("rigs").children[number].replaceWith(of === null ? element("div") : rig(of));
@@ -89,6 +89,6 @@ function tell() {
 
 live((section, content) => {
   shown[section] = content;
-  if (section.startsWith(RIG)) place(section, content);
+  if (section.startsWith(RIG)) updateCard(section, content);
   else SHOW[section]?.(content);
 }, tell, () => false);

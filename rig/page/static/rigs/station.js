@@ -63,10 +63,10 @@ function ready() {
 async function say(text) {
   const question = asked;
   if (!question) return;
-  const allowed = (ANSWERS[question.kind] ?? []).map(([each]) => each);
+  const allowed = (ANSWERS[question.kind] ?? []).map(([answer]) => answer);
   if (allowed.length && !allowed.includes(text.toLowerCase())) {
     $("said").value = "";
-    $("hint").textContent = `"${text}" answers nothing here: ${allowed.map((each) => each || "Enter").join(" or ")}`;
+    $("hint").textContent = `"${text}" answers nothing here: ${allowed.map((answer) => answer || "Enter").join(" or ")}`;
     return;
   }
   const why = await act("say", { number: question.number, text });
