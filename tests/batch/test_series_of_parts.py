@@ -62,8 +62,8 @@ def test_a_part_that_has_not_ended_is_in_hand() -> None:
     ("serial", "before", "why", "final"),
     [
         ("G-1", None, "does not match", True),
-        ("G-00é", None, "no serial number", True),
-        ("G-001\nG-002", None, "no serial number", True),
+        ("G-00é", None, "not a serial number", True),
+        ("G-001\nG-002", None, "not a serial number", True),
         ("G-009", None, "no part G-009", False),
         ("G-001", None, "is done: part 1", False),
         ("G-002", "2026-11-25, PASS (calibration 7)", "today: 2026-11-25", False),

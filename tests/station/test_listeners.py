@@ -55,7 +55,7 @@ def test_a_line_is_made_of_what_the_event_holds() -> None:
     stored = CalibrationStored("gyro", "lsm9ds1", "LSM9DS1-001", 3)
     assert line(stored) == "stored on the board: gyro, lsm9ds1 LSM9DS1-001, record 3"
     said = line(PhaseSkipped("verify"))
-    assert said == "not verified: the calibration failed its limits, so the board keeps what it had"
+    assert said == "not verified: the calibration failed its limits, so the board keeps its old calibration"
     assert line(Plotted(("one", "other"))) == "plotted: one, other (.png, .svg)"
     assert line(RunFolderWritten(Path("a run"))) == "written: a run"
     kept = "the data are kept in a run"
