@@ -190,7 +190,7 @@ def test_a_result_that_was_changed_with_its_own_hash_is_named(tmp_path: Path) ->
     with open_history(file) as history:
         found = "\n".join(f"{each.what}: {each.why}" for each in examined(history) if each.state in WRONG)
     assert (
-        "run [1]: its rows are not those entered" in found
+        "run [1]: its rows have changed since their entry" in found
         and "run 1, calibration 1: k 1, stated 1.00333333, of gyro" in found
     )
 

@@ -219,7 +219,7 @@ def test_what_is_no_history_is_not_made_one(tmp_path: Path) -> None:
     other.execute("CREATE TABLE letters (id INTEGER)")
     other.commit()
     other.close()
-    with pytest.raises(Refused, match=r"not_a_history: .*something else"), open_history(str(file)):
+    with pytest.raises(Refused, match=r"not_a_history: .*another kind of database"), open_history(str(file)):
         pass
     words = tmp_path / "words.txt"
     words.write_text("no database at all, but long enough to be looked at\n" * 100, encoding="utf-8")

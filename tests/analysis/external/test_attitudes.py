@@ -157,7 +157,7 @@ def test_any_estimator_can_be_asked_for(estimator: str, capsys: pytest.CaptureFi
 def test_people_read_what_was_found_and_what_was_not(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(solve(example(STILL), *PLACE, "--all")) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "attitude error found:" in said and "as_published, attitudes alone: k" in said
+    assert "estimated attitude error:" in said and "as_published, attitudes alone: k" in said
     assert "imu, magnetometer, not calibrated: field_strength_unknown:" in said
 
 
