@@ -16,6 +16,7 @@ AROUND = 161  # bins of the running median
 MOST_LINES = 8  # three of a servo, and vibrations in the room, each of which a turning sensor may read as two
 APART = 2.5  # cycles in all the readings: least distance from a line that was found
 SAME = 1.5  # cycles in all the readings: lines that are nearer to each other are a jerk
+BESIDE = 0.5  # cycles in all the readings: sidebands nearer to each other, of slow lines, resemble the turn's own waves
 PASSES = 1
 WIDE = 4  # columns of a line, and of each of its sidebands
 BEATS = 1  # sidebands of a vibration in the room for a sensor that makes a turn
@@ -60,11 +61,24 @@ def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fra
         if strongest is None:
             break
         refined = _refine(np.append(cycles, strongest), residuals, fixed, fraction, search.beats)
-        if np.diff(np.sort(refined)).min(initial=np.inf) < SAME or refined.min() < 1.0:
+        if _are_too_near(refined, search):
             merged = np.append(merged, strongest)
         else:
             cycles = refined
     return cycles
+
+
+def _are_too_near(cycles: Array, search: LineSearch) -> bool:
+    """Return whether lines merge, or the slowest merges with the turn's own waves.
+
+    Refined to less than what is sought, it may stand only where its sidebands meet no other line's: two such lines,
+    about a vibration and a ripple less than a cycle apart, explain a part of the mean.
+    """
+    ordered = np.sort(cycles)
+    gaps = np.diff(ordered)
+    if gaps.min(initial=np.inf) < SAME or ordered[0] < 1.0:
+        return True
+    return bool(ordered[0] < search.slowest and gaps.size and gaps[0] < 2 * search.beats + BESIDE)
 
 
 def median_power(residuals: Array) -> float:

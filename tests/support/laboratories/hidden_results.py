@@ -90,18 +90,22 @@ def true_gyroscope(document: Mapping[str, Any], name: str, recording: ObservedRu
 
 
 def true_accelerometer(document: Mapping[str, Any], name: str, found: AccelerometerResult) -> np.ndarray:
-    """(6,) the scale of the readings at 1 g up and down, the bias of that at 0 g, as warm as in the mean of the dwells.
+    """Return (6,) the scale of the readings at 1 g up and down, and the bias of that at 0 g.
 
-    Neither moves by φ, for what is even is the same up and down, and nothing at 0 g. A bias that wanders is its mean
-    over the dwells.
+    Neither moves by φ, for what is even is the same up and down, and nothing at 0 g. The scale is that of a part as
+    warm as in the mean of dwells and sweeps, the bias its mean over the run, as docs/uncertainty.md states it: what
+    wanders in sweeps and between the dwells counts as well.
     """
     sensor = read_world_section(parse(yaml.safe_dump(dict(document)))).sensors[name]
     drawn = sensor.accelerometer
-    at_s = [(dwell.window.start_s + dwell.window.end_s) / 2 for dwell in found.dwells]
-    warmer_k = float(np.mean([_warmer_k(sensor, each) for each in at_s]))
-    scale = np.array(drawn.scale) * (1 + warmer_k * np.array(drawn.scale_per_k))
-    windows_s = sorted((dwell.window.start_s, dwell.window.end_s) for dwell in found.dwells)
-    return np.concatenate([scale, bias_at_0_g(document, name, windows_s)])
+    assert found.movement.own is not None
+    windows_s = found.movement.own.windows_s
+    warmer_k = np.average(
+        [_warmer_k(sensor, each) for each in windows_s.mean(axis=1)], weights=np.ptp(windows_s, axis=1)
+    )
+    scale = np.array(drawn.scale) * (1 + float(warmer_k) * np.array(drawn.scale_per_k))
+    whole = float(windows_s.min()), float(windows_s.max())
+    return np.concatenate([scale, bias_at_0_g(document, name, [whole])])
 
 
 def _warmer_k(sensor: SimulatedSensorSection, time_s: float) -> float:
