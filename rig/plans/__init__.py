@@ -1,1 +1,1 @@
-"""Procedure → steps: what the arm will do, before it does it; pure."""
+"""Procedure → steps: the motions of the arm, before it moves; pure."""

@@ -13,7 +13,7 @@ from rig.plans.script_errors import script_errors
 
 
 class PhasePlanner(Protocol):
-    """Makes the plan, as `Planner` does, for the turner and the section of one configuration."""
+    """A planner, as `Planner`, for the turner and the section of one configuration."""
 
     def __call__(self, start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan: ...
 
@@ -22,8 +22,8 @@ class PhasePlanner(Protocol):
 class Phase:
     """One movement of a run.
 
-    `procedure` says what streams, what is done and how it is judged, `plan` makes the steps. The operator has `agreed`
-    to it with the phase before, and `follows` is what comes after it if it passes.
+    `procedure` determines what is streamed, done and judged, `plan` makes the steps. The operator has `agreed` to it
+    with the phase before, and `follows` is the next phase if it passes.
     """
 
     procedure: AnyProcedure
@@ -33,24 +33,24 @@ class Phase:
 
 
 def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedures) -> Phase:
-    """The phase a run of `procedure` begins with; what follows repeats its movement.
+    """Return the phase with which a run of `procedure` begins; the next phase repeats its movement.
 
-    Raises Refused `no_such_procedure`; the phase's `plan` raises Refused as the procedure's, `script_failed`, and
-    `rank_deficient`, `ill_conditioned` where the whole plan's attitudes do not tell what is asked of them, and
-    `other_turner` where the procedure plans for another kind than is configured.
+    Raise Refused `no_such_procedure`; the phase's `plan` raises Refused as the procedure's, `script_failed`, and
+    `rank_deficient`, `ill_conditioned` if the whole plan's attitudes do not determine the requested parameters, and
+    `other_turner` if the procedure plans for another kind than is configured.
     """
 
     def plan(start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan:
         turner = turner_for(procedure, config)
         with script_errors(f"the procedure {procedure.name} cannot be planned"):
-            made = procedure.plan(turner, config.procedure, start_q_rad, done)
-            if not isinstance(made, Plan):
-                raise TypeError(f"its planner gives {type(made).__name__}, no Plan")
+            steps = procedure.plan(turner, config.procedure, start_q_rad, done)
+            if not isinstance(steps, Plan):
+                raise TypeError(f"its planner gives {type(steps).__name__}, no Plan")
         if not done:
             from rig.analysis.design.attitude_account import refuse_undetermined
 
-            refuse_undetermined(config, made)
-        return made
+            refuse_undetermined(config, steps)
+        return steps
 
     following = procedure.following(procedures) if config.procedure.then_verify else None
     follows = None if following is None else Phase(following, plan, agreed=True)
@@ -58,7 +58,7 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
 
 
 def turner_for(procedure: AnyProcedure, config: RigConfig) -> TurnerSection:
-    """The turner's section, which the procedure has to know."""
+    """Return the turner's section, of the type that the procedure needs. Raise Refused `other_turner`."""
     if not isinstance(config.turner, procedure.turner):
         raise Refused(
             "other_turner",

@@ -1,4 +1,4 @@
-"""A run as it was recorded, and judged again by the procedure that judged it when it ended."""
+"""A recorded run, and its analysis by the procedure that judged it."""
 
 import os
 from collections.abc import Container, Mapping, Sequence
@@ -21,8 +21,8 @@ RAW, CORRECTED = "six_observation", "verify"  # procedures that judge any record
 class RecordedRun:
     """The recordings of a run, oldest first: of `raw` readings, and of those the board `corrected`.
 
-    `path` is the run folder, or the run file when a recording stands `alone`. `script` is the one that the user has
-    named for it, None where none was.
+    `path` is the run folder, or the run file of a single recording (`alone`). `script` is the one that the user has
+    named for it, or None.
     """
 
     path: Path
@@ -33,15 +33,15 @@ class RecordedRun:
 
     @property
     def movement(self) -> tuple[RunData, ...]:
-        """The recordings of the first movement."""
+        """Recordings of the first movement."""
         return self.raw or self.corrected
 
     def only_raw(self) -> "RecordedRun":
-        """The calibration alone."""
+        """Return the calibration alone."""
         return replace(self, corrected=(), alone=True)
 
     def judged_by(self, overrides: Sequence[str]) -> "RecordedRun":
-        """The run with other thresholds or limits, see `RunSettings.with_overrides`."""
+        """Return the run with other thresholds or limits, see `RunSettings.with_overrides`."""
         raw, corrected = (tuple(run.judged_by(overrides) for run in runs) for runs in (self.raw, self.corrected))
         return replace(self, raw=raw, corrected=corrected)
 
@@ -53,12 +53,10 @@ def open_run(
     only: Container[str] | None = None,
     begun: Mapping[Path, Reading] = MappingProxyType({}),
 ) -> RecordedRun:
-    """The recordings in a run folder, or a run file; `script` is executed, if it is named.
+    """Return the recordings in a run folder, or a run file; `script` is executed, if it is named.
 
-    Of a folder `only` those of these names, where some are given: what was recorded there later is left out. Those
-    that are `begun` are being read already.
-
-    Raises Refused `no_run`, and as `read_run` and `load_script`.
+    Of a folder `only` those of these names, if any are given: later recordings are left out. Raise Refused `no_run`,
+    and as `read_run` and `load_script`.
     """
     named = None if script is None else load_script(script)
     if not path.is_dir():
@@ -80,12 +78,10 @@ def open_run(
 
 
 def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
-    """What a run says, phase after phase; one that was to follow and is missing has not passed.
+    """Return the outcome of a run, phase after phase; one that was to follow and is missing has not passed.
 
-    By the procedure's own estimator where none is asked for.
-
-    Of a recording that stands alone it is what that recording says. Raises Fault and Refused by name as the
-    procedure's analysis does.
+    By the procedure's own estimator, unless another is requested; of a single recording the outcome of that recording.
+    Raise Fault and Refused by name as the procedure's analysis does.
     """
     procedure = _procedure_of(run, run.movement[0])
     estimator = estimator or procedure.estimator
@@ -99,42 +95,42 @@ def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
 
 
 def left_out(run: RecordedRun) -> str | None:
-    """What is not in the solution of a run, as a sentence: the analysis of a script that is not executed here."""
-    for each in (*run.raw, *run.corrected):
-        if each.elsewhere is None and _script_of(run, each) is None and not _by_installed(each):
+    """Return the sentence that a script's analysis is missing in the solution, because it is not executed here."""
+    for recording in (*run.raw, *run.corrected):
+        if recording.elsewhere is None and _script_of(run, recording) is None and not _is_by_installed(recording):
             return (
-                f"recorded by the script {each.provenance.script}, which no run of yours on this computer was begun "
-                "with: it is not executed, and what it adds to the analysis is left out (--script FILE names it)"
+                f"recorded by the script {recording.provenance.script}, which no run of yours on this computer was "
+                "begun with: it is not executed, and what it adds to the analysis is left out (--script FILE names it)"
             )
     return None
 
 
 def _is_corrected(run: RunData) -> bool:
-    """Whether the board corrected what the sensors to calibrate streamed."""
+    """Return whether the board corrected the readings of the sensors to calibrate."""
     return any(sensor.mode == "calibrated" for sensor in run.sensors.values())
 
 
 def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
-    """The procedure a recording names: an installed one, or that of a script of the user's own.
+    """Return the procedure of a recording: an installed one, or that of a script of the user's own.
 
-    Where neither is known here, an installed one that reads what was recorded: to solve a recording needs no script.
-    Raises Refused `another_script` when the script there is not the one it was recorded with, and as `kept_script`.
+    If neither is known here, an installed one for the kind of readings: a solution needs no script. Raise Refused
+    `another_script` if the script is not the one of the recording, and as `kept_script`.
     """
-    if _by_installed(recording):
+    if _is_by_installed(recording):
         return installed()[recording.settings.procedure]
     if (script := _script_of(run, recording)) is not None:
         return script.procedure
     return installed()[CORRECTED if _is_corrected(recording) else RAW]
 
 
-def _by_installed(recording: RunData) -> bool:
+def _is_by_installed(recording: RunData) -> bool:
     return recording.provenance.script_installed and recording.settings.procedure in installed()
 
 
 def _script_of(run: RecordedRun, recording: RunData) -> ScriptFile | None:
-    """The script a recording was made by, where it may be executed: named by the user, or known from an own run."""
+    """Return the script of a recording if it may be executed: named by the user, or known from an own run."""
     folder = run.path if run.path.is_dir() else run.path.parent
-    if _by_installed(recording) or (run.script is None and not (folder / SCRIPT).exists()):
+    if _is_by_installed(recording) or (run.script is None and not (folder / SCRIPT).exists()):
         return None
     try:
         return kept_script(folder, recording.provenance.script_identity, run.script)

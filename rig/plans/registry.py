@@ -1,7 +1,7 @@
 """The procedures by name: the stock ones, and those that packages add through the entry-point group `rig.procedures`.
 
-The stock ones are those of `STOCK_SECTIONS`: the script of each is the module of its name in `procedures/`. Nothing in
-the rig knows a procedure except through its `Procedure`; one that is not installed comes from a file of its own
+The stock ones are those of `STOCK_SECTIONS`: the script of each is the module of its name in `procedures/`. The rig
+knows a procedure only through its `Procedure`; one that is not installed comes from a file of its own
 (`rig.plans.script_file`).
 """
 
@@ -30,10 +30,11 @@ SectionT_contra = TypeVar("SectionT_contra", bound=ProcedureSection, contravaria
 
 
 class Planner(Protocol[SectionT_contra]):
-    """Makes the steps; pure. `start_q_rad` is where the turner stands (at home when None), `done` what to leave out.
+    """A function that plans the steps; pure. `start_q_rad` is the turner's pose (home if None), `done` the steps to
+    leave out.
 
-    The `index` of sweeps and dwells, by which `done` names them, is their place in the whole procedure. Raises
-    `Refused` by name when there is no such movement.
+    The `index` of sweeps and dwells, by which `done` names them, counts through the whole procedure. Raise Refused by
+    name if the movement is impossible.
     """
 
     def __call__(
@@ -46,24 +47,25 @@ class Planner(Protocol[SectionT_contra]):
     ) -> Plan: ...
 
 
-# The recordings of this phase (none when it did not happen), what the phase before amounts to (None for the first one),
+# The recordings of this phase (none if it did not happen), the outcome of the phase before (None for the first one),
 # the estimator's name.
 Analysis = Callable[[Sequence[RunData], Outcome | None, str], Outcome]
 
 
 def calibration(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
-    """The usual analysis: scale and bias of every sensor from averaged revolutions, held against the limits."""
+    """Return the usual analysis: scale and bias of every sensor from averaged revolutions, compared with the limits."""
     return calibrate(runs, estimator)
 
 
 @dataclass(frozen=True, slots=True)
 class Procedure(Generic[SectionT]):
-    """A procedure: its name and section in the configuration, how it plans, what it does, how it is judged.
+    """A procedure: its name, its section in the configuration, its planner, its script and its analysis.
 
-    `readings` is what the sensors to calibrate stream: raw counts, which the board averages as well, or what the board
-    has corrected by the calibration it has stored. `turner` is the section of the kind of turner that it plans for.
-    `then` names the procedure that follows with the same movement when the section says `then_verify`. `estimator` is
-    the one whose solution is the answer, where nobody asks for another.
+    - readings: those that the sensors to calibrate stream: raw counts, which the board averages as well, or readings
+      that the board has corrected by its stored calibration.
+    - then: the procedure that follows with the same movement if the section has `then_verify`.
+    - turner: the section of the kind of turner that it plans for.
+    - estimator: the one of the result, unless another is requested.
     """
 
     name: str
@@ -87,7 +89,7 @@ class Procedure(Generic[SectionT]):
         return self.readings == "raw"
 
     def following(self, procedures: "Procedures") -> "AnyProcedure | None":
-        """The procedure that `then` names, if it names one. Raises Refused `no_such_procedure`."""
+        """Return the procedure that `then` names, or None. Raise Refused `no_such_procedure`."""
         if self.then is not None and self.then not in procedures:
             raise Refused(
                 "no_such_procedure",
@@ -102,11 +104,11 @@ Procedures = Mapping[str, AnyProcedure]
 
 
 @cache
-def _found() -> Mapping[str, tuple[AnyProcedure, str]]:
-    """The installed procedures by name, each with the module it stands in."""
+def _load_installed() -> Mapping[str, tuple[AnyProcedure, str]]:
+    """Return the installed procedures by name, each with its module."""
     stock = (EntryPoint(name, f"procedures.{name}:PROCEDURE", GROUP) for name in STOCK_SECTIONS)
-    found = added(GROUP, _not_loaded, stock)
-    return {procedure.name: (procedure, entry.module) for entry, procedure in found}
+    entries = added(GROUP, _not_loaded, stock)
+    return {procedure.name: (procedure, entry.module) for entry, procedure in entries}
 
 
 def _not_loaded(what: str, remedy: str) -> Refused:
@@ -114,15 +116,15 @@ def _not_loaded(what: str, remedy: str) -> Refused:
 
 
 def installed() -> Procedures:
-    """The procedures of the packages installed here. Raises Refused `procedure_not_loaded`."""
-    return {name: procedure for name, (procedure, _) in _found().items()}
+    """Return the procedures of the packages installed here. Raise Refused `procedure_not_loaded`."""
+    return {name: procedure for name, (procedure, _) in _load_installed().items()}
 
 
 def module_of(name: str) -> str:
-    """The module an installed procedure stands in."""
-    return _found()[name][1]
+    """Return the module of an installed procedure."""
+    return _load_installed()[name][1]
 
 
 def sections(procedures: Procedures) -> Mapping[str, type[ProcedureSection]]:
-    """What the `procedure:` section of a configuration may be, by its name."""
+    """Return the types of the `procedure:` section of a configuration, by name."""
     return {name: procedure.section for name, procedure in procedures.items()}

@@ -1,4 +1,4 @@
-"""What the code of somebody's own procedure raises, by name: it is no defect of the rig."""
+"""Errors in the code of a user's own procedure, by name: they are no defects of the rig."""
 
 import traceback
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ ENDING = 'Let it end nothing by itself: `if __name__ == "__main__":` belongs bef
 
 @contextmanager
 def script_errors(what: str, remedy: str = "Correct the script") -> Iterator[None]:
-    """Raises Refused `script_failed`, `what` with the reason and its place; errors that have a name stay as they are.
+    """Raise Refused `script_failed`, `what` with the reason and its position; errors with a name stay as they are.
 
     A script that ends the program is refused as well: its exit status would be taken for a verdict.
     """
@@ -27,7 +27,7 @@ def script_errors(what: str, remedy: str = "Correct the script") -> Iterator[Non
 
 
 def _reason(error: BaseException) -> str:
-    """What was raised, and where: the innermost place."""
-    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    """Return the error, and the innermost position where it was raised."""
+    message = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     places = traceback.extract_tb(error.__traceback__)[2:]  # the first two are the rig's own
-    return f"{said}; {Path(places[-1].filename).name}, line {places[-1].lineno}" if places else said
+    return f"{message}; {Path(places[-1].filename).name}, line {places[-1].lineno}" if places else message

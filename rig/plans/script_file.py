@@ -1,4 +1,4 @@
-"""A procedure and the file it stands in: the run folder keeps the file, so that a resumed run goes on with the same."""
+"""A procedure and its file: the run folder keeps the file, so that a resumed run continues with the same one."""
 
 import hashlib
 import inspect
@@ -32,7 +32,7 @@ class ScriptFile:
 
     @property
     def identity(self) -> ScriptIdentity:
-        """What the run folder and the recording know it by."""
+        """Identity of the script in the run folder and the recording."""
         return ScriptIdentity(self.name, _sha256(self.text))
 
     @property
@@ -48,30 +48,31 @@ class ScriptFile:
 
 
 def script_in(module: ModuleType, procedure: AnyProcedure) -> ScriptFile:
-    """The procedure a module that is imported already defines, with the module's file."""
+    """Return the procedure of a module that is imported already, with the module's file."""
     path = Path(inspect.getfile(module))
     return ScriptFile(procedure, path.name, _text(path))
 
 
 def installed_script(name: str) -> ScriptFile:
-    """An installed procedure with its file."""
+    """Return an installed procedure with its file."""
     return script_in(sys.modules[module_of(name)], installed()[name])
 
 
 def load_script(path: Path) -> ScriptFile:
-    """The procedure a file defines as `PROCEDURE`; it stands alone, whatever folder it lies in. Executes the file.
+    """Execute a file and return the procedure that it defines as `PROCEDURE`; its neighbours in the folder do not
+    matter.
 
-    Raises Refused `no_script`, `script_failed`, `not_a_script`.
+    Raise Refused `no_script`, `script_failed`, `not_a_script`.
     """
-    return _executed(path, path.name, _text(path))
+    return _execute(path, path.name, _text(path))
 
 
 def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = None) -> ScriptFile:
-    """The script a run folder knows as `kept`; the text in the folder is executed only where it is the user's own.
+    """Return the script `kept` in a run folder; the text in the folder is executed only if it is the user's own.
 
-    An installed script is taken from where it is installed, and one that the user has `named` is the consent to it; the
-    text in the folder may be executed when a run of the user's own was begun with the same. Raises Refused
-    `another_script`, `foreign_script`, and as `load_script`.
+    An installed script is taken from its package, and one that the user has `named` is the consent to it; the text in
+    the folder may be executed if a run of the user's own was begun with the same. Raise Refused `another_script`,
+    `foreign_script`, and as `load_script`.
     """
     if named is not None:
         if named.sha256 != kept.sha256:
@@ -91,11 +92,11 @@ def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = N
             "and a script can do anything that you can",
             f"Read it; if you trust it: --script {shlex.quote(str(path))}",
         )
-    return _executed(path, kept.name, text)
+    return _execute(path, kept.name, text)
 
 
 def another_script(what: str) -> Refused:
-    """The refusal of a script that a run was not begun with."""
+    """Return the refusal of a script with which a run was not begun."""
     return Refused(
         "another_script",
         f"{what} is not the script with which the run was begun",
@@ -103,7 +104,7 @@ def another_script(what: str) -> Refused:
     )
 
 
-def _executed(path: Path, name: str, text: str) -> ScriptFile:
+def _execute(path: Path, name: str, text: str) -> ScriptFile:
     # Not in `sys.path`: the text alone is kept in the run folder, so it must do without its neighbours.
     spec = ModuleSpec("rig_script", None, origin=str(path))
     module = module_from_spec(spec)

@@ -39,7 +39,7 @@ from rig.estimation.gyroscope.budget import FLICKER, NOISE, STATES, WANDERING
 from rig.motion.by_hand import Instruction
 from rig.motion.steps import Plan
 from rig.plans.by_hand import Wanted as Asked
-from rig.plans.by_hand import listed
+from rig.plans.by_hand import simulate_session
 from rig.plans.phase import turner_for
 from rig.plans.registry import installed
 from rig.plans.shortest_motions import Motion, of_arm, of_attitudes, of_imu, of_servo
@@ -314,7 +314,7 @@ class _ByHand:
 def _session(procedure: ProcedureSection) -> tuple[ByHandSection, Sequence[Instruction], float]:
     """The section of a session by hand, what is asked for in it, and how long the item rests between."""
     assert isinstance(procedure, ByHandSection)
-    return procedure, list(listed(Asked(procedure.flips, procedure.turns))), procedure.rest_s
+    return procedure, list(simulate_session(Asked(procedure.flips, procedure.turns))), procedure.rest_s
 
 
 # What is tried of a procedure, by its name.

@@ -1,4 +1,4 @@
-"""The verbs a procedure's script is written in. What carries them out is `rig.runner.procedure.Rig`."""
+"""The verbs of a procedure's script. `rig.runner.procedure.Rig` carries them out."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -11,11 +11,11 @@ class Verbs(Protocol):
 
     @property
     def plan(self) -> Plan:
-        """What is to be done, step by step; less than the whole when an interrupted run goes on."""
+        """Steps to be done; less than the whole when an interrupted run is resumed."""
         ...
 
     def preflight(self) -> None:
-        """Check all that must be right before the arm moves, ask the operator, and take control of the arm."""
+        """Check all conditions for moving the arm, ask the operator, and take control of the arm."""
         ...
 
     def start_sampling(self) -> None:
@@ -39,14 +39,14 @@ class Verbs(Protocol):
         ...
 
     def wait_for_next_temperature(self, rest: Rest) -> bool:
-        """Stand still until the sensors are as warm as the next set wants them; False where the range is covered.
+        """Stand still until the sensors are warm enough for the next set; return False if the range is covered.
 
-        What comes after it, up to the next call, is one set.
+        The steps after it, up to the next call, are one set.
         """
         ...
 
     def end_temperature_range(self) -> None:
-        """Switch the heater off. Whatever part of the range no set has covered ends the run."""
+        """Switch the heater off. A part of the range that no set has covered ends the run."""
         ...
 
     def turn_by_hand(self) -> None:
@@ -54,7 +54,7 @@ class Verbs(Protocol):
         ...
 
     def solve_on_board(self) -> None:
-        """Let the board compute its own calibration; nothing where it does not calibrate along."""
+        """Let the board compute its own calibration; do nothing if it does not calibrate."""
         ...
 
 

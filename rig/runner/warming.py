@@ -141,7 +141,7 @@ class Warming:
             means = {name: float(np.mean([each[name] for each in self._of_set])) for name in self.names}
             measured = SetMeasured(first, end, bool(self.course.warming), means)
             self.note(measured)
-            self.course.measured(measured)
+            self.course.add_set(measured)
             self.set_s = max(self.set_s, self._looked_s - self._began_s)
         self._of_set = None
         if self._ramp is not None:

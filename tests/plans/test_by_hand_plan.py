@@ -3,7 +3,7 @@
 import pytest
 
 from rig.motion.by_hand import FACES, Face, HandMove, Instruction
-from rig.plans.by_hand import Wanted, asked_next, still_open
+from rig.plans.by_hand import Wanted, next_instruction, still_open
 
 
 def followed(
@@ -12,7 +12,7 @@ def followed(
     """What is made by somebody who does as asked, but for the moves of these numbers, which end on another side."""
     taken: list[HandMove] = []
     lay: list[Face] = [start]
-    while (asked := asked_next(still_open(wanted, taken, lay), lay[-1])) is not None:
+    while (asked := next_instruction(still_open(wanted, taken, lay), lay[-1])) is not None:
         assert len(taken) < 100
         if asked.say == "turn":
             assert asked.face == lay[-1]
@@ -57,7 +57,7 @@ def test_who_goes_astray_is_led_on_from_there() -> None:
 def test_a_move_that_was_no_whole_turn_leaves_the_turn_open() -> None:
     taken, _ = followed(Wanted(12, 0))
     left = still_open(Wanted(12, 3), [*taken, HandMove("turn", "+z", "+z", 0)], FACES)
-    assert asked_next(left, "+z") == Instruction("turn", "+z", 1)
+    assert next_instruction(left, "+z") == Instruction("turn", "+z", 1)
 
 
 def test_turns_come_once_flips_have_told_the_scale() -> None:
@@ -66,6 +66,6 @@ def test_turns_come_once_flips_have_told_the_scale() -> None:
 
 
 def test_where_nobody_knows_how_it_lies_a_side_is_asked_for() -> None:
-    asked = asked_next(still_open(Wanted(12, 3), [], []), None)
+    asked = next_instruction(still_open(Wanted(12, 3), [], []), None)
     assert asked is not None
     assert asked.words == "Lay it down with the side +z up, and let go"

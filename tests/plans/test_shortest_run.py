@@ -23,7 +23,7 @@ from rig.estimation.by_hand import SessionConditions, solve_by_hand
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.observation.by_hand.handled import segment_session
 from rig.plans.by_hand import Wanted as Asked
-from rig.plans.by_hand import listed
+from rig.plans.by_hand import simulate_session
 from rig.plans.registry import installed, sections
 from rig.plans.shortest import plan_of, shortest_run, tried
 from rig.plans.shortest_motions import ARCS_DEG
@@ -137,7 +137,7 @@ def reached(of: Run, seed: int) -> ReachedUncertainty:
 
 def reached_by_hand(of: Run, seed: int) -> ReachedUncertainty:
     keys = dict(of.keys)
-    asked = listed(Asked(int(keys["flips"]), int(keys["turns"])))
+    asked = simulate_session(Asked(int(keys["flips"]), int(keys["turns"])))
     actions: list[Action] = [TurnAction(each.turns) if each.turns else FlipAction(each.face) for each in asked]
     part = Part(SAMPLED_HZ, noise_of(of), clock_ppm=20.0)
     told = handle(actions, seed, part, rest_s=1.5)

@@ -21,7 +21,7 @@ def course(*temperatures_c: float, both_directions: bool = False) -> Course:
     found = Course(20, 40, 5, both_directions)
     found.begin(20.0)
     for temperature_c in temperatures_c:
-        found.measured(measured(temperature_c))
+        found.add_set(measured(temperature_c))
     return found
 
 
@@ -45,7 +45,7 @@ def test_a_range_is_covered_when_no_gap_of_it_is_wider_than_allowed(
 def test_every_sensor_has_to_have_seen_the_range() -> None:
     found = Course(20, 30, 5, both_directions=False)
     for gyro_c, other_c in ((20, 20), (25, 23), (30, 26)):
-        found.measured(measured(gyro_c, other=other_c))
+        found.add_set(measured(gyro_c, other=other_c))
     assert found.missing() == "other was never between 26.0 and 30.0 °C"
 
 
@@ -54,11 +54,11 @@ def test_both_ways_are_covered_each_by_its_own_sets() -> None:
     assert found.missing() == "no set of sweeps was made while cooling"
     assert found.warming is False, "at the end it turns round"
     for temperature_c in (36, 31, 25):
-        found.measured(measured(temperature_c, warming=False))
+        found.add_set(measured(temperature_c, warming=False))
     assert found.missing() == "gyro was never between 20.0 and 25.0 °C while cooling"
-    found.measured(measured(21, warming=False))
+    found.add_set(measured(21, warming=False))
     assert found.missing() == "gyro was never between 25.0 and 31.0 °C while cooling"
-    found.measured(measured(28, warming=False))
+    found.add_set(measured(28, warming=False))
     assert found.missing() is None, "the set at 40 °C, after which it turned round, belongs to both ways"
 
 
@@ -66,7 +66,7 @@ def test_the_next_set_is_due_half_a_gap_on_for_the_slowest_sensor() -> None:
     found = Course(20, 40, 5, both_directions=False)
     found.begin(20.0)
     assert found.is_due({"gyro": 20.0, "other": 20.0})
-    found.measured(measured(22.0, other=21.0))
+    found.add_set(measured(22.0, other=21.0))
     assert not found.is_due({"gyro": 26.0, "other": 23.0})
     assert found.is_due({"gyro": 26.0, "other": 23.6})
 
@@ -117,7 +117,7 @@ class Bench:
                 self.live(LOOK_S)
                 assert self.time_s - began_s < 1200, "patience"
             warming = bool(self.course.warming)
-            self.course.measured(measured(self.live(self.set_s), warming=warming))
+            self.course.add_set(measured(self.live(self.set_s), warming=warming))
 
 
 @pytest.mark.slow

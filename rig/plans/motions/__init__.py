@@ -1,1 +1,1 @@
-"""What procedures plan: sweeps, attitudes, temperatures, and the transfers between them."""
+"""The motions that procedures plan: sweeps, attitudes, temperatures, and the transfers between them."""

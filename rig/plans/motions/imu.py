@@ -1,4 +1,4 @@
-"""Sweeps and attitudes in one run: what calibrates a gyroscope and the accelerometer beside it."""
+"""Sweeps and attitudes in one run, for a gyroscope and the accelerometer in the same device."""
 
 from collections.abc import Collection
 
@@ -8,7 +8,7 @@ from rig.motion.state import Joints
 from rig.motion.steps import Plan
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.plans.motions.static_attitudes import dwells
-from rig.plans.motions.ways import followed
+from rig.plans.motions.ways import append_steps
 
 
 def plan_imu(
@@ -17,11 +17,12 @@ def plan_imu(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """All sweeps as in `plan_six_observation`, home, then all attitudes as in `plan_static_attitudes`, and home again.
+    """Plan all sweeps as in `plan_six_observation`, home, then all attitudes as in `plan_static_attitudes`, and home
+    again.
 
-    Sweeps are counted first, dwells after them; `done` holds the indices of either to leave out.
-    Raises Refused `axes_do_not_span`.
+    Sweeps are counted first, dwells after them; `done` holds the indices of either to leave out. Raise Refused
+    `axes_do_not_span`.
     """
     sweeps = plan_six_observation(arm, procedure, start_q_rad, done)
     first = len(plan_six_observation(arm, procedure).sweeps)
-    return followed(sweeps, dwells(arm, procedure, procedure.repeats, done, first))
+    return append_steps(sweeps, dwells(arm, procedure, procedure.repeats, done, first))

@@ -1,4 +1,4 @@
-"""The turns of the six observations with one shaft: in each mounting of the item once each way, with rests between."""
+"""The turns of the six observations with one shaft: both directions in each mounting, with rests between."""
 
 import math
 from collections.abc import Collection, Iterator, Sequence
@@ -7,10 +7,10 @@ from rig.config.procedures.servo_procedure import ServoSixObservationSection
 from rig.config.procedures.servo_section import ServoSection
 from rig.motion.state import Joints
 from rig.motion.steps import TURN_RAD, Plan, Rest, Step, Sweep
-from rig.plans.motions.sweeps import Profile, Station, connected, in_stages, sweep_about, trial
+from rig.plans.motions.sweeps import Profile, Station, build_stages, connect_sweeps, sweep_about, trial
 from rig.plans.motions.ways import approach, pace_of
 
-MARGIN_RAD = math.radians(3)  # of constant speed at either end, for a shaft that follows late
+MARGIN_RAD = math.radians(3)  # of constant speed at either end, for a shaft that lags
 # Of the mounting: far enough to stand out from any gyroscope's noise and a gear's play.
 TRIAL_RAD, TRIAL_PACE = math.radians(15), pace_of(20, 80)
 
@@ -21,28 +21,28 @@ def plan_servo_six_observation(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Three mountings or more, a small trial of each, then rest, turn, rest, turn back, rest.
+    """Plan three mountings or more, a small trial of each, then rest, turn, rest, turn back, rest.
 
     Each turn is a revolution and `overtravel_deg` more at constant speed, centred on `servo.home_deg`, so that a cable
-    winds by a turn's half and a little either way. `start_q_rad` is where the shaft stands (home when None); from
-    there the plan goes home first, slowly, and each stage begins and ends at home. `done` holds the indices of turns
-    to leave out; a stage of which nothing is left has no steps.
+    winds by half a turn and a little either way. `start_q_rad` is the shaft's angle (home if None); from there the plan
+    goes home first, slowly, and each stage begins and ends at home. `done` holds the indices of turns to leave out; a
+    stage without remaining turns has no steps.
     """
     home = (math.radians(servo.home_deg),)
     shaft, pace = Station(0, "shaft", home), pace_of(servo.transfer_speed_deg_s, procedure.acceleration_deg_s2)
     even_rad = TURN_RAD + math.radians(procedure.overtravel_deg) + 2 * MARGIN_RAD
     profile = Profile(TURN_RAD, even_rad, pace_of(procedure.speed_deg_s, procedure.acceleration_deg_s2))
     turns = [
-        sweep_about(index, shaft, way, (0.0, 0.0, 1.0 if way == "ccw" else -1.0), profile)
-        for index, way in enumerate(procedure.directions * procedure.repeats)
+        sweep_about(index, shaft, direction, (0.0, 0.0, 1.0 if direction == "ccw" else -1.0), profile)
+        for index, direction in enumerate(procedure.directions * procedure.repeats)
     ]
 
     def steps_of(sweeps: Sequence[Sweep]) -> Iterator[Step]:
         yield from trial("trial of the shaft", "back from the trial", shaft, TRIAL_RAD, TRIAL_PACE)
-        for step in connected(sweeps, home, pace, procedure.rest_s, lambda *_: True):
+        for step in connect_sweeps(sweeps, home, pace, procedure.rest_s, lambda *_: True):
             if step is sweeps[0]:
                 yield Rest(f"rest before {step.name}", procedure.rest_s)
             yield step
 
     stages = ((section, turns) for section in procedure.stages)
-    return in_stages(approach(start_q_rad, home, pace), stages, steps_of, done)
+    return build_stages(approach(start_q_rad, home, pace), stages, steps_of, done)

@@ -1,4 +1,4 @@
-"""Attitudes in which the arm stands still, one after the other, as TRIAX needs them of an accelerometer."""
+"""Attitudes in which the arm stands still, one after the other, for TRIAX's calibration of an accelerometer."""
 
 from collections.abc import Collection, Iterator
 from functools import lru_cache
@@ -11,7 +11,7 @@ from rig.motion.model import home_of
 from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, trapezoid_duration
 from rig.plans.motions.shortest_way import shortest_way
-from rig.plans.motions.ways import approach, followed, in_radians, pace_of, transfer
+from rig.plans.motions.ways import append_steps, approach, convert_to_radians, pace_of, transfer
 
 
 def plan_static_attitudes(
@@ -20,47 +20,46 @@ def plan_static_attitudes(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Home, every attitude once in the order that takes the arm least time, `repeats` times, and home again.
+    """Plan home, every attitude once in the order that takes the arm least time, `repeats` times, and home again.
 
-    `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, slowly.
-    `done` holds the indices of dwells to leave out: those an interrupted run has finished.
-    Limits and clearances are not judged here: see the turner's `problems`; nor what the attitudes tell: see
-    `rig.analysis.design.attitude_account`.
+    `start_q_rad` is the arm's pose (home if None); from there the plan goes home first, slowly. `done` holds the
+    indices of dwells to leave out: those an interrupted run has finished. Limits and clearances are checked by the
+    turner's `problems`, the rank of the attitudes by `rig.analysis.design.attitude_account`.
     """
     before = approach(start_q_rad, home_of(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
-    return followed(before, dwells(arm, procedure, procedure.repeats, done))
+    return append_steps(before, dwells(arm, procedure, procedure.repeats, done))
 
 
 def dwells(
     arm: ArmSection, procedure: AttitudesSection, repeats: int, done: Collection[int] = (), first: int = 0
 ) -> Iterator[Step]:
-    """The dwells with the ways to them, from home and back; none if all are `done`. They are counted from `first`.
+    """Yield the dwells, counted from `first`, with the transfers to them, from home and back; none if all are `done`.
 
     With field tests at home before them and after.
     """
     home = home_of(arm)
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)
     attitudes = enumerate(_order(arm, procedure) * repeats, first)
-    left = [Dwell(index, q, procedure.dwell_s, procedure.settle_s) for index, q in attitudes if index not in done]
-    if left and procedure.field_test_s > 0:
+    remaining = [Dwell(index, q, procedure.dwell_s, procedure.settle_s) for index, q in attitudes if index not in done]
+    if remaining and procedure.field_test_s > 0:
         yield Rest("field test before the attitudes", procedure.field_test_s)
-    here = home
-    for dwell in left:
-        yield from transfer(f"transfer to the {dwell.name}", here, dwell.q_rad, pace)
+    pose = home
+    for dwell in remaining:
+        yield from transfer(f"transfer to the {dwell.name}", pose, dwell.q_rad, pace)
         yield dwell
-        here = dwell.q_rad
-    yield from transfer("transfer home", here, home, pace)
-    if left and procedure.field_test_s > 0:
+        pose = dwell.q_rad
+    yield from transfer("transfer home", pose, home, pace)
+    if remaining and procedure.field_test_s > 0:
         yield Rest("field test after the attitudes", procedure.field_test_s)
 
 
 @lru_cache(maxsize=16)
 def _order(arm: ArmSection, procedure: AttitudesSection) -> tuple[Joints, ...]:
-    """The attitudes' joint angles, in the order of the shortest way from home through all of them and back."""
+    """Return the attitudes' joint angles, in the order of the shortest round trip from home."""
     home = home_of(arm)
-    attitudes = [(*home[:3], *in_radians(wrists)) for wrists in procedure.attitudes]
-    places = np.array([home, *attitudes])
+    attitudes = [(*home[:3], *convert_to_radians(wrists)) for wrists in procedure.attitudes]
+    points = np.array([home, *attitudes])
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)
-    farthest = np.abs(places[:, None] - places).max(axis=-1)
+    farthest = np.abs(points[:, None] - points).max(axis=-1)
     between_s = np.vectorize(trapezoid_duration)(farthest, pace.speed_rad_s, pace.acceleration_rad_s2)
-    return tuple(attitudes[place - 1] for place in shortest_way(between_s))
+    return tuple(attitudes[index - 1] for index in shortest_way(between_s))

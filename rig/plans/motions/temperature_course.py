@@ -1,6 +1,6 @@
-"""Which temperatures a calibration over temperature has still to see. Pure.
+"""The temperatures that a calibration over temperature still lacks. Pure.
 
-The sensors go from one end of the range to the other, and back where both ways are wanted. A set of sweeps counts at
+The sensors go from one end of the range to the other, and back if both directions are wanted. A set of sweeps counts at
 the mean of its temperatures. Neighbours may be a gap apart, the outermost a quarter of it from the ends of the range.
 """
 
@@ -10,18 +10,19 @@ from itertools import pairwise, zip_longest
 
 from rig.data.recording.thermal_events import SetMeasured
 
-NEXT_AFTER = 0.5  # of a gap, and a set begins: its own change of temperature comes on top
+NEXT_AFTER = 0.5  # of a gap, after which a set begins: its own change of temperature is added
 AT_THE_END = 0.25  # of a gap, from an end of the range
-FULL_POWER_K = 2.0  # so far behind, it has all its power
-FOLLOWS_K = 3.0  # the ramp is never farther from who follows it
-REMEMBERS_S = 30.0  # after so long of what it is behind, the power for it has doubled
+FULL_POWER_K = 2.0  # control error at which the heater has full power
+FOLLOWS_K = 3.0  # largest distance of the ramp from the heated sensor
+REMEMBERS_S = 30.0  # integral time of the controller
 
 
 @dataclass(slots=True)
 class Course:
-    """The way through the range from `from_c` to `to_c` with gaps of at most `max_step_k`; `sets` are those measured.
+    """The course through the range from `from_c` to `to_c` with gaps of at most `max_step_k`; `sets` are the measured
+    ones.
 
-    `warming` says which way it goes now, None before anybody knows how warm the sensors are.
+    `warming` is its present direction, None before a temperature is known.
     """
 
     from_c: float
@@ -32,14 +33,14 @@ class Course:
     warming: bool | None = None
 
     def begin(self, temperature_c: float) -> None:
-        """Choose the way: away from the end that is nearer, or the one taken before a run was interrupted."""
+        """Choose the direction: away from the nearer end, or the one before a run was interrupted."""
         self.warming = temperature_c <= (self.from_c + self.to_c) / 2
         if self.sets:
             self.warming = self.sets[-1].warming
             self._turn_round(self.sets[-1])
 
-    def measured(self, step: SetMeasured) -> None:
-        """Count a set, and turn round where it was at the end of the range."""
+    def add_set(self, step: SetMeasured) -> None:
+        """Count a set, and reverse if it was at the end of the range."""
         self.sets.append(step)
         self._turn_round(step)
 
@@ -50,7 +51,7 @@ class Course:
             self.warming = True
 
     def is_due(self, now_c: Mapping[str, float]) -> bool:
-        """Whether the sensors, so warm now, have moved on far enough for the next set, or are at the end of the way."""
+        """Return whether the sensors have changed enough for the next set, or are at the end of the course."""
         if not self.sets:
             return True
         if min(now_c.values()) >= self.to_c if self.warming else max(now_c.values()) <= self.from_c:
@@ -60,7 +61,7 @@ class Course:
         return min(moved) >= NEXT_AFTER * self.max_step_k
 
     def next_c(self, now_c: float) -> float:
-        """Where the next set is due, for who is so warm now."""
+        """Return the temperature at which the next set is due, for a sensor at `now_c`."""
         if not self.sets:
             return now_c
         last = self.sets[-1].temperatures_c.values()
@@ -68,31 +69,31 @@ class Course:
         return min(max(last) + step_k, self.to_c) if self.warming else max(min(last) - step_k, self.from_c)
 
     def missing(self) -> str | None:
-        """What of the range no set has covered yet, in words; None where all of it is covered."""
-        ways = ((True, "while warming"), (False, "while cooling")) if self.both_directions else ((None, ""),)
-        return next(self._missing(ways), None)
+        """Return the part of the range that no set covers, in words; None if all of it is covered."""
+        directions = ((True, "while warming"), (False, "while cooling")) if self.both_directions else ((None, ""),)
+        return next(self._missing(directions), None)
 
-    def _missing(self, ways: Iterable[tuple[bool | None, str]]) -> Iterator[str]:
-        for way, words in ways:
-            sets = self._of(way)
+    def _missing(self, directions: Iterable[tuple[bool | None, str]]) -> Iterator[str]:
+        for direction, words in directions:
+            sets = self._sets_in(direction)
             if not sets:
                 yield f"no set of sweeps was made {words}".strip()
             for name in sets[0].temperatures_c if sets else ():
-                gap = self._gap(sorted(each.temperatures_c[name] for each in sets))
+                gap = self._gap(sorted(step.temperatures_c[name] for step in sets))
                 if gap is not None:
                     yield f"{name} was never between {gap[0]:.1f} and {gap[1]:.1f} °C {words}".strip()
 
-    def _of(self, way: bool | None) -> list[SetMeasured]:
-        """The sets of a way, or all; one after which it turned round is the end of one way and that of another."""
-        followed = zip_longest(self.sets, self.sets[1:])
+    def _sets_in(self, direction: bool | None) -> list[SetMeasured]:
+        """Return the sets in a direction, or all; one at which it reversed belongs to both directions."""
+        pairs = zip_longest(self.sets, self.sets[1:])
         return [
-            each
-            for each, after in followed
-            if way is None or each.warming is way or (after is not None and after.warming is way)
+            step
+            for step, after in pairs
+            if direction is None or step.warming is direction or (after is not None and after.warming is direction)
         ]
 
     def _gap(self, temperatures_c: Sequence[float]) -> tuple[float, float] | None:
-        """The first part of the range that has no set, from the cold end on."""
+        """Return the first part of the range that has no set, from the cold end on."""
         end_k = AT_THE_END * self.max_step_k
         if temperatures_c[0] > self.from_c + end_k:
             return self.from_c, temperatures_c[0]
@@ -104,9 +105,9 @@ class Course:
 
 @dataclass(slots=True)
 class Ramp:
-    """The temperature that a heater is to follow, and the power for it: 0 to `most_power`.
+    """The setpoint that a heater follows, and the power for it: 0 to `most_power`.
 
-    It moves at `rate_k_s` and waits for who cannot follow. `now_c` is where the heated one is.
+    It moves at `rate_k_s` and waits for a sensor that cannot follow. `now_c` is the sensor's temperature.
     """
 
     rate_k_s: float
@@ -116,7 +117,7 @@ class Ramp:
     _time_s: float = 0.0
 
     def power(self, time_s: float, now_c: float, goal_c: float) -> float:
-        """The power now, on the way to `goal_c`."""
+        """Return the power now, on the way to `goal_c`."""
         if self.wanted_c is None:
             self.wanted_c, self._time_s = now_c, time_s
         dt_s, self._time_s = time_s - self._time_s, time_s
@@ -125,6 +126,6 @@ class Ramp:
         self.wanted_c = min(max(self.wanted_c, now_c - FOLLOWS_K), now_c + FOLLOWS_K)
         off_k = self.wanted_c - now_c
         wanted = off_k / FULL_POWER_K + self._sum_k_s / (FULL_POWER_K * REMEMBERS_S)
-        if 0.0 < wanted < 1.0 or (wanted >= 1.0) != (off_k > 0):  # at its end it remembers no more of that
+        if 0.0 < wanted < 1.0 or (wanted >= 1.0) != (off_k > 0):  # at its limit the integral must not wind up
             self._sum_k_s += off_k * dt_s
         return self.most_power * min(max(wanted, 0.0), 1.0)

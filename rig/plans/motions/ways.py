@@ -1,4 +1,4 @@
-"""The ways between what is measured, the way home from wherever the arm was left among them. Pure."""
+"""The transfers between measurements, and the approach to home from any pose. Pure."""
 
 import math
 from collections.abc import Iterable
@@ -17,16 +17,16 @@ class Pace:
 
 
 def pace_of(speed_deg_s: float, acceleration_deg_s2: float) -> Pace:
-    """The pace that a file gives in degrees."""
+    """Return the pace that a file gives in degrees."""
     return Pace(math.radians(speed_deg_s), math.radians(acceleration_deg_s2))
 
 
-# The first motion may swing the large joints from wherever somebody left the arm, so it is made at leisure.
+# The first motion may swing the large joints from any pose, so it is slow.
 LEISURE = pace_of(30, 60)
 
 
 def approach(start_q_rad: Joints | None, home: Joints, pace: Pace) -> Plan:
-    """The first motion, home from where the turner stands, at leisure; none if that is home, or None."""
+    """Return the first motion, slowly home from the turner's pose; none if that is home, or None."""
     start = home if start_q_rad is None else start_q_rad
     speed_rad_s = min(pace.speed_rad_s, LEISURE.speed_rad_s)
     acceleration_rad_s2 = min(pace.acceleration_rad_s2, LEISURE.acceleration_rad_s2)
@@ -34,13 +34,13 @@ def approach(start_q_rad: Joints | None, home: Joints, pace: Pace) -> Plan:
     return Plan(steps, start_q_rad=start, home_q_rad=home)
 
 
-def followed(plan: Plan, steps: Iterable[Step]) -> Plan:
-    """The plan with more steps at its end."""
+def append_steps(plan: Plan, steps: Iterable[Step]) -> Plan:
+    """Return the plan with more steps at its end."""
     return replace(plan, steps=(*plan.steps, *steps))
 
 
 def transfer(name: str, start: Joints, target: Joints, pace: Pace) -> Iterable[Transfer]:
-    """The way from `start` to `target`; none if they are the same place."""
+    """Yield the transfer from `start` to `target`; none if they are the same pose."""
     distance_rad = max(map(abs, travel(start, target)))
     if distance_rad > SAME_PLACE_RAD:
         speed_rad_s, acceleration_rad_s2 = pace.speed_rad_s, pace.acceleration_rad_s2
@@ -48,6 +48,6 @@ def transfer(name: str, start: Joints, target: Joints, pace: Pace) -> Iterable[T
         yield Transfer(name, start, target, speed_rad_s, acceleration_rad_s2, duration_s)
 
 
-def in_radians(degrees: Iterable[float]) -> Joints:
-    """Joint angles as a file gives them, in rad."""
+def convert_to_radians(degrees: Iterable[float]) -> Joints:
+    """Return joint angles of a file, in rad."""
     return tuple(math.radians(angle) for angle in degrees)

@@ -39,7 +39,7 @@ from rig.observation.by_hand.runs import (
     replay_runs,
     rotate_face,
 )
-from rig.plans.by_hand import Open, Wanted, asked_next, still_open
+from rig.plans.by_hand import Open, Wanted, next_instruction, still_open
 from rig.runner.acquisition import Acquisition
 from rig.station.events import HandSeen, RunEvent
 
@@ -106,7 +106,7 @@ class HandSession:
         Raises Fault for what no hand can mend, by its name, and for what was wrong ten times in a row.
         """
         heard = self.acquisition.hear()
-        self._ask(asked_next(self._open, None))
+        self._ask(next_instruction(self._open, None))
         while self._asked is not None:
             self.wait(LOOK_S)
             check()
@@ -186,7 +186,7 @@ class HandSession:
         """What is asked next; None once it is enough."""
         wanted = self.settings.wanted_scale_u
         enough = wanted is not None and now.solution is not None and float(max(now.expanded_scale)) <= wanted
-        return None if enough else asked_next(self._open, face)
+        return None if enough else next_instruction(self._open, face)
 
     def _take(self, move: Move, now: SessionProgress, face: Face) -> None:
         """A move counts, unless too much time passed in it for it to tell anything."""

@@ -67,7 +67,7 @@ def warmed() -> Warmed:
             starts.append(now_s)
         elif began is not None and now_s >= starts[-1] + SET_S:
             mean_c = float(np.mean([row[1] for row in rows[began:]]))
-            course.measured(SetMeasured(6 * len(starts) - 6, 6 * len(starts), bool(course.warming), {"gyro": mean_c}))
+            course.add_set(SetMeasured(6 * len(starts) - 6, 6 * len(starts), bool(course.warming), {"gyro": mean_c}))
             began = None
     time_s, thermometer_c, element_c, branch = np.array(rows).T
     return Warmed(time_s, thermometer_c, element_c, branch, tuple(starts))
