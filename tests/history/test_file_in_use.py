@@ -233,7 +233,7 @@ def test_what_is_not_there_when_it_is_read_back_is_not_told_as_entered(file: Pat
         def lose(*_: object) -> None:
             forge(str(file), "DELETE FROM parameter WHERE calibration_id = 2 AND name = 'kx'")
 
-        with pytest.raises(Refused, match=r"entry_not_kept: .*run \[2\]: its rows are not those entered"):
+        with pytest.raises(Refused, match=r"entry_not_kept: .*run \[2\]: its rows have changed since their entry"):
             history.enter(finished(1))
         with pytest.raises(Refused, match="entry_not_kept"):
             history.enter(finished(1))

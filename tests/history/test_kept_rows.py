@@ -133,14 +133,14 @@ def test_a_file_that_is_not_what_was_entered_is_named(
     [
         (["UPDATE parameter SET value = 2 * value WHERE name = 'kx'"], "kx 2.02, stated 1.01, of gyro"),
         (["INSERT INTO parameter SELECT calibration_id, 'k2', value, std_statistical, NULL, unit, NULL, 2 "
-          "FROM parameter WHERE name = 'kx'"], "its rows are not those entered"),
+          "FROM parameter WHERE name = 'kx'"], "its rows have changed since their entry"),
         (["UPDATE run SET verdict = 'fail'"], "verdict is fail"),
         (["UPDATE calibration SET serial_number = 'G-9'"], "serial_number of gyro: G-9, stated G-1"),
-        (["UPDATE run SET operator = 'Somebody else'"], "its rows are not those entered"),
-        (["UPDATE calibration SET check_standard = 1"], "its rows are not those entered"),
+        (["UPDATE run SET operator = 'Somebody else'"], "its rows have changed since their entry"),
+        (["UPDATE calibration SET check_standard = 1"], "its rows have changed since their entry"),
         (["DELETE FROM voided"], "voided [1]: entered"),
         (["DELETE FROM certificate_file", "DELETE FROM certificate"], "certificate [1]: entered"),
-        (["DELETE FROM document"], "its rows are not those entered"),
+        (["DELETE FROM document"], "its rows have changed since their entry"),
         (["DELETE FROM journal WHERE number = 1"], "journal 1 to 1"),
         (["UPDATE journal SET entered_utc = '2020-01-01' WHERE number = 2"], "journal 2: it does not follow"),
         (["UPDATE journal SET chain_sha256 = 'ab' WHERE number = 3"], "journal 3: it does not follow"),
