@@ -135,6 +135,7 @@ def test_every_estimator_recovers_the_truth(finished: tuple[Path, dict[str, Any]
     assert np.all(np.abs(error) < 4 * np.sqrt(np.diag(solved["covariance"])))
 
 
+@pytest.mark.thorough
 def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = start("run", configuration(tmp_path, {"world": {"time_scale": 4}}), "--out", out)

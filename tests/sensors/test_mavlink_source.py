@@ -73,7 +73,7 @@ def test_readings_are_raw_again_whatever_the_parameters(firmware: Any, imu: str)
     assert np.diff(samples["board_time_us"].astype(np.int64)).mean() == pytest.approx(1e4, rel=0.02)
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("imu", "of_it"),

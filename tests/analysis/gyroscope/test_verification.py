@@ -290,6 +290,7 @@ REFUSALS: dict[str, tuple[str, Callable[[RunData], RunData]]] = {
 }
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", REFUSALS)
 def test_recordings_that_cannot_be_compared_are_refused_by_name(name: str) -> None:
     error, spoil = REFUSALS[name]

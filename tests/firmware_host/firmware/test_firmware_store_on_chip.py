@@ -109,7 +109,7 @@ def test_an_erased_calibration_is_gone_for_good(written: FlashMemory) -> None:
     assert stored(boot(session.flash)) is None
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("torn", [False, True])
 @pytest.mark.parametrize("operation", range(1, WRITE_OPERATIONS + 1))
 def test_power_that_fails_at_any_operation_of_a_write_leaves_the_old_calibration(

@@ -170,6 +170,7 @@ def mcap(path: Path, *, not_measured: float = 0.0, without_rate: int = 0) -> Pat
     return path
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_damaged_bag_is_refused_by_name_whatever_its_parser_ends_in(tmp_path: Path) -> None:
     bag, damage = mcap(tmp_path / "bag"), np.random.default_rng(1)

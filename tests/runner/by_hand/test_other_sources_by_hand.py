@@ -110,7 +110,6 @@ def began(laboratory: dict[str, Any], log: str) -> float:
     return time.monotonic() - now_s / section.time_scale
 
 
-@pytest.mark.thorough
 @pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("source", SOURCES)

@@ -27,6 +27,7 @@ def in_stages(truth: list[dict[str, Any]], stages: list[dict[str, Any]] = STAGES
     return {"procedure": {"stages": stages}, "world": {"mounts": truth}, **more}
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_board_that_is_mounted_anew_gives_one_calibration(tmp_path: Path) -> None:
     out = tmp_path / "run"

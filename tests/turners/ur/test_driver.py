@@ -588,7 +588,7 @@ def test_a_move_beyond_the_limits_is_refused_by_the_controller_and_named(laborat
         assert fault.value.name == "program_stopped"
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "orders"),
     [
