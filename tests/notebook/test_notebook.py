@@ -118,3 +118,11 @@ def test_everything_shows_itself_in_a_line_or_a_table(run: rig.Run, result: rig.
         assert json.loads(json.dumps(shown.to_dict()))
     for plot in (run["gyro"].plot(), result.plot(), beside.plot()):
         assert plot._repr_png_().startswith(b"\x89PNG")
+
+
+def test_a_result_is_a_table_with_a_row_for_each_axis() -> None:
+    result = rig.load_result(RECORDINGS / "six_observation")
+    table = result.to_frame()
+    assert list(table.columns) == ["scale", "scale_expanded", "bias", "bias_expanded", "unit"]
+    assert list(table.loc[["gyro x", "gyro y", "gyro z"], "scale"]) == list(result["gyro"].scale)
+    assert list(table.loc[["gyro x", "gyro y", "gyro z"], "bias_expanded"]) == list(result["gyro"].bias_expanded)

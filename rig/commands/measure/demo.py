@@ -24,7 +24,7 @@ def add(parser: ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: a new one in runs)")
     add_json(parser)
     add_page(parser)
-    parser.set_defaults(overrides=[], script=None, yes=False, other_board=[])
+    parser.set_defaults(overrides=[], script=None, yes=False, other_board=[], notify=None)
 
 
 def run(options: Namespace) -> int:

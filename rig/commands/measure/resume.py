@@ -4,6 +4,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from rig.commands.config_arguments import add_run, add_set
+from rig.commands.measure.notice import noticed
 from rig.commands.measure.run import add_outcome
 from rig.commands.page_arguments import wish
 from rig.errors import Refused
@@ -64,4 +65,8 @@ def run(options: Namespace) -> int:
     script, moved = kept_script(folder, script_identity(folder), named), frozenset(options.other_board)
     note_run(folder)
     with configured_here(folder / CONFIG, options.overrides, script=script) as found:
-        return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
+
+        def work() -> int:
+            return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
+
+        return noticed(options.notify, folder, work)

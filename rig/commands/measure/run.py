@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_script
+from rig.commands.measure.notice import add_notice, noticed
 from rig.commands.page_arguments import add_page, wish
 from rig.station.plain_text import say
 
@@ -35,6 +36,7 @@ def add_outcome(parser: ArgumentParser) -> None:
         help="the sensor of this serial number is on another board than when it was last calibrated, and that is right",
     )
     parser.add_argument("--json", action="store_true", help="print result.json instead of tables")
+    add_notice(parser)
     add_page(parser)
 
 
@@ -47,7 +49,11 @@ def run(options: Namespace) -> int:
         )
 
         moved = frozenset(options.other_board)
-        return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
+
+        def work() -> int:
+            return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
+
+        return noticed(options.notify, folder, work)
 
 
 @contextmanager

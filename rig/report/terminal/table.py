@@ -15,6 +15,7 @@ from rig.report.findings.characteristic import Term, terms
 from rig.report.findings.kind import outlet_items
 from rig.report.kinds.registry import kinds
 from rig.report.terminal.ending import ending
+from rig.report.terminal.whole_words import with_whole_words
 from rig.report.words.expanded import factor_words
 from rig.report.words.mounts import mount_lines
 from rig.report.words.rounding import plus_minus
@@ -81,7 +82,10 @@ def print_values(result: ResultDocument, console: Console, sensor: str | None = 
                 *outlet_items(kind.printed, finding),
                 *map(_term_line, terms(kind.characteristics, finding, "terminal")),
             ):
-                console.print(plain(item) if isinstance(item, str) else item)
+                if isinstance(item, Table):
+                    console.print(with_whole_words(item, console.width))
+                else:
+                    console.print(plain(item))
         for line in kind.unsolved(result):
             console.print(plain(line))
     for line in (*mount_lines(result), *omitted_lines(result, sensor)):
@@ -102,7 +106,7 @@ def print_checks(result: ResultDocument, console: Console, sensor: str | None = 
         by_sensor.setdefault(check.means.sensor, []).append(check)
     for name, checks in by_sensor.items():
         if sensor in (None, name):
-            console.print(_checks(name, checks))
+            console.print(with_whole_words(_checks(name, checks), console.width))
 
 
 def print_verdict(result: ResultDocument, console: Console) -> None:

@@ -1,0 +1,57 @@
+"""A command of the user's that is run when a run has ended: a message, a mail, a lamp, after hours of measuring."""
+
+import os
+import subprocess
+import sys
+from argparse import ArgumentParser
+from collections.abc import Callable
+from pathlib import Path
+
+from rig.errors import Fault, RigError
+from rig.station.plain_text import say
+
+PATIENCE_S = 60.0
+INTERRUPTED = 130
+
+
+def add_notice(parser: ArgumentParser) -> None:
+    """Add the argument `--notify`."""
+    parser.add_argument(
+        "--notify",
+        metavar="COMMAND",
+        help="run this command in a shell when the run has ended, however it ended; RIG_RUN is its folder, RIG_STATUS "
+        "the exit status: 0 passed, 1 failed, 2 refused, 3 fault, 130 interrupted",
+    )
+
+
+def noticed(command: str | None, folder: Path, work: Callable[[], int]) -> int:
+    """Do the work of a run in a folder and return its exit status; then, whatever became of it, run the command.
+
+    A command that fails or hangs is told and changes nothing.
+    """
+    if command is None:
+        return work()
+    status = Fault.exit_status
+    try:
+        status = work()
+        return status
+    except RigError as error:
+        status = error.exit_status
+        raise
+    except KeyboardInterrupt:
+        status = INTERRUPTED
+        raise
+    finally:
+        _notify(command, folder, status)
+
+
+def _notify(command: str, folder: Path, status: int) -> None:
+    environment = {**os.environ, "RIG_RUN": str(folder.resolve()), "RIG_STATUS": str(status)}
+    try:
+        # Its words are no result: they go where the progress of the run went.
+        done = subprocess.run(command, shell=True, env=environment, timeout=PATIENCE_S, check=False, stdout=2)
+        why = f"it ended with status {done.returncode}" if done.returncode else None
+    except (OSError, ValueError, subprocess.TimeoutExpired) as error:
+        why = str(error)
+    if why is not None:
+        say(f"rig: the command of --notify failed: {why}", sys.stderr)

@@ -1,0 +1,30 @@
+"""Fits a table into a terminal without cutting a word: columns shrink to their longest word, then the frame goes."""
+
+from rich import box
+from rich.cells import cell_len
+from rich.table import Table
+
+FRAMED, BARE = 3, 2  # what a column takes beside its words: two blanks and a stroke; at most two blanks without a frame
+STROKE = 1
+
+
+def with_whole_words(table: Table, width: int) -> Table:
+    """Return the table, its columns as wide as `width` cells of a terminal allow, and no narrower than their words."""
+    texts = [[str(column.header), *map(str, column.cells), str(column.footer)] for column in table.columns]
+    lines = [max(cell_len(line) for text in column for line in text.split("\n")) for column in texts]
+    words = [max((cell_len(word) for text in column for word in _words(text)), default=0) for column in texts]
+    room = width - FRAMED * len(lines) - STROKE
+    if sum(lines) <= room:
+        return table
+    if sum(words) > room:
+        table.box, table.padding, room = box.SIMPLE, (0, 0), width - BARE * len(lines)
+    spare = max(room - sum(words), 0)
+    wished = [line - word for line, word in zip(lines, words, strict=True)]
+    for column, word, wish in zip(table.columns, words, wished, strict=True):
+        column.width = word + (min(wish, spare * wish // sum(wished)) if sum(wished) else 0)
+    return table
+
+
+def _words(text: str) -> list[str]:
+    """Return what a line is broken between: at blanks, not at those that keep a number and its unit together."""
+    return text.replace("\n", " ").split(" ")
