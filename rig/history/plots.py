@@ -1,13 +1,13 @@
 """Pictures of a sensor's series: each calibration with U, the drift, and the control chart below. Needs matplotlib."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.history.series import Subject, Trend
+from rig.history.series import Change, Subject, Trend
 from rig.history.statistics.charts import SHEWHART_LIMIT
 from rig.history.terminal.tables import title_of
 from rig.report.exports.names import plain_names
@@ -51,6 +51,31 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
             save(figure, folder, name)
         written += [folder / f"{name}.png", folder / f"{name}.svg"]
     return written
+
+
+def draw_changes(title: str, changes: Sequence[Change], folder: Path, name: str) -> list[Path]:
+    """Draw the differences of two calibrations, each divided by its U, as `name` in PNG and SVG into a folder.
+
+    The band of a parameter is the limit beyond which it has changed; a changed one is red.
+    """
+    from matplotlib.figure import Figure
+
+    with use_style():
+        figure = Figure(figsize=(7.0, 1.2 + 0.28 * len(changes)), layout="constrained")
+        axes = figure.subplots()
+        for i, change in enumerate(changes):
+            ratio = math.copysign(change.normalised_error, change.now.value - change.before.value)
+            axes.barh(i, 2 * change.limit, left=-change.limit, height=0.8, color="0.9")
+            colour = "C3" if change.has_changed else "C0"
+            axes.errorbar(ratio, i, xerr=1.0, fmt="o", ms=4, lw=1, capsize=2, color=colour)
+        axes.axvline(0.0, color="0.5", lw=0.8)
+        axes.use_sticky_edges = False  # a bar's end would be the end of the picture
+        axes.set_yticks(range(len(changes)), [change.name for change in changes])
+        axes.invert_yaxis()
+        axes.set_xlabel("(now − before) / U of the difference; grey: what chance explains")
+        axes.set_title(title)
+        save(figure, folder, name)
+    return [folder / f"{name}.png", folder / f"{name}.svg"]
 
 
 def _drawn_names() -> list[str]:

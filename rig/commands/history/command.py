@@ -61,6 +61,9 @@ def add(history: argparse.ArgumentParser) -> None:
     compare = added("compare", "two calibrations of one sensor, with E_n")
     compare.add_argument("first", type=int, metavar="A", help="number of the earlier one, as `rig history` has it")
     compare.add_argument("second", type=int, metavar="B", help="number of the later one")
+    compare.add_argument(
+        "--plot", type=Path, metavar="DIR", help="draw the differences into this folder (extra `study`)"
+    )
     add_json(compare)
     void = added("void", "say that a calibration does not count, and why; nothing is taken away")
     void.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")

@@ -3,7 +3,7 @@
 import json
 import sys
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from rig.errors import Refused, RigError
 from rig.errors.extras import missing_extra
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.entered.finished import PAGE, Finished, finished_run
-from rig.history.series import changes_between, effects, rig_states, subjects, trends
+from rig.history.series import Change, changes_between, effects, rig_states, subjects, trends
 from rig.history.storage.address import own_place, resolve_address
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.terminal.change_words import comparison_in_words
@@ -82,23 +82,37 @@ def show(options: Namespace) -> int:
 
 def plot(options: Namespace) -> int:
     """Draw the series of a serial number. Raises Refused `not_in_history`, `missing_extra`, `report_folder`."""
+    with opened(options) as history:
+        pasts = _selected(history, _selection(options))
+
+    def draw(folder: Path) -> list[Path]:
+        from rig.history.plots import draw_trends
+
+        return draw_trends({subject: trends(each) for subject, each in subjects(pasts).items()}, folder)
+
+    for path in _draw(options.out, draw):
+        say(str(path))
+    return 0
+
+
+def _drawn_changes(title: str, changes: Sequence[Change], folder: Path, name: str) -> list[Path]:
+    from rig.history.plots import draw_changes
+
+    return draw_changes(title, changes, folder, name)
+
+
+def _draw(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
+    """Draw into a folder and return the files. Raise Refused `missing_extra`, `report_folder`."""
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
         raise missing_extra(error, "study") from error
-    from rig.history.plots import draw_trends
-
-    with opened(options) as history:
-        pasts = _selected(history, _selection(options))
     try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        found = {subject: trends(each) for subject, each in subjects(pasts).items()}
-        for path in draw_trends(found, options.out):
-            say(str(path))
+        folder.mkdir(parents=True, exist_ok=True)
+        return draw(folder)
     except OSError as error:
-        why = f"{options.out} cannot be written: {error}"
-        raise Refused("report_folder", why, "Choose another with --out") from error
-    return 0
+        why = f"{folder} cannot be written: {error}"
+        raise Refused("report_folder", why, "Choose another folder") from error
 
 
 def rigs(options: Namespace) -> int:
@@ -163,7 +177,10 @@ def verify(options: Namespace) -> int:
 
 
 def compare(options: Namespace) -> int:
-    """Two calibrations of one sensor. Raises Refused `not_in_history`, `not_comparable`."""
+    """Print how two calibrations of one sensor differ, and draw it with `--plot`; return 0.
+
+    Raise Refused `not_in_history`, `not_comparable`, and as `plot`.
+    """
     with opened(options) as history:
         first, second = history.calibration(options.first), history.calibration(options.second)
         before, now = ([*history.of_run(each.run_id), each] for each in (first, second))
@@ -174,12 +191,17 @@ def compare(options: Namespace) -> int:
             "Give two calibrations of one sensor at one range",
         )
     found = changes_between(before, now)[second.subject]
+    title = f"{title_of(first.subject)}: {first.id} and {second.id}"
+    if options.plot is not None:
+        name = f"compare_{first.id}_{second.id}"
+        for path in _draw(options.plot, lambda folder: _drawn_changes(title, found, folder, name)):
+            say(str(path), sys.stderr)
     if options.json:
         numbers = {"before": first.id, "now": second.id}
         document = {**numbers, "parameters": {each.name: change_entry(each) for each in found}}
         print(json.dumps(document, indent=2, allow_nan=False))
         return 0
-    Console(highlight=False).print(changes_table(f"{title_of(first.subject)}: {first.id} and {second.id}", found))
+    Console(highlight=False).print(changes_table(title, found))
     say(comparison_in_words(found))
     return 0
 

@@ -194,6 +194,8 @@ def test_a_series_is_drawn(year: str, capsys: pytest.CaptureFixture[str]) -> Non
     drawn = told(capsys, "plot", "G-1", "--out", out).split()
     assert drawn == [str(out / "history_G_1_rate.png"), str(out / "history_G_1_rate.svg")]
     assert all(Path(each).stat().st_size > 10_000 for each in drawn)
+    assert json.loads(told(capsys, "compare", "1", "12", "--json", "--plot", out))["parameters"]
+    assert all((out / f"compare_1_12.{kind}").stat().st_size > 5_000 for kind in ("png", "svg"))
 
 
 @pytest.mark.slow
