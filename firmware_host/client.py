@@ -24,7 +24,7 @@ from firmware_host.answers import (
 )
 from firmware_host.errors import BoardError
 from firmware_host.frames import Frame
-from firmware_host.hand_answers import HandReport, HandSolved
+from firmware_host.hand_answers import BoardHandSolution, HandReport
 from firmware_host.link import BoardLink
 
 __all__ = [
@@ -136,9 +136,9 @@ class Board:
         """Return the progress of the calibration by hand."""
         return HandReport.decode(self._ask("hand_status"))
 
-    def hand_solution(self) -> HandSolved:
+    def hand_solution(self) -> BoardHandSolution:
         """Return the present solution of the calibration by hand."""
-        return HandSolved.decode(self._ask("hand_solve"))
+        return BoardHandSolution.decode(self._ask("hand_solve"))
 
     def read_calibration(self, sensor: int) -> StoredCalibration | None:
         """Return the calibration stored on the board for a sensor; None if there is none."""

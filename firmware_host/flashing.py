@@ -40,7 +40,7 @@ LONGEST_TEXT = 10_000  # bytes of a file on a Nucleo's drive
 _POLL_S = 0.05
 
 
-def shipped_image() -> bytes:
+def load_shipped_image() -> bytes:
     """Return the image that comes with this program. Raise BoardError `bad_image` if it is invalid or has changed."""
     folder = resources.files("firmware_host") / "firmware" / "image"
     image = (folder / IMAGE_NAME).read_bytes()

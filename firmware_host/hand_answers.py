@@ -62,7 +62,7 @@ class HandReport:
 
 
 @dataclass(frozen=True, slots=True)
-class HandSolved:
+class BoardHandSolution:
     """A `hand_solution`, g = C (m + b), of `taken` moves in single precision.
 
     - `sensor`, `state`, `taken`: its index, one of `protocol.HAND_STATES`, and the number of accepted moves.

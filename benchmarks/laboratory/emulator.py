@@ -56,11 +56,11 @@ def main(duration_s: float) -> None:
         board.receive(encode("start", 2, {"sensors": 0}))
         board.advance(0.2)
         reader, samples = FrameReader(), 0
-        reader.feed(board.transmitted())
+        reader.feed(board.take_sent())
         start_s, start_cpu_s = time.perf_counter(), time.process_time()
         for step in range(1, round(duration_s / TICK_S) + 1):
             board.advance(0.2 + step * TICK_S)
-            frames = reader.feed(board.transmitted())
+            frames = reader.feed(board.take_sent())
             samples += sum(len(frame.items) for frame in frames if frame.name in ("samples", "imu_samples"))
         elapsed_s, cpu_s = time.perf_counter() - start_s, time.process_time() - start_cpu_s
         rates = " + ".join(f"{rate_hz:g}" for rate_hz in rates_hz) or "no"

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.history.entered.finished import Finished, finished_run
+from rig.history.entered.finished import Finished, read_finished_run
 from rig.history.store import History, Selection, open_history
 
 ROOT = Path(__file__).parents[2]
@@ -48,7 +48,7 @@ print(between_s - began_s, time.perf_counter() - between_s)
 
 def runs(count: int) -> list[Finished]:
     """`count` runs of `count / OF_EACH` sensors, taken in turn."""
-    first = finished_run(FIXTURE)
+    first = read_finished_run(FIXTURE)
     (sensor,) = first.document.gyroscopes.values()
     slim = sensor.model_copy(update={"observations": (), "rests": ()})
     found = []

@@ -18,7 +18,7 @@ from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
 from rig.page.server.serving import Address, serving
@@ -78,7 +78,7 @@ def measured(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], s
 
 def with_page(seconds: float, reading: int, stalled: int) -> tuple[float, float, float]:
     """The share of a core, %, the longest wait, s, and the frames a second that one browser has read."""
-    spawning, feed, events = multiprocessing.get_context("spawn"), Feed(Shown(ABOUT)), run_of(seconds)
+    spawning, feed, events = multiprocessing.get_context("spawn"), Feed(PageState(ABOUT)), run_of(seconds)
     frames = spawning.Value("l", 0)
     for event in before_it_moves(planned()):
         feed.event(event)

@@ -118,11 +118,11 @@ class EmulatedBoard:
         """Let bytes from the host arrive from now on, one after the other at the port's pace."""
         self._chip.usart.receive(data)
 
-    def transmitted(self) -> bytes:
+    def take_sent(self) -> bytes:
         """Return the bytes whose stop bit has passed since the last call."""
         if not self._sent:
-            return self._chip.usart.transmitted()
-        data = bytes(self._sent) + self._chip.usart.transmitted()
+            return self._chip.usart.take_sent()
+        data = bytes(self._sent) + self._chip.usart.take_sent()
         self._sent.clear()
         return data
 
@@ -247,7 +247,7 @@ class EmulatedBoard:
         assert self._reset_cause is not None
         self._chip.rcc.note_reset(self._reset_cause)
         self._reset_cause = None
-        self._sent += self._chip.usart.transmitted()
+        self._sent += self._chip.usart.take_sent()
         self._start()
 
     def _start(self) -> None:

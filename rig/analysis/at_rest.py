@@ -14,7 +14,7 @@ from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.observation.arm_rests import still_samples
-from rig.observation.average import Stream, on_the_arms_clock
+from rig.observation.average import Stream, synchronize_stream
 from rig.observation.by_hand.steadiness import check_at_rest, contiguous_slices
 from rig.observation.external.csv_samples import Samples
 from rig.observation.motion.arm_motion import motion_of
@@ -50,14 +50,14 @@ class SensorAtRest:
 def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
     """Every sensor with rates, by name, over all recordings of a run; readings the board corrected are left out.
 
-    Raises Fault as `motion_of` and `on_the_arms_clock` do.
+    Raises Fault as `motion_of` and `synchronize_stream` do.
     """
     motions = [motion_of(run) for run in runs]
     found = {}
     for name, sensor in runs[0].measuring(RATE).items():
         pieces = []
         for run, motion in zip(runs, motions, strict=True):
-            stream = on_the_arms_clock(run.samples[name], sensor, motion)
+            stream = synchronize_stream(run.samples[name], sensor, motion)
             pieces += [(stream, inside) for inside in still_samples(run, stream, motion)]
         quantities = [RATE, ACCELERATION] if sensor.measures(ACCELERATION) else [RATE]
         found[name] = SensorAtRest(

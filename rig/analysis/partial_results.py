@@ -17,8 +17,8 @@ from rig.errors import Fault
 from rig.errors.attempts import Attempts, all_failed, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import VectorSolution
-from rig.observation.average import Average, Stream, on_the_arms_clock
-from rig.observation.field import dwelt_beside, field_mean
+from rig.observation.average import Average, Stream, synchronize_stream
+from rig.observation.field import field_mean, find_dwelling_companion
 from rig.observation.finished import finished_dwells, finished_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of
 from rig.observation.observe import Observation, observe_each_sweep, observe_sensor
@@ -100,7 +100,7 @@ def _turned(sweeps: Attempts[int, Observation], rests: Sequence[Average], mounti
 def _observe(run: RunData, name: str, motion: ArmMotion) -> _Recorded:
     sensor = run.sensors[name]
     try:
-        stream = on_the_arms_clock(run.samples[name], sensor, motion)
+        stream = synchronize_stream(run.samples[name], sensor, motion)
     except Fault as fault:  # of the sensor as a whole: its clock is not found
         dwells = finished_dwells(run) if sensor.measures(ACCELERATION) else ()
         return _Recorded(None, all_failed(finished_sweeps(run), fault), all_failed(dwells, fault), ())
@@ -125,7 +125,7 @@ def _fields(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[Quantit
     fields: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
     for name in run.measuring(FIELD):
         dwelling = (sensor for sensor, each in recorded.items() if each.dwells.results or each.dwells.faults)
-        other = dwelt_beside(run, name, dwelling)
+        other = find_dwelling_companion(run, name, dwelling)
         if other is None:
             continue
         clock, dwells = recorded[other].clock, recorded[other].dwells

@@ -17,7 +17,7 @@ refusing = partial(raised_as, Refused)  # before anything has moved
 changing = partial(raised_as, Fault)  # while the board is being changed, a refusal is too late
 
 
-def configured_board(config: SensorsConfig) -> BoardSection:
+def require_board_section(config: SensorsConfig) -> BoardSection:
     """Return the section board. Raise Refused `no_board_section` if every sensor has a port of its own."""
     if config.board is None:
         raise Refused(
@@ -42,7 +42,7 @@ def refuse_other_firmware(identity: BoardIdentity) -> None:
 def sensor_entry(identity: BoardIdentity, name: str, section: ConfiguredSensor) -> SensorInfo:
     """Return the board's entry for a configured sensor, whichever part answers. Raise Refused `sensor_missing`."""
     for info in identity.sensors:
-        if configured_part(info.part) == section.part:
+        if spell_part(info.part) == section.part:
             return info
     raise _missing(name, section, "no driver for it")
 
@@ -70,7 +70,7 @@ def _missing(name: str, section: ConfiguredSensor, finding: str) -> Refused:
     )
 
 
-def stored_calibration(board: Board, name: str, section: SensorSection) -> StoredCalibration:
+def read_stored_calibration(board: Board, name: str, section: SensorSection) -> StoredCalibration:
     """Read the calibration by which the board corrects a configured sensor's readings.
 
     Raise Refused `no_calibration`, and as `find_sensor` and `refuse_other_sensor` do.
@@ -84,7 +84,7 @@ def stored_calibration(board: Board, name: str, section: SensorSection) -> Store
         )
     refuse_other_sensor(
         f"sensors.{name}: the calibration stored on the board",
-        configured_part(stored.part),
+        spell_part(stored.part),
         stored.calibration.serial_number,
         stored.range_deg_s,
         section,
@@ -114,7 +114,7 @@ def refuse_other_sensor(
         )
 
 
-def configured_part(part: str) -> str:
+def spell_part(part: str) -> str:
     """Return a part's name in the configuration's spelling; the board spells it as its maker does."""
     names = {part_on_board.name: name for name, part_on_board in BOARD_PARTS.items()}
     return names.get(part, part.lower())

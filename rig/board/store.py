@@ -8,7 +8,7 @@ import numpy as np
 
 from firmware_host.client import Board, Calibration, StoredCalibration, StoredPolynomials
 from firmware_host.errors import BoardError
-from rig.board.identify import configured_board, find_sensor
+from rig.board.identify import find_sensor, require_board_section
 from rig.config.models import RigConfig
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.errors import Refused
@@ -41,7 +41,7 @@ def store_calibrations(
     """
     if not config.on_board:
         return
-    section = configured_board(config)
+    section = require_board_section(config)
     with Board(section.port, section.baud, lambda batch: None) as board:
         for name, sensor in config.on_board.items():
             if name not in config.to_calibrate:

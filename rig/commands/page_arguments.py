@@ -131,12 +131,12 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
         yield OperatorsPage()
         return
     from rig.page.analysis_process import looking_out
-    from rig.page.page_state import Shown
+    from rig.page.page_state import PageState
     from rig.page.server.control import Control
     from rig.page.server.feed import Feed
     from rig.page.server.serving import serving
 
-    feed, control = Feed(Shown(about())), Control(may_answer=wanted.may_answer)
+    feed, control = Feed(PageState(about())), Control(may_answer=wanted.may_answer)
     with ExitStack() as stack:
         url = stack.enter_context(serving(feed, control, folder, wanted.address()))
         lookout = stack.enter_context(looking_out(folder, feed))

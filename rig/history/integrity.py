@@ -33,7 +33,7 @@ class EntryState:
     why: str = ""
 
 
-def examined(history: History) -> Iterator[EntryState]:
+def examine_history(history: History) -> Iterator[EntryState]:
     """Yield the state of triggers, numbers and rows, of each run by its result, and of files by their hashes.
 
     Files are read where they were last seen. Those entered on another computer and not accessible here are `elsewhere`;

@@ -11,7 +11,7 @@ FLANGE: Position = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class FlangeLoad:
     """The payload's mass, and the positions, in the flange's frame, of its centre and of an extension's end."""
 
     payload_kg: float
@@ -19,9 +19,9 @@ class Carried:
     extension_m: Position = FLANGE
 
 
-def read_load(arm: "ArmSection") -> Carried:
+def read_load(arm: "ArmSection") -> FlangeLoad:
     """Return the load of an arm by its configuration."""
-    return Carried(arm.payload_kg, _metres(arm.payload_centre_mm), arm.extension_m)
+    return FlangeLoad(arm.payload_kg, _metres(arm.payload_centre_mm), arm.extension_m)
 
 
 def _metres(millimetres: Position) -> Position:

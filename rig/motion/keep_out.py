@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.errors import Problem
 from rig.estimation.arrays import Array
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import DenavitHartenberg, distance_to_forearm, distance_to_upper_arm
 from rig.motion.model import TurnerModel
 from rig.motion.state import JointLimits, Joints
@@ -36,8 +36,8 @@ class _Path(NamedTuple):
     remedy: str
 
 
-def clearance_problems(
-    plan: Plan, carried: Carried, model: TurnerModel, arm: DenavitHartenberg | None = None
+def find_clearance_problems(
+    plan: Plan, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> list[Problem]:
     """Return the problems of steps that bring flange, payload's centre or extension too near to forearm or upper arm.
 
@@ -70,7 +70,7 @@ def clearance_problems(
     return problems
 
 
-def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: Carried, model: TurnerModel) -> bool:
+def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: FlangeLoad, model: TurnerModel) -> bool:
     """Return whether a straight path in joint space is clear enough of the arm for sweeps and motions between them.
 
     Lengths are those of the model's drawing, because plans are made before an arm is connected. Paths beyond the
@@ -90,7 +90,7 @@ def _clearance_m(radius_m: float, room_m: float) -> float:
 
 
 def _measure_to_forearm(
-    q_rad: Array, carried: Carried, model: TurnerModel, arm: DenavitHartenberg | None = None
+    q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
     """Return name and distance, m, of the part of the load that comes nearest to the forearm in the poses (N, 6)."""
     names, points = _list_load_points(carried)
@@ -99,7 +99,7 @@ def _measure_to_forearm(
 
 
 def _measure_to_upper_arm(
-    q_rad: Array, carried: Carried, model: TurnerModel, arm: DenavitHartenberg | None = None
+    q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
     """Return name and distance, m, of the part of the load that comes nearest to the upper arm in the poses (N, 6)."""
     names, points = _list_load_points(carried)
@@ -113,14 +113,14 @@ def _find_nearest(names: Sequence[str], distances_m: Array) -> tuple[str, float]
     return names[int(least_m.argmin())], float(least_m.min())
 
 
-def _list_load_points(carried: Carried) -> tuple[list[str], Array]:
+def _list_load_points(carried: FlangeLoad) -> tuple[list[str], Array]:
     """Return names and points (k, 1, 3), m, of the load in the flange's frame."""
     extension = _list_extension_points(carried)
     points = np.array([np.zeros(3), carried.centre_m, *extension])
     return ["flange", "payload", *["extension"] * len(extension)], points[:, None]
 
 
-def _list_extension_points(carried: Carried) -> list[Array]:
+def _list_extension_points(carried: FlangeLoad) -> list[Array]:
     """Return points of an extension in the flange's frame, m, the last at its end; none without an extension."""
     end = np.array(carried.extension_m)
     count = 1 + int(np.linalg.norm(end) / EXTENSION_STEP_M)

@@ -54,7 +54,7 @@ class TurnerModel:
 
 
 @lru_cache
-def turner_model(key: ModelName) -> TurnerModel:
+def load_turner_model(key: ModelName) -> TurnerModel:
     """Return the model that a configuration names `key`. Raise FileNotFoundError if there is none."""
     import yaml  # here, because the process of the arm's client must start fast and needs no model
 
@@ -94,9 +94,9 @@ def turner_model(key: ModelName) -> TurnerModel:
 
 def model_of(arm: "ArmSection") -> TurnerModel:
     """Return the model of an arm by its configuration."""
-    return turner_model(arm.model)
+    return load_turner_model(arm.model)
 
 
-def home_of(arm: "ArmSection") -> Joints:
+def find_home(arm: "ArmSection") -> Joints:
     """Return the home pose (n,), rad: the configured one, or else the model's."""
     return model_of(arm).home_rad if arm.home_deg is None else tuple(radians(angle) for angle in arm.home_deg)

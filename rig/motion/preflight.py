@@ -7,7 +7,7 @@ from rig.motion.state import Joints
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, travel
 
 
-def step_problems(plan: Plan) -> list[Problem]:
+def find_step_problems(plan: Plan) -> list[Problem]:
     """Return the problems of steps: every step must take time, and every motion must move something at some speed."""
     problems = [
         Problem(
@@ -37,7 +37,7 @@ def step_problems(plan: Plan) -> list[Problem]:
     return problems
 
 
-def way_to_home(plan: Plan, q_rad: Joints) -> Joints:
+def find_travel_to_home(plan: Plan, q_rad: Joints) -> Joints:
     """Return each joint's travel (n,), rad, in the first motion, from the arm's pose to the plan's home."""
     return travel(q_rad, plan.home_q_rad)
 

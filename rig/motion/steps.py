@@ -69,7 +69,7 @@ class Sweep:
         return 1.0 if self.direction == "ccw" else -1.0
 
     @property
-    def began_q_rad(self) -> Joints:
+    def first_q_rad(self) -> Joints:
         """The joint angles at the start of the revolution or arc."""
         low, high = self.revolution_rad
         angle_rad = low if self.direction == "ccw" else high

@@ -15,7 +15,7 @@ from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.notebook.frames import frame
 from rig.notebook.html import table
-from rig.observation.average import on_the_arms_clock
+from rig.observation.average import synchronize_stream
 from rig.observation.motion.arm_motion import motion_of
 from rig.observation.observed_run import one_clock, times_s
 from rig.observation.windows import Finished, Window, swept
@@ -183,7 +183,7 @@ class Readings:
         return (
             {}
             if source is None
-            else {source: on_the_arms_clock(run.samples[source], gyroscopes[source], motion_of(run)).clock}
+            else {source: synchronize_stream(run.samples[source], gyroscopes[source], motion_of(run)).clock}
         )
 
     @cached_property

@@ -102,7 +102,7 @@ class Stream:
         return float(thermometer.convert(float(thermometer.counts(self.raw)[inside].mean())))
 
 
-def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: KnownMotion) -> Stream:
+def synchronize_stream(raw: NDArray[Any], sensor: RecordedSensor, motion: KnownMotion) -> Stream:
     """Return a gyroscope's samples (n,) in rad/s at controller times. Raise Fault as `estimate_time_base` does."""
     readings = sensor.channel(RATE).values(raw)
     return convert_stream(raw, sensor, estimate_time_base(raw["board_time_us"] * 1e-6, readings, motion))

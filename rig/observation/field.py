@@ -24,12 +24,12 @@ SETTLING_S = 0.2  # cut off at either end of a rest
 
 def find_companion(recording: ObservedRun, name: str) -> str | None:
     """Return the sensor on the clock of the magnetometer `name` whose accelerometer was read in dwells, or None."""
-    return dwelt_beside(
+    return find_dwelling_companion(
         recording.run, name, (sensor for sensor, observations in recording.sensors.items() if observations.dwells)
     )
 
 
-def dwelt_beside(run: RunData, name: str, sensors: Iterable[str]) -> str | None:
+def find_dwelling_companion(run: RunData, name: str, sensors: Iterable[str]) -> str | None:
     """Return the first of `sensors` that is on the clock of the magnetometer `name`; None without one."""
     return next((sensor for sensor in sensors if one_clock(run, sensor, name)), None)
 

@@ -23,7 +23,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
 from rig.observation.arm_rests import add_attitude, average_rests, estimate_bias_drift
-from rig.observation.average import Average, Stream, between, build_average, on_the_arms_clock
+from rig.observation.average import Average, Stream, between, build_average, synchronize_stream
 from rig.observation.lost_samples import lost_samples
 from rig.observation.motion.arm_motion import ArmMotion, is_sparse
 from rig.observation.motion.revolution import Revolution, arm_states_lost, describe
@@ -103,7 +103,7 @@ def observe_sensor(
     `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`, `wrong_unit`, `not_finite`,
     `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`, `impossible_times`.
     """
-    stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
+    stream = synchronize_stream(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = list[Observation]()
     for finished in swept(run):
         if finished.sweep.index in superseded:

@@ -11,7 +11,7 @@ from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Sweep
-from rig.observation.average import on_the_arms_clock
+from rig.observation.average import synchronize_stream
 from rig.observation.finished import finished_sweeps
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.windows import Window
@@ -36,21 +36,21 @@ def revolution_on_the_board(
     """
     names = [f"joint {number}" for number in range(kinematics.joints)]
     motion = ArmMotion(states, kinematics, names, reading_std_rad=reading_std_rad)
-    clock = on_the_arms_clock(samples, sensor, motion).clock
+    clock = synchronize_stream(samples, sensor, motion).clock
     window = Window(float(states["time_s"][min(first, len(states) - 1)]), float(states["time_s"][-1]))
     revolution = motion.turn(sweep, window, settings)
     start_s, end_s = (clock.board_time_s(time_s) for time_s in (revolution.start_s, revolution.end_s))
     return round(start_s * 1e6), round(end_s * 1e6), revolution.speed_rad_s
 
 
-def observed_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
+def find_averaged_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
     """Return the sweeps for which the board has an average for each of the sensors that is on it."""
     sweeps = finished_sweeps(run)
     on_board = [sensor for sensor in sensors if run.sensors[sensor].on_board]
-    return sweeps.intersection(*(observed_before([run], sensor, sweeps) for sensor in on_board))
+    return sweeps.intersection(*(find_board_averages([run], sensor, sweeps) for sensor in on_board))
 
 
-def observed_before(earlier: Sequence[RunData], sensor: str, done: Collection[int]) -> dict[int, BoardObserved]:
+def find_board_averages(earlier: Sequence[RunData], sensor: str, done: Collection[int]) -> dict[int, BoardObserved]:
     """Return the board's averages of a sensor in earlier recordings, by sweep: the newest of each sweep in `done`."""
     return {
         event.sweep: event

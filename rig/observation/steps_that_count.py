@@ -7,7 +7,7 @@ from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.arm_rests import average_rests
-from rig.observation.average import Stream, between, on_the_arms_clock
+from rig.observation.average import Stream, between, synchronize_stream
 from rig.observation.finished import finished_dwells, finished_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of
 from rig.observation.observe import check_response, observe_each_sweep
@@ -41,7 +41,7 @@ def _find_sound_steps_of(
 ) -> frozenset[int]:
     """Return one sensor's sound sweeps and dwells; none if it once did not follow the arm: its onset is unknown."""
     try:
-        stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
+        stream = synchronize_stream(run.samples[sensor], run.sensors[sensor], motion)
         dwells = read_each_dwell(run, stream, motion, settings)
         rests = average_rests(run, stream, motion, np.array(stream.sensor.mounting))
         check_response(run, rests, list(dwells.results.values()))

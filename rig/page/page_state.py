@@ -60,7 +60,7 @@ LINES = 40  # newest lines of the log
 ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
 
 
-class Shown:
+class PageState:
     """The page's sections by name, in plain numbers and texts, and the `changed` ones since the last request.
 
     Samples, states and progress come fifty times a second, but are requested ten times: only the newest are stored, and

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from math import degrees
 
 from rig.motion.doubts import doubts
-from rig.motion.preflight import way_to_home
+from rig.motion.preflight import find_travel_to_home
 from rig.motion.state import Report
 from rig.motion.steps import Plan, turn_words
 from rig.motion.winding import cable_words
@@ -44,7 +44,7 @@ def announcement(
     lines, which sensors are turned, `early` that the movement may end before its last repeat.
     """
     at_most = " at most, until the uncertainty is what is wanted" if early else ""
-    way = way_to_home(plan, report.state.q_rad)
+    way = find_travel_to_home(plan, report.state.q_rad)
     turns = ", ".join(
         f"{name} {degrees(angle):+.0f}°" for name, angle in zip(report.joints, way, strict=True) if abs(angle) > 0.01
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 from firmware_host.client import Calibration
 from rig.analysis.design.shortest import target_of
 from rig.board.crystal import follows_crystal
-from rig.board.identify import configured_board, refusing
+from rig.board.identify import refusing, require_board_section
 from rig.board.store import SensorSolution, calibration_of
 from rig.config.load import Loaded
 from rig.config.procedures.procedure_sections import SixObservationSection, ThermalSection
@@ -38,7 +38,7 @@ from rig.runner.mounted import Memory, mounted
 from rig.runner.procedure import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
 from rig.runner.warming import Warming
-from rig.sensors.registry import by_port
+from rig.sensors.registry import group_by_port
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import ArmConnected, ArmSeen, BoardConnected, RunResumed, SensorConnected
 from rig.station.station import Station
@@ -126,13 +126,13 @@ class Connector:
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
         with refusing():
             source = stack.enter_context(board_source(config, acquisition.on_samples, calibrated=calibrated))
-        self.station.event(BoardConnected(configured_board(config).port, source.board.identity))
+        self.station.event(BoardConnected(require_board_section(config).port, source.board.identity))
         return source
 
     def _connect_others(self, stack: ExitStack, acquisition: Acquisition) -> Iterator[SampleSource]:
         """The sensors with a port of their own; to verify them, their calibrations correct their readings here."""
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
-        for port, kind, sections in by_port(config.sensors):
+        for port, kind, sections in group_by_port(config.sensors):
             on_samples: OnSamples = acquisition.on_samples
             calibrations = {
                 name: self._calibration(name) for name in sections if calibrated and name in config.to_calibrate

@@ -29,7 +29,7 @@ from rig.data.recording.run_file import RunRecorder
 from rig.errors import Fault, Refused, refuse
 from rig.estimation.arrays import Array
 from rig.motion.geometry import DenavitHartenberg, flange_attitude, flange_axes
-from rig.motion.preflight import way_to_home
+from rig.motion.preflight import find_travel_to_home
 from rig.motion.state import Report
 from rig.motion.steps import Dwell, Motion, Plan, Rest, Stage, Step, Sweep, Transfer, travel
 from rig.plans.phase import Phase
@@ -160,7 +160,7 @@ class Rig:
         if self.hand is not None:
             self._motions = iter(())
             return  # nothing moves by itself, so nothing is asked before
-        away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)), default=0.0)
+        away_rad = max(map(abs, find_travel_to_home(self.plan, report.state.q_rad)), default=0.0)
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
             self._agree()
         self._refuse_moved()

@@ -22,7 +22,7 @@ from rig.observation.timebase import NOMINAL_DRIFT
 from rig.runner.acquisition import SensorCount
 from rig.runner.board.sensors import BoardSource, board_source
 from rig.runner.first_samples import FirstSamples
-from rig.sensors.registry import by_port
+from rig.sensors.registry import group_by_port
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import SensorSamples
 
@@ -37,7 +37,7 @@ def connected(config: SensorsConfig, on_samples: OnSamples) -> Iterator[tuple[Sa
         with refusing():
             if config.parts_on_board:
                 sources.append(stack.enter_context(board_source(config, on_samples, calibrated=False)))
-            for _, kind, sections in by_port(config.sensors):
+            for _, kind, sections in group_by_port(config.sensors):
                 sources.append(stack.enter_context(kind.connect(sections, on_samples)))
         yield tuple(sources)
 

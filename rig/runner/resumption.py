@@ -9,7 +9,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import Refused
-from rig.observation.onboard_window import observed_sweeps
+from rig.observation.onboard_window import find_averaged_sweeps
 from rig.observation.steps_that_count import sound_dwells, sound_sweeps
 from rig.plans.script_file import ScriptFile
 
@@ -67,6 +67,8 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
                 "config.yaml in the run folder describes another procedure or home pose than the recording there",
                 REMEDY,
             )
-    swept = (sound_sweeps(run, settings.observation) & observed_sweeps(run, settings.to_calibrate) for run in earlier)
+    swept = (
+        sound_sweeps(run, settings.observation) & find_averaged_sweeps(run, settings.to_calibrate) for run in earlier
+    )
     dwelt = (sound_dwells(run, settings.observation) for run in earlier)
     return Resumption(earlier, frozenset[int]().union(*swept, *dwelt) - disturbed_sweeps(earlier))

@@ -67,7 +67,7 @@ OWN_PORT: Mapping[str, PartKind] = MappingProxyType(
 )
 
 
-def by_port(sensors: Sections) -> Iterator[tuple[str, PartKind, Sections]]:
+def group_by_port(sensors: Sections) -> Iterator[tuple[str, PartKind, Sections]]:
     """Yield the sensors with a port of their own, grouped by port: the port, their kind, their sections."""
     sections_by_port: dict[str, dict[str, SensorSection]] = {}
     for name, section in sensors.items():

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from rig.config.models import TurnerSection
 from rig.errors import Problem
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.state import Report, State, StateField, TurnerIdentity
 from rig.motion.steps import Plan
 from rig.turners.turner import Turner
@@ -73,7 +73,7 @@ class TurnerKind(Generic[SectionT, ReportT]):
     problems: Callable[[Sequence[Plan], SectionT, ReportT | None], list[Problem]]
     describe_configured: Callable[[SectionT], TurnerIdentity]
     describe_connected: Callable[[SectionT, ReportT], TurnerIdentity]
-    carried: Callable[[SectionT], Carried]
+    carried: Callable[[SectionT], FlangeLoad]
     words: Wording
     fields: tuple[StateField, ...] = ()
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.state import Report, State
 from rig.motion.steps import Motion
 
@@ -34,7 +34,7 @@ class Turner(Protocol):
         """Raise the problem that has occurred meanwhile, if any."""
         ...
 
-    def take_control(self, carried: Carried) -> None:
+    def take_control(self, carried: FlangeLoad) -> None:
         """Make it ready to move its payload. Raise `Refused` by name."""
         ...
 

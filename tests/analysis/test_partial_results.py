@@ -10,7 +10,7 @@ from rig.data.recording.events import SweepFinished
 from rig.data.recording.run_file import RunData
 from rig.errors.attempts import Attempts
 from rig.estimation.gyroscope.vector_model import VectorSolution
-from rig.observation.average import on_the_arms_clock
+from rig.observation.average import synchronize_stream
 from rig.observation.motion.arm_motion import motion_of
 from rig.observation.windows import swept
 from support.recordings.synthetic_run import BIAS_RAD_S, SCALE, Setup, synthetic_run
@@ -45,7 +45,7 @@ def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
 def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
     samples = run.samples["gyro"].copy()
     third = list(swept(run))[2].window
-    times_s = on_the_arms_clock(samples, run.sensors["gyro"], motion_of(run)).time_s
+    times_s = synchronize_stream(samples, run.sensors["gyro"], motion_of(run)).time_s
     samples["counts"][np.searchsorted(times_s, (third.start_s + third.end_s) / 2), 0] = 32767
     found = so_far([replace(run, samples={"gyro": samples})]).gyroscopes["gyro"]
     assert {sweep: fault.name for sweep, fault in found.sweeps.faults.items()} == {2: "saturation"}

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from rig.cli import main
 from rig.commands.laboratory.laboratory import simulated_laboratory
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import flange_attitude, flange_rate
 from rig.motion.state import ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration, travel
@@ -63,7 +63,7 @@ def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pyt
             while not (out / "kvh.csv").exists():
                 table.check()
                 assert recording.poll() is None
-            table.take_control(Carried(0.95, (0.0, 0.0, 0.04)))
+            table.take_control(FlangeLoad(0.95, (0.0, 0.0, 0.04)))
             for way in WAYS:
                 table.move(to(table.latest.q_rad, way))
             said, _ = recording.communicate(timeout=PATIENCE_S)

@@ -20,7 +20,7 @@ from rig.motion.steps import Rest
 from rig.observation.observed_run import observe_run
 from rig.observation.statistics.mean import even_mean
 from rig.page.about import About
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.report.exports.formats import writer_of_readings
 from rig.report.exports.recorded import WithMotion
 from rig.runner.acquisition import Acquisition
@@ -102,7 +102,7 @@ def test_a_scalar_is_shown_while_it_comes_on_the_terminal_and_on_the_page() -> N
         view.event(SamplesTaken((seen,)))
         view.event(Progress(1, 4, Rest("rest", 3.0), 0.5, 1.5, 1.5, 0.0))
     assert f"+964.80 hPa, {seen.samples} samples, 0 lost" in console.export_text()
-    page = Shown(About("run", "six_observation"))
+    page = PageState(About("run", "six_observation"))
     page.take(SamplesTaken((seen,)))
     assert page.sections["sensors"][0]["units"] == {"pressure_pa": ["pressure", "hPa"]}
 

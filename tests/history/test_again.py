@@ -10,9 +10,9 @@ import pytest
 from sqlalchemy import text
 
 from rig.errors import Refused
-from rig.history.again.answer import Answer, Compared, Given, Unsolved, compared, to_solve
+from rig.history.again.answer import Answer, Compared, RecomputedResult, Unsolved, compared, to_solve
 from rig.history.again.done import JOURNAL, Journal, Question
-from rig.history.again.plan import stated_results
+from rig.history.again.plan import list_stated_results
 from rig.history.again.report import again_csv, again_page, counts
 from rig.history.entered.finished import Finished
 from rig.history.store import History, Selection, open_history
@@ -30,13 +30,13 @@ def history(tmp_path: Path) -> Iterator[History]:
         yield opened
 
 
-def given(run: Finished, verdict: str = "pass") -> Given:
-    return Given(verdict, (), followed(run.document))
+def given(run: Finished, verdict: str = "pass") -> RecomputedResult:
+    return RecomputedResult(verdict, (), followed(run.document))
 
 
 def again(history: History, answers: Sequence[tuple[Finished, Answer]], of_u: float = 0.1) -> list[Compared]:
     by_key = {run.content_sha256: answer for run, answer in answers}
-    return list(compared(stated_results(history, Selection()), by_key, of_u).compared)
+    return list(compared(list_stated_results(history, Selection()), by_key, of_u).compared)
 
 
 def scaled(by: float) -> Sequence[float]:
@@ -71,10 +71,10 @@ def test_a_u_that_was_too_small_and_a_value_that_is_gone_are_moves_too(history: 
     (calibration,) = followed(run.document)
     wider = tuple(replace(each, std_statistical=1.5 * each.std_statistical) for each in calibration.parameters)
     for parameters, size in ((wider, 0.5), (calibration.parameters[1:], float("inf")), ((), float("inf"))):
-        (found,) = again(history, [(run, Given("pass", (), (replace(calibration, parameters=parameters),)))])
+        (found,) = again(history, [(run, RecomputedResult("pass", (), (replace(calibration, parameters=parameters),)))])
         assert found.moved == (1,) and found.moves[1][0].size == pytest.approx(size)
     narrower = tuple(replace(each, std_statistical=0.5 * each.std_statistical) for each in calibration.parameters)
-    (found,) = again(history, [(run, Given("pass", (), (replace(calibration, parameters=narrower),)))])
+    (found,) = again(history, [(run, RecomputedResult("pass", (), (replace(calibration, parameters=narrower),)))])
     assert found.same
 
 
@@ -113,18 +113,21 @@ def test_a_replaced_result_is_solved_again_only_where_a_certificate_relies_on_it
     first, later = finished(0, solved_after_s=60), finished(0, scaled(U), solved_after_s=3600)
     history.enter(first)
     history.enter(later)
-    assert [each.run_id for each in stated_results(history, Selection())] == [2]
+    assert [each.run_id for each in list_stated_results(history, Selection())] == [2]
     certified(history, first, "RIG-1")
-    assert [(each.run_id, len(each.calibrations)) for each in stated_results(history, Selection())] == [(1, 1), (2, 1)]
+    assert [(each.run_id, len(each.calibrations)) for each in list_stated_results(history, Selection())] == [
+        (1, 1),
+        (2, 1),
+    ]
 
 
 def test_what_was_voided_does_not_count_and_a_selection_is_heeded(history: History) -> None:
     for day in range(3):
         history.enter(finished(day, serial_number=f"G-{day}"))
     history.void(2, "it was dropped")
-    assert [each.run_id for each in stated_results(history, Selection())] == [1, 3]
-    assert [each.run_id for each in stated_results(history, Selection(serial_number="G-2"))] == [3]
-    assert [each.run_id for each in stated_results(history, Selection(serial_number="G-1"))] == []
+    assert [each.run_id for each in list_stated_results(history, Selection())] == [1, 3]
+    assert [each.run_id for each in list_stated_results(history, Selection(serial_number="G-2"))] == [3]
+    assert [each.run_id for each in list_stated_results(history, Selection(serial_number="G-1"))] == []
 
 
 def test_the_journal_gives_the_same_numbers_back_and_forgets_what_a_kill_left_half_written(tmp_path: Path) -> None:
@@ -151,7 +154,7 @@ def test_what_is_solved_is_not_solved_again_and_what_is_not_is_tried_again(histo
     runs = [finished(day) for day in range(3)]
     for run in runs:
         history.enter(run)
-    stated = stated_results(history, Selection())
+    stated = list_stated_results(history, Selection())
     solved: dict[str, Answer] = {
         runs[0].content_sha256: given(runs[0]),
         runs[1].content_sha256: Unsolved("damaged", "another SHA-256"),
@@ -167,9 +170,11 @@ def test_the_report_says_all_in_csv_and_what_is_to_be_looked_at_on_the_page(hist
     certified(history, hostile, "RIG-1")
     answers: dict[str, Answer] = {
         run.content_sha256: given(run),
-        hostile.content_sha256: Given("fail", ("gyro.scale_std",), followed(finished(1, scaled(U)).document)),
+        hostile.content_sha256: RecomputedResult(
+            "fail", ("gyro.scale_std",), followed(finished(1, scaled(U)).document)
+        ),
     }
-    outcome = compared(stated_results(history, Selection()), answers, 0.1)
+    outcome = compared(list_stated_results(history, Selection()), answers, 0.1)
     rows = list(csv.DictReader(io.StringIO(again_csv(outcome))))
     assert [(row["calibration"], row["state"], row["verdict"], row["verdict_now"], row["moved"]) for row in rows] == [
         ("1", "solved", "pass", "pass", "False"),
@@ -210,7 +215,7 @@ def replicated(history: History, run: Finished, count: int) -> None:
 @pytest.mark.slow
 def test_ten_thousand_results_are_planned_in_a_handful_of_questions(history: History, tmp_path: Path) -> None:
     replicated(history, finished(0), 10_000)
-    stated = stated_results(history, Selection())
+    stated = list_stated_results(history, Selection())
     assert len(stated) == 10_000 and len({each.content_sha256 for each in stated}) == 10_000
     assert all(len(each.calibrations) == len(each.recordings) == len(each.places) == 1 for each in stated)
     answer = given(finished(0))

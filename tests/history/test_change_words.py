@@ -3,7 +3,7 @@
 import pytest
 
 from rig.history.series import Change
-from rig.history.terminal.change_words import change_in_short, changed_values, name_in_words
+from rig.history.terminal.change_words import change_in_short, name_in_words, select_changed
 from rig.report.findings.followed import Parameter
 
 
@@ -13,7 +13,7 @@ def change(name: str, before: float, now: float, u: float, unit: str = "1") -> C
 
 
 def said(*changes: Change) -> list[str]:
-    return [change_in_short(each) for each in changed_values(changes)]
+    return [change_in_short(each) for each in select_changed(changes)]
 
 
 def test_a_scale_factor_changes_by_a_share_of_itself() -> None:

@@ -12,9 +12,9 @@ from sqlalchemy import select, text
 from sqlalchemy.exc import DBAPIError
 
 from rig.cli import main
-from rig.history.entered.finished import content_sha256, finished_run
+from rig.history.entered.finished import content_sha256, read_finished_run
 from rig.history.entered.issued import Issued
-from rig.history.integrity import WRONG, examined
+from rig.history.integrity import WRONG, examine_history
 from rig.history.storage import journal, schema
 from rig.history.storage.engine import WRITES
 from rig.history.storage.journal import Head
@@ -73,7 +73,7 @@ def run_folder(folder: Path) -> Path:
     shutil.copytree(RECORDINGS / "verified", folder)
     shutil.copy(CONFIGS / "demo.yaml", folder / "config.yaml")
     (folder / "calibration.h").write_text("#define KX 1.01f\n", encoding="utf-8")
-    document = finished_run(folder).document
+    document = read_finished_run(folder).document
     page = certificate_page(certificate_of(document, stated_in(folder)))
     (folder / "certificate.html").write_text(page, encoding="utf-8")
     return folder
@@ -118,10 +118,10 @@ def test_a_file_that_is_not_what_was_entered_is_named(
 ) -> None:
     folder = run_folder(tmp_path / "run")
     with open_history(str(tmp_path / "history.sqlite")) as history:
-        history.enter(finished_run(folder))
-        assert {each.state for each in examined(history)} == {"ok"}
+        history.enter(read_finished_run(folder))
+        assert {each.state for each in examine_history(history)} == {"ok"}
         attack(folder)
-        assert [(each.state, each.what) for each in examined(history) if each.state in WRONG] == [
+        assert [(each.state, each.what) for each in examine_history(history) if each.state in WRONG] == [
             (state, str(folder / name))
         ]
 
@@ -150,10 +150,12 @@ def test_a_row_that_is_not_what_was_entered_is_named(statements: list[str], name
     file = str(tmp_path / "history.sqlite")
     with open_history(file) as history:
         fill(history)
-        assert "changed" not in {each.state for each in examined(history)}
+        assert "changed" not in {each.state for each in examine_history(history)}
     forge(file, *statements)
     with open_history(file) as history:
-        assert named in "\n".join(f"{each.what}: {each.why}" for each in examined(history) if each.state in WRONG)
+        assert named in "\n".join(
+            f"{each.what}: {each.why}" for each in examine_history(history) if each.state in WRONG
+        )
 
 
 @pytest.mark.slow
@@ -188,7 +190,7 @@ def test_a_result_that_was_changed_with_its_own_hash_is_named(tmp_path: Path) ->
     other = run.text.replace("1.01", "1.02")
     forge(file, "UPDATE run SET result = ?, content_sha256 = ?", values=(other, content_sha256(other)))
     with open_history(file) as history:
-        found = "\n".join(f"{each.what}: {each.why}" for each in examined(history) if each.state in WRONG)
+        found = "\n".join(f"{each.what}: {each.why}" for each in examine_history(history) if each.state in WRONG)
     assert (
         "run [1]: its rows have changed since their entry" in found
         and "run 1, calibration 1: k 1, stated 1.00333333, of gyro" in found
@@ -208,15 +210,15 @@ def test_a_run_that_was_deleted_with_all_its_rows_is_named(tmp_path: Path) -> No
     gone = [f"DELETE FROM {each}" for each in (*without, "recording WHERE run_id = 2", "run WHERE id = 2")]
     forge(file, *gone)
     with open_history(file) as history:
-        missing = [each.what for each in examined(history) if each.state == "missing" and "[" in each.what]
+        missing = [each.what for each in examine_history(history) if each.state == "missing" and "[" in each.what]
     assert missing == ["run [2]", "location [2]"]
     forge(file, "DELETE FROM journal WHERE kind IN ('run', 'location') AND key = '[2]'")
     with open_history(file) as history:
-        assert "journal 3 to 4" in [each.what for each in examined(history)]
+        assert "journal 3 to 4" in [each.what for each in examine_history(history)]
 
 
 def wrong(history: History) -> list[tuple[str, str]]:
-    return [(each.state, each.what) for each in examined(history) if each.state in WRONG]
+    return [(each.state, each.what) for each in examine_history(history) if each.state in WRONG]
 
 
 def carried_out(history: History, *statements: str) -> None:
@@ -287,7 +289,7 @@ def test_a_run_that_was_taken_away_leaves_its_numbers_though_the_journal_was_wri
 def test_a_file_of_a_run_that_no_run_was_entered_with_is_named(name: str, tmp_path: Path) -> None:
     folder = run_folder(tmp_path / "run")
     with open_history(str(tmp_path / "history.sqlite")) as history:
-        history.enter(finished_run(folder))
+        history.enter(read_finished_run(folder))
         (folder / "notes.txt").write_text("not of the run", encoding="utf-8")
         assert wrong(history) == []
         shutil.copy(folder / "run.h5", folder / name)
@@ -299,8 +301,8 @@ def test_a_file_of_a_run_that_no_run_was_entered_with_is_named(name: str, tmp_pa
 def test_a_run_that_was_gone_on_with_is_entered_with_its_new_recording(tmp_path: Path) -> None:
     folder = run_folder(tmp_path / "run")
     with open_history(str(tmp_path / "history.sqlite")) as history:
-        history.enter(finished_run(folder))
+        history.enter(read_finished_run(folder))
         shutil.copy(folder / "run.h5", folder / "run-2.h5")
         another_value(folder)
-        history.enter(replace(finished_run(folder), certificate=None))
+        history.enter(replace(read_finished_run(folder), certificate=None))
         assert wrong(history) == []

@@ -18,11 +18,11 @@ from rig.config.load import ConfigurationRefused, load
 from rig.data.result_file import read_result
 from rig.errors import Refused
 from rig.estimation.gyroscope.budget import Budget, Contributor
-from rig.history.entered.finished import Finished, compact, content_sha256, finished_run
+from rig.history.entered.finished import Finished, compact, content_sha256, read_finished_run
 from rig.history.entered.issued import Issued
 from rig.history.series import Trend, changes_between, effects, rig_states, subjects, trends
 from rig.history.storage import schema
-from rig.history.storage.address import chosen_place, resolve_address
+from rig.history.storage.address import choose_history_address, resolve_address
 from rig.history.storage.engine import engine_of
 from rig.history.store import History, Selection, open_history
 from rig.report.entries.budget import budget_entry
@@ -42,7 +42,7 @@ def history(tmp_path: Path) -> Iterator[History]:
 
 
 def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
-    run = finished_run(RECORDINGS / "verified")
+    run = read_finished_run(RECORDINGS / "verified")
     entered = history.enter(run)
     assert entered.new
     (kept,) = history.kept()
@@ -229,14 +229,16 @@ def test_what_is_no_history_is_not_made_one(tmp_path: Path) -> None:
 
 def test_a_history_is_in_the_user_s_folder_unless_somebody_says_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", "/somewhere/share")
-    usual = chosen_place(HistorySection(), {})
+    usual = choose_history_address(HistorySection(), {})
     assert usual is not None and usual.where == Path("/somewhere/share/calibration-rig/history.sqlite")
-    said = chosen_place(HistorySection(url="/data/rig.sqlite"), {})
+    said = choose_history_address(HistorySection(url="/data/rig.sqlite"), {})
     assert said is not None and said.where == Path("/data/rig.sqlite")
-    told = chosen_place(HistorySection(url="/data/rig.sqlite", off=True), {"RIG_HISTORY": "/tmp/other.sqlite"})
+    told = choose_history_address(
+        HistorySection(url="/data/rig.sqlite", off=True), {"RIG_HISTORY": "/tmp/other.sqlite"}
+    )
     assert told is not None and told.where == Path("/tmp/other.sqlite")
-    assert chosen_place(HistorySection(off=True), {}) is None
-    assert chosen_place(HistorySection(), {"RIG_HISTORY": "off"}) is None
+    assert choose_history_address(HistorySection(off=True), {}) is None
+    assert choose_history_address(HistorySection(), {"RIG_HISTORY": "off"}) is None
 
 
 def test_a_password_is_not_told_and_not_taken_from_a_file_that_recordings_keep() -> None:
@@ -317,7 +319,7 @@ def test_a_history_that_may_only_be_read_is_read_and_nothing_is_laid_beside_it(
     """In somebody else's folder, or on a medium that takes no more."""
     file = tmp_path / "history.sqlite"
     with open_history(str(file)) as history:
-        history.enter(finished_run(RECORDINGS / "verified"))
+        history.enter(read_finished_run(RECORDINGS / "verified"))
     before = file.read_bytes()
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everywhere
     with open_history(str(file)) as history:
@@ -337,7 +339,7 @@ def test_a_history_that_is_only_read_while_another_writes_it_is_as_that_one_left
     with closing(sqlite3.connect(file)) as another:
         another.execute("SELECT count(*) FROM run").fetchall()  # who has it open too, so that the log stays
         with open_history(str(file)) as written:
-            written.enter(finished_run(RECORDINGS / "verified"))
+            written.enter(read_finished_run(RECORDINGS / "verified"))
         assert file.with_name(f"{file.name}-wal").stat().st_size > 0
         monkeypatch.setattr(os, "access", lambda *_: False)
         with open_history(str(file)) as history:

@@ -13,8 +13,8 @@ from rig.config.procedures.procedure_sections import SixObservationSection, Stat
 from rig.config.ranges import ModelName
 from rig.motion.carried import read_load
 from rig.motion.geometry import NOMINAL, flange_axes, lengths_m
-from rig.motion.keep_out import clearance_problems
-from rig.motion.model import CLIENT_SPEED_RAD_S, home_of, model_of, turner_model
+from rig.motion.keep_out import find_clearance_problems
+from rig.motion.model import CLIENT_SPEED_RAD_S, find_home, load_turner_model, model_of
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Plan, Transfer
 from rig.plans.motions.six_sweeps import plan_six_observation
@@ -37,7 +37,7 @@ def problems(section: ArmSection, plan: Plan) -> list[str]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_two_tables_made_apart_say_the_same_of_an_arm(name: ModelName) -> None:
-    ours, theirs = turner_model(name), MODELS[name]
+    ours, theirs = load_turner_model(name), MODELS[name]
     a, d, quarters = np.array(theirs.drawing).T
     np.testing.assert_array_equal([ours.drawing.a_m, ours.drawing.d_m], [a, d])
     np.testing.assert_array_equal(ours.drawing.alpha_rad, quarters * math.pi / 2)
@@ -53,7 +53,7 @@ def test_two_tables_made_apart_say_the_same_of_an_arm(name: ModelName) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_row_says_where_its_figures_are_from(name: ModelName) -> None:
-    row = turner_model(name)
+    row = load_turner_model(name)
     wanted = {"drawing", "limits", "acceleration", "payload", "room", "state_rate", "home"}
     assert row.sources.keys() == wanted and all(len(each) > 10 for each in row.sources.values())
     height, upper_arm, forearm, *_ = lengths_m(row.drawing)
@@ -63,18 +63,20 @@ def test_every_row_says_where_its_figures_are_from(name: ModelName) -> None:
 
 
 def test_a_configuration_ranges_as_far_as_any_of_them() -> None:
-    rows = [turner_model(name) for name in NAMES]
+    rows = [load_turner_model(name) for name in NAMES]
     assert max(row.payload_kg for row in rows) == ranges.PAYLOAD_RANGE_KG
     fastest = max(max(row.limits.speed_rad_s) for row in rows)
     assert math.degrees(fastest) < ranges.SPEED_RANGE_DEG_S < math.degrees(fastest) + 0.1
-    assert {turner_model(name).home_rad for name in NAMES} == {turner_model(name).home_rad for name in TWO_HOMES}
+    assert {load_turner_model(name).home_rad for name in NAMES} == {
+        load_turner_model(name).home_rad for name in TWO_HOMES
+    }
     for name in TWO_HOMES:
-        home_deg = np.degrees(turner_model(name).home_rad).round(9)
+        home_deg = np.degrees(load_turner_model(name).home_rad).round(9)
         assert str([int(angle) for angle in home_deg]) in HOMES
 
 
 def test_what_was_recorded_without_a_model_was_a_ur10e() -> None:
-    assert turner_model("ur10e").drawing == NOMINAL
+    assert load_turner_model("ur10e").drawing == NOMINAL
     assert arm("ur10e") == ArmSection(host="10.0.0.2", payload_kg=0.35)
 
 
@@ -86,7 +88,7 @@ def test_every_model_can_make_the_six_sweeps_about_its_home(name: ModelName, cen
     section = arm(name, payload_centre_mm=centre_mm)
     for axes in (3, 6):
         assert problems(section, plan_six_observation(section, SixObservationSection(axes=axes))) == []
-    wrists = flange_axes(home_of(section))[:, 3:]
+    wrists = flange_axes(find_home(section))[:, 3:]
     assert np.linalg.svd(wrists, compute_uv=False)[2] > 0.7
 
 
@@ -119,7 +121,7 @@ def test_a_ur3es_home_is_where_it_must_be() -> None:
 
 
 def turned(model: ModelName, joint: int, speed_deg_s: float, by_deg: float = 40.0) -> list[str]:
-    home = turner_model(model).home_rad
+    home = load_turner_model(model).home_rad
     target = tuple(angle + (math.radians(by_deg) if at == joint else 0.0) for at, angle in enumerate(home))
     way = Transfer("a way", home, target, math.radians(speed_deg_s), 2.0, 3.0)
     return problems(arm(model), Plan((way,), home, target))
@@ -156,4 +158,4 @@ def test_a_ur5es_plan_is_no_ur10es() -> None:
     towards = StaticAttitudesSection.model_validate({"attitudes": [(45, -98, 0)]})
     for section, clear in ((arm("ur10e"), True), (arm("ur5e"), False)):
         made = plan_static_attitudes(section, towards)
-        assert (clearance_problems(made, read_load(section), model_of(section)) == []) == clear
+        assert (find_clearance_problems(made, read_load(section), model_of(section)) == []) == clear

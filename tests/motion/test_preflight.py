@@ -11,9 +11,9 @@ from rig.config.models import ArmSection
 from rig.config.procedures.attitude_sets import EIGHTEEN, FACES
 from rig.config.procedures.procedure_sections import SixObservationSection, StaticAttitudesSection
 from rig.errors import Problem, Refused, refuse
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import NOMINAL, distance_to_forearm
-from rig.motion.preflight import way_to_home
+from rig.motion.preflight import find_travel_to_home
 from rig.motion.state import ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.motion.steps import Dwell, Motion, Plan, Rest, Transfer
 from rig.plans.motions.six_sweeps import plan_six_observation
@@ -25,7 +25,7 @@ from support.wires.ur10e import plan_problems
 
 HOME_DEG = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)
-LIGHT = Carried(0.3)
+LIGHT = FlangeLoad(0.3)
 SWEPT_BESIDE = (*HOME_DEG[:3], 0.0, *HOME_DEG[4:])
 SWEPT_INTO = (*HOME_DEG[:3], 90.0, *HOME_DEG[4:])
 HOME: Joints = tuple(math.radians(angle) for angle in HOME_DEG)
@@ -138,7 +138,7 @@ def test_a_rest_takes_time() -> None:
 
 
 def test_payload_beyond_the_arm_is_refused() -> None:
-    assert names(plan_problems(plan(), Carried(13.0))) == ["payload_too_heavy"]
+    assert names(plan_problems(plan(), FlangeLoad(13.0))) == ["payload_too_heavy"]
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_the_simulator_address_and_an_old_controller_need_no_remote_control() ->
 
 def test_the_way_home_is_told_for_each_joint() -> None:
     start = (HOME[0] + 0.1, *HOME[1:5], HOME[5] - 0.2)
-    assert way_to_home(plan(), start) == pytest.approx((-0.1, 0, 0, 0, 0, 0.2))
+    assert find_travel_to_home(plan(), start) == pytest.approx((-0.1, 0, 0, 0, 0, 0.2))
 
 
 def test_refusal_carries_every_problem_and_is_named_after_the_first() -> None:
@@ -247,14 +247,14 @@ def test_what_the_flange_carries_is_kept_from_the_forearm_too() -> None:
     assert plan_problems(made, LIGHT) == []
     said = {
         problem.what.split(" brings the ")[1].split()[0]
-        for problem in plan_problems(made, Carried(0.3, (0.0, 0.0, 0.06)))
+        for problem in plan_problems(made, FlangeLoad(0.3, (0.0, 0.0, 0.06)))
     }
     assert said == {"payload"}
 
 
 def test_an_extension_is_kept_from_the_forearm_and_from_the_upper_arm() -> None:
     def problems(made: Plan, extension_m: tuple[float, float, float]) -> set[str]:
-        return set(names(plan_problems(made, Carried(0.3, extension_m=extension_m))))
+        return set(names(plan_problems(made, FlangeLoad(0.3, extension_m=extension_m))))
 
     magnetic = plan_static_attitudes(ARM, StaticAttitudesSection.model_validate({"attitudes": "magnetic"}))
     assert problems(magnetic, (0.0, 0.0, 0.32)) == set()
@@ -313,8 +313,8 @@ def test_a_home_about_which_wrist_2_sweeps_into_the_forearm_is_refused() -> None
 
 @pytest.mark.parametrize("below_m", [0.025, 0.057, 0.12])
 def test_a_fixture_below_the_flange_passes_beside_the_forearm_too(below_m: float) -> None:
-    assert plan_problems(plan(), Carried(0.3, (0.0, 0.0, below_m))) == []
-    assert names(plan_problems(plan(), Carried(0.3, (0.0, 0.06, below_m)))) == ["forearm_too_near"]
+    assert plan_problems(plan(), FlangeLoad(0.3, (0.0, 0.0, below_m))) == []
+    assert names(plan_problems(plan(), FlangeLoad(0.3, (0.0, 0.06, below_m)))) == ["forearm_too_near"]
 
 
 def test_sweeps_left_out_do_not_lead_the_rest_to_the_forearm() -> None:

@@ -13,7 +13,7 @@ from rig.data.quantity import ACCELERATION
 from rig.data.recording.run_file import RunData, read_run
 from rig.data.result_file import ResultDocument, read_result
 from rig.page.about import About
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.page.rows import look_of
 from rig.runner.phases import observations_of
 from support.paths import ROOT
@@ -54,7 +54,7 @@ def test_accelerations_stand_beside_gravity_and_fields_beside_the_field(run: Run
 
 
 def test_what_was_so_far_is_what_the_result_rests_on(run: RunData) -> None:
-    shown = Shown(About("", ""))
+    shown = PageState(About("", ""))
     shown.look(look_of(so_far([run])))
     as_they_came = shown.sections["observations"]
     for event in observations_of(calibrate([run])):

@@ -11,7 +11,7 @@ import pytest
 
 from rig.motion.state import Report
 from rig.page.history import POINTS, STEP_S
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.page.server.feed import Broadcast, Feed, Mailbox
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent, SamplesTaken, SensorSamples
 from rig.turners.registry import installed
@@ -30,7 +30,7 @@ from support.page.told_runs import (
 
 
 def fed() -> Feed:
-    return Feed(Shown(ABOUT))
+    return Feed(PageState(ABOUT))
 
 
 def read(frame: bytes | None) -> tuple[str, dict[str, Any]]:
@@ -83,7 +83,7 @@ TURNERS: dict[str, tuple[Report, Callable[[float], RunEvent], dict[str, float]]]
 def test_what_arrives_has_the_age_of_its_last_arrival_whatever_turns_and_reads(turner: str, sensor: str) -> None:
     connected, seen, at_first = TURNERS[turner]
     now_s = [100.0]
-    feed = Feed(Shown(ABOUT), lambda: now_s[0])
+    feed = Feed(PageState(ABOUT), lambda: now_s[0])
 
     def comes(number: int) -> None:
         feed.event(SamplesTaken((SensorSamples(sensor, 10 * number, 0, {"rate": (0.0, 0.0, 0.0)}),)))
@@ -155,7 +155,7 @@ def test_the_last_news_reach_who_reads_and_nobody_else_is_waited_for_long() -> N
 
 
 def test_the_hosts_observation_takes_the_place_of_the_boards_and_a_result_that_of_what_was_so_far() -> None:
-    shown, plan = Shown(ABOUT), planned()
+    shown, plan = PageState(ABOUT), planned()
     for event in [*before_it_moves(plan), *moving(plan, 100.0)]:
         shown.take(event)
     assert [(row["sweep"], row["by"]) for row in shown.sections["observations"]] == [(n, "board") for n in range(6)]

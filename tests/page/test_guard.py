@@ -17,7 +17,7 @@ from rig.commands.page_arguments import PageWish, add_page, wish
 from rig.commands.station.watch import last_words
 from rig.errors import Refused
 from rig.page.about import About
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.page.server.control import STOPPED, Control
 from rig.page.server.feed import Feed
 from rig.page.server.guard import Door
@@ -53,7 +53,7 @@ class Asking:
 
 @contextmanager
 def server(folder: Path, control: Control | None = None, feed: Feed | None = None) -> Iterator[Asking]:
-    feed = feed or Feed(Shown(About("a run", "six_observation", may_answer=True)))
+    feed = feed or Feed(PageState(About("a run", "six_observation", may_answer=True)))
     with serving(feed, control or Control(may_answer=True), folder, Address(port=0, token=TOKEN)) as url:
         yield Asking(url)
 
@@ -167,7 +167,7 @@ def test_a_port_that_is_taken_is_refused_by_name(tmp_path: Path) -> None:
         address = Address(port=taken.getsockname()[1])
         with (
             pytest.raises(Refused, match=r"page_address: .*in use"),
-            serving(Feed(Shown(About("", ""))), Control(may_answer=False), tmp_path, address),
+            serving(Feed(PageState(About("", ""))), Control(may_answer=False), tmp_path, address),
         ):
             pass
 
@@ -182,7 +182,7 @@ def test_a_port_that_is_taken_is_refused_by_name(tmp_path: Path) -> None:
     ],
 )
 def test_an_address_that_will_not_do_is_refused(tmp_path: Path, address: Address, words: str) -> None:
-    feed = Feed(Shown(About("", "")))
+    feed = Feed(PageState(About("", "")))
     with (
         pytest.raises(Refused, match="page_address: .*" + words),
         serving(feed, Control(may_answer=False), tmp_path, address),
@@ -202,7 +202,7 @@ def test_a_page_that_may_not_answer_does_not(tmp_path: Path) -> None:
 def test_an_answer_counts_once_and_for_the_question_that_is_asked(tmp_path: Path) -> None:
     control = Control(may_answer=True)
     answers: list[bool | None] = []
-    feed = Feed(Shown(About("", "")))
+    feed = Feed(PageState(About("", "")))
     asked = threading.Thread(target=lambda: answers.append(control.ask((), "start")))
     with server(tmp_path, control, feed) as asking:
         feed.event(Prompt(("The arm will move.",), "start"))

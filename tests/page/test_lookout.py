@@ -9,7 +9,7 @@ import pytest
 from rig.motion.steps import Sweep
 from rig.page.about import About
 from rig.page.analysis_process import looking_out
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.page.server.feed import Feed
 from rig.station.events import StepFinished
 from support.page.told_runs import moving, planned
@@ -46,7 +46,7 @@ def test_a_helper_that_is_killed_is_told_of_and_harms_nothing(
         said += capfd.readouterr().err
         return "The page shows no more of observations" in said and said.endswith("\n")
 
-    with looking_out(tmp_path, Feed(Shown(About("", "")))) as lookout:
+    with looking_out(tmp_path, Feed(PageState(About("", "")))) as lookout:
         wait_for(lambda: helper() > 0, "the helper")
         if asked == "after":
             lookout.event(swept())

@@ -10,7 +10,7 @@ from rig.analysis.partial_results import so_far
 from rig.data.recording.run_file import RunData
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.page.about import About
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.page.replay import Moment, moments
 from rig.page.rows import Look, look_of
 from rig.station.events import ArmSeen, PhaseStarted, Progress, SamplesTaken, StepFinished, StepStarted
@@ -60,7 +60,7 @@ def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed
 
 @pytest.mark.slow
 def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
-    shown = Shown(About("", "", replayed=True, arm={"model": "UR10e or UR12e", "serial_number": "2026"}))
+    shown = PageState(About("", "", replayed=True, arm={"model": "UR10e or UR12e", "serial_number": "2026"}))
     for moment in replayed:
         if isinstance(moment.event, Look):
             shown.look(moment.event)

@@ -12,7 +12,7 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
 from rig.errors import Fault, Refused
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
 from rig.page.server.serving import Address, serving
@@ -175,7 +175,7 @@ def test_an_address_of_this_computer_without_its_token_shows_nothing_and_says_so
 ) -> None:
     host = own_address()
     severe(driver), asked_hosts(driver)  # of before
-    feed = Feed(Shown(ABOUT))
+    feed = Feed(PageState(ABOUT))
     feed.event(Prompt(ANNOUNCED))
     address = Address(host, 0, "a-token-of-forty-characters-and-no-other")
     with serving(feed, Control(may_answer=True), tmp_path, address) as url:

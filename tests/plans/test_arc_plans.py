@@ -10,7 +10,7 @@ from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.data.recording.settings import settings_of
 from rig.errors import Refused
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Plan, closes
 from rig.plans.motions.six_sweeps import plan_six_observation
 from support.laboratories.commands import rig_here
@@ -41,7 +41,7 @@ def test_an_arc_is_centred_on_the_home_pose_with_its_ramps_outside(arc_deg: floa
         assert math.degrees(sweep.angle_rad) == pytest.approx(arc_deg)
         travelled = math.degrees(abs(sweep.end_q_rad[sweep.joint] - sweep.start_q_rad[sweep.joint]))
         assert arc_deg + 2 * 2.0 < travelled < arc_deg + 25
-    assert plan_problems(made, Carried(0.35)) == []
+    assert plan_problems(made, FlangeLoad(0.35)) == []
 
 
 def test_a_whole_turn_is_what_it_always_was() -> None:
@@ -55,7 +55,7 @@ def test_two_turns_are_closed_and_too_many_for_an_arm() -> None:
     """Its joints go 360° either way: who turns without end may."""
     made = plan(arc_deg=720)
     assert {sweep.angle_rad for sweep in made.sweeps} == {4 * math.pi}
-    assert {problem.name for problem in plan_problems(made, Carried(0.35))} == {"joint_limit"}
+    assert {problem.name for problem in plan_problems(made, FlangeLoad(0.35))} == {"joint_limit"}
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.config.procedures.stage_section import StageMountSection, mount_matrix
 from rig.errors import Refused
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Plan, Sweep, Transfer
 from rig.plans.motions.six_sweeps import plan_six_observation
 from support.wires.ur10e import plan_problems
@@ -41,7 +41,7 @@ def test_every_stage_begins_and_ends_at_home_and_its_sweeps_go_on_counting() -> 
     assert motions[-1].target_q_rad == pytest.approx(made.home_q_rad)
     for before, after in pairwise(motions):
         assert after.start_q_rad == pytest.approx(before.target_q_rad)
-    assert plan_problems(made, Carried(0.35)) == []
+    assert plan_problems(made, FlangeLoad(0.35)) == []
 
 
 def test_each_joint_that_is_swept_is_tried_first_by_a_small_turn() -> None:

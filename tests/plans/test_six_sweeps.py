@@ -8,16 +8,16 @@ import pytest
 from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.errors import Refused
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import flange_axes, flange_pose, flange_rate
-from rig.motion.model import home_of
+from rig.motion.model import find_home
 from rig.motion.steps import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
 from rig.plans.motions.drift import drift_effect
 from rig.plans.motions.six_sweeps import plan_six_observation
 from support.wires.ur10e import plan_problems
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
-HOME = home_of(ARM)
+HOME = find_home(ARM)
 
 
 def plan(**settings: object) -> Plan:
@@ -40,7 +40,7 @@ def test_six_axes_are_the_three_and_three_between_them() -> None:
     axes = {tuple(np.round(np.abs(sweep.axis_flange) * np.sqrt(2), 3) ** 2 / 2) for sweep in made.sweeps}
     assert len(made.sweeps) == 12
     assert len(axes) == 6
-    assert plan_problems(made, Carried(0.35)) == []
+    assert plan_problems(made, FlangeLoad(0.35)) == []
 
 
 @pytest.mark.parametrize("wrist_2_deg", [-90.0, 90.0])
@@ -48,7 +48,7 @@ def test_the_flange_never_turns_towards_the_forearm(wrist_2_deg: float) -> None:
     """Wrist 1 turns in the forearm's plane: along its axis the flange keeps its distance, 0.174 m, or has more."""
     arm = ArmSection(host="127.0.0.2", payload_kg=0.35, home_deg=(0, -90, 90, -90, wrist_2_deg, 0))
     made = plan_six_observation(arm, SixObservationSection(axes=6))
-    assert plan_problems(made, Carried(0.35)) == []
+    assert plan_problems(made, FlangeLoad(0.35)) == []
     for sweep in made.sweeps:
         if sweep.joint_name == "wrist_1":
             pose = flange_pose(sweep.start_q_rad)

@@ -13,8 +13,8 @@ from rig.config.procedures.attitude_sets import EIGHTEEN, FACES
 from rig.config.procedures.procedure_sections import ImuSection, StaticAttitudesSection
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.motion.carried import Carried
-from rig.motion.model import home_of
+from rig.motion.carried import FlangeLoad
+from rig.motion.model import find_home
 from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer, trapezoid_duration
 from rig.plans.motions.imu import plan_imu
 from rig.plans.motions.shortest_way import shortest_way
@@ -25,7 +25,7 @@ from support.paths import CONFIGS
 from support.wires.ur10e import plan_problems
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
-HOME = home_of(ARM)
+HOME = find_home(ARM)
 
 
 def plan(**settings: object) -> Plan:
@@ -61,7 +61,7 @@ def test_every_attitude_is_held_once_with_base_shoulder_and_elbow_at_home() -> N
     assert {dwell.q_rad[:3] for dwell in made.dwells} == {HOME[:3]}
     assert [dwell.index for dwell in made.dwells] == list(range(18))
     assert {(dwell.duration_s, dwell.settle_s) for dwell in made.dwells} == {(3.0, 5.0)}
-    assert stands_where_it_came(made) and plan_problems(made, Carried(0.35)) == []
+    assert stands_where_it_came(made) and plan_problems(made, FlangeLoad(0.35)) == []
     assert made.dwells[0].name == "dwell at -45 -90 -45"
 
 
@@ -140,7 +140,7 @@ def test_sweeps_and_attitudes_take_five_minutes_with_every_wait_for_settling() -
     made = imu()
     assert (len(made.sweeps), len(made.dwells)) == (12, 18)
     assert made.duration_s < 205 and made.duration_s + made.settling_s < 300
-    assert stands_where_it_came(made) and plan_problems(made, Carried(0.35)) == []
+    assert stands_where_it_came(made) and plan_problems(made, FlangeLoad(0.35)) == []
 
 
 def test_sweeps_come_first_and_are_counted_first() -> None:

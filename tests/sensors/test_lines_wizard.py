@@ -182,7 +182,7 @@ FORMATS = {
 }  # fmt: skip
 
 
-def looked_at(name: str) -> tuple[Shape, Guess]:
+def inspect_file(name: str) -> tuple[Shape, Guess]:
     shape = find_shape(arrived(FORMATS[name]))
     return shape, guess(shape, STILL_S)
 
@@ -192,7 +192,7 @@ def looked_at(name: str) -> tuple[Shape, Guess]:
 @pytest.mark.parametrize("name", FORMATS)
 def test_the_section_is_right_or_says_what_it_cannot_tell(name: str) -> None:
     wanted = FORMATS[name]
-    shape, found = looked_at(name)
+    shape, found = inspect_file(name)
     document = yaml.safe_load(section(shape, found, "/dev/ttyUSB0", 115200))["sensors"]["imu"]
     lines = document["lines"]
     assert lines["columns"] == wanted.columns.split()

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import pytest
 
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Transfer, trapezoid_duration
 from rig.turners.ur.driver import Arm
 from rig.world import network
@@ -257,7 +257,7 @@ def test_a_stalled_wire_does_not_end_a_move(world: World) -> None:
     times_s: list[float] = []
     laboratory = world({"world": {"time_scale": 8}})
     with relay(laboratory.host) as wire, Arm(wire.host, lambda state: times_s.append(state.time_s)) as arm:
-        arm.take_control(Carried(0.35, (0.0, 0.0, 0.025)))
+        arm.take_control(FlangeLoad(0.35, (0.0, 0.0, 0.025)))
         ends = threading.Timer(0.5, wire.stalled.clear)
 
         def stall() -> None:
@@ -277,7 +277,7 @@ def test_a_stalled_wire_does_not_end_a_move(world: World) -> None:
 def test_a_driver_that_stalls_for_a_moment_misses_no_state(world: World) -> None:
     others = set(multiprocessing.active_children())
     with Arm(world({"world": {"time_scale": 8}}).host) as arm:
-        arm.take_control(Carried(0.35, (0.0, 0.0, 0.025)))
+        arm.take_control(FlangeLoad(0.35, (0.0, 0.0, 0.025)))
         (child,) = set(multiprocessing.active_children()) - others
         assert child.pid is not None
         pid, missed = child.pid, arm.missed_states

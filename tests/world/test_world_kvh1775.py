@@ -36,10 +36,10 @@ def instrument(
 def said(kvh: SimulatedKvh1775, *commands: str) -> list[str]:
     """What it answers in configuration mode."""
     kvh.receive(b"=config,1\n")
-    kvh.transmitted()
+    kvh.take_sent()
     for command in commands:
         kvh.receive(command.encode() + b"\r\n")
-    return kvh.transmitted().decode().split("\r\n")[:-1]
+    return kvh.take_sent().decode().split("\r\n")[:-1]
 
 
 @pytest.mark.parametrize(
@@ -80,20 +80,20 @@ def test_a_setting_it_does_not_have_cannot_be_left_in_it() -> None:
 
 def test_it_streams_in_normal_mode_only_and_hears_two_commands_there() -> None:
     kvh = instrument(KvhMemory({}))
-    assert MessageReader().feed(kvh.transmitted()).tests[0].passed, "what it says of itself when it is switched on"
+    assert MessageReader().feed(kvh.take_sent()).tests[0].passed, "what it says of itself when it is switched on"
     kvh.advance(0.0105)
-    assert len(MessageReader().feed(kvh.transmitted()).messages) == 10
+    assert len(MessageReader().feed(kvh.take_sent()).messages) == 10
     kvh.receive(b"?dr\r\n?bit,2\r\n")
     kvh.advance(0.0115)
-    heard = MessageReader().feed(kvh.transmitted())
+    heard = MessageReader().feed(kvh.take_sent())
     assert len(heard.messages) == 1 and len(heard.tests[0].values) == 8
     assert said(kvh, "?DR") == ["DR,1000"]
     kvh.advance(0.5)
-    assert kvh.transmitted() == b""
+    assert kvh.take_sent() == b""
     kvh.receive(b"=CONFIG,0\r\n")
-    assert kvh.transmitted() == b"", "leaving is not answered"
+    assert kvh.take_sent() == b"", "leaving is not answered"
     kvh.advance(0.6)
-    assert len(MessageReader().feed(kvh.transmitted()).messages) == 100
+    assert len(MessageReader().feed(kvh.take_sent()).messages) == 100
 
 
 def test_delta_angles_sum_to_the_angle_and_its_own_clock_says_when() -> None:
@@ -101,7 +101,7 @@ def test_delta_angles_sum_to_the_angle_and_its_own_clock_says_when() -> None:
     and the instrument sums it over what it takes for seconds."""
     kvh = instrument(KvhMemory({"DR": "10", "OUTPUTFMT": "B", "ROTUNITS": "DEG"}), lambda t: (t, -t, 0, 0, 0, 1), 1000)
     kvh.advance(10.0)
-    messages = MessageReader().feed(kvh.transmitted()).messages
+    messages = MessageReader().feed(kvh.take_sent()).messages
     time_s = 0.1 * len(messages) / 1.001
     assert len(messages) == 100, "the next one is 10 ms away"
     assert np.radians(messages["rotation"].sum(axis=0, dtype=float)) == pytest.approx(
@@ -115,7 +115,7 @@ def test_axes_turn_and_scale_rates_and_accelerations() -> None:
         KvhMemory({"AXES": "0,2,0,-1,0,0,0,0,1", "ROTFMT": "RATE"}), lambda t: (0.1, 0.2, 0.3, 0.5, 0.6, 0.7)
     )
     kvh.advance(0.0011)
-    (message,) = MessageReader().feed(kvh.transmitted()).messages
+    (message,) = MessageReader().feed(kvh.take_sent()).messages
     assert message["rotation"].tolist() == pytest.approx([0.4, -0.1, 0.3])
     assert message["acceleration_g"].tolist() == pytest.approx([1.2, -0.5, 0.7])
 
@@ -124,5 +124,5 @@ def test_axes_turn_and_scale_rates_and_accelerations() -> None:
 def test_the_temperature_has_four_units(unit: str, number: int) -> None:
     kvh = instrument(KvhMemory({"TEMPUNITS": unit}))
     kvh.advance(0.0011)
-    (message,) = MessageReader().feed(kvh.transmitted()).messages
+    (message,) = MessageReader().feed(kvh.take_sent()).messages
     assert message["temperature"] == number

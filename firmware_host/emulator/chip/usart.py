@@ -92,7 +92,7 @@ class Usart2:
             self._timeline.schedule(self._arrival_slot, self._timeline.now + self._byte_ticks)
         self._incoming.extend(data)
 
-    def transmitted(self) -> bytes:
+    def take_sent(self) -> bytes:
         """Return the bytes whose stop bit has passed since the last call."""
         if self._dma_start is not None:
             self._load()

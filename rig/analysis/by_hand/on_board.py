@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.hand_answers import HandReport, HandSolved
+from firmware_host.hand_answers import BoardHandSolution, HandReport
 from firmware_host.protocol import HAND_FACES
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -43,7 +43,9 @@ class HandAgreement:
     bias_difference_rad_s: float
 
 
-def compare_with_board(readings: BoardReadings, reports: Sequence[HandReport], solved: HandSolved) -> HandAgreement:
+def compare_with_board(
+    readings: BoardReadings, reports: Sequence[HandReport], solved: BoardHandSolution
+) -> HandAgreement:
     """Compare the board's solution with double precision on the same readings.
 
     Raise Fault `board_unverified` if readings or reports are missing, `board_disagrees` beyond the limits.

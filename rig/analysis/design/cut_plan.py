@@ -12,7 +12,7 @@ from rig.estimation.arrays import Array
 from rig.motion.steps import Plan, Sweep
 from rig.observation.consistency.raw_readings import REST
 from rig.observation.consistency.segments import MotionInterval, segment_counts
-from rig.observation.consistency.transfers import SPARSE_S, find_transfer, is_by_wrists, sensed_gravity_m_s2
+from rig.observation.consistency.transfers import SPARSE_S, find_transfer, is_by_wrists, mean_specific_force_m_s2
 from rig.observation.motion.arm_motion import ArmMotion
 
 
@@ -63,7 +63,7 @@ def plan_segments(run: PlannedRun) -> PlannedSegments:
             variances_rad2_s2=nothing,
             rates_rad_s=np.array([motion.mean_rate(interval.start_s, interval.end_s) for interval in intervals]),
             gravity_m_s2=np.array(
-                [sensed_gravity_m_s2(interval, run.site.down_m_s2, extension_m) for interval in intervals]
+                [mean_specific_force_m_s2(interval, run.site.down_m_s2, extension_m) for interval in intervals]
             ),
             attitudes=np.array([motion.attitude(interval.start_s, interval.end_s) for interval in intervals]),
             speed_std=np.zeros(len(parts)),

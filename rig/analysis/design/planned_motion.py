@@ -85,7 +85,7 @@ def measuring_steps(plan: Plan) -> Iterator[Timed[Step]]:
 
 def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
     """Return the revolution of a sweep, or its arc, as `ArmMotion.turn` will find it, with a mount (3, 3)."""
-    sweep, start_q_rad = timed_step.step, timed_step.step.began_q_rad
+    sweep, start_q_rad = timed_step.step, timed_step.step.first_q_rad
     return Revolution(
         *timed_step.window_s,
         duration_std_s=0.0,
@@ -103,7 +103,7 @@ def predict_attitude(timed_step: Timed[Step], arm: DenavitHartenberg, mount: Arr
     if not isinstance(timed_step.step, Sweep):
         return mount @ _attitude(timed_step.q_rad, arm)
     return mount @ _mean_attitude(
-        timed_step.step.began_q_rad, timed_step.step.joint, timed_step.step.growing * timed_step.step.angle_rad, arm
+        timed_step.step.first_q_rad, timed_step.step.joint, timed_step.step.growing * timed_step.step.angle_rad, arm
     )
 
 
@@ -113,8 +113,8 @@ _attitude, _arm = lru_cache(maxsize=512)(flange_attitude), lru_cache(maxsize=512
 
 
 @lru_cache(maxsize=512)
-def _mean_attitude(began_q_rad: Joints, joint: int, turned_rad: float, arm: DenavitHartenberg) -> Array:
-    q_rad = np.tile(began_q_rad, (ATTITUDES, 1))
+def _mean_attitude(first_q_rad: Joints, joint: int, turned_rad: float, arm: DenavitHartenberg) -> Array:
+    q_rad = np.tile(first_q_rad, (ATTITUDES, 1))
     q_rad[:, joint] += turned_rad * (np.arange(ATTITUDES) + 0.5) / ATTITUDES
     mean: Array = flange_attitude(q_rad, arm).mean(axis=0)
     return mean

@@ -91,7 +91,7 @@ def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> Piece:
     """Return a dwell or a sweep at constant temperature."""
     step = timed_step.step
     wrist = step.joint - WRIST_1 if isinstance(step, Sweep) else None
-    q_rad = step.began_q_rad if isinstance(step, Sweep) else step.q_rad
+    q_rad = step.first_q_rad if isinstance(step, Sweep) else step.q_rad
     return Piece(step.index, timed_step.window_s, 1, 0.0, Stood(np.array(q_rad), wrist))
 
 

@@ -19,7 +19,7 @@ from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Accumulator
-from rig.observation.onboard_window import observed_before
+from rig.observation.onboard_window import find_board_averages
 
 SCALE_LIMIT = 1e-4  # relative
 BIAS_LIMIT_RAD_S = 1e-5
@@ -110,7 +110,7 @@ def _observations(runs: Sequence[RunData], sensor: str) -> list[_Observation]:
 def _recalled(earlier: Sequence[RunData], recalled: BoardRecalled) -> _Observation:
     """What the newest of the earlier recordings says of it; a mean that is not a number where none does."""
     for run in reversed(earlier):
-        if seen := observed_before([run], recalled.sensor, (recalled.sweep,)):
+        if seen := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
             return _observation(run, seen[recalled.sweep])
     return _Observation(np.full(3, np.nan), np.nan, averaged=False)
 

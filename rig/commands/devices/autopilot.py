@@ -170,12 +170,12 @@ def _connected(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[st
     from rig.errors import raised_as
     from rig.sensors.mavlink.link import AutopilotLink
     from rig.sensors.mavlink.source import mavlink_section
-    from rig.sensors.registry import by_port
+    from rig.sensors.registry import group_by_port
 
     with ExitStack() as stack:
         loaded = stack.enter_context(loaded_here(options.config, options.overrides))
         sensors = {name: each for name, each in loaded.config.sensors.items() if each.mavlink is not None}
-        found = [(port, sections) for port, _, sections in by_port(sensors)]
+        found = [(port, sections) for port, _, sections in group_by_port(sensors)]
         if len(found) != 1:
             raise Refused(
                 "no_autopilot_section",

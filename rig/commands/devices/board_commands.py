@@ -12,13 +12,13 @@ from firmware_host.client import Board, Calibration, StoredCalibration
 from rig.board.crystal import follows_crystal
 from rig.board.identify import (
     changing,
-    configured_board,
-    configured_part,
     find_sensor,
     refuse_other_firmware,
     refuse_other_sensor,
     refusing,
+    require_board_section,
     sensor_entry,
+    spell_part,
 )
 from rig.board.store import calibration_of, store
 from rig.commands.laboratory.claims import claimed_board
@@ -55,10 +55,10 @@ def info(options: Namespace) -> int:
         follows_crystal(board)  # of a board that has just started one waits for the crystal
         status = board.status()
         sensors = tuple(
-            BoardSensor(sensor, names.get(configured_part(sensor.part)), counts, stored)
+            BoardSensor(sensor, names.get(spell_part(sensor.part)), counts, stored)
             for sensor, counts, stored in zip(board.identity.sensors, status.sensors, calibrations, strict=True)
         )
-        found = BoardInfo(configured_board(config).port, board.identity, status, sensors)
+        found = BoardInfo(require_board_section(config).port, board.identity, status, sensors)
     print_info(found, as_json=options.json)
     return 0
 
@@ -120,7 +120,7 @@ def _connected(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
     """The board of a configuration, in its simulated laboratory if it has one."""
     with ExitStack() as stack:
         loaded = stack.enter_context(loaded_here(options.config, options.overrides))
-        section = configured_board(loaded.config)
+        section = require_board_section(loaded.config)
         if loaded.simulated:
             stack.enter_context(simulated_laboratory(loaded.text))
             kept = loaded.flash_file

@@ -15,7 +15,7 @@ from rig.station.plain_text import say
 def flash(options: Namespace) -> int:
     """Put the shipped image onto the board, through its debug probe or by a copy to its USB drive."""
     with refusing():
-        image = flashing.shipped_image()
+        image = flashing.load_shipped_image()
         put: Callable[[], object]
         if options.drive is not None:
             target = Path(options.drive) if options.drive else flashing.find_drive()

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 from firmware_host.client import Board, Calibration
 from rig.board.identify import (
     changing,
-    configured_board,
-    configured_part,
     find_sensor,
     refuse_other_firmware,
     refuse_other_sensor,
     refusing,
+    require_board_section,
+    spell_part,
 )
 from rig.board.store import store
 from rig.commands.laboratory.claims import claimed_board
@@ -64,7 +64,7 @@ def hand(options: Namespace) -> int:
         operator = None
         if loaded.simulated:
             operator = SimulatedOperator(stack.enter_context(simulated_laboratory(loaded.text)))
-        stack.enter_context(claimed_board(configured_board(config).port))
+        stack.enter_context(claimed_board(require_board_section(config).port))
         of_board = _fetched(config, among) if options.fetch else _made(config, next(iter(among)), options, operator)
         board, name, found = stack.enter_context(of_board)
         calibration = Calibration(
@@ -127,13 +127,13 @@ def _fetched(config: RigConfig, among: dict[str, SensorSection]) -> Iterator[tup
     """What the board keeps of its last session, of one of the sensors that may be meant."""
     from rig.runner.by_hand.on_board import kept_by_board
 
-    section = configured_board(config)
+    section = require_board_section(config)
     with ExitStack() as held:
         with refusing():
             board = held.enter_context(Board(section.port, section.baud, lambda batch: None))
             refuse_other_firmware(board.identity)
             found = kept_by_board(board)
-        part = configured_part(board.identity.sensors[found.index].part)
+        part = spell_part(board.identity.sensors[found.index].part)
         name = next((name for name, sensor in among.items() if sensor.part == part), None)
         if name is None:
             raise Refused(

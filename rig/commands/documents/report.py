@@ -91,7 +91,7 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
     from rig.data.entries.magnetometer import read_reversal
     from rig.data.result_file import read_result
     from rig.data.run_folder import CERTIFICATE, RESULT, refuse_links
-    from rig.history.entered.issued import issued_certificate
+    from rig.history.entered.issued import issue_certificate
     from rig.report.certificate.content import certificate_of
     from rig.report.certificate.page import certificate_page
     from rig.report.certificate.pdf import PDF
@@ -129,7 +129,7 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
         raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     for name in written:
         say(str(folder / name))
-    issued = issued_certificate(certificate, written)
+    issued = issue_certificate(certificate, written)
     missed = remember_certificate(file.parent, file.read_text(encoding="utf-8"), issued, named_history(options.history))
     if missed is not None:
         say(f"rig: the certificate is in no history: {missed}", sys.stderr)
@@ -152,22 +152,22 @@ def _digital(
         return {}
     if by is None:
         return {DCC: made}
-    from rig.report.signatures.signing import signed_xml
+    from rig.report.signatures.signing import sign_as_xades
 
-    return {DCC: signed_xml(made, by, reason)}
+    return {DCC: sign_as_xades(made, by, reason)}
 
 
 def _pdf(
     page: str, attached: Mapping[str, bytes], by: "Signatory | None", reason: "Reason", options: Namespace
 ) -> bytes:
-    """The page as PDF, signed where somebody signs. Raises Refused as `pdf_of`, `authorities_in` and `signed_pdf`."""
+    """Return the page as PDF, signed if there is a signatory. Raise Refused as `pdf_of` and `sign_as_pades`."""
     from rig.report.certificate.pdf import pdf_of
 
     made = pdf_of(page, attached)
     if by is None:
         return made
-    from rig.report.signatures.long_term import authorities_in
-    from rig.report.signatures.signing import signed_pdf
+    from rig.report.signatures.long_term import read_authorities
+    from rig.report.signatures.signing import sign_as_pades
 
-    authorities = authorities_in(options.long_term) if options.long_term else None
-    return signed_pdf(made, by, reason, options.time_server, authorities)
+    authorities = read_authorities(options.long_term) if options.long_term else None
+    return sign_as_pades(made, by, reason, options.time_server, authorities)

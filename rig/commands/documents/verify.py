@@ -13,7 +13,7 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.report.signatures.findings import Looked, SignatureReport
+    from rig.report.signatures.findings import SignatureReport
 
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
@@ -69,17 +69,17 @@ class _Found:
 def run(options: Namespace) -> int:
     """Look at each file and say what is found; returns 0, or the exit status that `--help` names.
 
-    Raises Refused `bad_option`, `verify_file`, and as `trusted_in`, `looked_at` and `open_history`.
+    Raises Refused `bad_option`, `verify_file`, and as `read_trusted_certificates`, `inspect_file` and `open_history`.
     """
-    from rig.report.signatures.inspection import looked_at, trusted_in
+    from rig.report.signatures.inspection import inspect_file, read_trusted_certificates
     from rig.report.signatures.trust import Trust
 
     if options.signer is not None and not options.trust:
         what = "--signer names whom a trusted authority must have certified, and no --trust says which authority"
         raise Refused("bad_option", what, "Give --trust CERTIFICATE too, or leave it out")
-    trust = Trust(trusted_in(options.trust), options.signer)
+    trust = Trust(read_trusted_certificates(options.trust), options.signer)
     contents = {file: _content(file) for file in options.files}
-    looks = {file: looked_at(file.name, content, trust) for file, content in contents.items()}
+    looks = {file: inspect_file(file.name, content, trust) for file, content in contents.items()}
     named = named_history(options.history)
     known = {} if named is None else _known(named, contents, looks)
     found = [_found(file, contents[file], looks, known.get(file)) for file in contents]
@@ -102,7 +102,7 @@ def _content(file: Path) -> bytes:
         raise Refused("verify_file", f"{file} cannot be read: {why}", "Give the files of a certificate") from None
 
 
-def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Looked]") -> dict[Path, Any]:
+def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]") -> dict[Path, Any]:
     """What the history says of each file."""
     from rig.commands.history.waiting import answer_of
     from rig.history.entered_file import find_file_entries
@@ -128,7 +128,7 @@ def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Loo
     return answer_of(asked)
 
 
-def _found(file: Path, content: bytes, looks: "Mapping[Path, Looked]", known: Any) -> _Found:
+def _found(file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", known: Any) -> _Found:
     """A file that has no signature of its own is held by the signed one it is attached to, or by the history."""
     look, attached_to = looks[file], None
     problems = look.problems
@@ -141,7 +141,7 @@ def _found(file: Path, content: bytes, looks: "Mapping[Path, Looked]", known: An
 
 
 def _held(
-    name: str, content: bytes, look: "Looked", looks: "Mapping[Path, Looked]"
+    name: str, content: bytes, look: "FileInspection", looks: "Mapping[Path, FileInspection]"
 ) -> tuple[str | None, tuple[Refused, ...]]:
     """The signed file that an unsigned one is attached to, and what is wrong: if it is attached, as with its signer."""
     from rig.report.signatures.findings import not_as_signed

@@ -19,7 +19,7 @@ from rig.data.version import VERSION
 from rig.errors import Fault, Refused
 from rig.history.again.answer import Answer, Outcome, Stated, compared, to_solve
 from rig.history.again.done import JOURNAL, Journal, Question
-from rig.history.again.plan import stated_results
+from rig.history.again.plan import list_stated_results
 from rig.history.again.report import CSV, PAGE, again_csv, again_page, counts, notable_table
 from rig.history.store import Selection
 from rig.station.plain_text import say
@@ -80,7 +80,7 @@ def _question(options: Namespace) -> Question:
 
 def _stated(options: Namespace, selection: Selection) -> tuple[str, tuple[Stated, ...]]:
     with opened(options) as history:
-        found = stated_results(history, selection)
+        found = list_stated_results(history, selection)
         label = history.engine.url.render_as_string()
     if not found:
         raise Refused("not_in_history", "no calibration in the history fits", "Look with `rig history`")

@@ -7,7 +7,7 @@ from pathlib import Path
 from rig.config.files.regular_file import UnfitFile
 from rig.data.version import VERSION
 from rig.errors import RigError
-from rig.history.again.answer import Answer, Given, State, Unsolved
+from rig.history.again.answer import Answer, RecomputedResult, State, Unsolved
 from rig.history.entered.finished import Recording, recording_of
 
 # Refusals that say nothing of a recording: it has no such setting or estimator, or this computer cannot solve it.
@@ -80,7 +80,7 @@ def _given(folder: Path, task: Task) -> Answer:
         state: State = "unjudged" if error.name in NOT_OF_IT else "failed" if error.name in NOT_HERE else "refused"
         return Unsolved(state, f"{folder}: {error}")
     document = document_of(outcome)
-    return Given(
+    return RecomputedResult(
         document.verdict,
         tuple(each.name for each in document.checks if not each.passed),
         followed(document),

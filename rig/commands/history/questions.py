@@ -15,9 +15,9 @@ from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
 from rig.errors.extras import missing_extra
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
-from rig.history.entered.finished import PAGE, Finished, finished_run
+from rig.history.entered.finished import PAGE, Finished, read_finished_run
 from rig.history.series import Change, changes_between, effects, rig_states, subjects, trends
-from rig.history.storage.address import own_place, resolve_address
+from rig.history.storage.address import own_history_address, resolve_address
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.terminal.change_words import comparison_in_words
 from rig.history.terminal.tables import (
@@ -162,11 +162,11 @@ def imported(options: Namespace) -> int:
 
 def verify(options: Namespace) -> int:
     """Hold rows against their journal and results, files against hashes; names what is wrong. Returns 1 then."""
-    from rig.history.integrity import STATES, WRONG, examined
+    from rig.history.integrity import STATES, WRONG, examine_history
 
     counts = dict.fromkeys(STATES, 0)
     with opened(options) as history:
-        for found in examined(history):
+        for found in examine_history(history):
             counts[found.state] += 1
             if found.state != "ok":
                 say(f"{found.state}: {found.what}: {found.why}")
@@ -216,7 +216,7 @@ def void(options: Namespace) -> int:
 
 def opened(options: Namespace) -> AbstractContextManager[History]:
     """The history that is meant. Raises Refused as `open_history`, and as `load` where a configuration names it."""
-    return open_history(own_place(named_history(options.history)) or resolve_address(None))
+    return open_history(own_history_address(named_history(options.history)) or resolve_address(None))
 
 
 def _selection(options: Namespace) -> Selection:
@@ -249,7 +249,7 @@ def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
 
     Raises Refused `no_recording`, `result_not_of_recording`, and as the recordings' solution does.
     """
-    claimed = None if solve and not (folder / RESULT).exists() else finished_run(folder)
+    claimed = None if solve and not (folder / RESULT).exists() else read_finished_run(folder)
     if claimed is not None:
         if history.has(claimed.content_sha256):
             return claimed
@@ -276,4 +276,4 @@ def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
             "Enter the result of the recordings by `rig history import --solve DIR`; a result of an older "
             "version may differ too",
         )
-    return finished_run(folder, given)
+    return read_finished_run(folder, given)

@@ -18,10 +18,10 @@ def remembered(config: RigConfig, moved: frozenset[str]) -> Memory:
 
     `moved` are serial numbers of sensors that are stated to be on another board than before.
     """
-    from rig.history.storage.address import chosen_place
+    from rig.history.storage.address import choose_history_address
 
     try:
-        where = chosen_place(config.history)
+        where = choose_history_address(config.history)
         if where is None:
             return Memory(silent="the history is off", moved=moved)
         numbers = sorted({each.serial_number for each in config.all_sensors.values()})
@@ -38,10 +38,10 @@ def known_board(
 
     The newest calibration decides. A history that does not answer knows none.
     """
-    from rig.history.storage.address import chosen_place
+    from rig.history.storage.address import choose_history_address
 
     try:
-        where = chosen_place(config.history)
+        where = choose_history_address(config.history)
         found = () if where is None else history_answer(where, lambda: _on(where, board))
     except Exception:  # whatever it is, a run does not depend on the history, and says that it is silent
         return None

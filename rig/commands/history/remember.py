@@ -32,16 +32,16 @@ class Beside:
 
 def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, tuple[Beside, ...]]:
     """Enter the run in `folder`; what to tell of it, and its calibrations beside the ones before."""
-    from rig.history.storage.address import chosen_place
+    from rig.history.storage.address import choose_history_address
 
-    return _remembered(folder, lambda: chosen_place(section))
+    return _remembered(folder, lambda: choose_history_address(section))
 
 
 def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tuple[Beside, ...]]:
     """Enter the run in `folder` in the user's own history, or in the one that is `named`; returns as `remember`."""
-    from rig.history.storage.address import own_place
+    from rig.history.storage.address import own_history_address
 
-    return _remembered(folder, lambda: own_place(named))
+    return _remembered(folder, lambda: own_history_address(named))
 
 
 def _remembered(
@@ -49,13 +49,13 @@ def _remembered(
 ) -> tuple[RunEvent | None, tuple[Beside, ...]]:
     label = "the history"
     try:
-        from rig.history.entered.finished import finished_run
+        from rig.history.entered.finished import read_finished_run
 
         where = chosen()
         if where is None:
             return None, ()
         label = where.label
-        run = finished_run(folder)
+        run = read_finished_run(folder)
         numbers, beside = history_answer(where, lambda: _entered(where, run), TO_ENTER)
     except Exception as error:  # whatever it is, the run is finished and its result is written
         return NotRemembered(folder, f"{label}: {why(error)}"), ()
@@ -64,10 +64,10 @@ def _remembered(
 
 def _is_usual(where: "HistoryAddress") -> bool:
     """Whether it is the one that a command means which names none."""
-    from rig.history.storage.address import own_place
+    from rig.history.storage.address import own_history_address
 
     try:
-        return where == own_place(None)
+        return where == own_history_address(None)
     except RigError:  # the user has no home
         return False
 
@@ -79,11 +79,11 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
     the folder may have come from anywhere.
     """
     try:
-        from rig.history.entered.finished import configured_in, content_sha256
-        from rig.history.storage.address import own_place
+        from rig.history.entered.finished import content_sha256, read_configuration
+        from rig.history.storage.address import own_history_address
 
-        loaded = configured_in(folder)
-        where = own_place(history)
+        loaded = read_configuration(folder)
+        where = own_history_address(history)
         if where is None or (history is None and loaded is not None and loaded.config.history.off):
             return None
         known = history_answer(where, lambda: _certified(where, content_sha256(result), certificate))
@@ -102,11 +102,11 @@ def journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | N
     None where there is no history, or none that answers, or an empty one.
     """
     try:
-        from rig.history.entered.finished import configured_in
-        from rig.history.storage.address import own_place
+        from rig.history.entered.finished import read_configuration
+        from rig.history.storage.address import own_history_address
 
-        loaded = configured_in(folder)
-        where = own_place(history)
+        loaded = read_configuration(folder)
+        where = own_history_address(history)
         if where is None or (history is None and loaded is not None and loaded.config.history.off):
             return None
         return history_answer(where, lambda: _end(where))
@@ -118,10 +118,10 @@ def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
     """How calibrations lie beside those of before, in words: each that has changed, then the others together."""
     if not calibrations:  # as with the history off, which costs no import of it
         return ()
-    from rig.history.terminal.change_words import change_in_short, changed_values
+    from rig.history.terminal.change_words import change_in_short, select_changed
 
-    changed = [(each, values) for each in calibrations if (values := changed_values(each.changes))]
-    same = [each for each in calibrations if not changed_values(each.changes)]
+    changed = [(each, values) for each in calibrations if (values := select_changed(each.changes))]
+    same = [each for each in calibrations if not select_changed(each.changes)]
     lines = []
     for each, values in changed:
         of = "" if each.now.quantity == "rate" else f", {each.now.quantity}"

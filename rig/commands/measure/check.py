@@ -63,14 +63,20 @@ def _named(
 
 def _look_at_board(configured: "Configured", tell: Tell) -> list[Problem]:
     from firmware_host.client import Board
-    from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, refusing, stored_calibration
+    from rig.board.identify import (
+        find_sensor,
+        read_stored_calibration,
+        refuse_other_firmware,
+        refusing,
+        require_board_section,
+    )
     from rig.commands.laboratory.claims import claimed_board
 
     config = configured.loaded.config
     missing: list[Problem] = []
     if not config.parts_on_board:
         return missing
-    section = configured_board(config)
+    section = require_board_section(config)
     with refusing(), claimed_board(section.port), Board(section.port, section.baud, lambda batch: None) as board:
         identity = board.identity
         tell(f"board at {section.port}: {identity.unique_id}, firmware {identity.firmware}")
@@ -83,7 +89,7 @@ def _look_at_board(configured: "Configured", tell: Tell) -> list[Problem]:
                 info = find_sensor(identity, name, part)
                 tell(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
                 if configured.phase.procedure.reads_corrected and name in config.to_calibrate:
-                    stored = stored_calibration(board, name, config.to_calibrate[name])
+                    stored = read_stored_calibration(board, name, config.to_calibrate[name])
                     tell(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
             except RigError as error:
                 missing.append(error.problem)
@@ -94,10 +100,10 @@ def _look_at_instruments(configured: "Configured", tell: Tell) -> list[Problem]:
     """The sensors with a port of their own; nothing in their memories is changed."""
     from rig.commands.laboratory.claims import claimed_sensor
     from rig.sensors.errors import SensorError
-    from rig.sensors.registry import by_port
+    from rig.sensors.registry import group_by_port
 
     missing: list[Problem] = []
-    for port, kind, sections in by_port(configured.loaded.config.sensors):
+    for port, kind, sections in group_by_port(configured.loaded.config.sensors):
         name = ", ".join(sections)
         try:
             with claimed_sensor(name, port):

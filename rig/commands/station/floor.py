@@ -21,13 +21,13 @@ def run(options: Namespace) -> int:
     Raises Refused `page_address`, `no_history`, and as `open_history`.
     """
     from rig.floor.feed import looking
-    from rig.history.storage.address import own_place
+    from rig.history.storage.address import own_history_address
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
     from rig.page.server.control import Control
     from rig.page.server.serving import Page, serving
 
-    place = own_place(named_history(options.history))
+    place = own_history_address(named_history(options.history))
     if place is None or not is_there(place):
         what = "the history is off" if place is None else f"there is no history {place.label}"
         raise Refused("no_history", what, "Name the history that the rigs share: rig floor --history URL")

@@ -116,9 +116,9 @@ def _carried_out(options: Namespace, configured: "Configured", operator: "Operat
 def _beating(config: "RigConfig", present: "Present") -> Iterator[None]:
     """The station's heartbeat in the history that its runs are entered in; none where they are entered in none."""
     from rig.floor.heartbeat import heartbeat
-    from rig.history.storage.address import chosen_place
+    from rig.history.storage.address import choose_history_address
 
-    place = chosen_place(config.history)
+    place = choose_history_address(config.history)
     if place is None:
         yield
         return

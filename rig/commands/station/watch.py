@@ -50,7 +50,7 @@ def run(options: Namespace) -> int:
     from rig.data.result_file import read_result
     from rig.data.run_folder import RESULT, recordings
     from rig.observation.motion.arm_motion import check_arms_times, turner_of
-    from rig.page.page_state import Shown
+    from rig.page.page_state import PageState
     from rig.page.replay import moments
     from rig.page.server.control import Control
     from rig.page.server.feed import Feed
@@ -66,7 +66,7 @@ def run(options: Namespace) -> int:
             turner_of(run)
             check_arms_times(run.states)
     result = read_result(folder / RESULT) if (folder / RESULT).exists() else None
-    feed = Feed(Shown(_about(folder, runs)))
+    feed = Feed(PageState(_about(folder, runs)))
     with serving(feed, Control(may_answer=False), folder, wanted.address()) as url:
         say(f"page: {url}", sys.stderr)
         try:

@@ -41,7 +41,7 @@ class Stated:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class RecomputedResult:
     """The present result of recordings: the verdict, the names of failed checks, and all calibrations.
 
     `left_out` names omitted quantities in a sentence.
@@ -61,7 +61,7 @@ class Unsolved:
     why: str
 
 
-Answer = Given | Unsolved
+Answer = RecomputedResult | Unsolved
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ class Compared:
     @cached_property
     def moves(self) -> Mapping[int, tuple[Move, ...]]:
         """Every parameter of each calibration, by its number, the largest move first; empty if unsolved."""
-        if not isinstance(self.answer, Given):
+        if not isinstance(self.answer, RecomputedResult):
             return {}
         now = {(record.sensor, record.quantity): record.parameters for record in self.answer.calibrations}
         by_number = {}
@@ -120,7 +120,7 @@ class Compared:
     @property
     def verdict_changed(self) -> bool:
         """Whether the present verdict differs from the stated one."""
-        return isinstance(self.answer, Given) and self.answer.verdict != self.stated.verdict
+        return isinstance(self.answer, RecomputedResult) and self.answer.verdict != self.stated.verdict
 
     @property
     def withdrawn(self) -> tuple[Issued, ...]:
@@ -131,13 +131,13 @@ class Compared:
     @property
     def unconfirmed(self) -> tuple[Issued, ...]:
         """The certificates that could not be checked, because their recordings were not solved."""
-        unsolved = not isinstance(self.answer, Given) and not self.withdrawn
+        unsolved = not isinstance(self.answer, RecomputedResult) and not self.withdrawn
         return self.stated.certificates if unsolved else ()
 
     @property
     def same(self) -> bool:
         """Whether it was solved with the stated result."""
-        return isinstance(self.answer, Given) and not (self.moved or self.verdict_changed)
+        return isinstance(self.answer, RecomputedResult) and not (self.moved or self.verdict_changed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,7 @@ class Outcome:
     @property
     def solved(self) -> int:
         """The number of solved recordings."""
-        return sum(isinstance(comparison.answer, Given) for comparison in self.compared)
+        return sum(isinstance(comparison.answer, RecomputedResult) for comparison in self.compared)
 
     @property
     def unsolved(self) -> Mapping[State, int]:
@@ -202,7 +202,7 @@ def compared(stated: Iterable[Stated], answers: Mapping[str, Answer], of_u: floa
 
 def to_solve(stated: Sequence[Stated], solved: Mapping[str, Answer]) -> tuple[Stated, ...]:
     """Return the recordings still to be solved: all without a result, failed ones included."""
-    return tuple(result for result in stated if not isinstance(solved.get(result.content_sha256), Given))
+    return tuple(result for result in stated if not isinstance(solved.get(result.content_sha256), RecomputedResult))
 
 
 def _in_units(difference: float, expanded: float) -> float:

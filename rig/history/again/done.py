@@ -15,7 +15,7 @@ from rig.config.files.regular_file import UnfitFile, open_regular_file
 from rig.config.files.written_file import open_to_append
 from rig.data.checked import validate
 from rig.errors import Refused
-from rig.history.again.answer import Answer, Given
+from rig.history.again.answer import Answer, RecomputedResult
 
 JOURNAL = "recomputed.jsonl"
 SCHEMA: Final = "rig.recomputation/1"
@@ -57,7 +57,7 @@ class Journal(AbstractContextManager["Journal"]):
 
     def note(self, key: str, answer: Answer) -> None:
         """Add an answer. Only solved ones are stored: all others are tried again."""
-        if isinstance(answer, Given):
+        if isinstance(answer, RecomputedResult):
             self._write(json.dumps({"key": key, "given": asdict(answer)}, allow_nan=False))
 
     def _write(self, line: str) -> None:
@@ -91,7 +91,7 @@ def _read(path: Path, question: Question) -> tuple[Mapping[str, Answer], int]:
                 continue
             try:
                 document = json.loads(line)
-                solved[str(document["key"])] = validate(Given, document["given"], "given")
+                solved[str(document["key"])] = validate(RecomputedResult, document["given"], "given")
             except (ValueError, KeyError, TypeError, RecursionError):
                 continue  # the recording of an invalid line is solved again
     return solved, complete_bytes

@@ -17,7 +17,7 @@ Value = TypeVar("Value")
 _RUN = schema.run.c
 
 
-def stated_results(history: History, selection: Selection) -> tuple[Stated, ...]:
+def list_stated_results(history: History, selection: Selection) -> tuple[Stated, ...]:
     """Return all valid results in the order of time, and replaced ones on which a certificate in force relies.
 
     Voided calibrations do not count, nor runs with no others. Runs without calibrations, such as a verification alone,

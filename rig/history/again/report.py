@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rig.history.again.answer import Compared, Given, Move, Outcome, Unsolved
+from rig.history.again.answer import Compared, Move, Outcome, RecomputedResult, Unsolved
 from rig.history.again.done import Question
 from rig.history.documents import cell
 from rig.history.entered.issued import Issued
@@ -136,7 +136,7 @@ def _line(compared: Compared, past: Past | None) -> dict[str, str]:
 
 
 def _verdict(compared: Compared) -> str:
-    if not isinstance(compared.answer, Given) or not compared.verdict_changed:
+    if not isinstance(compared.answer, RecomputedResult) or not compared.verdict_changed:
         return compared.stated.verdict
     by = f" ({', '.join(compared.answer.failed)})" if compared.answer.failed else ""
     return f"{compared.stated.verdict}, now {compared.answer.verdict}{by}"
@@ -174,7 +174,7 @@ def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
         "certificates_unconfirmed": _numbers(compared.unconfirmed),
         "folder": compared.stated.places[0][1] if compared.stated.places else None,
     }
-    if isinstance(answer, Given):
+    if isinstance(answer, RecomputedResult):
         columns |= {
             "state": "solved",
             "verdict_now": answer.verdict,
@@ -191,7 +191,7 @@ def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
             "part": past.part,
             "serial_number": past.serial_number,
             "quantity": past.quantity,
-            **({} if not isinstance(answer, Given) else {"moved": past.id in compared.moved}),
+            **({} if not isinstance(answer, RecomputedResult) else {"moved": past.id in compared.moved}),
             **({} if move is None else _move_columns(move)),
         }
     if not compared.stated.calibrations:

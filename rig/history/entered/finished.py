@@ -12,7 +12,7 @@ from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_r
 from rig.data.checked import refuse_duplicate_keys
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused
-from rig.history.entered.issued import Issued, issued_certificate
+from rig.history.entered.issued import Issued, issue_certificate
 
 if TYPE_CHECKING:
     from rig.config.load import Loaded
@@ -66,7 +66,7 @@ class Finished:
         return content_sha256(self.text)
 
 
-def finished_run(folder: Path, document: "ResultDocument | None" = None) -> Finished:
+def read_finished_run(folder: Path, document: "ResultDocument | None" = None) -> Finished:
     """Return the run in `folder`, with its result.json or the `document` that was computed from its recordings.
 
     Raise the errors of `read_result`; OSError if a recording cannot be read.
@@ -81,7 +81,7 @@ def finished_run(folder: Path, document: "ResultDocument | None" = None) -> Fini
         text = read_regular_file(folder / RESULT, SIZE_MAX_BYTES)
     else:
         text = document.text().encode()
-    loaded = configured_in(folder)
+    loaded = read_configuration(folder)
     section = HistorySection() if loaded is None else loaded.config.history
     simulated = loaded is not None and loaded.simulated
     provenance = document.provenance
@@ -150,7 +150,7 @@ def content_sha256(text: str) -> str:
     return hashlib.sha256(canonical.encode()).hexdigest()
 
 
-def configured_in(folder: Path) -> "Loaded | None":
+def read_configuration(folder: Path) -> "Loaded | None":
     """Return the folder's configuration.
 
     None if there is none, or if this program refuses it because of an unknown key: the result is entered nevertheless.
@@ -178,4 +178,4 @@ def _certificate(folder: Path, document: "ResultDocument", stated: "Stated") -> 
     from rig.report.certificate.page import certificate_page
 
     certificate = certificate_of(document, stated)
-    return issued_certificate(certificate, {PAGE: page}) if certificate_page(certificate).encode() == page else None
+    return issue_certificate(certificate, {PAGE: page}) if certificate_page(certificate).encode() == page else None

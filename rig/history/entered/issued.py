@@ -25,7 +25,7 @@ class Issued:
     files: tuple[tuple[str, str], ...] = ()
 
 
-def issued_certificate(certificate: "Certificate", files: Mapping[str, bytes]) -> Issued:
+def issue_certificate(certificate: "Certificate", files: Mapping[str, bytes]) -> Issued:
     """Return the certificate for a history, with the checksums of its files."""
     return Issued(
         certificate.number,

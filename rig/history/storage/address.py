@@ -28,7 +28,9 @@ class HistoryAddress:
     where: "Path | URL"
 
 
-def chosen_place(section: "HistorySection", environment: Mapping[str, str] = os.environ) -> HistoryAddress | None:
+def choose_history_address(
+    section: "HistorySection", environment: Mapping[str, str] = os.environ
+) -> HistoryAddress | None:
     """Return the history of a run: by the environment's `RIG_HISTORY`, else by its configuration; None for none.
 
     `section` must be of a configuration that the user has named or knows, never of a foreign folder. Raise Refused
@@ -40,7 +42,7 @@ def chosen_place(section: "HistorySection", environment: Mapping[str, str] = os.
     return resolve_address(variable or section.url)
 
 
-def own_place(address: str | None) -> HistoryAddress | None:
+def own_history_address(address: str | None) -> HistoryAddress | None:
     """Return the user's history: by the command's `address`, else `RIG_HISTORY`, else the own file; None if switched
     off.
 

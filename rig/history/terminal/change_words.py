@@ -13,7 +13,7 @@ PERCENT, PPM = 1e-2, 1e-6
 DEGREE_RAD = pi / 180
 
 
-def changed_values(changes: Iterable[Change]) -> list[Change]:
+def select_changed(changes: Iterable[Change]) -> list[Change]:
     """Return the significant changes, the largest change in multiples of its U first."""
     return sorted((change for change in changes if change.has_changed), key=lambda change: -change.normalised_error)
 
@@ -22,7 +22,7 @@ def comparison_in_words(changes: Sequence[Change]) -> str:
     """Return the number of significant changes of one sensor, and the E_n above which a change is significant."""
     if not changes:
         return "the two have no value in common"
-    changed, limits, compared = changed_values(changes), [change.limit for change in changes], changes[0].compared
+    changed, limits, compared = select_changed(changes), [change.limit for change in changes], changes[0].compared
     fraction = f"{len(changed) or 'none'} of {len(changes)} values changed"
     others = f" (with {compared - len(changes)} of the run's other sensors)" if compared > len(changes) else ""
     limit = " to ".join(dict.fromkeys(f"{size:.2f}" for size in (min(limits), max(limits))))

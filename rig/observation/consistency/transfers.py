@@ -87,7 +87,7 @@ def average_transfers(
                     scatter_rad2_s2=_scatter(readings, time_s, interval.motion, site.down_m_s2),
                     rounding_rad2_s2=rounding_left(readings, stream.steps, moving, stream.steps.variance),
                     rate_rad_s=interval.motion.mean_rate(interval.start_s, interval.end_s),
-                    gravity_m_s2=sensed_gravity_m_s2(interval, site.down_m_s2, extension_m),
+                    gravity_m_s2=mean_specific_force_m_s2(interval, site.down_m_s2, extension_m),
                     attitude=interval.motion.attitude(interval.start_s, interval.end_s),
                     interval=interval,
                 )
@@ -112,7 +112,7 @@ def is_by_wrists(interval: MotionInterval) -> bool:
     return bool(SHORTEST_S < interval.end_s - interval.start_s < LONGEST_S and rotated_rad < STANDS_RAD)
 
 
-def sensed_gravity_m_s2(interval: MotionInterval, down_m_s2: Array, extension_m: Array) -> Array:
+def mean_specific_force_m_s2(interval: MotionInterval, down_m_s2: Array, extension_m: Array) -> Array:
     """Return the mean (3,) of gravity less the acceleration of the sensors' position, in the flange's frame."""
     time_s, step_s = np.linspace(interval.start_s, interval.end_s, STEPS, retstep=True)
     pose = flange_pose(interval.motion.angles(time_s), interval.motion.kinematics)

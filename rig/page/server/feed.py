@@ -13,7 +13,7 @@ from collections.abc import AsyncGenerator, Callable
 from typing import Any, Protocol
 
 from rig.page.arrivals import Arrivals
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.page.rows import Look
 from rig.station.events import RunEvent
 
@@ -37,7 +37,7 @@ class Source(Protocol):
 class Feed:
     """The page's state between two threads; a listener of the run's events. Every frame has the ages of its content."""
 
-    def __init__(self, shown: Shown, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, shown: PageState, now: Callable[[], float] = time.monotonic) -> None:
         self._shown, self._now = shown, now
         self._arrivals = Arrivals()
         self._lock = threading.Lock()

@@ -18,7 +18,7 @@ from rig.estimation.arrays import Array
 from rig.motion.carried import read_load
 from rig.motion.geometry import flange_axes
 from rig.motion.keep_out import keeps_clear
-from rig.motion.model import home_of, model_of
+from rig.motion.model import find_home, model_of
 from rig.motion.state import JOINT_NAMES, Joints
 from rig.motion.steps import Plan, Step, Sweep
 from rig.plans.motions.drift import drift_effect
@@ -59,7 +59,7 @@ def plan_six_observation(
     has finished. If the item is mounted in several stages, all of it is done in each, with the wrists that are swept
     there. Limits are checked by the turner's `problems`. Raise Refused `axes_do_not_span`.
     """
-    home = home_of(arm)
+    home = find_home(arm)
     swept = _order_sweeps(arm, procedure)
     before = approach(start_q_rad, home, pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
     if not procedure.mountings:
@@ -105,7 +105,7 @@ def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, 
     """Return all sweeps in the order of the file, or else in the best one: directions first, then the order of the
     wrists.
     """
-    home = home_of(arm)
+    home = find_home(arm)
 
     def harm(order: Order) -> float:
         sweeps = _sweeps(order, procedure, min(procedure.repeats, 2))  # more of them repeat these
@@ -189,7 +189,7 @@ def _connect(sweeps: Sequence[Sweep], arm: ArmSection, procedure: SixSweepsSecti
     carried, model = read_load(arm), model_of(arm)
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)
     return connect_sweeps(
-        sweeps, home_of(arm), pace, procedure.rest_s, lambda here, there: _clear(here, there, carried, model)
+        sweeps, find_home(arm), pace, procedure.rest_s, lambda here, there: _clear(here, there, carried, model)
     )
 
 

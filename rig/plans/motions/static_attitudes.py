@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import AttitudesSection
-from rig.motion.model import home_of
+from rig.motion.model import find_home
 from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, trapezoid_duration
 from rig.plans.motions.shortest_way import shortest_way
@@ -26,7 +26,7 @@ def plan_static_attitudes(
     indices of dwells to leave out: those an interrupted run has finished. Limits and clearances are checked by the
     turner's `problems`, the rank of the attitudes by `rig.analysis.design.attitude_account`.
     """
-    before = approach(start_q_rad, home_of(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
+    before = approach(start_q_rad, find_home(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
     return append_steps(before, dwells(arm, procedure, procedure.repeats, done))
 
 
@@ -37,7 +37,7 @@ def dwells(
 
     With field tests at home before them and after.
     """
-    home = home_of(arm)
+    home = find_home(arm)
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)
     attitudes = enumerate(_order(arm, procedure) * repeats, first)
     remaining = [Dwell(index, q, procedure.dwell_s, procedure.settle_s) for index, q in attitudes if index not in done]
@@ -56,7 +56,7 @@ def dwells(
 @lru_cache(maxsize=16)
 def _order(arm: ArmSection, procedure: AttitudesSection) -> tuple[Joints, ...]:
     """Return the attitudes' joint angles, in the order of the shortest round trip from home."""
-    home = home_of(arm)
+    home = find_home(arm)
     attitudes = [(*home[:3], *convert_to_radians(wrists)) for wrists in procedure.attitudes]
     points = np.array([home, *attitudes])
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)

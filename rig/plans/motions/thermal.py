@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import ThermalSection
-from rig.motion.model import home_of
+from rig.motion.model import find_home
 from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep
 from rig.plans.motions.six_sweeps import plan_six_observation
@@ -26,7 +26,7 @@ def plan_thermal(
     Before each the arm rests at home until the temperature is right. A set that is not complete in `done` is repeated:
     its sweeps belong to one temperature. Raise Refused `axes_do_not_span`.
     """
-    plan = approach(start_q_rad, home_of(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
+    plan = approach(start_q_rad, find_home(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
     for steps in _sets(arm, procedure):
         if not {step.index for step in steps if isinstance(step, (Sweep, Dwell))} <= set(done):
             wait = Rest("wait for the next temperature", _wait_s(procedure, steps), for_temperature=True)

@@ -26,7 +26,7 @@ class SignatureReport:
 
 
 @dataclass(frozen=True, slots=True)
-class Looked:
+class FileInspection:
     """The inspection of a file: its signatures, the files attached to the signed one, and problems by name."""
 
     signatures: tuple[SignatureReport, ...] = ()

@@ -7,14 +7,14 @@ from pathlib import Path
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
-from rig.report.signatures.findings import Looked, not_as_signed, not_signed
+from rig.report.signatures.findings import FileInspection, not_as_signed, not_signed
 from rig.report.signatures.signatory import EXTRA, SIZE_MAX_BYTES
 from rig.report.signatures.trust import Trust
 
 HEAD_BYTES = 200  # enough to detect the type of a file
 
 
-def looked_at(name: str, content: bytes, trust: Trust) -> Looked:
+def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
     """Inspect a file by its content: PDF, XML, or one without a signature of its own.
 
     Raise Refused `missing_extra`.
@@ -29,13 +29,15 @@ def looked_at(name: str, content: bytes, trust: Trust) -> Looked:
     elif _is_xml(content):
         inspect = inspect_xml
     else:
-        return Looked(problems=(not_signed(name),))
+        return FileInspection(problems=(not_signed(name),))
     try:
         with warnings.catch_warnings(action="ignore"):  # warnings of the libraries about the file's content
             return inspect(name, content, trust)
     except Exception as error:  # the libraries raise any error for a crafted file
         why = str(error).strip().splitlines()
-        return Looked(problems=(not_as_signed(name, f"it cannot be read: {why[0] if why else type(error).__name__}"),))
+        return FileInspection(
+            problems=(not_as_signed(name, f"it cannot be read: {why[0] if why else type(error).__name__}"),)
+        )
 
 
 def _is_xml(content: bytes) -> bool:
@@ -44,7 +46,7 @@ def _is_xml(content: bytes) -> bool:
     return head.startswith(b"<") and not head.startswith(b"<!doctype html")
 
 
-def trusted_in(files: Sequence[Path]) -> tuple[bytes, ...]:
+def read_trusted_certificates(files: Sequence[Path]) -> tuple[bytes, ...]:
     """Return the certificates in these files, PEM or DER, as DER. Raise Refused `trust_file`, `missing_extra`."""
     try:
         from cryptography.hazmat.primitives.serialization import Encoding

@@ -40,7 +40,7 @@ class Authorities:
         )
 
 
-def authorities_in(files: Sequence[Path]) -> Authorities:
+def read_authorities(files: Sequence[Path]) -> Authorities:
     """Return certificates and lists in these files: PEM, or a list alone as DER. Raise Refused `revocation_list`."""
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_crl, load_pem_x509_certificates, load_pem_x509_crl

@@ -19,7 +19,7 @@ from pyhanko_certvalidator import ValidationContext
 from rig.errors import Refused
 from rig.report.signatures.cms_coverage import certificates_with, find_uncovered_in_container
 from rig.report.signatures.findings import (
-    Looked,
+    FileInspection,
     SignatureReport,
     authority_not_trusted,
     not_as_signed,
@@ -32,23 +32,23 @@ from rig.report.signatures.reason import Reason
 from rig.report.signatures.trust import Trust, find_unvouched, why_untrusted
 
 
-def inspect_pdf(name: str, content: bytes, trust: Trust) -> Looked:
+def inspect_pdf(name: str, content: bytes, trust: Trust) -> FileInspection:
     """Return the inspection of a PDF's signature. Raise the errors of its reader for a damaged file."""
     for library in ("pyhanko", "pyhanko_certvalidator"):
         logging.getLogger(library).setLevel(logging.CRITICAL)  # problems are named here
     reader = PdfFileReader(io.BytesIO(content), strict=True)
     if not reader.embedded_regular_signatures:
-        return Looked(problems=(not_signed(name),))
+        return FileInspection(problems=(not_signed(name),))
     if len(reader.embedded_signatures) > 1:
-        return Looked(problems=(not_as_signed(name, "it has several signatures"),))
+        return FileInspection(problems=(not_as_signed(name, "it has several signatures"),))
     (signature,) = reader.embedded_signatures
     status = _status(signature, trust)
     attachments = list(_attachments(reader))
     alterations = [not_as_signed(name, why) for why in _alterations(signature, status, content, attachments)]
     report, doubts = _inspect_signature(name, signature, status, trust, _lists(reader))
     if alterations:
-        return Looked((report,), {}, (*alterations, *doubts))
-    return Looked((report,), dict(attachments), (*doubts, *_check_authorities(name, signature, trust)))
+        return FileInspection((report,), {}, (*alterations, *doubts))
+    return FileInspection((report,), dict(attachments), (*doubts, *_check_authorities(name, signature, trust)))
 
 
 def _status(signature: Any, trust: Trust) -> Any:

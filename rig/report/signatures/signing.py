@@ -13,7 +13,7 @@ from rig.report.signatures.signatory import DIGEST, Signatory
 FIELD = "Laboratory"  # the form field that readers show
 
 
-def signed_pdf(
+def sign_as_pades(
     pdf: bytes, by: Signatory, reason: Reason, time_server: str | None = None, authorities: Authorities | None = None
 ) -> bytes:
     """Return the PDF with a certification signature that permits no changes: B-B, or B-T with a time server's URL.
@@ -59,7 +59,7 @@ def signed_pdf(
     return bytes(output.getbuffer())
 
 
-def signed_xml(xml: bytes, by: Signatory, reason: Reason) -> bytes:
+def sign_as_xades(xml: bytes, by: Signatory, reason: Reason) -> bytes:
     """Return the document with an enveloped signature over its canonical form (C14N 1.1), with time and reason."""
     from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey
     from lxml import etree

@@ -14,7 +14,7 @@ from signxml.util import add_pem_header
 from signxml.xades.xades import XAdESSignatureConfiguration, XAdESVerifier
 
 from rig.report.signatures.findings import (
-    Looked,
+    FileInspection,
     SignatureReport,
     not_as_signed,
     not_signed,
@@ -28,29 +28,29 @@ from rig.report.signatures.xml_document import NAMES, canonical, read_xml, rebui
 DCC = "{https://ptb.de/dcc}"
 
 
-def inspect_xml(name: str, content: bytes, trust: Trust) -> Looked:
+def inspect_xml(name: str, content: bytes, trust: Trust) -> FileInspection:
     """Return the inspection of an XML document's signature. Raise the errors of its reader for a damaged file."""
     root = read_xml(content)
     signature = root.find("ds:Signature", NAMES)
     if signature is None:
-        return Looked(problems=(not_signed(name),))
+        return FileInspection(problems=(not_signed(name),))
     texts = [element.text for element in signature.iterfind("ds:KeyInfo/ds:X509Data/ds:X509Certificate", NAMES)]
     chain = [load_pem_x509_certificate(add_pem_header(text)) for text in texts]
     method = _method(chain[0])
     try:
         signed = _verify(root, chain[0], method)
     except SignXMLException as error:
-        return Looked(problems=(not_as_signed(name, " ".join(str(error).split())),))
+        return FileInspection(problems=(not_as_signed(name, " ".join(str(error).split())),))
     document, properties, key_info = signed  # in this order
     value = signature.findtext("ds:SignatureValue", "", NAMES)
     verified = (document.signed_data, properties.signed_data, key_info.signed_data)
     if canonical(root) != canonical(rebuild_document(verified, method.value, value)):
-        return Looked(problems=(not_as_signed(name, "it has content that its signature does not cover"),))
-    if not _is_one_certificate(document.signed_xml):
+        return FileInspection(problems=(not_as_signed(name, "it has content that its signature does not cover"),))
+    if not _is_one_certificate(document.sign_as_xades):
         why = "the signed document is not a digital certificate with one set of results"
-        return Looked(problems=(not_as_signed(name, why),))
-    report, problems = _inspect(name, chain, properties.signed_xml, trust)
-    return Looked((report,), {}, problems)
+        return FileInspection(problems=(not_as_signed(name, why),))
+    report, problems = _inspect(name, chain, properties.sign_as_xades, trust)
+    return FileInspection((report,), {}, problems)
 
 
 def _method(certificate: Certificate) -> SignatureMethod:

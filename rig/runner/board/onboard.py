@@ -25,7 +25,7 @@ from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each
 from rig.motion.steps import Sweep
-from rig.observation.onboard_window import observed_before, revolution_on_the_board
+from rig.observation.onboard_window import find_board_averages, revolution_on_the_board
 from rig.runner.acquisition import Acquisition
 
 # From asking the board to keep its readings to the arm's first motion, and how late that may be on a busy machine.
@@ -52,7 +52,7 @@ class BoardCalibration:
     def recall(self, earlier: Sequence[RunData], done: Collection[int]) -> None:
         """Give the board back what it observed of the sweeps `done` before the run was interrupted."""
         for name, (index, _) in self.sensors.items():
-            for sweep, seen in observed_before(earlier, name, done).items():
+            for sweep, seen in find_board_averages(earlier, name, done).items():
                 self.board.recall(index, self._count(name), seen.observation.mean_rad_s, seen.speed_rad_s)
                 self._observed[name] += 1
                 self.note(BoardRecalled(name, sweep))

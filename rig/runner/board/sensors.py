@@ -9,7 +9,7 @@ import numpy as np
 
 from firmware_host.client import Board, Calibration, SampleBatch, StoredCalibration
 from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
-from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, stored_calibration
+from rig.board.identify import find_sensor, read_stored_calibration, refuse_other_firmware, require_board_section
 from rig.config.models import SensorsConfig
 from rig.config.sensors.sensor_sections import MagnetometerSection, SensorSection
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
@@ -60,9 +60,9 @@ class BoardSource:
 def board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
     """The board for the length of the `with` block.
 
-    Raises BoardError as `Board`, Refused as `configured_board`, `refuse_other_firmware` and `set_up_sensors`.
+    Raises BoardError as `Board`, Refused as `require_board_section`, `refuse_other_firmware` and `set_up_sensors`.
     """
-    section = configured_board(config)
+    section = require_board_section(config)
     names: dict[int, str] = {}
 
     def on_batch(batch: SampleBatch) -> None:
@@ -78,7 +78,7 @@ def board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bo
 def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
     """Every configured sensor on the board by its name; those to calibrate stream corrected readings when `calibrated`.
 
-    Raises Refused as `find_sensor` and `stored_calibration`.
+    Raises Refused as `find_sensor` and `read_stored_calibration`.
     """
     gyroscopes = {
         name: _corrected(board, name, section)
@@ -111,7 +111,7 @@ def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
 
 def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
     raw = _raw(board, name, section)
-    stored = stored_calibration(board, name, section)
+    stored = read_stored_calibration(board, name, section)
     return BoardSensor(raw.index, corrected(raw.described, stored.calibration, CALIBRATED_RAD_S), stored)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.client import Board
-from firmware_host.hand_answers import HandReport, HandSolved
+from firmware_host.hand_answers import BoardHandSolution, HandReport
 from rig.analysis.by_hand.on_board import BoardReadings, HandAgreement, compare_with_board
 from rig.board.crystal import follows_crystal
 from rig.board.identify import changing, refusing
@@ -48,7 +48,7 @@ class CalibratedByBoard:
     """What the board found of a sensor of that index, and the same in double precision, None without its readings."""
 
     index: int
-    solved: HandSolved
+    solved: BoardHandSolution
     agreement: HandAgreement | None
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rig.config.procedures.hand_sections import HandSection
 from rig.errors import Fault, Problem
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import Joints, Row, TurnerIdentity
 from rig.motion.steps import Motion, Plan
@@ -81,7 +81,7 @@ class Hand:
     def check(self) -> None:
         """Return at once: a hand has no faults to raise."""
 
-    def take_control(self, carried: Carried) -> None:
+    def take_control(self, carried: FlangeLoad) -> None:
         """Return at once: a hand needs no preparation."""
 
     def move(self, motion: Motion, watch: Callable[[], None] = lambda: None) -> None:
@@ -136,7 +136,7 @@ HAND = TurnerKind(
     problems=_problems,
     describe_configured=lambda section: RECORDED,
     describe_connected=lambda section, report: RECORDED,
-    carried=lambda section: Carried(0.0),
+    carried=lambda section: FlangeLoad(0.0),
     words=Wording(
         name="hand",
         short="hand",

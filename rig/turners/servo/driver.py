@@ -9,7 +9,7 @@ from typing import Self
 
 from rig.data.processes import silence
 from rig.errors import Fault, Problem, Refused, RigError, refuse
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Motion
 from rig.turners.servo import problems
 from rig.turners.servo.bus import Bus, BusError, InstructionDenied
@@ -110,7 +110,7 @@ class Servo:
         self.check()
         return self._report
 
-    def problems(self, carried: Carried, motions: Iterable[Motion] = ()) -> list[Problem]:
+    def problems(self, carried: FlangeLoad, motions: Iterable[Motion] = ()) -> list[Problem]:
         """Return every reason against this payload and these motions."""
         return [
             *servo_problems(self._report, self._wanted_model, carried, self._period_s),
@@ -134,7 +134,7 @@ class Servo:
 
     # Moving -----------------------------------------------------------------------------------------------------
 
-    def take_control(self, carried: Carried) -> None:
+    def take_control(self, carried: FlangeLoad) -> None:
         """Have the shaft held at its position, with the watchdog armed. Raise `Refused` by name."""
         self.check()
         refuse(self.problems(carried))

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rig.config.procedures.servo_section import ServoSection
 from rig.errors import Problem
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.preflight import step_problems
+from rig.motion.preflight import find_step_problems
 from rig.motion.state import TurnerIdentity
 from rig.motion.steps import Plan
 from rig.turners.kind import OnState, TurnerKind, Wording
@@ -59,7 +59,7 @@ def _stance(report: ServoReport) -> str:
 
 
 def _problems(plans: Sequence[Plan], section: ServoSection, report: ServoReport | None) -> list[Problem]:
-    problems = list(dict.fromkeys(problem for plan in plans for problem in step_problems(plan)))
+    problems = list(dict.fromkeys(problem for plan in plans for problem in find_step_problems(plan)))
     motions = [motion for plan in plans for motion in plan.motions]  # one problem of each kind is reported
     if report is None:
         return [*problems, *move_problems(motions, find_model(section.model).no_load_rad_s)]
@@ -94,9 +94,9 @@ def _make_recorded(section: ServoSection, report: ServoReport) -> TurnerIdentity
     return TurnerIdentity(MAKER, report.model, SHAFT, reading_std_rad=READING_STD_RAD)
 
 
-def _read_payload(section: ServoSection) -> Carried:
+def _read_payload(section: ServoSection) -> FlangeLoad:
     x, y, z = (coordinate_mm / 1000 for coordinate_mm in section.payload_centre_mm)
-    return Carried(section.payload_kg, (x, y, z))
+    return FlangeLoad(section.payload_kg, (x, y, z))
 
 
 SERVO = TurnerKind(

@@ -3,7 +3,7 @@
 import math
 
 from rig.errors import Problem
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.turners.servo.models import LOAD_FRACTION
 from rig.turners.servo.registers import (
     BY_HEAT,
@@ -21,7 +21,7 @@ GRAVITY_M_S2 = 9.81
 HEADROOM_C = 10.0  # margin below its limit: a servo that holds and turns for minutes grows warmer
 
 
-def servo_problems(report: ServoReport, wanted_model: str, carried: Carried, period_s: float) -> list[Problem]:
+def servo_problems(report: ServoReport, wanted_model: str, carried: FlangeLoad, period_s: float) -> list[Problem]:
     """Return every reason why this servo cannot be driven as it is; `period_s` is the period of its states."""
     problems = [*_identity(report, wanted_model), *_settings(report), *_condition(report), *_load(report, carried)]
     if report.round_trip_s > period_s:
@@ -131,7 +131,7 @@ def _condition(report: ServoReport) -> list[Problem]:
     return problems
 
 
-def _load(report: ServoReport, carried: Carried) -> list[Problem]:
+def _load(report: ServoReport, carried: FlangeLoad) -> list[Problem]:
     """Return a problem if the payload's torque is too high, for a horizontal shaft: its true direction is unknown."""
     lever_m = math.hypot(*carried.centre_m[:2])
     torque_nm = carried.payload_kg * GRAVITY_M_S2 * lever_m

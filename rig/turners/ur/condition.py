@@ -1,7 +1,7 @@
 """Problems of an arm that one state shows. Pure, for pre-flight and for supervision of a move."""
 
 from rig.errors import Problem
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.state import ArmState, RobotMode, RuntimeState, SafetyMode
 
 # The slider is reported as a fraction; anything below 99.9 % stretches a sweep measurably.
@@ -114,7 +114,7 @@ def speed_limited(state: ArmState) -> Problem:
     )
 
 
-def payload_refused(carried: Carried) -> Problem:
+def payload_refused(carried: FlangeLoad) -> Problem:
     """Describe a program that the controller has ended because of its payload."""
     return Problem(
         "payload_not_set",

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Self
 
 from rig.errors import Fault, Problem, Refused, RigError
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.state import ArmState, RuntimeState
 from rig.motion.steps import Motion, travel
 from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
@@ -90,7 +90,7 @@ class Arm:
         self._connected: Connected | None = None
         self._answer: Message | None = None
         self._braked: Braked | None = None
-        self._carried = Carried(0.0)
+        self._carried = FlangeLoad(0.0)
         self._sets_payload = False  # our program runs, and sets the payload
         self._problem: Problem | None = None
         self._doing = "the preparation"
@@ -141,7 +141,7 @@ class Arm:
 
     # Moving -------------------------------------------------------------------------------------------------------
 
-    def take_control(self, carried: Carried) -> None:
+    def take_control(self, carried: FlangeLoad) -> None:
         """Upload the control script and set the payload. Raise `Refused` by name.
 
         The client would end a program that runs, so a running program is refused here.

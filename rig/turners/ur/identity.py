@@ -13,7 +13,7 @@ import numpy as np
 from rig.config.ranges import ModelName
 from rig.errors import Problem
 from rig.motion.geometry import LENGTHS, DenavitHartenberg, lengths_m
-from rig.motion.model import TurnerModel, model_of, turner_model
+from rig.motion.model import TurnerModel, load_turner_model, model_of
 from rig.turners.ur.report import ArmReport
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def _robot_type(report: ArmReport) -> int | None:
         return report.setup.robot_type
     if report.kinematics is not None:
         series = "CB3" if _models(report) is CB3_MODELS else "e-Series"
-        models = (model for model in map(turner_model, get_args(ModelName)) if model.series == series)
+        models = (model for model in map(load_turner_model, get_args(ModelName)) if model.series == series)
         return next((model.robot_type for model in models if _other_length(report.kinematics, model) is None), None)
     called = (report.called or "").strip().upper()
     names = ((number, name.upper()) for number, words in _models(report).items() for name in words.split(" or "))

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from rig.errors import Problem
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.state import ArmState, Joints
 
 # Parent to child ---------------------------------------------------------------------------------------------------
@@ -13,7 +13,7 @@ from rig.motion.state import ArmState, Joints
 class TakeControl:
     """The request to upload the script and set the payload, answered by `ScriptStarted` and `ControlTaken`."""
 
-    carried: Carried
+    carried: FlangeLoad
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,11 @@
 """Problems of a plan by itself for an arm of Universal Robots: by its model, and by its controller's limits."""
 
 from rig.errors import Problem
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.keep_out import clearance_problems
+from rig.motion.keep_out import find_clearance_problems
 from rig.motion.model import TurnerModel
-from rig.motion.preflight import step_problems, travels
+from rig.motion.preflight import find_step_problems, travels
 from rig.motion.state import JointLimits
 from rig.motion.steps import Plan
 from rig.turners.ur.limits import motion_problems
@@ -13,7 +13,7 @@ from rig.turners.ur.limits import motion_problems
 
 def plan_problems(
     plan: Plan,
-    carried: Carried,
+    carried: FlangeLoad,
     model: TurnerModel,
     *,
     arm: DenavitHartenberg | None = None,
@@ -24,10 +24,10 @@ def plan_problems(
     Clearance is that of the flange and its payload from the arm. `controller` are the controller's own limits, which
     count if they are narrower than the `model`'s; the lengths are those of `arm`, or else the drawing's.
     """
-    problems = step_problems(plan)
+    problems = find_step_problems(plan)
     moving = [motion for motion in plan.motions if travels(motion)]
     problems += [problem for motion in moving for problem in motion_problems(motion, model.limits, controller)]
-    problems += clearance_problems(plan, carried, model, arm)
+    problems += find_clearance_problems(plan, carried, model, arm)
     if not 0 <= carried.payload_kg <= model.payload_kg:
         problems.append(
             Problem(

@@ -9,8 +9,8 @@ from rig.config.models import ArmSection
 from rig.errors import Problem, refuse
 from rig.motion.carried import read_load
 from rig.motion.geometry import DenavitHartenberg, flange_axes
-from rig.motion.model import home_of, model_of
-from rig.motion.preflight import way_to_home
+from rig.motion.model import find_home, model_of
+from rig.motion.preflight import find_travel_to_home
 from rig.motion.state import JOINT_NAMES, TurnerIdentity
 from rig.motion.steps import Plan
 from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, readiness
@@ -69,7 +69,7 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
     too_far = [
         f"{name} {math.degrees(angle):+.0f}°"
         for name, angle, limit in zip(
-            JOINT_NAMES, way_to_home(plan, report.state.q_rad), FIRST_MOTION_LIMIT_RAD, strict=True
+            JOINT_NAMES, find_travel_to_home(plan, report.state.q_rad), FIRST_MOTION_LIMIT_RAD, strict=True
         )
         if abs(angle) > limit
     ]
@@ -118,7 +118,7 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
                 "Enable the primary interface in the arm's security settings, or set arm.kinematics: nominal",
             )
         ]
-    home, model = home_of(arm), model_of(arm)
+    home, model = find_home(arm), model_of(arm)
     actual, nominal = (flange_axes(home, chain)[:, WRISTS] for chain in (report.kinematics, model.drawing))
     angles = np.arctan2(np.linalg.norm(np.cross(actual, nominal, axis=0), axis=0), np.sum(actual * nominal, axis=0))
     return [

@@ -96,7 +96,7 @@ class SimulatedAutopilot:
         for name, value in faults.items():
             setattr(self.faults, name, value)
 
-    def transmitted(self) -> bytes:
+    def take_sent(self) -> bytes:
         """Return the bytes sent since the last call."""
         data = bytes(self._sent)
         self._sent.clear()

@@ -39,7 +39,7 @@ class Device(Protocol):
     def baud_rate(self) -> float | None:
         """The device's baud rate; None while it neither sends nor receives."""
 
-    def transmitted(self) -> bytes: ...
+    def take_sent(self) -> bytes: ...
     def receive(self, data: bytes) -> None: ...
 
 
@@ -68,7 +68,7 @@ class SerialLine:
 
     def tick(self) -> None:
         device = self._device()
-        self.fresh = device.transmitted() if device is not None else b""
+        self.fresh = device.take_sent() if device is not None else b""
         if self.stolen and self.fresh and self._random.random() < self.stolen:
             self.fresh = self.fresh[: int(self._random.integers(len(self.fresh)))]
         if self.bit_error_rate and self.fresh:

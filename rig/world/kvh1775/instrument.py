@@ -93,7 +93,7 @@ class SimulatedKvh1775:
         faults.status = faults.status if status is None else int(status)
         faults.test = faults.test if test is None else int(test)
 
-    def transmitted(self) -> bytes:
+    def take_sent(self) -> bytes:
         """Return the bytes sent since the last call."""
         data = bytes(self._sent)
         self._sent.clear()

@@ -87,7 +87,7 @@ class Printer:
         self.faults.lose += int(lose)
         self.faults.stuck = self.faults.stuck if stuck is None else bool(stuck)
 
-    def transmitted(self) -> bytes:
+    def take_sent(self) -> bytes:
         """Return the bytes sent since the last call."""
         data = bytes(self._sent)
         self._sent.clear()

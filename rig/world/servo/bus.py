@@ -60,7 +60,7 @@ class SimulatedBus:
         """Return the time at which the host gets its next bytes, s; infinity if none are pending."""
         return min((due_s for due_s, _ in self._pending), default=float("inf"))
 
-    def transmitted(self) -> bytes:
+    def take_sent(self) -> bytes:
         """Return the bytes that have reached the host since the last call."""
         now_s = self._now()
         arrived = b"".join(data for due_s, data in self._pending if due_s <= now_s)

@@ -12,7 +12,7 @@ from rig.analysis.gyroscope.onboard_check import agreement, check_observed
 from rig.data.recording.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event, Recorded
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
-from rig.observation.onboard_window import observed_sweeps
+from rig.observation.onboard_window import find_averaged_sweeps
 from rig.observation.windows import swept
 from rig.report.entries.gyroscope import sensor_entry
 from rig.report.terminal.table import print_result
@@ -101,7 +101,7 @@ def test_a_sweep_the_board_missed_is_a_fault_that_a_resumed_run_repeats(run: Run
     missed = with_events(run, [*observed(run, range(5)), BoardNotObserved("gyro", 5, "not_kept: late")])
     with pytest.raises(Fault, match=r"board_missed_sweep: .*gyro, sweep 5: not_kept: late"):
         check_observed(missed, ["gyro"])
-    assert observed_sweeps(missed, ["gyro"]) == {0, 1, 2, 3, 4}
+    assert find_averaged_sweeps(missed, ["gyro"]) == {0, 1, 2, 3, 4}
 
 
 def test_a_resumed_run_recalls_what_was_observed_before(run: RunData) -> None:

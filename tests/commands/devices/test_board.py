@@ -18,7 +18,7 @@ import yaml
 from firmware_host.client import Board, BoardIdentity, SensorInfo
 from firmware_host.parts import BOARD_PARTS, GYROSCOPES, MAGNETOMETERS
 from firmware_host.protocol import FIRMWARE_VERSION
-from rig.board.identify import find_sensor, refuse_other_firmware, stored_calibration
+from rig.board.identify import find_sensor, read_stored_calibration, refuse_other_firmware
 from rig.board.store import calibration_of, store
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.result_file import read_passed_result, read_result, write_result
@@ -256,9 +256,9 @@ def test_a_calibration_of_another_sensor_or_range_corrects_nothing(laboratory: W
             ({"range_deg_s": 500.0}, "another_range", "holds for 245 °/s"),
         ):
             with pytest.raises(Refused) as refusal:
-                stored_calibration(board, "gyro", section.model_copy(update=changes))
+                read_stored_calibration(board, "gyro", section.model_copy(update=changes))
             assert refusal.value.name == name and words in refusal.value.what
-        assert stored_calibration(board, "gyro", section).calibration.scale == pytest.approx(SCALE["gyro"])
+        assert read_stored_calibration(board, "gyro", section).calibration.scale == pytest.approx(SCALE["gyro"])
         board.erase_calibration(0)
 
 

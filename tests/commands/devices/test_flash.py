@@ -44,7 +44,7 @@ class Probe(threading.Thread):
         self._copied = folder / flashing.IMAGE_NAME
 
     def run(self) -> None:
-        size = len(flashing.shipped_image())
+        size = len(flashing.load_shipped_image())
         while not self._copied.exists() or self._copied.stat().st_size < size:
             time.sleep(0.002)
         self.taken = self._copied.read_bytes()
@@ -67,7 +67,7 @@ def rig_board_flash(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_shipped_image_is_of_the_version_the_program_needs() -> None:
-    assert FIRMWARE_VERSION.encode() in flashing.shipped_image()
+    assert FIRMWARE_VERSION.encode() in flashing.load_shipped_image()
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_the_shipped_image_is_of_the_version_the_program_needs() -> None:
     ],
 )
 def test_another_image_is_refused(change: Callable[[bytes], bytes], why: str) -> None:
-    error = refused(lambda: flashing.check_image(change(flashing.shipped_image())))
+    error = refused(lambda: flashing.check_image(change(flashing.load_shipped_image())))
     assert error.name == "bad_image" and why in error.what
 
 
@@ -89,9 +89,9 @@ def test_the_drive_takes_the_image(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
     probe = Probe(nucleo)
     probe.start()
-    flashing.flash_by_drive(flashing.shipped_image(), nucleo)
+    flashing.flash_by_drive(flashing.load_shipped_image(), nucleo)
     probe.join()
-    assert probe.taken == flashing.shipped_image()
+    assert probe.taken == flashing.load_shipped_image()
 
 
 @pytest.mark.slow
@@ -99,27 +99,27 @@ def test_an_earlier_failure_does_not_count(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
     (nucleo / "FAIL.TXT").write_text("of yesterday")
     Probe(nucleo).start()
-    flashing.flash_by_drive(flashing.shipped_image(), nucleo)
+    flashing.flash_by_drive(flashing.load_shipped_image(), nucleo)
 
 
 @pytest.mark.slow
 def test_what_the_board_says_of_its_failure_is_passed_on(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
     Probe(nucleo, "The interface firmware FAILED to reset/halt the target MCU\r\n").start()
-    error = refused(lambda: flashing.flash_by_drive(flashing.shipped_image(), nucleo))
+    error = refused(lambda: flashing.flash_by_drive(flashing.load_shipped_image(), nucleo))
     assert error.name == "flash_failed" and "FAILED to reset/halt" in error.what and "\n" not in str(error)
 
 
 @pytest.mark.slow
 def test_a_board_that_does_not_take_the_image_is_not_taken_for_flashed(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
-    error = refused(lambda: flashing.flash_by_drive(flashing.shipped_image(), nucleo, timeout_s=0.2))
+    error = refused(lambda: flashing.flash_by_drive(flashing.load_shipped_image(), nucleo, timeout_s=0.2))
     assert error.name == "flash_unconfirmed" and "rig board info" in error.remedy
 
 
 def test_a_drive_that_is_full(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
-    image = flashing.shipped_image()
+    image = flashing.load_shipped_image()
     with full_disk(1000):
         error = refused(lambda: flashing.flash_by_drive(image, nucleo))
     assert error.name == "flash_failed" and "File too large" in error.what
@@ -129,11 +129,11 @@ def test_an_image_that_is_not_the_one_it_was_is_refused(monkeypatch: pytest.Monk
     shutil.copytree(IMAGE, tmp_path / "firmware" / "image")
     monkeypatch.setattr("firmware_host.flashing.resources.files", lambda package: tmp_path)
     shipped = tmp_path / "firmware" / "image" / flashing.IMAGE_NAME
-    assert flashing.shipped_image() == shipped.read_bytes()
+    assert flashing.load_shipped_image() == shipped.read_bytes()
     changed = bytearray(shipped.read_bytes())
     changed[5000] ^= 1
     shipped.write_bytes(changed)
-    error = refused(flashing.shipped_image)
+    error = refused(flashing.load_shipped_image)
     assert error.name == "bad_image" and flashing.sha256(bytes(changed)) in error.what
 
 
@@ -145,7 +145,7 @@ def test_a_stick_that_passes_for_a_nucleo_s_drive_is_not_read_or_written_beyond_
     precious.write_text("mine", encoding="utf-8")
     if laid == "link":
         (stick / flashing.IMAGE_NAME).symlink_to(precious)
-        error = refused(lambda: flashing.flash_by_drive(flashing.shipped_image(), stick))
+        error = refused(lambda: flashing.flash_by_drive(flashing.load_shipped_image(), stick))
         assert error.name == "flash_failed" and precious.read_text(encoding="utf-8") == "mine"
         return
     (stick / "MBED.HTM").unlink()
@@ -244,7 +244,7 @@ def test_what_runs_on_the_board_is_stopped_by_a_reset_before_its_flash_is_erased
             chip.contents = file.read()
 
     monkeypatch.setattr("pyocd.flash.file_programmer.FileProgrammer", Programmer)
-    flashing._program(SimpleNamespace(target=chip), flashing.shipped_image())
+    flashing._program(SimpleNamespace(target=chip), flashing.load_shipped_image())
     debug_bits_cleared = "0xe0042004 = 0"
     assert chip.done == ["halted after a reset", "programmed", debug_bits_cleared, "reset"]
 
@@ -253,7 +253,7 @@ def test_what_runs_on_the_board_is_stopped_by_a_reset_before_its_flash_is_erased
 @pytest.mark.parametrize(("kilobytes", "package"), [(128, flashing.UFQFPN32), (256, 0x0B)], ids=["L432KB", "L433CC"])
 def test_another_part_of_the_family_is_refused_before_it_is_touched(kilobytes: int, package: int) -> None:
     chip = Chip(kilobytes, package)
-    error = refused(lambda: flashing._program(SimpleNamespace(target=chip), flashing.shipped_image()))
+    error = refused(lambda: flashing._program(SimpleNamespace(target=chip), flashing.load_shipped_image()))
     assert error.name == "other_microcontroller" and f"{kilobytes} KB" in error.what and chip.done == []
 
 
@@ -275,7 +275,7 @@ def test_no_script_of_the_working_folder_is_executed(monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(tmp_path)
     probe = SimpleNamespace(unique_id="0123", session=None, associated_board_info=None, create_associated_board=None)
     with contextlib.suppress(Exception):  # there is nothing to flash at this probe
-        flashing.flash_by_probe(flashing.shipped_image(), probe)
+        flashing.flash_by_probe(flashing.load_shipped_image(), probe)
     assert probe.session is not None and not (tmp_path / "trace").exists() and Path.cwd() == tmp_path
 
 

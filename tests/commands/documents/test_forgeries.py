@@ -13,7 +13,7 @@ from pyhanko.pdf_utils.generic import StreamObject
 from pyhanko.pdf_utils.writer import PageObject, PdfFileWriter
 
 from rig.report.signatures.reason import Reason
-from rig.report.signatures.signing import signed_pdf, signed_xml
+from rig.report.signatures.signing import sign_as_pades, sign_as_xades
 from support.documents.forged_json import FORGED_JSON, IN_OTHER_BYTES
 from support.documents.forged_pdf import FORGED_PDF, UNTRUSTED_PDF
 from support.documents.forged_xml import FORGED_XML, MOVED_XML
@@ -150,8 +150,8 @@ def signed_by(lab: Laboratory, by: Holder) -> None:
     """Both files anew, as another signs them."""
     root = etree.fromstring(lab.read(XML))
     root.remove(root.find(f"{DS}Signature"))
-    (lab.folder / XML).write_bytes(signed_xml(etree.tostring(root), signing_as(by), Reason("A test")))
-    (lab.folder / PDF).write_bytes(signed_pdf(empty_pdf(), signing_as(by), Reason("A test")))
+    (lab.folder / XML).write_bytes(sign_as_xades(etree.tostring(root), signing_as(by), Reason("A test")))
+    (lab.folder / PDF).write_bytes(sign_as_pades(empty_pdf(), signing_as(by), Reason("A test")))
 
 
 @pytest.mark.one_in(2)
@@ -195,7 +195,7 @@ def test_what_is_signed_must_be_a_certificate_with_one_set_of_results(change: st
         root.insert(2, better_results(root))
     else:
         root.tag = f"{DCC}digitalCalibrationRequest"
-    signed = signed_xml(etree.tostring(root), signing_as(lab.signer), Reason("A test"))
+    signed = sign_as_xades(etree.tostring(root), signing_as(lab.signer), Reason("A test"))
     (lab.folder / XML).write_bytes(signed)
     status, said = lab.verified(XML, history=False)
     assert (status, names_of(said)) == (ALTERED, ["not_as_signed"]) and "one set of results" in said

@@ -13,7 +13,7 @@ from rig.commands.history import command as history_command
 from rig.commands.history.again import again
 from rig.commands.history.again_work import Task
 from rig.data.result_file import ResultDocument
-from rig.history.again.answer import Answer, Given
+from rig.history.again.answer import Answer, RecomputedResult
 from rig.history.store import History, open_history
 from rig.report.kinds.registry import followed
 from support.history.kept_recordings import certified, keep
@@ -180,7 +180,7 @@ def test_an_interrupted_one_is_gone_on_with(history: History) -> None:
             asked.append("interrupted")
             raise KeyboardInterrupt
         asked.append(task.key)
-        return Given("pass", (), followed(runs[task.key].document))
+        return RecomputedResult("pass", (), followed(runs[task.key].document))
 
     parser = argparse.ArgumentParser()
     history_command.add(parser)

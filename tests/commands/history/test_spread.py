@@ -9,7 +9,7 @@ from rig.commands.history.cluster import client_of
 from rig.commands.history.spread import Cluster, Processes, one_by_one, spread
 from rig.data.run_folder import RESULT
 from rig.errors import Fault
-from rig.history.again.answer import Given, Unsolved
+from rig.history.again.answer import RecomputedResult, Unsolved
 from support.history.again_stand_ins import DEADLY, WAITING, deadly, failing, task, told, waiting
 from support.processes.clusters import local_cluster
 
@@ -24,8 +24,8 @@ def test_a_process_that_dies_costs_its_recording_and_no_other(monkeypatch: pytes
         answers = {task.key: answer for task, answer in spread(TASKS, deadly, hands)}
     assert isinstance(lost := answers.pop(DEADLY), Unsolved) and lost.state == "lost"
     assert sorted(answers) == sorted(set(NAMES) - {DEADLY})
-    assert all(isinstance(each, Given) and each.verdict == key for key, each in answers.items())
-    workers = {each.failed for each in answers.values() if isinstance(each, Given)}
+    assert all(isinstance(each, RecomputedResult) and each.verdict == key for key, each in answers.items())
+    workers = {each.failed for each in answers.values() if isinstance(each, RecomputedResult)}
     assert {threads for _, threads in workers} == {"1"}
     assert str(os.getpid()) not in {number for number, _ in workers}
 
@@ -33,7 +33,7 @@ def test_a_process_that_dies_costs_its_recording_and_no_other(monkeypatch: pytes
 def test_a_defect_at_one_recording_costs_no_other_here() -> None:
     answers = {task.key: answer for task, answer in one_by_one(TASKS, failing)}
     assert answers.pop(DEADLY) == Unsolved("failed", "ZeroDivisionError: a defect")
-    assert all(isinstance(each, Given) for each in answers.values()) and len(answers) == len(NAMES) - 1
+    assert all(isinstance(each, RecomputedResult) for each in answers.values()) and len(answers) == len(NAMES) - 1
 
 
 @pytest.mark.thorough
@@ -51,8 +51,8 @@ def test_workers_of_a_cluster_work_in_processes_of_their_own_and_one_that_dies_c
                 (tmp_path / RESULT).touch()
                 killed = True
     assert sorted(answers) == sorted(each.key for each in tasks)
-    assert all(isinstance(each, Given) and each.verdict == key for key, each in answers.items())
-    workers = {each.failed for each in answers.values() if isinstance(each, Given)}
+    assert all(isinstance(each, RecomputedResult) and each.verdict == key for key, each in answers.items())
+    workers = {each.failed for each in answers.values() if isinstance(each, RecomputedResult)}
     assert str(os.getpid()) not in {number for number, _ in workers} and {threads for _, threads in workers} == {"1"}
 
 

@@ -24,7 +24,7 @@ def run(source: str, folder: Path, duration_s: float = 0.02) -> bytes:
     """What a tiny image sends in `duration_s`."""
     board = tiny_firmware.board(source, folder)
     board.advance(duration_s)
-    return board.transmitted()
+    return board.take_sent()
 
 
 def failure(source: str, folder: Path) -> BoardError:
@@ -107,7 +107,7 @@ def test_bytes_come_at_the_pace_of_the_line() -> None:
     arrivals_s: list[float] = []
     for step in range(1, 2000):
         board.advance(session.time_s + step * tick_s)
-        arrivals_s += [step * tick_s] * len(board.transmitted())
+        arrivals_s += [step * tick_s] * len(board.take_sent())
     assert len(arrivals_s) > 40
     assert arrivals_s[0] > (len(encode("hello", 1)) + 1) * byte_s, "the answer cannot come before the question is over"
     np.testing.assert_allclose(np.diff(arrivals_s), byte_s, atol=1.1 * tick_s)
@@ -401,7 +401,7 @@ def test_a_byte_that_arrives_is_an_interrupt(tmp_path: Path) -> None:
     board.advance(0.001)
     board.receive(b"HAL")
     board.advance(0.002)
-    assert board.transmitted() == b"IBM"
+    assert board.take_sent() == b"IBM"
 
 
 def test_instructions_take_a_cycle_each_and_every_line_of_the_flash_its_wait_states(tmp_path: Path) -> None:
@@ -499,7 +499,7 @@ def test_the_wrong_spi_mode_is_refused(tmp_path: Path) -> None:
 def test_a_part_is_deselected_only_when_the_last_bit_is_over(tmp_path: Path) -> None:
     board = board_with_gyro(_ASK_THE_GYRO.format(control=_MODE_3_AT_625_KHZ, after=_AWAIT_QUIET), tmp_path)
     board.advance(0.001)
-    assert board.transmitted() == bytes([WHO_AM_I])
+    assert board.take_sent() == bytes([WHO_AM_I])
     board = board_with_gyro(_ASK_THE_GYRO.format(control=_MODE_3_AT_625_KHZ, after=""), tmp_path)
     with pytest.raises(BoardError) as caught:  # all bits are in, but the last one has half its time to go
         board.advance(0.001)

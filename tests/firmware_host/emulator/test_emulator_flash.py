@@ -58,7 +58,7 @@ class Chip:
         """Power up for so long. Returns what the program sent."""
         board = self.power_up()
         board.advance(duration_s)
-        return board.transmitted()
+        return board.take_sent()
 
     def power_up(self) -> EmulatedBoard:
         return tiny_firmware.power_up(self.flash, self.elf)
@@ -114,9 +114,9 @@ def test_the_core_stands_still_while_the_flash_works(tmp_path: Path) -> None:
         outside="volatile uint32_t ticks; void systick(void) { ticks++; }",
     ).power_up()
     board.advance(0.021)
-    assert board.transmitted() == b""
+    assert board.take_sent() == b""
     board.advance(0.030)
-    erase_us, interrupts, program_us = words(board.transmitted())
+    erase_us, interrupts, program_us = words(board.take_sent())
     assert erase_us == pytest.approx(22020, abs=5)
     assert interrupts == 1
     assert program_us == pytest.approx(82, abs=3)
@@ -187,7 +187,7 @@ def test_a_power_cut_leaves_an_operation_undone_or_torn(
     board = one.power_up()
     board.advance(0.1)
     assert not board.powered
-    assert board.transmitted() == b""
+    assert board.take_sent() == b""
     assert one.flash.torn == {STORE_OFFSET + offset for offset in torn_bytes}
     if content is not None:
         assert one.flash.data[STORE_OFFSET : STORE_OFFSET + 16] == content

@@ -37,7 +37,7 @@ def run(
     flash.flags_lost = flags_lost
     board = tiny_firmware.power_up(flash, elf)
     board.advance(0.1)
-    return list(board.transmitted()), flash
+    return list(board.take_sent()), flash
 
 
 def test_a_doubleword_is_programmed_once_after_an_erase_and_a_refusal_is_told_and_forgotten(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from firmware_host.emulator.chip.gpio import Port
-from firmware_host.hand_answers import HandReport, HandSolved
+from firmware_host.hand_answers import BoardHandSolution, HandReport
 from rig.analysis.by_hand.on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, compare_with_board
 from rig.errors import Fault
 from rig.world.hand.habits import Action, FlipAction, Mistake, MistakeKind, TurnAction
@@ -223,14 +223,14 @@ def test_the_button_sets_a_gyroscope_up_starts_it_and_begins_a_session() -> None
 
 def test_what_was_found_alone_stays_until_the_next_session() -> None:
     board = handled_alone(twelve())
-    kept = HandSolved.decode(asked(board, "hand_solve"))
+    kept = BoardHandSolution.decode(asked(board, "hand_solve"))
     assert (kept.state, kept.taken, kept.sensor, kept.range_deg_s) == ("done", 12, 0, 500.0)
     assert kept.temperature_c == 25.0, "the middle of the part's scale, as was given"
     assert 1e-5 < kept.scale_std < 1e-3
     board.ask("stop", 2)
     configured(board, 0, 119.0, 245.0)
     configured(board, 1, 200.0, 250.0)
-    assert HandSolved.decode(asked(board, "hand_solve")) == kept
+    assert BoardHandSolution.decode(asked(board, "hand_solve")) == kept
     pressed(board, 100_000_000)
     assert state_of(board) == "starting"
 

@@ -18,12 +18,12 @@ from pyhanko.sign.validation.dss import DocumentSecurityStore
 from pyhanko_certvalidator import ValidationContext
 
 from rig.errors import Refused
-from rig.report.signatures.findings import Looked
-from rig.report.signatures.inspection import looked_at
-from rig.report.signatures.long_term import authorities_in
+from rig.report.signatures.findings import FileInspection
+from rig.report.signatures.inspection import inspect_file
+from rig.report.signatures.long_term import read_authorities
 from rig.report.signatures.reason import Reason
 from rig.report.signatures.signatory import signatory
-from rig.report.signatures.signing import signed_pdf
+from rig.report.signatures.signing import sign_as_pades
 from rig.report.signatures.trust import Trust
 from support.documents.signing import PASSPHRASE, Holder, holder, revocation_list, stamping, time_server
 from support.processes.waiting import PATIENCE_S
@@ -47,7 +47,7 @@ class Signing:
         file = self.folder / "authority.pem"
         file.write_bytes(b"".join((*lists, self.authority.certificates())))
         with signatory(str(self.key)) as by:
-            return signed_pdf(page(), by, Reason("A test"), self.time_server, authorities_in([file]))
+            return sign_as_pades(page(), by, Reason("A test"), self.time_server, read_authorities([file]))
 
 
 @pytest.fixture
@@ -69,8 +69,8 @@ def page() -> bytes:
     return out.getvalue()
 
 
-def seen(pdf: bytes, trust: list[bytes]) -> Looked:
-    return looked_at("certificate.pdf", pdf, Trust(tuple(trust)))
+def seen(pdf: bytes, trust: list[bytes]) -> FileInspection:
+    return inspect_file("certificate.pdf", pdf, Trust(tuple(trust)))
 
 
 @pytest.mark.slow
@@ -129,4 +129,4 @@ def test_what_no_list_clears_is_not_signed(signing: Signing) -> None:
 def test_a_file_that_is_no_list_is_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "odd.crl").write_bytes(b"no list")
     with pytest.raises(Refused, match=r"revocation_list.*odd\.crl"):
-        authorities_in([tmp_path / "odd.crl"])
+        read_authorities([tmp_path / "odd.crl"])

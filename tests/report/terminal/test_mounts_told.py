@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Console
 
 from rig.data.result_file import MountEntry, ResultDocument, write_result
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.terminal.ending import ending
 from rig.report.terminal.table import print_values
@@ -62,7 +62,7 @@ def test_certificates_tell_every_stage() -> None:
 
 def test_the_page_tells_every_stage(tmp_path: Path) -> None:
     write_result(in_stages(), tmp_path)
-    shown = Shown(ABOUT)
+    shown = PageState(ABOUT)
     shown.take(DocumentWritten(tmp_path / "result.json"))
     assert shown.sections["mounts"] == TOLD
 
@@ -71,6 +71,6 @@ def test_of_an_item_that_stayed_nothing_is_said(tmp_path: Path) -> None:
     found = compared(result())
     assert "mounted in" not in read(certificate(found)).text
     write_result(found, tmp_path)
-    shown = Shown(ABOUT)
+    shown = PageState(ABOUT)
     shown.take(DocumentWritten(tmp_path / "result.json"))
     assert shown.sections["mounts"] == []

@@ -10,7 +10,7 @@ import pytest
 from rig.config.ranges import ModelName
 from rig.data.recording.run_file import read_run
 from rig.motion.geometry import lengths_m
-from rig.motion.model import turner_model
+from rig.motion.model import load_turner_model
 from support.laboratories.hidden_results import Judged, solved
 from support.laboratories.hidden_worlds import MORE_ARMS, OTHER_ARMS, WORLDS, first_seed, recorded
 
@@ -50,7 +50,7 @@ def _calibrates(model: ModelName, tmp_path: Path) -> None:
     assert f"Universal Robots {NAMED[model]}" in certificate
     assert "UR10e" in NAMED[model] or "UR10e" not in certificate
     measured = read_run(run / "run.h5")
-    row = turner_model(model)
+    row = load_turner_model(model)
     assert measured.turner is not None
     assert lengths_m(measured.turner.geometry) == pytest.approx(lengths_m(row.drawing), abs=5e-3)
     rate_hz = 1 / np.median(np.diff(measured.states["time_s"]))

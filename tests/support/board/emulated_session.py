@@ -109,7 +109,7 @@ class Session:
         for _ in range(round(duration_s / self._tick_s)):
             self.time_s += self._tick_s
             self.board.advance(self.time_s)
-            data = self.board.transmitted()
+            data = self.board.take_sent()
             self.sent += data
             self._frames += self.reader.feed(data)
         assert self.reader.damaged == 0

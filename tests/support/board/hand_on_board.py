@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from firmware_host.frames import Frame
-from firmware_host.hand_answers import HandReport, HandSolved
+from firmware_host.hand_answers import BoardHandSolution, HandReport
 from rig.analysis.by_hand.on_board import BoardReadings, HandAgreement, compare_with_board
 from rig.estimation.arrays import Array
 from support.board.host_board import HostBoard, configured
@@ -34,7 +34,7 @@ class Played:
     times_us: np.ndarray
     rates: Array
     reports: list[HandReport]
-    solved: HandSolved
+    solved: BoardHandSolution
 
     @property
     def outcomes(self) -> list[str]:
@@ -102,7 +102,7 @@ def play(recorded: Recorded, moves: int = 12, scale_std: float = 1e-3, number: n
             report = HandReport.decode(asked(board, "hand_status"))
             if report.judged > len(reports):
                 reports.append(report)
-    solved = HandSolved.decode(asked(board, "hand_solve"))
+    solved = BoardHandSolution.decode(asked(board, "hand_solve"))
     return Played(times_us, counts * setup["sensitivity_rad_s"], reports, solved)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rig.data.result_file import write_result
-from rig.history.entered.finished import finished_run
+from rig.history.entered.finished import read_finished_run
 from rig.history.store import open_history
 from support.documents.certified import result
 from support.documents.signing import PASSPHRASE, Holder, holder, stamping, time_server
@@ -69,7 +69,7 @@ def signed_laboratory(base: Path) -> Iterator[Laboratory]:
     demo = (CONFIGS / "demo.yaml").read_text(encoding="utf-8")
     (folder / "config.yaml").write_text(f"{demo}site: {{country: DE, laboratory: Ours}}\n", encoding="utf-8")
     with open_history(str(history)) as opened:
-        opened.enter(finished_run(folder))
+        opened.enter(read_finished_run(folder))
     authority = holder("Authority")
     signer = holder("Laboratory", authority)
     (base / "root.pem").write_bytes(authority.certificates())

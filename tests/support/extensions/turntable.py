@@ -18,7 +18,7 @@ from rig.analysis.outcome import Origin
 from rig.config.section import Direction
 from rig.data.meaning import Meaning
 from rig.errors import Problem
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import Joints, Row, StateField, TurnerIdentity
 from rig.motion.steps import Motion, progress, travel
@@ -111,7 +111,7 @@ class Turntable:
     def check(self) -> None:
         """Nothing goes wrong with it."""
 
-    def take_control(self, carried: Carried) -> None:
+    def take_control(self, carried: FlangeLoad) -> None:
         """It is ready at once."""
         self._held = True
 
@@ -164,7 +164,7 @@ KIND = TurnerKind(
     problems=problems,
     describe_configured=lambda section: TurnerIdentity("Toys", None, GEOMETRY),
     describe_connected=lambda section, report: TurnerIdentity("Toys", report.model, GEOMETRY),
-    carried=lambda section: Carried(0.0),
+    carried=lambda section: FlangeLoad(0.0),
     words=Wording(
         name="turntable",
         short="table",

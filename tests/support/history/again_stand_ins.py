@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rig.commands.history.again_work import Task
 from rig.data.run_folder import RESULT
-from rig.history.again.answer import Answer, Given
+from rig.history.again.answer import Answer, RecomputedResult
 
 DEADLY, WAITING = "deadly", "waiting"
 
@@ -19,7 +19,7 @@ def task(key: str, *places: Path) -> Task:
 
 def told(task: Task) -> Answer:
     """An answer at once: what the worker is, and how many threads its linear algebra may have."""
-    return Given(task.key, (str(os.getpid()), os.environ.get("OPENBLAS_NUM_THREADS", "")), ())
+    return RecomputedResult(task.key, (str(os.getpid()), os.environ.get("OPENBLAS_NUM_THREADS", "")), ())
 
 
 def deadly(task: Task) -> Answer:

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from rig.data.result_file import ResultDocument
-from rig.history.entered.finished import Finished, compact, finished_run
+from rig.history.entered.finished import Finished, compact, read_finished_run
 from rig.history.entered.issued import Issued
 from rig.history.store import History
 from support.paths import RECORDINGS
@@ -20,7 +20,7 @@ Change = Callable[[ResultDocument], ResultDocument]
 def keep(history: History, folder: Path, of: Path = CALIBRATION, change: Change | None = None) -> Finished:
     """Copy recordings to `folder` and enter the result beside them, changed if so, as if begun a day after the last."""
     shutil.copytree(of, folder)
-    run = finished_run(folder)
+    run = read_finished_run(folder)
     document = _later(run.document, len(list(history.kept())))
     document = document if change is None else change(document)
     run = replace(run, document=document, text=compact(json.loads(document.text())), certificate=None)

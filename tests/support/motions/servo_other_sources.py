@@ -62,7 +62,7 @@ def by_lines(
                 listening.wait(PATIENCE_S)
             time_s += CHUNK_S
             printer.advance(time_s)
-            yield printer.transmitted()
+            yield printer.take_sent()
         ended.set()
 
     taken = _Taken()

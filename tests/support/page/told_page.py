@@ -15,7 +15,7 @@ from selenium.webdriver import Chrome
 
 from rig.motion.state import ArmState, RuntimeState
 from rig.page.about import About
-from rig.page.page_state import Shown
+from rig.page.page_state import PageState
 from rig.page.rows import Look
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
@@ -109,7 +109,7 @@ def showing(
     driver: Chrome, folder: Path, *, token: bool = True, may_answer: bool = True, about: About = ABOUT
 ) -> Iterator[Telling]:
     """A page that has been loaded and told nothing yet."""
-    feed = Feed(Shown(replace(about, may_answer=may_answer)))
+    feed = Feed(PageState(replace(about, may_answer=may_answer)))
     with serving(feed, Control(may_answer=may_answer), folder, Address(port=0)) as url:
         driver.get(url if token else url.split("#")[0])
         telling = Telling(driver, feed)
@@ -124,7 +124,7 @@ def showing(
 
 def main() -> None:
     """Serve a page, print its address, and tell of movements without an end."""
-    feed = Feed(Shown(ABOUT))
+    feed = Feed(PageState(ABOUT))
     with (
         tempfile.TemporaryDirectory() as folder,
         serving(feed, Control(may_answer=False), Path(folder), Address(port=0)) as url,

@@ -5,14 +5,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Transfer, trapezoid_duration
 from rig.turners.servo.driver import Servo
 from support.processes.yoked_clock import YokedClock
 from support.wires.servo_on_a_wire import ServoOnAWire
 
 MODEL = "xm430_w350"
-BOARD = Carried(0.05)
+BOARD = FlangeLoad(0.05)
 PATIENT_S = 2.0  # a watchdog for tests that are not about it
 STANDS_RAD_S = 1e-9
 

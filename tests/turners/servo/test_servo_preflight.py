@@ -8,7 +8,7 @@ import serial
 
 from rig.config.procedures.servo_section import ServoSection
 from rig.errors import Refused
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Plan, Transfer
 from rig.turners.servo.driver import Servo
 from rig.turners.servo.kind import SERVO
@@ -90,7 +90,7 @@ def test_a_port_that_is_not_there_is_refused_by_name(tmp_path: Path) -> None:
 def test_a_board_too_far_from_the_shaft_is_refused() -> None:
     with servo_on_a_wire() as wire, Servo(wire.port, MODEL, clock=wire.clock) as servo:
         report = servo.report()
-    heavy = Carried(1.0, (0.1, 0.0, 0.0))
+    heavy = FlangeLoad(1.0, (0.1, 0.0, 0.0))
     assert [each.name for each in servo_problems(report, MODEL, heavy, 0.1)] == ["servo_load"]
     assert servo_problems(report, MODEL, replace(heavy, centre_m=(0.0, 0.0, 0.1)), 0.1) == []
     held_fast = replace(report, torque_on=True, operating_mode=3)

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from rig.errors import Fault, Refused
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.state import ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration
 from rig.turners.ur.driver import Arm, look
@@ -23,7 +23,7 @@ from support.processes.waiting import wait_for
 
 pytestmark = pytest.mark.slow
 
-PAYLOAD = Carried(0.35, (0.0, 0.0, 0.025))
+PAYLOAD = FlangeLoad(0.35, (0.0, 0.0, 0.025))
 WRIST_3 = 5
 API_PORT = 8077
 X: dict[str, Any] = {"arm": {"robot_api_port": API_PORT}, "world": {"arm": {"polyscope": "10.14.0.0"}}}

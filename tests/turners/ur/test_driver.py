@@ -23,7 +23,7 @@ import pytest
 from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.motion.state import ARM_STATE_DTYPE, ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration
 from rig.plans.motions.six_sweeps import plan_six_observation
@@ -38,7 +38,7 @@ from support.wires.ur10e import plan_problems
 
 pytestmark = pytest.mark.slow
 
-PAYLOAD = Carried(0.35, (0.0, 0.0, 0.025))
+PAYLOAD = FlangeLoad(0.35, (0.0, 0.0, 0.025))
 WRIST_3 = 5
 SLOW = 0.5  # … of a real laboratory's pace
 

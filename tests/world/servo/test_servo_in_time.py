@@ -177,6 +177,6 @@ def test_an_ftdi_converter_hands_on_in_lumps_of_16_ms() -> None:
     clock[0] = 0.017
     bus.receive(encode(1, 0x01))
     clock[0] = 0.0319
-    assert bus.transmitted() == b""
+    assert bus.take_sent() == b""
     clock[0] = 0.0321
-    assert bus.transmitted() == encode_status(1, 0, (1020).to_bytes(2, "little") + b"\x30")
+    assert bus.take_sent() == encode_status(1, 0, (1020).to_bytes(2, "little") + b"\x30")
