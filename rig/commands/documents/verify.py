@@ -13,7 +13,7 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.report.signatures.findings import SignatureReport
+    from rig.report.signatures.findings import FileInspection, SignatureReport
 
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
