@@ -7,7 +7,7 @@ from svg import Drawing, Point
 
 from rig.config.sensors.sensor_sections import MountingSection, mounting_matrix
 from rig.motion.geometry import flange_attitude
-from rig.motion.model import turner_model
+from rig.motion.model import load_turner_model
 
 RED, GREEN, BLUE = "#c62828", "#2e7d32", "#1565c0"  # x, y, z
 NAMES = ("x", "y", "z")
@@ -97,7 +97,7 @@ def mounting() -> Drawing:
 
 def home() -> Drawing:
     """The usual home pose from the side, with the flange's axes: how to find them without a drawing of the flange."""
-    q = np.array(turner_model("ur10e").home_rad)
+    q = np.array(load_turner_model("ur10e").home_rad)
     attitude = flange_attitude(q)  # columns: the flange's axes in the base's frame
     drawing = Drawing(760, 470, "The flange's axes at the usual home pose")
     drawing.words((380, 30), "the usual home pose, from the side", size=18, anchor="middle", bold=True)

@@ -223,7 +223,7 @@ def test_what_is_no_history_is_not_made_one(tmp_path: Path) -> None:
         pass
     words = tmp_path / "words.txt"
     words.write_text("no database at all, but long enough to be looked at\n" * 100, encoding="utf-8")
-    with pytest.raises(Refused, match=r"not_a_history: .*no database"), open_history(str(words)):
+    with pytest.raises(Refused, match=r"not_a_history: .*not an SQLite database"), open_history(str(words)):
         pass
 
 
