@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import rig
-from rig.report.exports.calibrations import Calibrations, calibrations
+from rig.report.exports.calibrations import ExportedCalibrations, calibrations
 
 
-def toml_files(found: Calibrations) -> Mapping[str, str]:
+def toml_files(found: ExportedCalibrations) -> Mapping[str, str]:
     """Return the texts by name of the file; a file says its convention, and what it cannot hold."""
     lines = ["# corrected = matrix @ (reading - offset), SI units. Lost: uncertainties, second order, g-sensitivity."]
     for sensor in found.sensors:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.history.entered.finished import Finished, read_finished_run
+from rig.history.entered.finished import FinishedRun, read_finished_run
 from rig.history.store import History, Selection, open_history
 
 ROOT = Path(__file__).parents[2]
@@ -46,7 +46,7 @@ print(between_s - began_s, time.perf_counter() - between_s)
 """
 
 
-def runs(count: int) -> list[Finished]:
+def runs(count: int) -> list[FinishedRun]:
     """`count` runs of `count / OF_EACH` sensors, taken in turn."""
     first = read_finished_run(FIXTURE)
     (sensor,) = first.document.gyroscopes.values()

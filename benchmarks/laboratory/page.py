@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 from rig.page.page_state import PageState
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
-from rig.page.server.serving import Address, serving
+from rig.page.server.serving import PageAddress, serving
 from rig.station.events import RunEvent
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
@@ -84,7 +84,7 @@ def with_page(seconds: float, reading: int, stalled: int) -> tuple[float, float,
         feed.event(event)
     with (
         tempfile.TemporaryDirectory() as folder,
-        serving(feed, Control(may_answer=False), Path(folder), Address(port=0)) as url,
+        serving(feed, Control(may_answer=False), Path(folder), PageAddress(port=0)) as url,
     ):
         browsers = [spawning.Process(target=browser, args=(url, frames), daemon=True) for _ in range(reading)]
         for process in browsers:

@@ -79,7 +79,7 @@ Entry = Begun | PartBegun | PartEnded | BatchEnded
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class BatchPart:
     """A part of the batch: its serial number, its run's folder, its outcome (None: not yet)."""
 
     number: int
@@ -99,11 +99,11 @@ class Batch:
     """All parts so far, in their order; the last may be in work."""
 
     begun: Begun
-    parts: tuple[Part, ...] = ()
+    parts: tuple[BatchPart, ...] = ()
     ended_utc: str | None = None
 
     @property
-    def in_hand(self) -> Part | None:
+    def in_hand(self) -> BatchPart | None:
         """The part that was begun and has not ended."""
         return self.parts[-1] if self.parts and self.parts[-1].ended is None else None
 
@@ -117,11 +117,11 @@ class Batch:
         newest = (self.done(serial) for serial in {part.serial for part in self.parts})
         return all(part is not None and part.state == "pass" for part in newest)
 
-    def done(self, serial: str) -> Part | None:
+    def done(self, serial: str) -> BatchPart | None:
         """Return the newest run of that number with a verdict."""
         return next((part for part in reversed(self.parts) if part.serial == serial and _has_verdict(part)), None)
 
-    def same_chip(self, chip: Chip, serial: str) -> Part | None:
+    def same_chip(self, chip: Chip, serial: str) -> BatchPart | None:
         """Return the part with a verdict and another number that had this chip."""
         for part in reversed(self.parts):
             earlier = part.ended.chip if part.ended is not None and _has_verdict(part) else None
@@ -150,7 +150,7 @@ def after(batch: Batch | None, entry: Entry) -> Batch:
         case Begun() if batch is None:
             return Batch(entry)
         case PartBegun() if batch is not None and batch.in_hand is None:
-            part = Part(len(batch.parts) + 1, entry.serial, entry.folder, entry.at_utc)
+            part = BatchPart(len(batch.parts) + 1, entry.serial, entry.folder, entry.at_utc)
             return replace(batch, parts=(*batch.parts, part), ended_utc=None)
         case PartEnded() if batch is not None and batch.in_hand is not None:
             return replace(batch, parts=(*batch.parts[:-1], replace(batch.in_hand, ended=entry)))
@@ -185,5 +185,5 @@ def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable
     return None
 
 
-def _has_verdict(part: Part) -> bool:
+def _has_verdict(part: BatchPart) -> bool:
     return part.state in ("pass", "fail")

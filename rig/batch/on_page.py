@@ -16,7 +16,7 @@ from rig.page.server.application import acting, body_of
 from rig.page.server.control import Control
 from rig.page.server.guard import Door
 from rig.page.server.sections import Sections
-from rig.page.server.serving import Address, Page, serving
+from rig.page.server.serving import Page, PageAddress, serving
 
 LONGEST = 200  # characters of an answer
 LOOK_S = 0.5  # between two tests whether the page still exists
@@ -86,7 +86,7 @@ class OnPage:
 
 
 @contextmanager
-def on_page(present: Present, address: Address) -> Iterator[tuple[OnPage, str]]:
+def on_page(present: Present, address: PageAddress) -> Iterator[tuple[OnPage, str]]:
     """Open the page of what is `present`, for the length of the `with` block; yield it and its URL.
 
     Its last state shows how the station ended. Raise Refused `page_address`.

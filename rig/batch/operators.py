@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from rig.batch.batch import Doubt, Part
+from rig.batch.batch import BatchPart, Doubt
 from rig.batch.series import following
 from rig.errors import Refused, RigError
 from rig.errors.quoting import printable_lines
@@ -71,14 +71,14 @@ class Operator:
         """Whether the numbers come from a list."""
         return self.numbers is not None
 
-    def next_part(self, done: Sequence[Part], why: str = "") -> str | None:
+    def next_part(self, done: Sequence[BatchPart], why: str = "") -> str | None:
         """Return the next number of the list, or a typed one; `why` explains the refusal of the last one."""
         if self.numbers is not None:
             return following(self.numbers, [part.serial for part in done])
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"
         return self._answer("number", text, *([f"{why}."] if why else [])) or None
 
-    def is_mounted(self, part: Part) -> bool:
+    def is_mounted(self, part: BatchPart) -> bool:
         """Ask whether the part is mounted; "no" puts it aside."""
         text = f"{part.serial}: mount it, plug in its board, step back; then Enter (no: put it aside):"
         with self._asking("to mount the part"):
@@ -91,7 +91,7 @@ class Operator:
         with self._asking("whether to continue anyway"):
             return self._agrees("doubt", "Continue anyway? yes or no:", f"{doubt.why}.")
 
-    def tries_again(self, part: Part, error: RigError) -> bool:
+    def tries_again(self, part: BatchPart, error: RigError) -> bool:
         """Ask whether a part that was refused, or ended in a fault, is tried again; "no" puts it aside."""
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
@@ -101,7 +101,7 @@ class Operator:
             return self.voice is None or self._agrees("go", f"Type go to {to_do}:", *announcement)
         return self.voice is None or self._agrees("doubt", f"Type yes to {to_do}, or no:", *announcement)
 
-    def hears(self, part: Part) -> None:
+    def hears(self, part: BatchPart) -> None:
         """Print a part's outcome on stdout, one line each."""
         ended = part.ended
         if ended is None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from rig.batch import label, table
-from rig.batch.batch import Batch, BatchEnded, Chip, Doubt, Entry, Outcome, Part, PartBegun, PartEnded, doubt_of
+from rig.batch.batch import Batch, BatchEnded, BatchPart, Chip, Doubt, Entry, Outcome, PartBegun, PartEnded, doubt_of
 from rig.batch.journal import Journal
 from rig.batch.operators import Operator
 from rig.config.files.written_file import write_new
@@ -36,7 +36,7 @@ class Bench(Protocol):
         """Exchange the part, if a simulated operator does that."""
         ...
 
-    def run(self, part: Part, folder: Path, desk: "Desk") -> PartEnded:
+    def run(self, part: BatchPart, folder: Path, desk: "Desk") -> PartEnded:
         """Run the part, or continue the run in its folder. Raise Refused if nothing has moved, Fault."""
         ...
 
@@ -46,7 +46,7 @@ class Desk:
     """The questions of a run to the station before its arm moves."""
 
     work: "Work"
-    part: Part
+    part: BatchPart
 
     def agrees(self, announcement: Sequence[str], to_do: str, chip: Chip | None) -> bool:
         """Return whether the run may do that. Raise Refused `same_chip`."""
@@ -78,7 +78,7 @@ class Work:
         self._enter(BatchEnded(now_utc()))
         self._write_table()
 
-    def _begin_next(self) -> Part | None:
+    def _begin_next(self) -> BatchPart | None:
         """Enter and return the next part; None if none follows."""
         why = ""
         while (serial := self.operator.next_part(self.journal.batch.parts, why)) is not None:
@@ -93,7 +93,7 @@ class Work:
                 self._end_part(PartEnded("refused", now_utc(), doubt.why))
         return None
 
-    def _carry_out(self, part: Part) -> None:
+    def _carry_out(self, part: BatchPart) -> None:
         while True:
             try:
                 if not self.operator.is_mounted(part):
@@ -107,7 +107,7 @@ class Work:
                     outcome: Outcome = "refused" if isinstance(error, Refused) else "fault"
                     return self._end_part(PartEnded(outcome, now_utc(), f"{error.name}: {error.what}"))
 
-    def refuse_same_chip(self, part: Part, chip: Chip) -> None:
+    def refuse_same_chip(self, part: BatchPart, chip: Chip) -> None:
         """Raise Refused `same_chip` if another number had this chip, unless the operator confirms it."""
         if not self.section.own_board:
             return
@@ -133,7 +133,7 @@ class Work:
         self._write_table()
         self.operator.hears(self.journal.batch.parts[-1])
 
-    def _write_label(self, part: Part, ended: PartEnded) -> None:
+    def _write_label(self, part: BatchPart, ended: PartEnded) -> None:
         marks = "SIMULATED, NOT A MEASUREMENT" if self.bench.simulated else ""
         part_label = label.Label(part.serial, part.begun_utc[:10], ended.certificate, marks)
         folder = self.journal.folder / LABELS

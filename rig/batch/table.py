@@ -4,7 +4,7 @@ import csv
 from collections.abc import Iterator
 from io import StringIO
 
-from rig.batch.batch import Batch, Part
+from rig.batch.batch import Batch, BatchPart
 
 CSV, PAGE = "batch.csv", "batch.html"
 COLUMNS = (
@@ -69,7 +69,7 @@ def page_of(batch: Batch, *, simulated: bool) -> str:
     return template.render(batch=batch, title=title, summary=summary(batch), simulated=simulated)
 
 
-def _cells(part: Part) -> Iterator[str]:
+def _cells(part: BatchPart) -> Iterator[str]:
     ended = part.ended
     yield from (str(part.number), part.serial, part.state)
     if ended is None:

@@ -18,7 +18,7 @@ from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     from rig.page.about import About
-    from rig.page.server.serving import Address
+    from rig.page.server.serving import PageAddress
     from rig.station.events import RunEvent
     from rig.station.station import Listener
 
@@ -35,16 +35,16 @@ class PageWish:
     token: str | None = None
     may_answer: bool = False
 
-    def address(self) -> "Address":
+    def address(self) -> "PageAddress":
         """Raises Refused `page_address`."""
-        from rig.page.server.serving import ADDRESS, Address
+        from rig.page.server.serving import ADDRESS, PageAddress
 
         host, colon, port = (self.place or ADDRESS).rpartition(":")
         if not colon or (host.count(":") and not host.endswith("]")):  # no port, or an IPv6 address alone
             host, port = self.place or ADDRESS, ""
         if port and not (port.isascii() and port.isdecimal() and int(port) < 65536):
             raise Refused("page_address", f"{port!r} is no port", "Give --page-address ADDRESS:PORT")
-        return Address(host.strip("[]"), int(port) if port else None, self.token)
+        return PageAddress(host.strip("[]"), int(port) if port else None, self.token)
 
 
 @dataclass(frozen=True, slots=True)

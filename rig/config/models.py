@@ -29,7 +29,7 @@ from rig.config.section import (
     check_host,
     check_port,
 )
-from rig.config.sensors.link_budget import Stream, over_budget
+from rig.config.sensors.link_budget import LinkLoad, over_budget
 from rig.config.sensors.mavlink_section import autopilots_over_budget
 from rig.config.sensors.sensor_catalogue import MAGNETOMETERS
 from rig.config.sensors.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection
@@ -300,7 +300,7 @@ class SensorsConfig(Section):
             return magnetometers
         if info.data["board"] is None:
             raise ValueError(f"the board reads {' and '.join(magnetometers)}, but there is no section board")
-        fields = {name: Stream(m.rate_hz, calibrated=False, field=True) for name, m in magnetometers.items()}
+        fields = {name: LinkLoad(m.rate_hz, calibrated=False, field=True) for name, m in magnetometers.items()}
         _refuse_more_than_the_link_carries(info.data["board"], _streams(sensors) | fields)
         return magnetometers
 
@@ -353,15 +353,15 @@ def _bundled_names(sensors: Mapping[str, SensorSection]) -> list[str]:
     return [bundled for name, sensor in sensors.items() for bundled in sensor.brings(name)]
 
 
-def _streams(sensors: Mapping[str, SensorSection]) -> dict[str, Stream]:
+def _streams(sensors: Mapping[str, SensorSection]) -> dict[str, LinkLoad]:
     return {
-        name: Stream(s.rate_hz, calibrated=s.role == "calibrate", acceleration=s.acceleration is not None)
+        name: LinkLoad(s.rate_hz, calibrated=s.role == "calibrate", acceleration=s.acceleration is not None)
         for name, s in sensors.items()
         if s.on_board
     }
 
 
-def _refuse_more_than_the_link_carries(board: BoardSection, streams: Mapping[str, Stream]) -> None:
+def _refuse_more_than_the_link_carries(board: BoardSection, streams: Mapping[str, LinkLoad]) -> None:
     problem = over_budget(streams, board.baud)
     if problem is not None:
         raise ValueError(problem)

@@ -16,7 +16,7 @@ MINUTE_S: Final = 60.0  # √(3600 s): from √s to √h
 
 
 @dataclass(frozen=True, slots=True)
-class Unit:
+class DisplayUnit:
     """A unit that numbers are shown in, and its `size` in SI."""
 
     name: str
@@ -52,14 +52,14 @@ class Quantity:
     sensor: str
     unit: str
     suffix: str
-    reading: Unit
-    bias: Unit
+    reading: DisplayUnit
+    bias: DisplayUnit
     decimals: int
-    drift: Unit
-    residuals: tuple[Unit, ...]
+    drift: DisplayUnit
+    residuals: tuple[DisplayUnit, ...]
     walk: str
     walk_suffix: str
-    walk_unit: Unit
+    walk_unit: DisplayUnit
     steady: float
     d_si: str
     towards: str = "the reference"
@@ -120,7 +120,7 @@ class Scalar:
     sensor: str
     unit: str
     suffix: str
-    reading: Unit
+    reading: DisplayUnit
 
     def named(self, what: str) -> str:
         """Return the name in a file of `what` in this quantity's unit: `pressure_pa`."""
@@ -142,14 +142,14 @@ RATE: Final = Quantity(
     sensor="gyroscope",
     unit="rad/s",
     suffix="rad_s",
-    reading=Unit("°/s", pi / 180),
-    bias=Unit("rad/s", 1.0),
+    reading=DisplayUnit("°/s", pi / 180),
+    bias=DisplayUnit("rad/s", 1.0),
     decimals=5,  # a MEMS gyroscope's uncertainty
-    drift=Unit("°/h", DEG_H),
-    residuals=(Unit("mrad/s", 1e-3), Unit("µrad/s", 1e-6)),
+    drift=DisplayUnit("°/h", DEG_H),
+    residuals=(DisplayUnit("mrad/s", 1e-3), DisplayUnit("µrad/s", 1e-6)),
     walk="angle random walk",
     walk_suffix="rad_sqrt_s",
-    walk_unit=Unit("°/√h", pi / 180 / MINUTE_S),
+    walk_unit=DisplayUnit("°/√h", pi / 180 / MINUTE_S),
     steady=5e-3,
     d_si=r"\radian\second\tothe{-1}",
     mistaken=Mistaken("°/s", "numpy.radians(readings)", 400.0),
@@ -160,14 +160,14 @@ ACCELERATION: Final = Quantity(
     sensor="accelerometer",
     unit="m/s²",
     suffix="m_s2",
-    reading=Unit("m/s²", 1.0),
-    bias=Unit("m/s²", 1.0),
+    reading=DisplayUnit("m/s²", 1.0),
+    bias=DisplayUnit("m/s²", 1.0),
     decimals=5,
-    drift=Unit("µg", MICRO_G_M_S2),
-    residuals=(Unit("m/s²", 1.0), Unit("mm/s²", 1e-3), Unit("µm/s²", 1e-6)),
+    drift=DisplayUnit("µg", MICRO_G_M_S2),
+    residuals=(DisplayUnit("m/s²", 1.0), DisplayUnit("mm/s²", 1e-3), DisplayUnit("µm/s²", 1e-6)),
     walk="velocity random walk",
     walk_suffix="m_s_sqrt_s",
-    walk_unit=Unit("m/s/√h", 1 / MINUTE_S),
+    walk_unit=DisplayUnit("m/s/√h", 1 / MINUTE_S),
     steady=0.05,
     d_si=r"\metre\second\tothe{-2}",
     towards="up",
@@ -178,22 +178,22 @@ FIELD: Final = Quantity(
     sensor="magnetometer",
     unit="T",
     suffix="t",
-    reading=Unit("µT", 1e-6),
-    bias=Unit("µT", 1e-6),
+    reading=DisplayUnit("µT", 1e-6),
+    bias=DisplayUnit("µT", 1e-6),
     decimals=3,
-    drift=Unit("nT", 1e-9),
-    residuals=(Unit("µT", 1e-6), Unit("nT", 1e-9)),
+    drift=DisplayUnit("nT", 1e-9),
+    residuals=(DisplayUnit("µT", 1e-6), DisplayUnit("nT", 1e-9)),
     walk="white noise",
     walk_suffix="t_sqrt_s",
-    walk_unit=Unit("nT √s", 1e-9),
+    walk_unit=DisplayUnit("nT √s", 1e-9),
     steady=2e-6,
     d_si=r"\tesla",
     towards="the field",
     mistaken=Mistaken("µT or gauss", "1e-6 * readings for readings in µT, 1e-4 for gauss", 0.1),
 )
 OF_THE_RIG: Final = (RATE, ACCELERATION, FIELD)
-TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", Unit("°C", 1.0))
-PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", Unit("hPa", 100.0))
+TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", DisplayUnit("°C", 1.0))
+PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", DisplayUnit("hPa", 100.0))
 SCALARS: Final = (TEMPERATURE, PRESSURE)
 
 

@@ -14,7 +14,7 @@ KINDS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class CatalogueEntry:
     """An error's name, one of `KINDS`, a clause on when it occurs, and one on what to do."""
 
     name: str
@@ -23,7 +23,7 @@ class Entry:
     remedy: str
 
 
-def catalogue() -> tuple[Entry, ...]:
+def catalogue() -> tuple[CatalogueEntry, ...]:
     """Return the table in its order. Raise ValueError for a line not of the form `name | kind | when | remedy`."""
     entries = []
     for number, line in enumerate(TABLE.read_text(encoding="utf-8").splitlines(), 1):
@@ -32,5 +32,5 @@ def catalogue() -> tuple[Entry, ...]:
         cells = line.split(" | ")
         if len(cells) != 4 or cells[1] not in KINDS:
             raise ValueError(f"{TABLE.name}, line {number}: not `name | {' or '.join(KINDS)} | when | what to do`")
-        entries.append(Entry(*cells))
+        entries.append(CatalogueEntry(*cells))
     return tuple(entries)

@@ -18,7 +18,7 @@ from rig.data.run_folder import RESULT
 from rig.errors import Refused
 from rig.history.entered import certificates
 from rig.history.entered.entering import enter_run, note_place, now_utc
-from rig.history.entered.finished import Finished, Recording
+from rig.history.entered.finished import EnteredRecording, FinishedRun
 from rig.history.entered.issued import Issued
 from rig.history.storage import journal, numbers, read_back, schema, triggers
 from rig.history.storage.address import HistoryAddress, resolve_address
@@ -98,7 +98,7 @@ class Kept:
     run_id: int
     content_sha256: str
     result: str
-    recordings: tuple[Recording, ...]
+    recordings: tuple[EnteredRecording, ...]
     places: tuple[tuple[str, str], ...]
     certificates: tuple[Issued, ...]
     documents: tuple[tuple[str, str], ...]
@@ -133,7 +133,7 @@ class History:
     address: HistoryAddress
     engine: Engine
 
-    def enter(self, finished: Finished) -> Entered:
+    def enter(self, finished: FinishedRun) -> Entered:
         """Add a run; for one that the history already has, add only a new location of its folder.
 
         The result is not compared with its recordings: `rig history import` does that. Raise Refused `entry_not_kept`.
@@ -314,7 +314,7 @@ def _kept(connection: Connection, number: int) -> Kept:
         number,
         row["content_sha256"],
         row["result"],
-        tuple(Recording(*row) for row in connection.execute(recorded)),
+        tuple(EnteredRecording(*row) for row in connection.execute(recorded)),
         tuple((computer, path) for computer, path in connection.execute(locations)),
         certificates.of_run(connection, number),
         tuple((name, sha256) for name, sha256 in connection.execute(documented)),

@@ -18,7 +18,7 @@ from rig.notebook.html import table
 from rig.observation.average import synchronize_stream
 from rig.observation.motion.arm_motion import motion_of
 from rig.observation.observed_run import one_clock, times_s
-from rig.observation.windows import Finished, Window, swept
+from rig.observation.windows import FinishedSweep, Window, swept
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -187,7 +187,7 @@ class Readings:
         )
 
     @cached_property
-    def _finished_sweeps(self) -> Sequence[Finished]:
+    def _finished_sweeps(self) -> Sequence[FinishedSweep]:
         return [finished for run in self.recordings for finished in swept(run)]
 
     @property

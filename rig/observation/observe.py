@@ -33,7 +33,7 @@ from rig.observation.statistics.lines import BEATS, harmonics
 from rig.observation.stuck_check import check_dwells, check_other_direction, check_rests
 from rig.observation.timebase import TimeBase
 from rig.observation.turn_mean import SampledTurn, turn_mean
-from rig.observation.windows import Finished, Window, swept
+from rig.observation.windows import FinishedSweep, Window, swept
 
 ABOUT_ALL_AXES = 0.05  # least singular value, relative to the design's norm, from which a response is fitted
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds one count
@@ -152,7 +152,7 @@ def check_response(run: RunData, rests: Sequence[Average], dwells: Sequence[Dwel
 
 
 def _observe_revolution(
-    run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: ArmMotion, finished: FinishedSweep, settings: ObservationThresholds
 ) -> Observation:
     turn = motion.turn(finished.sweep, finished.window, settings)
     observation = _average_revolution(stream, motion, finished.sweep, turn, settings)

@@ -36,7 +36,7 @@ def inside(time_s: Array, window: Window) -> slice:
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
+class FinishedSweep:
     """A sweep that was started and finished, and its window."""
 
     sweep: Sweep
@@ -51,10 +51,10 @@ class Dwelt:
     window: Window
 
 
-def swept(run: RunData) -> Iterator[Finished]:
+def swept(run: RunData) -> Iterator[FinishedSweep]:
     """Yield the sweeps that were started and finished, in order; interrupted ones are left out."""
     for event, window in _pair_events(run, SweepStarted, SweepFinished):
-        yield Finished(event.sweep, window)
+        yield FinishedSweep(event.sweep, window)
 
 
 def rested(run: RunData, superseded: Collection[int] = ()) -> Iterator[Window]:

@@ -14,7 +14,7 @@ Values = Mapping[str, tuple[float, ...]]  # by the name of a line, such as "gyro
 
 
 @dataclass(slots=True)
-class History:
+class PageHistory:
     """Points in their order, counted from the first: a browser gets only those that it lacks."""
 
     first: int = 0

@@ -6,7 +6,7 @@ from typing import Any
 
 from rig.analysis.check import Check
 from rig.data.installed_kinds import measured
-from rig.data.quantity import TEMPERATURE, Quantity, Scalar, Unit, select_displayed
+from rig.data.quantity import TEMPERATURE, DisplayUnit, Quantity, Scalar, select_displayed
 from rig.data.recording.events import BoardNotObserved, BoardObserved
 from rig.data.recording.hand_events import (
     HandAsked,
@@ -23,7 +23,7 @@ from rig.motion.steps import Dwell, Rest, Step, Sweep
 from rig.page import by_hand
 from rig.page.about import About
 from rig.page.arm import connected, geometry, stance
-from rig.page.history import History, round_digits
+from rig.page.history import PageHistory, round_digits
 from rig.page.outcome import after_fault, after_verdict, outcome_rows, since_rows
 from rig.page.rows import Look, dwell_row, observation_row, parameter_rows, projection
 from rig.report.words.mounts import mount_lines
@@ -87,7 +87,7 @@ class PageState:
             "next": None,
             "ended": None,
         }
-        self.history = History()
+        self.history = PageHistory()
         self._changed: set[str] = set(self._sections)
         self._about, self._parts = about, about.parts
         self._checks: list[Check] = []
@@ -281,7 +281,7 @@ class PageState:
             )
 
 
-def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, Unit]]:
+def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, DisplayUnit]]:
     """Yield the quantities of a sensor, and the unit in which they are shown: that of its bias."""
     by_name = measured()
     for quantity in (by_name[name] for name in select_displayed(sensor.latest)):

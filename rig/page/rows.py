@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rig.analysis.partial_results import SoFar, Turned
-from rig.data.quantity import RATE, Unit
+from rig.data.quantity import RATE, DisplayUnit
 from rig.data.result_file import ResultDocument
 from rig.errors.attempts import Attempts
 from rig.estimation.arrays import Array
@@ -124,7 +124,7 @@ def _row(shown: DisplayRow) -> Row:
     return {**row, "labels": list(shown.labels), "missing": None}
 
 
-def _row_of(name: str, unit: Unit, bias: AxisValues | None, scale: AxisValues | None, *, contents: str) -> Row:
+def _row_of(name: str, unit: DisplayUnit, bias: AxisValues | None, scale: AxisValues | None, *, contents: str) -> Row:
     row: Row = {"sensor": name, "labels": list(RATE.axes), "unit": unit.name, "of": contents}
     for key, three in (("scale", scale), ("bias", bias)):
         row[key] = None if three is None else [float(value) for value in three.values]  # rounded on the screen

@@ -27,7 +27,7 @@ def plan_by_hand(
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedMoves:
     """The list of a session: its numbers of flips between faces and of whole turns."""
 
     flips: int
@@ -61,7 +61,7 @@ class Open:
         return not self.turns and (not self.pairs or (self.flips == 0 and not self.faces))
 
 
-def still_open(wanted: Wanted, moves: Sequence[HandMove], faces_up: Sequence[Face]) -> Open:
+def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequence[Face]) -> Open:
     """Return the remainder of a list after these moves; `faces_up` lay up at rest."""
     pairs, turns, flips = list(wanted.pairs), list(wanted.about), wanted.flips
     for move in moves:
@@ -91,7 +91,7 @@ def next_instruction(remaining: Open, face: Face | None) -> Instruction | None:
     return Instruction("lay", next(iter([*firsts, *remaining.faces, *(_side(axis) for axis, _ in remaining.turns)])))
 
 
-def simulate_session(wanted: Wanted) -> Iterator[Instruction]:
+def simulate_session(wanted: WantedMoves) -> Iterator[Instruction]:
     """Yield the requests to an operator who follows all of them and begins with +z up."""
     moves, faces_up = list[HandMove](), list[Face](["+z"])
     while (instruction := next_instruction(still_open(wanted, moves, faces_up), faces_up[-1])) is not None:

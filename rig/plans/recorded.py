@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from rig.analysis.outcome import Outcome
-from rig.data.processes.reading_process import Reading
+from rig.data.processes.reading_process import ReadingTask
 from rig.data.recording.run_file import RunData, read_run
 from rig.data.run_folder import SCRIPT, recordings
 from rig.errors import Refused
@@ -51,7 +51,7 @@ def open_run(
     script: Path | None = None,
     *,
     only: Container[str] | None = None,
-    begun: Mapping[Path, Reading] = MappingProxyType({}),
+    begun: Mapping[Path, ReadingTask] = MappingProxyType({}),
 ) -> RecordedRun:
     """Return the recordings in a run folder, or a run file; `script` is executed, if it is named.
 

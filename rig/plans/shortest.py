@@ -38,7 +38,7 @@ from rig.estimation.by_hand.solution import LINES, REAL_HANDS
 from rig.estimation.gyroscope.budget import FLICKER, NOISE, STATES, WANDERING
 from rig.motion.by_hand import Instruction
 from rig.motion.steps import Plan
-from rig.plans.by_hand import Wanted as Asked
+from rig.plans.by_hand import WantedMoves as Asked
 from rig.plans.by_hand import simulate_session
 from rig.plans.phase import turner_for
 from rig.plans.registry import installed

@@ -24,7 +24,7 @@ from rig.errors import Refused
 from rig.motion.state import Report, TurnerIdentity
 from rig.motion.steps import Plan
 from rig.observation.by_hand.runs import collect_inputs
-from rig.plans.motions.temperature_course import Course
+from rig.plans.motions.temperature_course import TemperatureCourse
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
@@ -247,7 +247,7 @@ class Connector:
             names=tuple(self.loaded.config.to_calibrate),
             heater=board.board if board is not None and section.heater_power > 0 else None,
             set_s=(whole_plan.duration_s - sum(each.duration_s for each in whole_plan.waits)) / section.repeats,
-            course=Course(
+            course=TemperatureCourse(
                 section.from_c,
                 section.to_c,
                 section.max_step_k,

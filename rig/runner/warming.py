@@ -18,7 +18,7 @@ from rig.data.quantity import TEMPERATURE
 from rig.data.recording.events import Event
 from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
 from rig.errors import Fault, ProblemError, Refused
-from rig.plans.motions.temperature_course import Course, Ramp
+from rig.plans.motions.temperature_course import Ramp, TemperatureCourse
 from rig.runner.acquisition import Acquisition
 
 LOOK_S = 0.25  # between two looks, and two words to the heater
@@ -44,7 +44,7 @@ class Warming:
     names: tuple[str, ...]
     heater: Board | None
     set_s: float
-    course: Course
+    course: TemperatureCourse
     _seen: dict[str, deque[tuple[float, float]]] = field(default_factory=dict)
     _of_set: list[dict[str, float]] | None = None  # temperatures, since a set began
     _began_s: float = 0.0  # the set

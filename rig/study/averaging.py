@@ -13,7 +13,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.six_observation import design
 from rig.study import simulation as sim
-from rig.study.report import Finding, Report, Settings, table
+from rig.study.report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ NOISES_RAD_S = (0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.15, 0.2)
 ORDERS = ("mean_then_square", "square_then_mean")
 
 
-def study(settings: Settings) -> Report:
+def study(settings: Settings) -> StudyReport:
     """Simulate 30 gyroscopes × 500 runs at each noise level, 60°/s, 200 Hz."""
     task = partial(_simulate_gyroscope, settings.runs or sim.RUNS)
     errors = np.concatenate(run_parallel(task, range(sim.SETS), settings), axis=2)  # (noises, orders, all runs, 6)
@@ -39,14 +39,14 @@ def study(settings: Settings) -> Report:
         for o, order in enumerate(ORDERS)
     ]
     findings = tuple(
-        Finding(
+        StudyFinding(
             f"mean error of the scale factor, {row['order']}, noise {noise:g} rad/s", row["scale_bias_percent"], "%"
         )
         for noise in sim.NOISE_LEVELS_RAD_S
         for row in rows
         if row["noise_rad_s"] == noise
     )
-    return Report(table(rows), findings, partial(_draw, rows), (10.0, 5.0))
+    return StudyReport(table(rows), findings, partial(_draw, rows), (10.0, 5.0))
 
 
 def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:

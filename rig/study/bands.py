@@ -11,7 +11,7 @@ from rig.estimation.gyroscope.batch import algorithm_1_batch
 from rig.estimation.gyroscope.levenberg_marquardt import solve_levenberg_marquardt
 from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.study import simulation as sim
-from rig.study.report import Finding, Report, Settings, table
+from rig.study.report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
@@ -46,17 +46,17 @@ def _list_conditions() -> list[_Condition]:
     return [_Condition(speed, noise, *kind) for speed in SPEEDS for noise in sim.NOISE_LEVELS_RAD_S for kind in kinds]
 
 
-def normal(settings: Settings) -> Report:
+def normal(settings: Settings) -> StudyReport:
     """Reproduce Fig. 2: scale factors U(0.8, 1.2), biases U(−0.1, 0.1) rad/s."""
     return _study(sim.NORMAL, settings)
 
 
-def extreme(settings: Settings) -> Report:
+def extreme(settings: Settings) -> StudyReport:
     """Reproduce Fig. 5: scale factors U(1.2, 2), biases ±U(0.1, 0.2) rad/s."""
     return _study(sim.EXTREME, settings)
 
 
-def _study(population: sim.Population, settings: Settings) -> Report:
+def _study(population: sim.Population, settings: Settings) -> StudyReport:
     task = partial(_simulate_gyroscope, population, settings.runs or sim.RUNS)
     errors = np.concatenate(run_parallel(task, range(sim.SETS), settings), axis=1)  # (conditions, all runs, 6)
     rows = [
@@ -74,7 +74,7 @@ def _study(population: sim.Population, settings: Settings) -> Report:
         for column, parameter in enumerate(PARAMETERS)
     ]
     columns = table(rows)
-    return Report(columns, _findings(rows), partial(_draw, population, rows), (12.0, 8.0))
+    return StudyReport(columns, _findings(rows), partial(_draw, population, rows), (12.0, 8.0))
 
 
 def _simulate_gyroscope(population: sim.Population, runs: int, rng: np.random.Generator, _: int) -> Array:
@@ -95,12 +95,12 @@ def _simulate_gyroscope(population: sim.Population, runs: int, rng: np.random.Ge
     return np.array(errors)
 
 
-def _solve_algorithm_1(means: Array, sweep: sim.Sweep) -> Array:
+def _solve_algorithm_1(means: Array, sweep: sim.SimulatedSweep) -> Array:
     solved = algorithm_1_batch(means, sweep.speed_rad_s)
     return np.concatenate([solved.scale, solved.bias_rad_s], axis=-1)
 
 
-def _solve_levenberg_marquardt(means: Array, sweep: sim.Sweep) -> Array:
+def _solve_levenberg_marquardt(means: Array, sweep: sim.SimulatedSweep) -> Array:
     speeds, variances = np.full(6, sweep.speed_rad_s), np.full((6, 3), sweep.variance_rad2_s2)
     solved = [solve_levenberg_marquardt(mean, speeds, variances, weighted=False) for mean in means]
     return np.array([np.concatenate([solution.scale, solution.bias_rad_s]) for solution in solved])
@@ -121,7 +121,7 @@ def _summarise(errors: Array) -> dict[str, float]:
     }
 
 
-def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
+def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
     findings = []
     for condition in _list_conditions():
         if condition.estimator != "algorithm_1":
@@ -130,7 +130,7 @@ def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
             group_rows = [row for row in _select(rows, condition) if row["parameter"].startswith(first)]
             band = np.mean([(row["whisker_high"] - row["whisker_low"]) / 2 for row in group_rows])
             name = f"{group} band, {condition.speed}, noise {condition.noise_rad_s:g} rad/s, {condition.vibration}"
-            findings.append(Finding(name, float(band), unit, group_rows[0]["published_band"]))
+            findings.append(StudyFinding(name, float(band), unit, group_rows[0]["published_band"]))
     ratios = [
         abs(a["std"] - b["std"]) / a["std"]
         for speed in SPEEDS
@@ -141,7 +141,9 @@ def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
             strict=True,
         )
     ]
-    findings.append(Finding("largest difference of std, Algorithm 1 and Levenberg–Marquardt", max(ratios), "relative"))
+    findings.append(
+        StudyFinding("largest difference of std, Algorithm 1 and Levenberg–Marquardt", max(ratios), "relative")
+    )
     return tuple(findings)
 
 

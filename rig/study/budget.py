@@ -21,7 +21,7 @@ from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.estimation.gyroscope.vector_fit import Seen, centripetal_m_s2, explain
 from rig.estimation.gyroscope.vector_model import solve_vector_model
 from rig.estimation.statistics.bias_process import flicker_covariance
-from rig.study.report import Finding, Report, Settings, table
+from rig.study.report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Session:
     joints: tuple[str | None, ...]
 
 
-def study(settings: Settings) -> Report:
+def study(settings: Settings) -> StudyReport:
     """Find the coverage of ± 2 u, and the RMS of error over standard uncertainty, with and without the remedies."""
     ratios = errors(Effects(), settings)
     rows = [
@@ -92,7 +92,7 @@ def study(settings: Settings) -> Report:
         for variant, remedies in enumerate(("with", "without"))
         for p, parameter in enumerate(PARAMETERS)
     ]
-    return Report(table(rows), _findings(rows), partial(_draw, rows), (8.0, 4.5))
+    return StudyReport(table(rows), _findings(rows), partial(_draw, rows), (8.0, 4.5))
 
 
 def errors(effects: Effects, settings: Settings) -> Array:
@@ -254,9 +254,9 @@ def _draw_random_walk(rng: np.random.Generator, windows_s: Array, rate: float) -
     return np.array([walk[mask].mean(axis=0) for mask in inside]), walk.mean(axis=0)
 
 
-def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
+def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
     return tuple(
-        Finding(f"± 2 u covers {row['parameter']}, {row['remedies']} the remedies", row["coverage_percent"], "%")
+        StudyFinding(f"± 2 u covers {row['parameter']}, {row['remedies']} the remedies", row["coverage_percent"], "%")
         for row in rows
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.batch import algorithm_1_batch, newton_batch
 from rig.study import simulation as sim
-from rig.study.report import Finding, Report, Settings, table
+from rig.study.report import Settings, StudyFinding, StudyReport, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,7 +70,7 @@ FOUR_DECIMALS = 5e-5
 RATIOS = np.round(np.concatenate([np.arange(0.02, 0.48, 0.02), np.arange(0.48, 0.5301, 0.004), [0.7, 2, 8, 32]]), 3)
 
 
-def study(settings: Settings) -> Report:
+def study(settings: Settings) -> StudyReport:
     """Show the estimators' convergence without noise, hence without random numbers: `settings` have no effect."""
     rows = []
     for name, example in TABLE_I.items():
@@ -78,7 +78,7 @@ def study(settings: Settings) -> Report:
             rows += _build_rows(name, np.array([example.scale]), np.array([example.bias_rad_s]), speed)
     growing = np.repeat(sim.ARM_RAD_S * np.sqrt(RATIOS / 3)[:, None], 3, axis=1)
     rows += _build_rows("growing bias", np.ones_like(growing), growing, sim.ARM_RAD_S)
-    return Report(table(rows), _findings(rows), partial(_draw, rows), (10.0, 5.0))
+    return StudyReport(table(rows), _findings(rows), partial(_draw, rows), (10.0, 5.0))
 
 
 def _build_rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: float) -> list[dict[str, Any]]:
@@ -109,20 +109,22 @@ def _count_passes(scale: float, ratio: float) -> int | None:
     return None if factor == 1 else int(np.ceil(np.log(2 * FOUR_DECIMALS / scale) / np.log(factor)))
 
 
-def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
+def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
     findings = []
     for name, example in TABLE_I.items():
-        findings.append(Finding(f"speed that the first pass implies, {name}", example.speed_rad_s, "rad/s"))
+        findings.append(StudyFinding(f"speed that the first pass implies, {name}", example.speed_rad_s, "rad/s"))
         for row in rows:
             if row["example"] == name and row["speed_rad_s"] == example.speed_rad_s:
                 passes = row["algorithm_1_passes_to_four_decimals"]
-                findings.append(Finding(f"passes to four decimals at that speed, {name}", passes, "1", example.passes))
-                findings.append(Finding(f"passes to Σ|Δβ| ≤ 1e-6, {name}", row["algorithm_1_passes"], "1"))
+                findings.append(
+                    StudyFinding(f"passes to four decimals at that speed, {name}", passes, "1", example.passes)
+                )
+                findings.append(StudyFinding(f"passes to Σ|Δβ| ≤ 1e-6, {name}", row["algorithm_1_passes"], "1"))
     growing = [row for row in rows if row["example"] == "growing bias"]
     last = max(row["beta0_over_speed_squared"] for row in growing if row["algorithm_1_converged"])
     worst = max(row["newton_largest_error"] for row in growing)
-    findings.append(Finding("largest β0/ω² at which Algorithm 1 converges", last, "1", 0.5))
-    findings.append(Finding("largest error of the closed form, β0/ω² up to 32", worst, "1 or rad/s"))
+    findings.append(StudyFinding("largest β0/ω² at which Algorithm 1 converges", last, "1", 0.5))
+    findings.append(StudyFinding("largest error of the closed form, β0/ω² up to 32", worst, "1 or rad/s"))
     return tuple(findings)
 
 

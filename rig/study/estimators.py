@@ -20,7 +20,7 @@ from rig.estimation.reference.reference_model import KnownNorm, KnownVector
 from rig.estimation.reference.triaxial import EqualWeights, solve_triaxial_batch
 from rig.study import rate_table as rt
 from rig.study import simulation as sim
-from rig.study.report import Finding, Report, Settings, table
+from rig.study.report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
@@ -34,14 +34,14 @@ METHODS: tuple[EqualWeights, ...] = ("as_published", "maximum_likelihood")
 TABLE_POSES = 40
 
 
-def study(settings: Settings) -> Report:
+def study(settings: Settings) -> StudyReport:
     """Simulate 30 mounted gyroscopes × 500 runs at each speed; tri-axial ones with 30 × 500 runs in 40 poses."""
     runs = settings.runs or sim.RUNS
     ratios = run_parallel(partial(_simulate_gyroscope, runs), range(sim.SETS), settings)
     rows = list(_gyroscope_rows(np.mean(ratios, axis=0)))
     errors = run_parallel(partial(_simulate_rate_table, runs), range(sim.SETS), settings)
     rows += list(_rate_table_rows({name: np.mean([run[name] for run in errors], axis=0) for name in errors[0]}))
-    return Report(table(rows), _findings(rows), partial(_draw, rows), (12.0, 6.0))
+    return StudyReport(table(rows), _findings(rows), partial(_draw, rows), (12.0, 6.0))
 
 
 def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
@@ -153,20 +153,20 @@ def _row(estimator: str, parameter: str, ratio: float, square: float) -> dict[st
     }
 
 
-def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
+def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
     def mean(estimator: str, first: str, column: str) -> float:
         chosen = [row[column] for row in rows if row["estimator"] == estimator and row["parameter"].startswith(first)]
         return float(np.mean(chosen))
 
     findings = [
-        Finding(f"MSE/bound, mean over parameters: {estimator}", mean(estimator, "", "mse_over_bound"), "1")
+        StudyFinding(f"MSE/bound, mean over parameters: {estimator}", mean(estimator, "", "mse_over_bound"), "1")
         for estimator in dict.fromkeys(row["estimator"] for row in rows)
     ]
     for speed in SPEEDS:
         published, ours = f"Algorithm 1, {speed}", f"vector model with rests, {speed}"
         for name, first in (("bias", "b"), ("scale", "k")):
             ratio = mean(published, first, "mse_si_units_squared") / mean(ours, first, "mse_si_units_squared")
-            findings.append(Finding(f"{name} MSE, Algorithm 1 over vector model with rests, {speed}", ratio, "1"))
+            findings.append(StudyFinding(f"{name} MSE, Algorithm 1 over vector model with rests, {speed}", ratio, "1"))
     return tuple(findings)
 
 

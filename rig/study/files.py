@@ -10,13 +10,13 @@ import numpy as np
 
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
-from rig.study.report import Columns, Finding, Report, table
+from rig.study.report import Columns, StudyFinding, StudyReport, table
 from rig.study.style import use_style
 
 Format = Literal["csv", "parquet"]
 
 
-def write(report: Report, folder: Path, name: str, table_format: Format) -> tuple[Path, ...]:
+def write(report: StudyReport, folder: Path, name: str, table_format: Format) -> tuple[Path, ...]:
     """Write `name`.csv (or .parquet), `name`-findings.csv, `name`.svg and `name`.png, replacing earlier ones.
 
     Raise Refused `study_folder`, `missing_extra`.
@@ -54,7 +54,7 @@ def _remove_incomplete(path: Path) -> Iterator[None]:
         raise Refused("study_folder", problem, "Choose another with --out") from error
 
 
-def _findings(findings: Sequence[Finding]) -> Columns:
+def _findings(findings: Sequence[StudyFinding]) -> Columns:
     return table(
         {
             "quantity": finding.quantity,
@@ -90,7 +90,7 @@ def _write_parquet(columns: Columns, path: Path) -> None:
     pyarrow.parquet.write_table(pyarrow.table(dict(columns)), path)
 
 
-def _write_plots(report: Report, paths: Sequence[Path]) -> None:
+def _write_plots(report: StudyReport, paths: Sequence[Path]) -> None:
     from matplotlib.figure import Figure
 
     with use_style():

@@ -9,7 +9,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import TriaxialSolution, solve_triaxial
 from rig.study import rate_table as rt
-from rig.study.report import Finding, Report, Settings, table
+from rig.study.report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ PARAMETERS = {
 }
 
 
-def study(settings: Settings) -> Report:
+def study(settings: Settings) -> StudyReport:
     """Simulate a calibration from 24 attitudes at rest, 500 times, and ten repeats of ten attitudes."""
     runs = range(settings.runs or RUNS)
     solved = run_parallel(_calibrate, runs, settings)
@@ -44,17 +44,23 @@ def study(settings: Settings) -> Report:
     sample_noise = rt.ACCELEROMETER_RANDOM_WALK * np.sqrt(rt.RATE_HZ) / rt.MG
     drift = _simulate_drift(settings.seed)
     findings = (
-        Finding("largest residual std, with second-order terms", float(residuals[:, 0].mean()), "mg", 0.3901),
-        Finding("largest mean residual of an attitude, with second-order terms", float(residuals[:, 1].mean()), "mg"),
-        Finding("largest mean residual of an attitude, first order only", float(residuals[:, 2].mean()), "mg"),
-        Finding("noise of a sample at 25 Hz by the specified random walk", float(sample_noise), "mg", 0.3901),
-        Finding("largest error of F", float(np.abs(estimates[0, :9] - TRUTH[:9]).max()), "1"),
-        Finding("largest error of the bias", float(np.abs(estimates[0, 12:15] - TRUTH[12:15]).max() / rt.MG), "mg"),
-        Finding("norm of gravity", float(np.linalg.norm(estimates[0, 9:12])), "m/s²", rt.GRAVITY_M_S2),
-        Finding("RMS error of the drifting bias, F and reference held", rt.rms_drift_error(drift, "held", "mg"), "mg"),
-        Finding("RMS error of the drifting bias, everything anew", rt.rms_drift_error(drift, "free", "mg"), "mg"),
+        StudyFinding("largest residual std, with second-order terms", float(residuals[:, 0].mean()), "mg", 0.3901),
+        StudyFinding(
+            "largest mean residual of an attitude, with second-order terms", float(residuals[:, 1].mean()), "mg"
+        ),
+        StudyFinding("largest mean residual of an attitude, first order only", float(residuals[:, 2].mean()), "mg"),
+        StudyFinding("noise of a sample at 25 Hz by the specified random walk", float(sample_noise), "mg", 0.3901),
+        StudyFinding("largest error of F", float(np.abs(estimates[0, :9] - TRUTH[:9]).max()), "1"),
+        StudyFinding(
+            "largest error of the bias", float(np.abs(estimates[0, 12:15] - TRUTH[12:15]).max() / rt.MG), "mg"
+        ),
+        StudyFinding("norm of gravity", float(np.linalg.norm(estimates[0, 9:12])), "m/s²", rt.GRAVITY_M_S2),
+        StudyFinding(
+            "RMS error of the drifting bias, F and reference held", rt.rms_drift_error(drift, "held", "mg"), "mg"
+        ),
+        StudyFinding("RMS error of the drifting bias, everything anew", rt.rms_drift_error(drift, "free", "mg"), "mg"),
     )
-    return Report(table(rows), findings, partial(_draw, rows, drift), (12.0, 5.0))
+    return StudyReport(table(rows), findings, partial(_draw, rows, drift), (12.0, 5.0))
 
 
 def _calibrate(rng: np.random.Generator, _: int) -> tuple[Array, Array, Array]:

@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.reference_model import KnownVector
 from rig.estimation.reference.triaxial import solve_triaxial
 from rig.study import rate_table as rt
-from rig.study.report import Finding, Report, Settings, table
+from rig.study.report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ PARAMETERS = {
 }
 
 
-def study(settings: Settings) -> Report:
+def study(settings: Settings) -> StudyReport:
     """Simulate the calibration in oscillation, 20 times at either noise, and ten repeats of ten attitudes at rest."""
     rows: list[dict[str, Any]] = []
     findings = []
@@ -47,23 +47,25 @@ def study(settings: Settings) -> Report:
         residual = np.degrees(np.max([residual for _, _, residual in solved]))
         norm_std = float(norms.std(ddof=1))
         findings += [
-            Finding(f"largest residual std, {kind}", float(residual), "deg/s", 0.0475),
-            Finding(f"norm of the Earth's rate, {kind}, mean", float(norms.mean()), "deg/h", 15.4035),
-            Finding(f"norm of the Earth's rate, {kind}, std of one calibration", norm_std, "deg/h"),
-            Finding(f"largest error of F, {kind}", float(np.abs(estimates[0, :9] - TRUTH[:9]).max()), "1"),
+            StudyFinding(f"largest residual std, {kind}", float(residual), "deg/s", 0.0475),
+            StudyFinding(f"norm of the Earth's rate, {kind}, mean", float(norms.mean()), "deg/h", 15.4035),
+            StudyFinding(f"norm of the Earth's rate, {kind}, std of one calibration", norm_std, "deg/h"),
+            StudyFinding(f"largest error of F, {kind}", float(np.abs(estimates[0, :9] - TRUTH[:9]).max()), "1"),
         ]
     true_norm = rt.EARTH_RATE_RAD_S / rt.DEG_H
     printed = float(np.linalg.norm(rt.GYRO_REFERENCE_RAD_S)) / rt.DEG_H
     drift = _simulate_drift(settings.seed)
     findings += [
-        Finding("printed Earth rate against 7.2921159e-5 rad/s", 100 * (printed / true_norm - 1), "%", 2.69),
-        Finding("printed Earth rate against 15 deg/h", 100 * (printed / 15 - 1), "%", 2.69),
-        Finding(
+        StudyFinding("printed Earth rate against 7.2921159e-5 rad/s", 100 * (printed / true_norm - 1), "%", 2.69),
+        StudyFinding("printed Earth rate against 15 deg/h", 100 * (printed / 15 - 1), "%", 2.69),
+        StudyFinding(
             "RMS error of the drifting bias, F and reference held", rt.rms_drift_error(drift, "held", "deg_h"), "deg/h"
         ),
-        Finding("RMS error of the drifting bias, everything anew", rt.rms_drift_error(drift, "free", "deg_h"), "deg/h"),
+        StudyFinding(
+            "RMS error of the drifting bias, everything anew", rt.rms_drift_error(drift, "free", "deg_h"), "deg/h"
+        ),
     ]
-    return Report(table(rows), tuple(findings), partial(_draw, rows, drift), (12.0, 5.0))
+    return StudyReport(table(rows), tuple(findings), partial(_draw, rows, drift), (12.0, 5.0))
 
 
 def _calibrate(noise_rad_s: float, rng: np.random.Generator, _: int) -> tuple[Array, Array, float]:

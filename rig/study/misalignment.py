@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.batch import BatchSolution, newton_batch
 from rig.estimation.gyroscope.vector_model import VectorBatch, solve_vector_batch
 from rig.study import simulation as sim
-from rig.study.report import Finding, Report, Settings, table
+from rig.study.report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ ESTIMATORS = ("six_observation", "vector_model")
 NOISES_RAD_S = (0.0, sim.NOISE_LEVELS_RAD_S[0])
 
 
-def study(settings: Settings) -> Report:
+def study(settings: Settings) -> StudyReport:
     """Simulate 30 gyroscopes × 500 mountings at each angle, 60°/s, noise 0.035 rad/s, and again without noise."""
     task = partial(_simulate_gyroscope, settings.runs or sim.RUNS)
     squares = np.mean(run_parallel(task, range(sim.SETS), settings), axis=0)  # (sweeps, angles, noises, estimators, 2)
@@ -50,7 +50,7 @@ def study(settings: Settings) -> Report:
         for n, noise in enumerate(NOISES_RAD_S)
         for e, estimator in enumerate(ESTIMATORS)
     ]
-    return Report(table(rows), _findings(rows), partial(_draw, rows), (13.0, 5.0))
+    return StudyReport(table(rows), _findings(rows), partial(_draw, rows), (13.0, 5.0))
 
 
 def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
@@ -96,13 +96,13 @@ def _draw_axes(rng: np.random.Generator, runs: int, angle_rad: float) -> Array:
     return np.asarray(np.linalg.cholesky(gram), dtype=np.float64)
 
 
-def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
+def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
     findings = []
     for row in rows:
         is_reported = row["angle_deg"] == 20.0 if row["varied"] == "mounting" else row["angle_deg"] in (1.0, 2.0)
         if is_reported and row["noise_rad_s"] == 0:
             name = f"RMS scale error without noise, {row['estimator']}, {row['varied']} {row['angle_deg']:g}°"
-            findings.append(Finding(name, row["scale_rms_percent"], "%"))
+            findings.append(StudyFinding(name, row["scale_rms_percent"], "%"))
     return tuple(findings)
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 Columns = Mapping[str, Sequence[Any] | NDArray[Any]]
 
 
-class Progress(Protocol):
+class StudyProgress(Protocol):
     """A function that passes on the results of a study's tasks, and may show their number out of `total`."""
 
     def __call__(self, results: Iterable[Any], total: int) -> Iterable[Any]: ...
@@ -33,11 +33,11 @@ class Settings:
     seed: int = 1
     runs: int | None = None
     jobs: int | None = None
-    progress: Progress = pass_on
+    progress: StudyProgress = pass_on
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class StudyFinding:
     """One number of a study and, if there is one, the published value, both in `unit`."""
 
     quantity: str
@@ -52,11 +52,11 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class StudyReport:
     """A study's results: `columns` of its table (unit in each name), findings, and the function that draws the plot."""
 
     columns: Columns
-    findings: tuple[Finding, ...]
+    findings: tuple[StudyFinding, ...]
     draw: Callable[["Figure"], None]
     size_inches: tuple[float, float] = (10.0, 6.0)
 

@@ -53,7 +53,7 @@ EXTREME = Population("extreme", (1.2, 2.0), (0.1, 0.2))
 
 
 @dataclass(frozen=True, slots=True)
-class Sweep:
+class SimulatedSweep:
     """The properties of all six sweeps of a run: turn rate, noise of a sample, number of samples, kind of vibration."""
 
     speed_rad_s: float
@@ -72,9 +72,9 @@ def count_turn_samples(speed_rad_s: float) -> int:
     return round(RATE_HZ * 2 * np.pi / speed_rad_s)
 
 
-def build_whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibration = "whole_turns") -> Sweep:
+def build_whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibration = "whole_turns") -> SimulatedSweep:
     """Return a sweep of one revolution sampled at 200 Hz."""
-    return Sweep(speed_rad_s, noise_rad_s, count_turn_samples(speed_rad_s), vibration)
+    return SimulatedSweep(speed_rad_s, noise_rad_s, count_turn_samples(speed_rad_s), vibration)
 
 
 def draw_mountings(rng: np.random.Generator, runs: int, largest: float = LARGEST_MISALIGNMENT) -> Array:
@@ -96,12 +96,14 @@ def build_sensitivity(scale: Array, mounting: Array, skew: Array | None = None) 
     return np.asarray(intrinsic @ mounting, dtype=np.float64)
 
 
-def draw_mean_readings(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> Array:
+def draw_mean_readings(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: SimulatedSweep) -> Array:
     """Draw averaged readings (…, 6, 3), rad/s, of the six sweeps, for F (…, 3, 3), before anything is squared."""
     return _draw_means(rng, F, bias_rad_s, sweep)[0]
 
 
-def draw_means_and_squares(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> tuple[Array, Array]:
+def draw_means_and_squares(
+    rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: SimulatedSweep
+) -> tuple[Array, Array]:
     """Draw averaged readings and averages of squared readings, both (…, 6, 3), of the same samples, exactly.
 
     With d = n + c v the deviation of a sample from the mean, n noise and v the vibration common to the axes: v enters
@@ -116,7 +118,7 @@ def draw_means_and_squares(rng: np.random.Generator, F: Array, bias_rad_s: Array
     return mean, mean**2 + scatter / count
 
 
-def _draw_means(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> tuple[Array, Array]:
+def _draw_means(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: SimulatedSweep) -> tuple[Array, Array]:
     """Draw mean readings (…, 6, 3); return also each axis' reading per rad/s along the turn, (…, 6, 3)."""
     per_rate = np.asarray(np.einsum("...ij,sj->...si", F, DIRECTIONS), dtype=np.float64)
     speed: Array | float = sweep.speed_rad_s

@@ -9,7 +9,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.batch import newton_batch
 from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.study import simulation as sim
-from rig.study.report import Columns, Finding, Report, Settings
+from rig.study.report import Columns, Settings, StudyFinding, StudyReport
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,7 +21,7 @@ BIAS_RAD_S = np.array([0.0528, 0.0813, -0.0992])
 PUBLISHED_ESTIMATE = (0.9070, 1.0502, 0.8735, 0.0529, 0.0802, -0.0994)
 
 
-def study(settings: Settings) -> Report:
+def study(settings: Settings) -> StudyReport:
     """Simulate a calibration at 3 rad/s, then a sine of 1 rad/s and 0.75 Hz about an axis equally far from x, y and z.
 
     SIX corrects "using Eq. (1)"; with g = K m + b as printed, its own estimates would leave errors of (1 − k) b. The
@@ -46,15 +46,15 @@ def study(settings: Settings) -> Report:
         **{f"calibrated_{axis}_rad_s": corrected[:, i] for i, axis in enumerate("xyz")},
     }
     findings = [
-        Finding(f"estimate of {name}", float(value), "1" if name[0] == "k" else "rad/s", published)
+        StudyFinding(f"estimate of {name}", float(value), "1" if name[0] == "k" else "rad/s", published)
         for name, value, published in zip(PARAMETERS, [*scale, *bias], PUBLISHED_ESTIMATE, strict=True)
     ]
     for i, axis in enumerate("xyz"):
         for when, readings in (("before", reading), ("after", corrected)):
             mean, rms = np.mean(readings[:, i] - rate[:, i]), np.sqrt(np.mean((readings[:, i] - rate[:, i]) ** 2))
-            findings.append(Finding(f"mean error of {axis} {when} calibration", float(mean), "rad/s"))
-            findings.append(Finding(f"RMS error of {axis} {when} calibration", float(rms), "rad/s"))
-    return Report(columns, tuple(findings), partial(_draw, time_s, desired, reading, corrected), (12.0, 6.0))
+            findings.append(StudyFinding(f"mean error of {axis} {when} calibration", float(mean), "rad/s"))
+            findings.append(StudyFinding(f"RMS error of {axis} {when} calibration", float(rms), "rad/s"))
+    return StudyReport(columns, tuple(findings), partial(_draw, time_s, desired, reading, corrected), (12.0, 6.0))
 
 
 def _draw(time_s: Array, desired: Array, reading: Array, corrected: Array, figure: "Figure") -> None:

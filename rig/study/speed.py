@@ -14,7 +14,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.batch import newton_batch
 from rig.study import simulation as sim
-from rig.study.report import Finding, Report, Settings, table
+from rig.study.report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ DURATIONS: dict[str, Callable[[float], int]] = {
 }
 
 
-def study(settings: Settings) -> Report:
+def study(settings: Settings) -> StudyReport:
     """Simulate 30 gyroscopes × 500 runs at each speed and noise level."""
     task = partial(_simulate_gyroscope, settings.runs or sim.RUNS)
     squares = np.mean(run_parallel(task, range(sim.SETS), settings), axis=0)  # (durations, noises, speeds, 2)
@@ -44,7 +44,7 @@ def study(settings: Settings) -> Report:
         for n, noise in enumerate(sim.NOISE_LEVELS_RAD_S)
         for s, speed in enumerate(SPEEDS_RAD_S)
     ]
-    return Report(table(rows), _findings(rows), partial(_draw, rows), (12.0, 5.5))
+    return StudyReport(table(rows), _findings(rows), partial(_draw, rows), (12.0, 5.5))
 
 
 def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
@@ -55,23 +55,25 @@ def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
     for d, samples in enumerate(DURATIONS.values()):
         for n, noise in enumerate(sim.NOISE_LEVELS_RAD_S):
             for s, speed in enumerate(SPEEDS_RAD_S):
-                sweep = sim.Sweep(speed, noise, samples(speed))
+                sweep = sim.SimulatedSweep(speed, noise, samples(speed))
                 solved = newton_batch(sim.draw_mean_readings(rng, F, bias, sweep), speed)
                 squares[d, n, s] = np.mean((solved.scale - scale) ** 2), np.mean((solved.bias_rad_s - bias) ** 2)
     return squares
 
 
-def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
+def _findings(rows: list[dict[str, Any]]) -> tuple[StudyFinding, ...]:
     """Return slopes in the doubly logarithmic plot: the errors follow powers of the speed, not SIX's exponential."""
     findings = []
     for duration in DURATIONS:
         chosen = [row for row in rows if row["samples"] == duration and row["noise_rad_s"] == sim.NOISE_LEVELS_RAD_S[0]]
         for column, name, published in (("scale_mse", "scale", None), ("bias_mse_rad2_s2", "bias", 0.0)):
             slope = np.polyfit(np.log(SPEEDS_RAD_S), np.log([row[column] for row in chosen]), 1)[0]
-            findings.append(Finding(f"power of speed in the {name} MSE, {duration}", float(slope), "1", published))
+            findings.append(StudyFinding(f"power of speed in the {name} MSE, {duration}", float(slope), "1", published))
         mse = {row["speed_rad_s"]: row["mean_of_both"] for row in chosen}
-        findings.append(Finding(f"mean MSE at 0.3 rad/s over that at 1 rad/s, {duration}", mse[0.3] / mse[1.0], "1"))
-        findings.append(Finding(f"mean MSE at 1 rad/s over that at 3 rad/s, {duration}", mse[1.0] / mse[3.0], "1"))
+        findings.append(
+            StudyFinding(f"mean MSE at 0.3 rad/s over that at 1 rad/s, {duration}", mse[0.3] / mse[1.0], "1")
+        )
+        findings.append(StudyFinding(f"mean MSE at 1 rad/s over that at 3 rad/s, {duration}", mse[1.0] / mse[3.0], "1"))
     return tuple(findings)
 
 

@@ -24,7 +24,7 @@ from rig.world.kvh1775.mounting import build_kvh_mounts
 from rig.world.lines.mounting import build_printer_mounts
 from rig.world.magnetic_field import build_magnetic_field
 from rig.world.on_arm import OnArm
-from rig.world.operator import Operator
+from rig.world.operator import SimulatedOperator
 from rig.world.servo.bench import ServoBench
 from rig.world.turning import MotionSource
 from rig.world.ur10e.motion.flange_motion import BodyMotion
@@ -72,9 +72,9 @@ class Laboratory:
         return self.motion_source
 
     @property
-    def operator(self) -> Operator:
+    def operator(self) -> SimulatedOperator:
         """The operator whose hand turns the sensors. Raise TypeError if something else turns them."""
-        if not isinstance(self.motion_source, Operator):
+        if not isinstance(self.motion_source, SimulatedOperator):
             raise TypeError("no hand turns the sensors in this laboratory")
         return self.motion_source
 
@@ -211,4 +211,4 @@ def _build_motion_source(config: RigConfig, world: WorldSection) -> MotionSource
         case ServoSection() as section:
             return ServoBench(section, world)
         case _:
-            return Operator(world)
+            return SimulatedOperator(world)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, radians, sin, sqrt
 
-from rig.config.world.laboratory import SiteSection
+from rig.config.world.laboratory import WorldSiteSection
 from rig.config.world.magnetism import IronSection
 from rig.world.site import Vector, rotate_into_base
 from rig.world.ur10e.motion.forward_kinematics import Rotation, rotate
@@ -78,7 +78,7 @@ class MagneticField:
         return x, y, z
 
 
-def build_magnetic_field(section: SiteSection, iron: Sequence[IronSection] = ()) -> MagneticField:
+def build_magnetic_field(section: WorldSiteSection, iron: Sequence[IronSection] = ()) -> MagneticField:
     """Build the field of the Earth (magnitude, dip, declination), of the room and of the arm's iron."""
     size_t = MICROTESLA_T * section.magnetic_field_ut
     dip, declination = radians(section.magnetic_dip_deg), radians(section.magnetic_declination_deg)

@@ -14,7 +14,7 @@ from rig.world.ur10e.motion.models import select_model
 from rig.world.ur10e.motion.ripple import draw_ripple
 from rig.world.ur10e.motion.true_arm import TrueArm, build_calibrated_links
 from rig.world.ur10e.motion.vibration import WRISTS, Vibration
-from rig.world.ur10e.robot import Identity, Robot
+from rig.world.ur10e.robot import Robot, RobotIdentity
 
 JOINTS = 6
 
@@ -41,7 +41,7 @@ class OnArm:
         self.arm = TrueArm(arm, build_site(world.site), motion, random, model.drawing)
         about_x, about_y, about_z = arm.tcp_rotation_deg
         self.robot = Robot(
-            Identity(arm.serial_number, model.polyscope),
+            RobotIdentity(arm.serial_number, model.polyscope),
             motion,
             arm.remote_control,
             arm.speed_slider,

@@ -24,7 +24,7 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 UNMOVED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-class Operator:
+class SimulatedOperator:
     """A `MotionSource`. The same instructions at the same ticks give the same motions."""
 
     ideal = False

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import cos, radians, sin
 
-from rig.config.world.laboratory import SiteSection
+from rig.config.world.laboratory import WorldSiteSection
 
 EARTH_RATE_RAD_S = 7.292115e-5  # WGS 84; sidereal
 
@@ -18,7 +18,7 @@ class SiteTruth:
     specific_force_m_s2: Vector
 
 
-def build_site(section: SiteSection) -> SiteTruth:
+def build_site(section: WorldSiteSection) -> SiteTruth:
     """Build the site from its section."""
     rate = EARTH_RATE_RAD_S if section.latitude_deg is not None else 0.0
     latitude = radians(section.latitude_deg or 0.0)
@@ -28,7 +28,7 @@ def build_site(section: SiteSection) -> SiteTruth:
     )
 
 
-def rotate_into_base(section: SiteSection, *, north: float = 0.0, west: float = 0.0, up: float = 0.0) -> Vector:
+def rotate_into_base(section: WorldSiteSection, *, north: float = 0.0, west: float = 0.0, up: float = 0.0) -> Vector:
     """Return a vector in the base's axes: rotated clockwise by the heading, then tilted about x and the new y axis."""
     heading = radians(section.heading_deg)
     about_x, about_y = (radians(angle) for angle in section.base_tilt_deg)

@@ -19,7 +19,7 @@ from rig.motion.geometry import NOMINAL
 from rig.plans.recorded import open_run
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.certificate.statements import Stated
+from rig.report.certificate.statements import StatedFacts
 from rig.report.document import document_of
 from rig.report.words.validity_words import load_words, when_words
 from support.documents.certified import LABORATORY, read
@@ -93,7 +93,7 @@ def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_s
         and sensor.temperature_c == 22.0
     )
     assert when_words(sensor.bias_conditions).startswith("at 22.0 °C, as stated, mean over")
-    certificate = certificate_of(document, Stated())
+    certificate = certificate_of(document, StatedFacts())
     said = " ".join(read(certificate).text.split())
     assert "Temperature and time, as stated, for the item provided no temperature: scale factors at 22.0 °C" in said
     assert "Temperature: as stated; not traceable" in said and "own thermometer" not in said

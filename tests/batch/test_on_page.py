@@ -13,7 +13,7 @@ from rig.batch.on_page import OnPage
 from rig.batch.operators import Question
 from rig.page.server.control import Control
 from rig.page.server.sections import Sections
-from rig.page.server.serving import Address, Page, serving
+from rig.page.server.serving import Page, PageAddress, serving
 from support.processes.waiting import PATIENCE_S, wait_for
 
 TOKEN = "a-token-of-two-and-twenty"
@@ -30,7 +30,7 @@ def ask(answers: "SimpleQueue[str]") -> Iterator[Asking]:
     """Asks the page of a station that waits for a number."""
     sections, control = Sections(), Control(may_answer=False)
     voice = OnPage(sections, control)
-    with serving(sections, control, None, Address(port=0, token=TOKEN), Page("station.html", voice.routes)) as url:
+    with serving(sections, control, None, PageAddress(port=0, token=TOKEN), Page("station.html", voice.routes)) as url:
         port = urlsplit(url).port or 0
 
         def asked(method: str, path: str, body: object = None, **headers: str) -> int:

@@ -17,7 +17,7 @@ from weakref import ReferenceType, ref
 
 import pytest
 
-from rig.batch.batch import Batch, BatchEnded, Begun, Chip, Entry, Part, PartBegun, PartEnded, doubt_of, state_of
+from rig.batch.batch import Batch, BatchEnded, BatchPart, Begun, Chip, Entry, PartBegun, PartEnded, doubt_of, state_of
 from rig.batch.journal import JOURNAL, open_journal, resume_journal
 from rig.batch.label import Label, files_of, zpl
 from rig.batch.operators import Operator, Question, Terminal
@@ -54,7 +54,7 @@ def batch(*ended: tuple[str, PartEnded | None]) -> Batch:
 
 def test_a_part_that_has_not_ended_is_in_hand() -> None:
     after_a_kill = batch(("G-001", PASSED), ("G-002", None))
-    assert after_a_kill.in_hand == Part(2, "G-002", "02-G-002", AT)
+    assert after_a_kill.in_hand == BatchPart(2, "G-002", "02-G-002", AT)
     assert batch(("G-001", PASSED)).in_hand is None
 
 
@@ -184,7 +184,7 @@ def test_at_the_terminal_what_is_typed_ahead_is_no_answer_and_a_number_mounts_no
     monkeypatch.setattr("sys.stdin", keyboard)
     monkeypatch.setattr("sys.stderr", SimpleNamespace(write=shown, flush=lambda: None, isatty=lambda: False))
     try:
-        assert not Operator(Terminal()).is_mounted(Part(1, "G-001", "01-G-001", AT))
+        assert not Operator(Terminal()).is_mounted(BatchPart(1, "G-001", "01-G-001", AT))
         os.write(terminal, b"go\n")
         assert not Operator(Terminal()).agrees(("The arm will move.",), Prompt(()).to_do)
     finally:
@@ -217,7 +217,7 @@ def test_between_two_parts_nothing_of_a_run_is_left_in_memory(tmp_path: Path) ->
 
     left = list[ReferenceType[OfARun]]()
 
-    def run(part: Part, folder: Path, desk: Desk) -> PartEnded:
+    def run(part: BatchPart, folder: Path, desk: Desk) -> PartEnded:
         assert [each() for each in left] == [None] * len(left)
         data = OfARun()
         data.itself = data

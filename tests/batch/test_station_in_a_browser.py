@@ -11,12 +11,12 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
-from rig.batch.batch import Part
+from rig.batch.batch import BatchPart
 from rig.batch.on_page import on_page
 from rig.batch.operators import Operator
 from rig.batch.status import Now, Present
 from rig.page.server.control import STOPPED
-from rig.page.server.serving import Address
+from rig.page.server.serving import PageAddress
 from rig.station.events import Interrupted
 from support.page.browser import legible, needs_browser, picture, screen, text, typed
 from support.processes.waiting import PATIENCE_S, wait_for
@@ -54,7 +54,7 @@ def replaced(button: WebElement) -> bool:
 
 def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
     questions = "number", "go", "go"
-    with on_page(Present(NOW), Address(port=0)) as (voice, url), answered(Operator(voice), *questions) as answers:
+    with on_page(Present(NOW), PageAddress(port=0)) as (voice, url), answered(Operator(voice), *questions) as answers:
         driver.get(url)
         wait_for(lambda: "serial number" in text(driver, "text"), "the question for a number")
         assert text(driver, "part") == "<b>G-003</b>" and "A. Person" in text(driver, "who")
@@ -84,13 +84,15 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
 
 def test_after_a_stop_the_page_says_that_and_not_that_there_is_no_news(driver: Chrome) -> None:
     present = Present(NOW)
-    with pytest.raises(KeyboardInterrupt), on_page(present, Address(port=0)) as (voice, url):
+    with pytest.raises(KeyboardInterrupt), on_page(present, PageAddress(port=0)) as (voice, url):
         driver.get(url)
         wait_for(lambda: "checks" in text(driver, "state"), "what the station does")
         stop = driver.find_element(By.ID, "halt")
         try:
             threading.Timer(0, stop.click).start()
-            Operator(voice, asking=present.asking).is_mounted(Part(1, "G-003", "01-G-003", "2026-11-25T08:00:00+00:00"))
+            Operator(voice, asking=present.asking).is_mounted(
+                BatchPart(1, "G-003", "01-G-003", "2026-11-25T08:00:00+00:00")
+            )
         except KeyboardInterrupt as interrupt:
             present.event(Interrupted(f"{interrupt} between two parts"))
             raise

@@ -24,9 +24,9 @@ from firmware_host.parts import BOARD_PARTS, MAGNETOMETERS
 from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from firmware_host.serial_port import SerialPort
 from rig.config.procedures.procedure_sections import ThermalSection
-from rig.config.sensors.link_budget import Stream
+from rig.config.sensors.link_budget import LinkLoad
 from rig.errors import Refused
-from rig.plans.motions.temperature_course import Course
+from rig.plans.motions.temperature_course import TemperatureCourse
 from rig.runner.acquisition import Acquisition
 from rig.runner.warming import Warming
 from support.board.host_board import HostBoard, configured, convert, settle
@@ -372,7 +372,7 @@ def test_a_stream_takes_as_much_of_the_link_as_the_configuration_reckons_with(ra
     for number in range(conversions):
         convert(board, round((number + 1) * 1e6 / rate_hz), (-number, 2 * number, 12345))
     bytes_per_sample = len(board.wire) / conversions
-    reckoned = Stream(rate_hz, calibrated).bytes_per_sample
+    reckoned = LinkLoad(rate_hz, calibrated).bytes_per_sample
     assert 0.9 * reckoned < bytes_per_sample <= reckoned
 
 
@@ -716,7 +716,7 @@ def test_a_board_that_knows_no_heater_is_refused_by_name(wire: tuple[BoardOnAWir
     wire[0].on_send = older
     section = ThermalSection(from_c=20, to_c=40, heater_power=1)
     with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
-        warming = Warming(section, Acquisition(), print, (), board, 40.0, Course(20, 40, 5, True))
+        warming = Warming(section, Acquisition(), print, (), board, 40.0, TemperatureCourse(20, 40, 5, True))
         with pytest.raises(Refused, match="of the board knows no heater") as refused:
             warming.prepare()
     assert refused.value.name == "no_heater"

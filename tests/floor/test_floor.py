@@ -26,7 +26,7 @@ from rig.motion.state import Report
 from rig.page.server.control import Control
 from rig.page.server.feed import frame_of
 from rig.page.server.sections import Sections
-from rig.page.server.serving import Address, Page, serving
+from rig.page.server.serving import Page, PageAddress, serving
 from rig.station.events import ArmConnected, Failed, Prompt, SamplingStarted
 from support.history.past_runs import FIRST, finished
 from support.processes.waiting import PATIENCE_S, wait_for
@@ -193,7 +193,7 @@ def test_the_database_alone_tells_ages(tmp_path: Path) -> None:
 def test_the_floor_is_guarded_as_the_operators_page_and_has_nothing_that_acts(tmp_path: Path) -> None:
     token = "a-token-of-two-and-twenty"
     feed = Sections()
-    with serving(feed, Control(may_answer=False), None, Address(port=0, token=token), Page("floor.html")) as page:
+    with serving(feed, Control(may_answer=False), None, PageAddress(port=0, token=token), Page("floor.html")) as page:
         port = urlsplit(page).port or 0
 
         def asked(method: str, path: str, **headers: str) -> tuple[int, str]:

@@ -14,7 +14,7 @@ from rig.history.storage.address import resolve_address
 from rig.history.store import open_history
 from rig.page.server.control import Control
 from rig.page.server.sections import Sections
-from rig.page.server.serving import Address, Page, serving
+from rig.page.server.serving import Page, PageAddress, serving
 from support.history.past_runs import FIRST, finished
 from support.page.browser import legible, needs_browser, picture, screen, text
 from support.processes.waiting import wait_for
@@ -44,7 +44,7 @@ def feed(tmp_path: Path) -> Iterator[Sections]:
 
 
 def test_the_floor_shows_each_rig_and_a_dead_one(driver: Chrome, feed: Sections) -> None:
-    with serving(feed, Control(may_answer=False), None, Address(port=0), Page("floor.html")) as url:
+    with serving(feed, Control(may_answer=False), None, PageAddress(port=0), Page("floor.html")) as url:
         driver.get(url)
         wait_for(lambda: len(cards(driver)) == len(SAID), "a card for each rig")
         assert cards(driver, " h3 span:first-child") == list(SAID)  # a name is text, whatever is in it

@@ -11,16 +11,16 @@ from sqlalchemy import text
 
 from rig.errors import Refused
 from rig.history.again.answer import Answer, Compared, RecomputedResult, Unsolved, compared, to_solve
-from rig.history.again.done import JOURNAL, Journal, Question
+from rig.history.again.done import JOURNAL, RecomputeJournal, RecomputeQuestion
 from rig.history.again.plan import list_stated_results
 from rig.history.again.report import again_csv, again_page, counts
-from rig.history.entered.finished import Finished
+from rig.history.entered.finished import FinishedRun
 from rig.history.store import History, Selection, open_history
 from rig.report.kinds.registry import followed
 from support.history.kept_recordings import certified
 from support.history.past_runs import BIAS_RAD_S, SCALE, STD, finished
 
-QUESTION = Question("1", ("reckoning=2",), None)
+QUESTION = RecomputeQuestion("1", ("reckoning=2",), None)
 U = 2 * STD[0]  # of a scale factor
 
 
@@ -30,11 +30,11 @@ def history(tmp_path: Path) -> Iterator[History]:
         yield opened
 
 
-def given(run: Finished, verdict: str = "pass") -> RecomputedResult:
+def given(run: FinishedRun, verdict: str = "pass") -> RecomputedResult:
     return RecomputedResult(verdict, (), followed(run.document))
 
 
-def again(history: History, answers: Sequence[tuple[Finished, Answer]], of_u: float = 0.1) -> list[Compared]:
+def again(history: History, answers: Sequence[tuple[FinishedRun, Answer]], of_u: float = 0.1) -> list[Compared]:
     by_key = {run.content_sha256: answer for run, answer in answers}
     return list(compared(list_stated_results(history, Selection()), by_key, of_u).compared)
 
@@ -132,22 +132,22 @@ def test_what_was_voided_does_not_count_and_a_selection_is_heeded(history: Histo
 
 def test_the_journal_gives_the_same_numbers_back_and_forgets_what_a_kill_left_half_written(tmp_path: Path) -> None:
     answer = given(finished(0, (1 / 3, 0.1, 1e-7), BIAS_RAD_S))
-    with Journal(tmp_path, QUESTION) as journal:
+    with RecomputeJournal(tmp_path, QUESTION) as journal:
         journal.note("one", answer)
         journal.note("two", Unsolved("missing", "the folder is gone"))
     whole = (tmp_path / JOURNAL).read_bytes()
     (tmp_path / JOURNAL).write_bytes(whole + b'{"key": "three", "gi')
-    with Journal(tmp_path, QUESTION) as journal:
+    with RecomputeJournal(tmp_path, QUESTION) as journal:
         assert journal.solved == {"one": answer}
     assert (tmp_path / JOURNAL).read_bytes() == whole
 
 
 def test_answers_to_another_question_are_not_mixed(tmp_path: Path) -> None:
-    with Journal(tmp_path, QUESTION):
+    with RecomputeJournal(tmp_path, QUESTION):
         pass
     for other in (replace(QUESTION, estimator="newton"), replace(QUESTION, rig_version="2")):
         with pytest.raises(Refused, match="another_question"):
-            Journal(tmp_path, other)
+            RecomputeJournal(tmp_path, other)
 
 
 def test_what_is_solved_is_not_solved_again_and_what_is_not_is_tried_again(history: History) -> None:
@@ -191,7 +191,7 @@ def test_the_report_says_all_in_csv_and_what_is_to_be_looked_at_on_the_page(hist
     ]
 
 
-def replicated(history: History, run: Finished, count: int) -> None:
+def replicated(history: History, run: FinishedRun, count: int) -> None:
     """As many runs as `count`, all like the one, which is entered: rows of an index alone, no journal of them."""
     history.enter(run)
     numbers = f"WITH RECURSIVE n(i) AS (SELECT 2 UNION ALL SELECT i + 1 FROM n WHERE i < {count}) "
@@ -219,10 +219,10 @@ def test_ten_thousand_results_are_planned_in_a_handful_of_questions(history: His
     assert len(stated) == 10_000 and len({each.content_sha256 for each in stated}) == 10_000
     assert all(len(each.calibrations) == len(each.recordings) == len(each.places) == 1 for each in stated)
     answer = given(finished(0))
-    with Journal(tmp_path, QUESTION) as journal:
+    with RecomputeJournal(tmp_path, QUESTION) as journal:
         for each in stated[:4000]:
             journal.note(each.content_sha256, answer)
-    with Journal(tmp_path, QUESTION) as journal:
+    with RecomputeJournal(tmp_path, QUESTION) as journal:
         left = to_solve(stated, journal.solved)
         assert [each.run_id for each in left] == [each.run_id for each in stated[4000:]]
         outcome = compared(stated, journal.solved)

@@ -18,7 +18,7 @@ from rig.config.load import ConfigurationRefused, load
 from rig.data.result_file import read_result
 from rig.errors import Refused
 from rig.estimation.gyroscope.budget import Budget, Contributor
-from rig.history.entered.finished import Finished, compact, content_sha256, read_finished_run
+from rig.history.entered.finished import FinishedRun, compact, content_sha256, read_finished_run
 from rig.history.entered.issued import Issued
 from rig.history.series import Trend, changes_between, effects, rig_states, subjects, trends
 from rig.history.storage import schema
@@ -84,7 +84,7 @@ def test_a_result_of_the_same_recordings_replaces_the_one_before(history: Histor
 
 
 def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(history: History) -> None:
-    def scarce(day: float, bias_rad_s: float, freedom: float) -> Finished:
+    def scarce(day: float, bias_rad_s: float, freedom: float) -> FinishedRun:
         run = finished(day, bias_rad_s=(bias_rad_s, 0.0, 0.0))
         sensor = run.document.gyroscopes["gyro"]
         line = Contributor("noise", "A", "normal", None, "", "", freedom, np.array(sensor.covariance))

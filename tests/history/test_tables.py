@@ -12,7 +12,7 @@ from rich.console import Console
 from rig.data.absent import NO_ARM
 from rig.history.series import Trend, changes_between, rig_states, subjects, trends
 from rig.history.store import History, Past, open_history
-from rig.history.terminal.fitting_table import Column, FittingTable
+from rig.history.terminal.fitting_table import FittingTable, TableColumn
 from rig.history.terminal.tables import calibrations_table, changes_table, parameters_table, trend_lines, trends_table
 from support.history.past_runs import FIRST, SCALE, STD, finished
 
@@ -86,7 +86,7 @@ def test_a_column_that_holds_nothing_is_left_out(history: History) -> None:
 
 def test_what_fits_nowhere_is_folded_and_not_cut() -> None:
     name = "a-serial-number-that-is-longer-than-the-line-it-is-to-stand-on"
-    text = printed(FittingTable("", (Column("sensor", [name]), Column("value", ["1.0"]))), 30)
+    text = printed(FittingTable("", (TableColumn("sensor", [name]), TableColumn("value", ["1.0"]))), 30)
     assert name in re.sub(r"[^a-z-]", "", "".join(row[:22] for row in text.splitlines()[3:]))
 
 

@@ -12,7 +12,7 @@ from rig.motion.by_hand import Face, HandMove, Instruction
 from rig.motion.steps import Plan
 from rig.page.about import About
 from rig.page.arm import built
-from rig.plans.by_hand import Wanted, still_open
+from rig.plans.by_hand import WantedMoves, still_open
 from rig.station.events import ArmConnected, HandSeen, PhaseStarted
 from rig.turners.registry import installed
 from support.page.browser import legible, needs_browser, picture, screen, text
@@ -30,7 +30,7 @@ SHOWN = "return document.getElementById('hand').checkVisibility()"
 
 
 def seen(doing: str, peak_deg_s: float, taken: list[HandMove], faces: list[Face]) -> HandSeen:
-    left = still_open(Wanted(12, 3), taken, faces)
+    left = still_open(WantedMoves(12, 3), taken, faces)
     return HandSeen(
         5.0, doing, 0.8, radians(212), radians(peak_deg_s), radians(500), 2.5e-3, tuple(faces), left.pairs, left.turns,
         len(taken),

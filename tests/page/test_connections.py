@@ -15,14 +15,14 @@ from rig.page.page_state import PageState
 from rig.page.server.connections import STRANGERS, TRUSTED, Connections
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
-from rig.page.server.serving import Address, serving
+from rig.page.server.serving import PageAddress, serving
 from support.page.flood import alive, half_a_request, opened
 from support.processes.waiting import PATIENCE_S, wait_for
 
 
 @contextmanager
 def page(folder: Path) -> Iterator[str]:
-    with serving(Feed(PageState(About("", ""))), Control(may_answer=False), folder, Address(port=0)) as url:
+    with serving(Feed(PageState(About("", ""))), Control(may_answer=False), folder, PageAddress(port=0)) as url:
         yield url
 
 
@@ -114,7 +114,7 @@ def test_headers_that_do_not_come_end_the_connection() -> None:
 @pytest.mark.slow
 def test_a_question_is_given_back_when_the_page_is_gone(tmp_path: Path) -> None:
     control = Control(may_answer=True)
-    with serving(Feed(PageState(About("", ""))), control, tmp_path, Address(port=0)):
+    with serving(Feed(PageState(About("", ""))), control, tmp_path, PageAddress(port=0)):
         pass
     assert control.ask((), "start") is None
 
@@ -127,7 +127,7 @@ def test_a_page_that_fails_says_so_and_what_it_showed_goes_on(
         def news(self) -> bytes | None:
             raise ZeroDivisionError("a defect")
 
-    with serving(Broken(PageState(About("", ""))), Control(may_answer=False), tmp_path, Address(port=0)) as url:
+    with serving(Broken(PageState(About("", ""))), Control(may_answer=False), tmp_path, PageAddress(port=0)) as url:
         wait_for(lambda: "The page has ended" in capsys.readouterr().err, "what it says")
         with pytest.raises(OSError):
             socket.create_connection((urlsplit(url).hostname, urlsplit(url).port or 0), timeout=PATIENCE_S)

@@ -21,7 +21,7 @@ from rig.page.page_state import PageState
 from rig.page.server.control import STOPPED, Control
 from rig.page.server.feed import Feed
 from rig.page.server.guard import Door
-from rig.page.server.serving import Address, serving
+from rig.page.server.serving import PageAddress, serving
 from rig.station.events import Prompt
 from support.processes.waiting import PATIENCE_S, wait_for
 
@@ -54,7 +54,7 @@ class Asking:
 @contextmanager
 def server(folder: Path, control: Control | None = None, feed: Feed | None = None) -> Iterator[Asking]:
     feed = feed or Feed(PageState(About("a run", "six_observation", may_answer=True)))
-    with serving(feed, control or Control(may_answer=True), folder, Address(port=0, token=TOKEN)) as url:
+    with serving(feed, control or Control(may_answer=True), folder, PageAddress(port=0, token=TOKEN)) as url:
         yield Asking(url)
 
 
@@ -164,7 +164,7 @@ def test_what_is_planted_as_a_certificate_is_not_shown(tmp_path: Path, planted: 
 
 def test_a_port_that_is_taken_is_refused_by_name(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        address = Address(port=taken.getsockname()[1])
+        address = PageAddress(port=taken.getsockname()[1])
         with (
             pytest.raises(Refused, match=r"page_address: .*in use"),
             serving(Feed(PageState(About("", ""))), Control(may_answer=False), tmp_path, address),
@@ -175,13 +175,13 @@ def test_a_port_that_is_taken_is_refused_by_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("address", "words"),
     [
-        (Address(host="192.0.2.1"), "needs a token"),
-        (Address(host="0.0.0.0", token=TOKEN), "every address"),
-        (Address(token="short"), "fewer than 22"),
-        (Address(host="192.0.2.1", port=1, token=TOKEN), "cannot be served at 192.0.2.1:1"),
+        (PageAddress(host="192.0.2.1"), "needs a token"),
+        (PageAddress(host="0.0.0.0", token=TOKEN), "every address"),
+        (PageAddress(token="short"), "fewer than 22"),
+        (PageAddress(host="192.0.2.1", port=1, token=TOKEN), "cannot be served at 192.0.2.1:1"),
     ],
 )
-def test_an_address_that_will_not_do_is_refused(tmp_path: Path, address: Address, words: str) -> None:
+def test_an_address_that_will_not_do_is_refused(tmp_path: Path, address: PageAddress, words: str) -> None:
     feed = Feed(PageState(About("", "")))
     with (
         pytest.raises(Refused, match="page_address: .*" + words),
@@ -241,7 +241,7 @@ def test_a_stop_interrupts_the_run_and_nothing_after_it(tmp_path: Path) -> None:
     ],
 )
 def test_where_the_page_is_wanted(place: str | None, host: str, port: int | None) -> None:
-    assert PageWish(place).address() == Address(host, port)
+    assert PageWish(place).address() == PageAddress(host, port)
 
 
 @pytest.mark.parametrize("place", ["127.0.0.1:x", "127.0.0.1:99999", "127.0.0.1:-1"])

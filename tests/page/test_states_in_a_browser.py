@@ -15,7 +15,7 @@ from rig.errors import Fault, Refused
 from rig.page.page_state import PageState
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
-from rig.page.server.serving import Address, serving
+from rig.page.server.serving import PageAddress, serving
 from rig.station.events import Answered, Crashed, Failed, Interrupted, PhaseRecorded, Prompt, RunEvent, SensorSamples
 from support.page import told_runs
 from support.page.browser import TABLET, asked_hosts, kind, legible, needs_browser, picture, set_theme, severe, text
@@ -177,7 +177,7 @@ def test_an_address_of_this_computer_without_its_token_shows_nothing_and_says_so
     severe(driver), asked_hosts(driver)  # of before
     feed = Feed(PageState(ABOUT))
     feed.event(Prompt(ANNOUNCED))
-    address = Address(host, 0, "a-token-of-forty-characters-and-no-other")
+    address = PageAddress(host, 0, "a-token-of-forty-characters-and-no-other")
     with serving(feed, Control(may_answer=True), tmp_path, address) as url:
         driver.get(url.split("#")[0])
         wait_for(lambda: "lacks its token" in text(driver, "link-words"), "what is missing")

@@ -22,7 +22,7 @@ from rig.errors import Refused
 from rig.estimation.by_hand import SessionConditions, solve_by_hand
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.observation.by_hand.handled import segment_session
-from rig.plans.by_hand import Wanted as Asked
+from rig.plans.by_hand import WantedMoves as Asked
 from rig.plans.by_hand import simulate_session
 from rig.plans.registry import installed, sections
 from rig.plans.shortest import plan_of, shortest_run, tried

@@ -7,7 +7,7 @@ import pytest
 
 from rig.config.world.thermal import SimulatedThermalSection
 from rig.data.recording.thermal_events import SetMeasured
-from rig.plans.motions.temperature_course import Course, Ramp
+from rig.plans.motions.temperature_course import Ramp, TemperatureCourse
 from rig.world.board.heat import HeatedBody
 
 LOOK_S = 0.25
@@ -17,8 +17,8 @@ def measured(temperature_c: float, *, warming: bool = True, **others: float) -> 
     return SetMeasured(0, 6, warming, {"gyro": temperature_c, **others})
 
 
-def course(*temperatures_c: float, both_directions: bool = False) -> Course:
-    found = Course(20, 40, 5, both_directions)
+def course(*temperatures_c: float, both_directions: bool = False) -> TemperatureCourse:
+    found = TemperatureCourse(20, 40, 5, both_directions)
     found.begin(20.0)
     for temperature_c in temperatures_c:
         found.add_set(measured(temperature_c))
@@ -43,7 +43,7 @@ def test_a_range_is_covered_when_no_gap_of_it_is_wider_than_allowed(
 
 
 def test_every_sensor_has_to_have_seen_the_range() -> None:
-    found = Course(20, 30, 5, both_directions=False)
+    found = TemperatureCourse(20, 30, 5, both_directions=False)
     for gyro_c, other_c in ((20, 20), (25, 23), (30, 26)):
         found.add_set(measured(gyro_c, other=other_c))
     assert found.missing() == "other was never between 26.0 and 30.0 °C"
@@ -63,7 +63,7 @@ def test_both_ways_are_covered_each_by_its_own_sets() -> None:
 
 
 def test_the_next_set_is_due_half_a_gap_on_for_the_slowest_sensor() -> None:
-    found = Course(20, 40, 5, both_directions=False)
+    found = TemperatureCourse(20, 40, 5, both_directions=False)
     found.begin(20.0)
     assert found.is_due({"gyro": 20.0, "other": 20.0})
     found.add_set(measured(22.0, other=21.0))
@@ -72,10 +72,10 @@ def test_the_next_set_is_due_half_a_gap_on_for_the_slowest_sensor() -> None:
 
 
 def test_an_interrupted_way_is_gone_on() -> None:
-    found = Course(20, 40, 5, both_directions=True, sets=[measured(39.5)])
+    found = TemperatureCourse(20, 40, 5, both_directions=True, sets=[measured(39.5)])
     found.begin(22.0)  # it has cooled meanwhile
     assert found.warming is False
-    found = Course(20, 40, 5, both_directions=True, sets=[measured(34.5)])
+    found = TemperatureCourse(20, 40, 5, both_directions=True, sets=[measured(34.5)])
     found.begin(22.0)
     assert found.warming is True
 
@@ -85,7 +85,7 @@ class Bench:
     """A simulated board, its thermometer, and a course with a heater that follows a ramp."""
 
     section: SimulatedThermalSection
-    course: Course
+    course: TemperatureCourse
     ramp: Ramp
     set_s: float
     time_s: float = 0.0
@@ -130,7 +130,7 @@ def test_a_heater_covers_the_range_both_ways_at_an_even_rate(
     section = SimulatedThermalSection(
         capacity_j_k=capacity_j_k, loss_w_k=loss_w_k, heater_w=heater_w, own_w=0.1, start_c=23, thermometer_lag_s=2
     )
-    bench = Bench(section, Course(26, 50, 5, True), Ramp(0.6 * most_k_per_min / 60, 1.0), set_s)
+    bench = Bench(section, TemperatureCourse(26, 50, 5, True), Ramp(0.6 * most_k_per_min / 60, 1.0), set_s)
     bench.carry_out(at_most_sets=40)
     seen = np.array(bench.seen_c)
     span = round(30 / LOOK_S)
@@ -142,7 +142,7 @@ def test_a_heater_covers_the_range_both_ways_at_an_even_rate(
 
 def test_a_heater_that_is_too_weak_has_all_its_power_and_reaches_what_it_can() -> None:
     section = SimulatedThermalSection(heater_w=0.5, loss_w_k=0.1, own_w=0.0, capacity_j_k=5, start_c=22)
-    bench = Bench(section, Course(22, 50, 5, False), Ramp(0.05, 0.8), 45)
+    bench = Bench(section, TemperatureCourse(22, 50, 5, False), Ramp(0.05, 0.8), 45)
     bench.live(1800)
     assert bench.powers[-1] == pytest.approx(0.8)
     assert bench.seen_c[-1] == pytest.approx(22 + 0.8 * 0.5 / 0.1, abs=0.1)
@@ -150,7 +150,7 @@ def test_a_heater_that_is_too_weak_has_all_its_power_and_reaches_what_it_can() -
 
 def test_the_boards_own_warm_up_is_a_way_too() -> None:
     section = SimulatedThermalSection(own_w=0.9, loss_w_k=0.06, capacity_j_k=20, start_c=22)
-    bench = Bench(section, Course(24, 34, 4, False), Ramp(0.0, 0.0), 45)
+    bench = Bench(section, TemperatureCourse(24, 34, 4, False), Ramp(0.0, 0.0), 45)
     bench.carry_out(at_most_sets=20)
     assert max(bench.powers) == 0.0
 

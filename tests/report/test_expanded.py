@@ -13,7 +13,7 @@ from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, VectorEntry
 from rig.estimation.statistics.coverage import PROBABILITY, coverage_factors, covered
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.certificate.statements import Stated
+from rig.report.certificate.statements import StatedFacts
 from rig.report.kinds.bias_drift import drift_table
 from rig.report.kinds.registry import followed
 from rig.report.tables.certificate import DEG, pair
@@ -22,7 +22,7 @@ from rig.report.words.expanded import expanded, factor_words
 from support.documents.certified import certificate, everything, read, result
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
-GERMAN = Stated(SiteSection(country="DE"))
+GERMAN = StatedFacts(SiteSection(country="DE"))
 SCARCE = (7.0, 12.0, None)
 
 

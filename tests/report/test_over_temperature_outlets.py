@@ -13,7 +13,7 @@ from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.result_file import ResultDocument, read_result
 from rig.estimation.arrays import Array
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.certificate.statements import Stated
+from rig.report.certificate.statements import StatedFacts
 from rig.report.exports.autopilots import ardupilot_files, px4_files
 from rig.report.exports.calibrations import calibrations
 from rig.report.header import calibration_header
@@ -93,7 +93,7 @@ def test_a_history_follows_the_slopes_and_the_values_at_the_reference(
 
 @pytest.mark.slow
 def test_the_digital_certificate_has_every_temperature(result: ResultDocument) -> None:
-    xml = digital_certificate(certificate(result, Stated(SiteSection(country="DE"))))
+    xml = digital_certificate(certificate(result, StatedFacts(SiteSection(country="DE"))))
     names = [each.text for each in ElementTree.fromstring(xml).iter("{https://ptb.de/dcc}content")]
 
     assert "scale factor along x over temperature" in names and "bias along z over temperature" in names
@@ -102,7 +102,7 @@ def test_the_digital_certificate_has_every_temperature(result: ResultDocument) -
 
 @pytest.mark.slow
 def test_the_digital_certificate_is_valid_by_ptbs_schema(result: ResultDocument) -> None:
-    assert schema_faults(digital_certificate(certificate(result, Stated(SiteSection(country="DE"))))) == []
+    assert schema_faults(digital_certificate(certificate(result, StatedFacts(SiteSection(country="DE"))))) == []
 
 
 def c_of(header: str, folder: Path, temperature_c: float) -> Array:

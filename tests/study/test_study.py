@@ -14,7 +14,7 @@ from rig.cli import main
 from rig.study import simulation as sim
 from rig.study.catalogue import STUDIES, find
 from rig.study.files import write
-from rig.study.report import Report, Settings
+from rig.study.report import Settings, StudyReport
 
 pytestmark = pytest.mark.slow
 
@@ -22,7 +22,7 @@ RUNS = {"normal": 15, "extreme": 15, "estimators": 50, "kvh-gyro": 3, "kvh-accel
 
 
 @cache
-def report(name: str) -> Report:
+def report(name: str) -> StudyReport:
     """The study run small, once for all tests."""
     return find(name).run(Settings(seed=3, runs=RUNS.get(name, 50)))
 
@@ -86,7 +86,7 @@ def test_squaring_before_averaging_shrinks_the_scale_factor() -> None:
 
 def test_drawn_moments_are_those_of_real_samples() -> None:
     rng = np.random.default_rng(5)
-    sweep = sim.Sweep(2.0, 0.3, 12)
+    sweep = sim.SimulatedSweep(2.0, 0.3, 12)
     F, bias, runs = np.diag([1.1, 0.9, 1.0]), np.array([0.1, -0.2, 0.05]), 20000
     mean, square = sim.draw_means_and_squares(rng, np.broadcast_to(F, (runs, 3, 3)), bias, sweep)
     vibration = sim.VIBRATION_FRACTION * sweep.speed_rad_s * rng.normal(size=(runs, sweep.samples))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.config.sensors.sensor_sections import MagnetometerSection
-from rig.config.world.laboratory import SiteSection
+from rig.config.world.laboratory import WorldSiteSection
 from rig.config.world.magnetism import IronSection, SimulatedMagnetometerSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.magnetic_field import MagneticField, Room, build_magnetic_field
@@ -15,7 +15,9 @@ PLACES = ((0.0, 0.0, 0.0), (0.7, -0.2, 0.4))
 
 
 def at_base(**section: object) -> np.ndarray:
-    field = build_magnetic_field(SiteSection.model_validate({"magnetic_field_ut": 50, "magnetic_dip_deg": 0} | section))
+    field = build_magnetic_field(
+        WorldSiteSection.model_validate({"magnetic_field_ut": 50, "magnetic_dip_deg": 0} | section)
+    )
     here, there = (np.array(field.flux_density_at(place, POSE, 3.0)) for place in PLACES)
     assert np.array_equal(here, there), "it is the same everywhere"
     return 1e6 * here
@@ -55,7 +57,7 @@ def test_a_magnetometer_feels_it_in_its_own_axes() -> None:
 
 
 def field_of(iron: tuple[IronSection, ...] = (), **site: object) -> MagneticField:
-    return build_magnetic_field(SiteSection.model_validate({"magnetic_field_ut": 0} | site), iron)
+    return build_magnetic_field(WorldSiteSection.model_validate({"magnetic_field_ut": 0} | site), iron)
 
 
 def test_a_gradient_changes_it_with_place_and_a_drift_with_time() -> None:

@@ -12,7 +12,7 @@ from rig.config.procedures.hand_sections import ByHandSection
 from rig.config.procedures.stage_section import rotation_by
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.config.sensors.sensor_sections import SensorSection, mounting_matrix
-from rig.data.recording.settings import ByHand, Uncertainty, hand_settings, uncertainty_of
+from rig.data.recording.settings import HandSettings, Uncertainty, hand_settings, uncertainty_of
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.fit import fit_session
 from rig.estimation.by_hand.session import HandRecording, SessionConditions, axis_of
@@ -51,7 +51,7 @@ def predict_hand_budgets(
     return budgets
 
 
-def _conditions(sensor: SensorSection, uncertainty: Uncertainty, procedure: ByHand) -> SessionConditions:
+def _conditions(sensor: SensorSection, uncertainty: Uncertainty, procedure: HandSettings) -> SessionConditions:
     first = None if sensor.acceleration is not None else rotate_face(FIRST, mounting_matrix(sensor.mounting))
     clock = "the board's crystal" if sensor.on_board else ITS_OWN_CLOCK
     return SessionConditions(uncertainty.crystal_ppm, clock, procedure.box_rad, first_face=first)

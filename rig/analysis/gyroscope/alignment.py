@@ -13,7 +13,7 @@ from rig.observation.observe import Observation
 MIN_INDEPENDENCE = 1e-3  # least over greatest information about a turn; revolutions about one axis alone have none
 
 
-class Calibration(Protocol):
+class AlignedCalibration(Protocol):
     """correction_matrix (3, 3) and bias_rad_s (3,) of g = M (m + b)."""
 
     @property
@@ -55,7 +55,7 @@ class RelativeRotation:
         return rotation_vectors(self.matrix)
 
 
-def mean_rates(observations: Sequence[Observation], calibration: Calibration | None = None) -> MeanRates:
+def mean_rates(observations: Sequence[Observation], calibration: AlignedCalibration | None = None) -> MeanRates:
     """The mean rates of a sensor's revolutions, corrected; without a calibration, as the sensor read them."""
     means = np.array([observation.average.mean_rad_s for observation in observations])
     variances = np.array([observation.average.variance_rad2_s2 for observation in observations])

@@ -11,7 +11,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_fit import Explained
 from rig.observation.consistency.raw_readings import REST, RawReadings
 from rig.observation.consistency.segments import FEWEST_AT_REST, MotionInterval, SegmentedAverage
-from rig.observation.consistency.transfers import Transfer
+from rig.observation.consistency.transfers import WristTransfer
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, si
 
 def with_transfers(
     segments: Segments,
-    transfers: Sequence[Transfer],
+    transfers: Sequence[WristTransfer],
     windows: Sequence[SegmentedAverage],
     explained: Explained,
 ) -> Segments:

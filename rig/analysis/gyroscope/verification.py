@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.gyroscope.alignment import Calibration, RelativeRotation, mean_rates, relative_rotation
+from rig.analysis.gyroscope.alignment import AlignedCalibration, RelativeRotation, mean_rates, relative_rotation
 from rig.analysis.gyroscope.comparison import Comparison, Reference, compare, turns_of
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
@@ -40,7 +40,7 @@ def verify(
     reference: Reference,
     after: Sequence[ObservedRun],
     before: Sequence[ObservedRun] = (),
-    calibration: Calibration | None = None,
+    calibration: AlignedCalibration | None = None,
     *,
     gravity_rad_s: tuple[Array, Array] | None = None,
 ) -> Verification:
@@ -81,7 +81,7 @@ def _apart(gravity_rad_s: tuple[Array, Array] | None, rotation: Array) -> Array 
 
 
 def relative_mounting(
-    sensor: str, reference: Reference, recordings: Sequence[ObservedRun], calibration: Calibration | None
+    sensor: str, reference: Reference, recordings: Sequence[ObservedRun], calibration: AlignedCalibration | None
 ) -> RelativeRotation:
     """How a sensor sits to the reference, by the revolutions of these recordings; None is for calibrated readings.
 

@@ -29,7 +29,7 @@ from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, read_passed_result
 from rig.errors import Fault, Refused
-from rig.report.terminal.board_info import BoardInfo, BoardSensor, print_info, print_stored
+from rig.report.terminal.board_info import BoardInfo, BoardSensorRow, print_info, print_stored
 from rig.station.confirm import agreed_or_refused
 from rig.station.plain_text import say
 
@@ -55,7 +55,7 @@ def info(options: Namespace) -> int:
         follows_crystal(board)  # of a board that has just started one waits for the crystal
         status = board.status()
         sensors = tuple(
-            BoardSensor(sensor, names.get(spell_part(sensor.part)), counts, stored)
+            BoardSensorRow(sensor, names.get(spell_part(sensor.part)), counts, stored)
             for sensor, counts, stored in zip(board.identity.sensors, status.sensors, calibrations, strict=True)
         )
         found = BoardInfo(require_board_section(config).port, board.identity, status, sensors)

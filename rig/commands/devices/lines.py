@@ -10,7 +10,7 @@ from rig.errors.quoting import printable_lines
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.sensors.lines.written import Stated
+    from rig.sensors.lines.written import StatedProperties
 
 SECONDS = (4.0, 6.0)
 
@@ -51,9 +51,9 @@ def run(options: Namespace) -> int:
     if not all(0.5 <= each <= 600 for each in options.seconds):
         raise Refused("bad_option", "--seconds are two times from 0.5 to 600", "Give for example --seconds 4 6")
     if options.write is None:
-        from rig.sensors.lines.written import Stated
+        from rig.sensors.lines.written import StatedProperties
 
-        known = Stated(options.serial_number, options.range_deg_s, options.range_g)
+        known = StatedProperties(options.serial_number, options.range_deg_s, options.range_g)
         section = section_of(options.port, options.baud, options.name, tuple(options.seconds), known)
         _tell('write what is known in place of "?"; rig check refuses the section until then')
         sys.stdout.write(section)
@@ -67,11 +67,11 @@ def run(options: Namespace) -> int:
     return written(options.write, Answers("hand", "lines", options.port, sensors=section))
 
 
-def stated(options: Namespace, *, by_hand: bool) -> "Stated":
+def stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
     """Ask what no line shows and no option says; without a terminal it stays open. Raise Refused `bad_option`."""
     from rig.commands.devices.questions import answered
     from rig.config.sensors.sensor_sections import check_serial_number
-    from rig.sensors.lines.written import Stated
+    from rig.sensors.lines.written import StatedProperties
 
     asked = {
         "serial_number": ("serial number of this specimen", "--serial-number", check_serial_number),
@@ -84,7 +84,7 @@ def stated(options: Namespace, *, by_hand: bool) -> "Stated":
         for key, (question, option, valid) in asked.items()
         if given[key] is not None or sys.stdin.isatty()
     }
-    return Stated(**found, by_hand=by_hand)
+    return StatedProperties(**found, by_hand=by_hand)
 
 
 def positive_number(text: str) -> str:
@@ -98,7 +98,7 @@ def positive_number(text: str) -> str:
     return text
 
 
-def section_of(port: str, baud: int | None, name: str, seconds: tuple[float, float], known: "Stated") -> str:
+def section_of(port: str, baud: int | None, name: str, seconds: tuple[float, float], known: "StatedProperties") -> str:
     """Look at a device for ten seconds and return its section as YAML; say what the lines show.
 
     Raise Refused as `listen`, and `lines_no_pattern` if its lines have nothing in common.

@@ -11,7 +11,7 @@ from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibratio
 from rig.station.plain_text import say, say_on_terminal
 
 if TYPE_CHECKING:
-    from rig.report.exports.calibrations import Calibrations
+    from rig.report.exports.calibrations import ExportedCalibrations
 
 
 def add(parser: ArgumentParser) -> None:
@@ -86,7 +86,7 @@ def _made(folder: Path, *, own: bool) -> None:
     refuse_links(*folder.rglob("*"))
 
 
-def _calibrations(run: Path, moved: tuple[str, str] | None) -> "Calibrations":
+def _calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCalibrations":
     from rig.data.result_file import read_passed_result, read_result
     from rig.report.exports.calibrations import calibrations
     from rig.report.exports.temperature import at_temperature

@@ -17,8 +17,8 @@ from rig.data.recording.settings import find_setting
 from rig.data.run_folder import refuse_links
 from rig.data.version import VERSION
 from rig.errors import Fault, Refused
-from rig.history.again.answer import Answer, Outcome, Stated, compared, to_solve
-from rig.history.again.done import JOURNAL, Journal, Question
+from rig.history.again.answer import Answer, RecomputeOutcome, StatedResult, compared, to_solve
+from rig.history.again.done import JOURNAL, RecomputeJournal, RecomputeQuestion
 from rig.history.again.plan import list_stated_results
 from rig.history.again.report import CSV, PAGE, again_csv, again_page, counts, notable_table
 from rig.history.store import Selection
@@ -42,7 +42,7 @@ def again(options: Namespace, solve: Solve = solved_again) -> int:
     refuse_links(*(out / name for name in (JOURNAL, CSV, PAGE)))
     with _written(out):
         out.mkdir(parents=True, exist_ok=True)
-    with Journal(out, question) as journal:
+    with RecomputeJournal(out, question) as journal:
         answers = dict(journal.solved)
         left = to_solve(stated, answers)
         if len(left) < len(stated):
@@ -62,7 +62,7 @@ def again(options: Namespace, solve: Solve = solved_again) -> int:
     return 0 if outcome.same else CHANGED
 
 
-def _question(options: Namespace) -> Question:
+def _question(options: Namespace) -> RecomputeQuestion:
     from rig.analysis.estimators import known_estimator
 
     if options.jobs < 1:
@@ -75,10 +75,10 @@ def _question(options: Namespace) -> Question:
         find_setting(item)
     if options.estimator is not None:
         known_estimator(options.estimator)
-    return Question(VERSION, tuple(options.overrides), options.estimator)
+    return RecomputeQuestion(VERSION, tuple(options.overrides), options.estimator)
 
 
-def _stated(options: Namespace, selection: Selection) -> tuple[str, tuple[Stated, ...]]:
+def _stated(options: Namespace, selection: Selection) -> tuple[str, tuple[StatedResult, ...]]:
     with opened(options) as history:
         found = list_stated_results(history, selection)
         label = history.engine.url.render_as_string()
@@ -88,7 +88,7 @@ def _stated(options: Namespace, selection: Selection) -> tuple[str, tuple[Stated
 
 
 def _solve_all(
-    tasks: Sequence[Task], options: Namespace, solve: Solve, journal: Journal, answers: dict[str, Answer]
+    tasks: Sequence[Task], options: Namespace, solve: Solve, journal: RecomputeJournal, answers: dict[str, Answer]
 ) -> Fault | None:
     """Have all solved and note each answer; the fault with which a cluster went away."""
     try:
@@ -141,7 +141,7 @@ def _written(out: Path) -> Iterator[None]:
         raise Refused("report_folder", f"{out} cannot be written: {error}", "Choose another with --out") from error
 
 
-def _print(outcome: Outcome, out: Path) -> None:
+def _print(outcome: RecomputeOutcome, out: Path) -> None:
     if outcome.notable:
         Console(highlight=False).print(notable_table(outcome, MOST_SHOWN))
     lines = sum(max(1, len(each.stated.calibrations)) for each in outcome.notable)

@@ -8,7 +8,7 @@ from rig.config.files.regular_file import UnfitFile
 from rig.data.version import VERSION
 from rig.errors import RigError
 from rig.history.again.answer import Answer, RecomputedResult, State, Unsolved
-from rig.history.entered.finished import Recording, recording_of
+from rig.history.entered.finished import EnteredRecording, recording_of
 
 # Refusals that say nothing of a recording: it has no such setting or estimator, or this computer cannot solve it.
 NOT_OF_IT = ("unknown_setting", "wrong_setting", "unknown_estimator")
@@ -23,7 +23,7 @@ class Task:
     """
 
     key: str
-    recordings: tuple[Recording, ...]
+    recordings: tuple[EnteredRecording, ...]
     places: tuple[tuple[str, str], ...]
     overrides: tuple[str, ...]
     estimator: str | None
@@ -53,7 +53,7 @@ def _folder(task: Task) -> Path | Unsolved:
     return damaged or Unsolved("missing", f"its recordings are not in {where}")
 
 
-def _held(file: Path, entered: Recording) -> Unsolved | None:
+def _held(file: Path, entered: EnteredRecording) -> Unsolved | None:
     try:
         found = recording_of(file)
     except (FileNotFoundError, NotADirectoryError):

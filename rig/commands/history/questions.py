@@ -15,7 +15,7 @@ from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
 from rig.errors.extras import missing_extra
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
-from rig.history.entered.finished import PAGE, Finished, read_finished_run
+from rig.history.entered.finished import PAGE, FinishedRun, read_finished_run
 from rig.history.series import Change, changes_between, effects, rig_states, subjects, trends
 from rig.history.storage.address import own_history_address, resolve_address
 from rig.history.store import History, Past, Selection, open_history
@@ -244,7 +244,7 @@ def _run_folders(given: list[Path], *, unsolved: bool) -> Iterator[Path]:
         yield from sorted(inner) or [folder]
 
 
-def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
+def _finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
     """The run as its recordings give it, which a result.json alone only claims; what is there already is not solved.
 
     Raises Refused `no_recording`, `result_not_of_recording`, and as the recordings' solution does.

@@ -14,7 +14,7 @@ from rig.station.events import NotRemembered, Remembered, RunEvent, Since
 
 if TYPE_CHECKING:
     from rig.config.judging.judging_sections import HistorySection
-    from rig.history.entered.finished import Finished
+    from rig.history.entered.finished import FinishedRun
     from rig.history.entered.issued import Issued
     from rig.history.series import Change
     from rig.history.storage.address import HistoryAddress
@@ -138,7 +138,7 @@ def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _entered(where: "HistoryAddress", run: "Finished") -> "tuple[tuple[int, ...], tuple[Beside, ...]]":
+def _entered(where: "HistoryAddress", run: "FinishedRun") -> "tuple[tuple[int, ...], tuple[Beside, ...]]":
     from rig.history.store import open_history
 
     with open_history(where) as history:

@@ -50,9 +50,9 @@ def run(options: Namespace) -> int:
 
 def _print_by_hand(section: "ByHandSection", *, as_json: bool) -> None:
     """What an operator is asked for, in the order in which it is when nothing comes between."""
-    from rig.plans.by_hand import Wanted, simulate_session
+    from rig.plans.by_hand import WantedMoves, simulate_session
 
-    asked = list(simulate_session(Wanted(section.flips, section.turns)))
+    asked = list(simulate_session(WantedMoves(section.flips, section.turns)))
     if as_json:
         moves = [{"say": each.say, "face": each.face, "turns": each.turns} for each in asked]
         say(json.dumps({"schema": "rig.by_hand_plan/1", "moves": moves}))

@@ -13,8 +13,8 @@ from rig.errors import Refused
 from rig.station.plain_text import duration_words, say
 
 if TYPE_CHECKING:
-    from rig.study.catalogue import Entry
-    from rig.study.report import Finding
+    from rig.study.catalogue import StudyEntry
+    from rig.study.report import StudyFinding
 
 WORTH_TELLING_S = 5.0
 
@@ -89,7 +89,7 @@ def _run(options: Namespace) -> int:
     return 0
 
 
-def _about(entry: "Entry", jobs: int = 1) -> str:
+def _about(entry: "StudyEntry", jobs: int = 1) -> str:
     """How long a study takes, in words; nothing where that is not known."""
     duration_s = entry.duration_s(jobs)
     return "" if duration_s is None else f"about {duration_words(max(duration_s, 1.0))}"
@@ -120,7 +120,7 @@ def _bar(jobs: int, results: Iterable[Any], total: int) -> Iterable[Any]:
         yield result
 
 
-def _print_findings(name: str, findings: "tuple[Finding, ...]") -> None:
+def _print_findings(name: str, findings: "tuple[StudyFinding, ...]") -> None:
     from rich.console import Console
     from rich.table import Table
 

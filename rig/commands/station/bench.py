@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from rig.analysis.outcome import Outcome
-from rig.batch.batch import Chip, Part, PartEnded
+from rig.batch.batch import BatchPart, Chip, PartEnded
 from rig.batch.parts_in_turn import Desk, now_utc
 from rig.commands.configured import Configured, changed
 from rig.commands.history.recall import known_board, remembered
@@ -113,7 +113,7 @@ class RigBench:
         if self.control is not None:
             part_fitter(self.control)(serial)
 
-    def run(self, part: Part, folder: Path, desk: Desk) -> PartEnded:
+    def run(self, part: BatchPart, folder: Path, desk: Desk) -> PartEnded:
         """Run the part in `folder`, or go on there; refused sweeps are repeated at once. Raises Refused, Fault."""
         of_part = self._of(part.serial)
         if (folder / RESULT).exists() and (ended := _finished(folder, of_part)) is not None:

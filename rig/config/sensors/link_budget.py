@@ -11,7 +11,7 @@ MARGIN = 0.1  # of the link stays free: answers, and a clock that is a little of
 
 
 @dataclass(frozen=True, slots=True)
-class Stream:
+class LinkLoad:
     """What one sensor sends: samples a second, raw or `calibrated` or both in turn, raw ones with its accelerations.
 
     Or those of a magnetometer, of its `field`.
@@ -48,7 +48,7 @@ def capacity_bytes_per_s(baud: int) -> float:
     return baud / BITS_PER_BYTE * (1 - MARGIN)
 
 
-def over_budget(streams: Mapping[str, Stream], baud: int) -> str | None:
+def over_budget(streams: Mapping[str, LinkLoad], baud: int) -> str | None:
     """Return the arithmetic if the link cannot carry all `streams` (by sensor name), else None."""
     needed = sum(stream.bytes_per_s for stream in streams.values())
     if needed <= capacity_bytes_per_s(baud):

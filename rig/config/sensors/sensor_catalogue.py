@@ -24,7 +24,7 @@ class Delivered:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PartSpec:
     """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
     `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity_percent` how far it may be
@@ -129,9 +129,9 @@ def has_own_port(part: str) -> bool:
     return part in PARTS and PARTS[part].own_port
 
 
-PARTS: Mapping[str, Part] = MappingProxyType(
+PARTS: Mapping[str, PartSpec] = MappingProxyType(
     {
-        "lsm9ds1": Part(  # datasheet DocID025715, tables 3 and 46
+        "lsm9ds1": PartSpec(  # datasheet DocID025715, tables 3 and 46
             rates_hz=(14.9, 59.5, 119, 238, 476, 952),
             rates_rule="14.9, 59.5, 119, 238, 476, 952",
             ranges_deg_s=(245, 500, 2000),
@@ -154,7 +154,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             acceleration_bias_instability_ug=30,
             delivered=Delivered(bias_deg_s=30),  # at ±2000 °/s
         ),
-        "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
+        "mpu9250": PartSpec(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
             rates_hz=tuple(1000 / (1 + divider) for divider in range(250)),
             rates_rule="1000/(n + 1) with n = 0 … 249",
             ranges_deg_s=(250, 500, 1000, 2000),
@@ -177,7 +177,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             acceleration_bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
             delivered=Delivered(bias_deg_s=5, scale_percent=3, rate_percent=1),  # PS-MPU-9250A-01, table 1
         ),
-        "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
+        "adis16465": PartSpec(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
             rates_hz=tuple(2000 / (1 + divider) for divider in range(2000)),
             rates_rule="2000/(n + 1) with n = 0 … 1999",
             ranges_deg_s=(125, 500, 2000),
@@ -200,7 +200,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             acceleration_scale_ppm_k=20,
             acceleration_bias_instability_ug=3.6,  # data sheet, features
         ),
-        "icm42688p": Part(  # DS-000347 rev. 1.8, section 14.37; slower rates let through more than half of themselves
+        "icm42688p": PartSpec(  # DS-000347 rev. 1.8, section 14.37; slower rates pass more than half their band
             rates_hz=(25, 50, 100, 200, 500, 1000, 2000),
             rates_rule="25, 50, 100, 200, 500, 1000, 2000",
             ranges_deg_s=(15.625, 31.25, 62.5, 125, 250, 500, 1000, 2000),
@@ -230,7 +230,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
                 rate_percent=3.5,  # table 4: ±1.5 % at 25 °C and ±2 % with temperature, the gyroscope's clock
             ),
         ),
-        "lsm6dsv16x": Part(  # DS13510 rev. 4, table 20: three sets of rates of the high-accuracy mode
+        "lsm6dsv16x": PartSpec(  # DS13510 rev. 4, table 20: three sets of rates of the high-accuracy mode
             rates_hz=tuple(
                 sorted(fastest / 2**n for fastest in (1600, 1920, 2000) for n in range(8)),
             ),
@@ -256,7 +256,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             # Table 3; the accelerometer's scale factor has no figure there
             delivered=Delivered(bias_deg_s=1, scale_percent=0.3, acceleration_bias_mg=12, rate_percent=1),
         ),
-        "kvh1775": Part(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
+        "kvh1775": PartSpec(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
             rates_hz=(1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000),
             rates_rule="1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000",
             ranges_deg_s=(490,),  # of the maker's data sheet
@@ -282,7 +282,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
         ),
         # IMUs of autopilots are of many kinds: what follows is what the ICM-42688-P of TDK states, DS-000347, table 1
         # and 2, which most flight controllers of today have; where it is silent, that of the MPU-9250.
-        "mavlink": Part(
+        "mavlink": PartSpec(
             rates_hz=tuple(range(5, 401)),
             rates_rule="5, 6, … 400",
             ranges_deg_s=(250, 500, 1000, 2000),
@@ -305,7 +305,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             acceleration_bias_instability_ug=30,
             own_port=True,
         ),
-        "lines": Part(  # any device: assumed to be as bad as the worst of the parts above; `uncertainty` says better
+        "lines": PartSpec(  # any device: assumed as poor as the worst part above; `uncertainty` states better
             rates_hz=(),
             rates_rule="any; what the device prints",
             ranges_deg_s=(),
@@ -339,7 +339,7 @@ MAGNETOMETERS: Mapping[str, MagnetometerPart] = MappingProxyType(
     }
 )
 
-CATALOGUE: Mapping[str, Part | MagnetometerPart] = MappingProxyType({**PARTS, **MAGNETOMETERS})
+CATALOGUE: Mapping[str, PartSpec | MagnetometerPart] = MappingProxyType({**PARTS, **MAGNETOMETERS})
 
 if TYPE_CHECKING:
     PartName = str

@@ -43,7 +43,7 @@ PartNumber = Annotated[str, Field(pattern=r"^[ -~]+$", max_length=40)]
 Gradient = Annotated[float, Field(ge=-1000, le=1000)]
 
 
-class SiteSection(Section):
+class WorldSiteSection(Section):
     """Where the laboratory stands, and how the arm's base stands in it."""
 
     latitude_deg: float | None = Field(
@@ -473,7 +473,7 @@ class WorldSection(Section):
     control_port: int = Field(
         default=7322, ge=1, le=65535, description="TCP port on which tests cause faults", json_schema_extra=RATIO
     )
-    site: SiteSection = SiteSection()
+    site: WorldSiteSection = WorldSiteSection()
     arm: SimulatedArmSection = SimulatedArmSection()
     hand: SimulatedHandSection = Field(
         default=SimulatedHandSection(), description="the simulated operator, where a hand turns the item"

@@ -133,7 +133,7 @@ def size_without_holes(file: BinaryIO) -> int:
     return stored
 
 
-class Reading:
+class ReadingTask:
     """A file that another process reads by a `reader` ("module:function"), called with its path and `arguments`.
 
     The arguments are values of JSON. The process has begun, so the caller may import meanwhile; leaving the context
@@ -189,8 +189,8 @@ class Reading:
 
 
 def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> list[Part]:
-    """Return the parts that a `reader` yields of a file: see `Reading`. Raise as `Reading` and `Reading.parts`."""
-    with Reading(reader, path, arguments, limits) as reading:
+    """Return the parts that a `reader` yields of a file: see `ReadingTask`. Raise as `ReadingTask.parts`."""
+    with ReadingTask(reader, path, arguments, limits) as reading:
         return reading.parts()
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rig.config.section import SensorName
 from rig.data.checked import LARGEST_NUMBER, parse_json, validate
-from rig.data.processes.reading_process import Reading, UnreadableFile
+from rig.data.processes.reading_process import ReadingTask, UnreadableFile
 from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
 from rig.data.recording.events import Event, Recorded, decode_events, encode_event
 from rig.data.recording.extract import reason
@@ -190,7 +190,7 @@ class RunRecorder:
         )
 
 
-def read_run(path: Path, timeout_s: float | None = None, *, begun: Reading | None = None) -> RunData:
+def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask | None = None) -> RunData:
     """Read a run file: finished, still being written, or left behind by a killed process.
 
     `begun` is its `begin_reading`, if that has been called already. Rows that the kill left unwritten or torn at the
@@ -253,7 +253,7 @@ def make_plain(path: Path) -> None:
     lay_out(path, replace(contents, samples=samples, states=_whole_rows(contents.states)), swmr=False)
 
 
-def _contents(path: Path, timeout_s: float | None, begun: Reading | None = None) -> Contents:
+def _contents(path: Path, timeout_s: float | None, begun: ReadingTask | None = None) -> Contents:
     """Return the file's contents, read by a process that can be ended: see `rig.data.recording.extract`."""
     try:
         with begun or begin_reading(path, timeout_s) as reading:

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
-from rig.data.processes.reading_process import MAX_UNPACKED, Reading, ReadingLimits, size_without_holes
+from rig.data.processes.reading_process import MAX_UNPACKED, ReadingLimits, ReadingTask, size_without_holes
 from rig.errors import Refused
 
 FIRST_RECORDING = "run.h5"
@@ -14,15 +14,15 @@ MAX_UNWRITTEN_BYTES = 50_000_000  # of all rows that are announced and not there
 LIBRARIES_BYTES = 1 << 29  # of memory, and more than the libraries and the structures of any file take
 
 
-def begin_reading(path: Path, timeout_s: float | None = None) -> Reading:
+def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
     """Begin to read a run file (`rig.data.recording.extract`), to be done within `timeout_s` (None: by its size).
 
-    Raises Refused `no_run_file`, and as `Reading`.
+    Raises Refused `no_run_file`, and as `ReadingTask`.
     """
     stored = _stored_bytes(path)
     if timeout_s is None:
         timeout_s = READ_TIMEOUT_S + stored / READ_BYTES_PER_S
-    return Reading("rig.data.recording.extract:contents", path, {}, _limits(stored, timeout_s))
+    return ReadingTask("rig.data.recording.extract:contents", path, {}, _limits(stored, timeout_s))
 
 
 def _limits(stored_bytes: int, time_s: float) -> ReadingLimits:
@@ -45,7 +45,7 @@ def _stored_bytes(path: Path) -> int:
 
 
 @contextmanager
-def reading_ahead(run: Path) -> Iterator[dict[Path, Reading]]:
+def reading_ahead(run: Path) -> Iterator[dict[Path, ReadingTask]]:
     """Read the first recording of a run folder, or a run file, for the length of the block; yield it by its path.
 
     Nothing of a folder in which there is none. Raises as `begin_reading`.

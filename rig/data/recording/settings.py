@@ -143,7 +143,7 @@ class Elsewhere:
 
 
 @dataclass(frozen=True, slots=True)
-class ByHand:
+class HandSettings:
     """The settings of a session by hand, and its planned numbers of `flips` and whole `turns`.
 
     The next move is asked for `rest_s` after the item came to rest. `box_rad` and `closure_rad` are standard
@@ -217,7 +217,7 @@ class RunSettings:
     elsewhere: Elsewhere | None = None
     mounts: tuple[Mounting, ...] = ()
     stage: Annotated[int, Field(ge=0)] = 0
-    by_hand: ByHand | None = None
+    by_hand: HandSettings | None = None
     reference_c: float | None = None
 
     @property
@@ -337,9 +337,9 @@ def _limits(config: "RigConfig") -> Limits:
     return Limits(**limits)
 
 
-def hand_settings(section: "ByHandSection") -> ByHand:
+def hand_settings(section: "ByHandSection") -> HandSettings:
     """Return the settings of a session by hand."""
-    return ByHand(
+    return HandSettings(
         flips=section.flips,
         turns=section.turns,
         rest_s=section.rest_s,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from rig.history.entered.finished import Recording
+from rig.history.entered.finished import EnteredRecording
 from rig.history.entered.issued import Issued
 from rig.history.store import Past
 from rig.report.findings.followed import HistoryRecord, Parameter
@@ -20,7 +20,7 @@ State = Literal["refused", "unjudged", "missing", "damaged", "lost", "failed"]
 
 
 @dataclass(frozen=True, slots=True)
-class Stated:
+class StatedResult:
     """A result of the history, with its recordings and the certificates that rely on it.
 
     - `run_id`, `content_sha256`, `started_utc`, `rig`, `verdict`: the run.
@@ -35,7 +35,7 @@ class Stated:
     rig: str
     verdict: str
     calibrations: tuple[Past, ...]
-    recordings: tuple[Recording, ...]
+    recordings: tuple[EnteredRecording, ...]
     places: tuple[tuple[str, str], ...]
     certificates: tuple[Issued, ...] = ()
 
@@ -65,7 +65,7 @@ Answer = RecomputedResult | Unsolved
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class ParameterMove:
     """One parameter as stated and as recomputed, None if the present result does not have it."""
 
     before: Parameter
@@ -95,12 +95,12 @@ class Move:
 class Compared:
     """A stated result with the present one of its recordings; None if they were not reached."""
 
-    stated: Stated
+    stated: StatedResult
     answer: Answer | None
     of_u: float = OF_U
 
     @cached_property
-    def moves(self) -> Mapping[int, tuple[Move, ...]]:
+    def moves(self) -> Mapping[int, tuple[ParameterMove, ...]]:
         """Every parameter of each calibration, by its number, the largest move first; empty if unsolved."""
         if not isinstance(self.answer, RecomputedResult):
             return {}
@@ -108,7 +108,7 @@ class Compared:
         by_number = {}
         for past in self.stated.calibrations:
             present = {parameter.name: parameter for parameter in now.get((past.sensor, past.quantity), ())}
-            moves = (Move(stated, present.get(name)) for name, stated in past.parameters.items())
+            moves = (ParameterMove(stated, present.get(name)) for name, stated in past.parameters.items())
             by_number[past.id] = tuple(sorted(moves, key=lambda move: -move.size))
         return by_number
 
@@ -141,7 +141,7 @@ class Compared:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class RecomputeOutcome:
     """All comparisons in the order of time, and their numbers."""
 
     of_u: float
@@ -195,12 +195,14 @@ class Outcome:
         return tuple(comparison for comparison in self.compared if not comparison.same)
 
 
-def compared(stated: Iterable[Stated], answers: Mapping[str, Answer], of_u: float = OF_U) -> Outcome:
+def compared(stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = OF_U) -> RecomputeOutcome:
     """Return the results with their answers, found by the checksum of the result."""
-    return Outcome(of_u, tuple(Compared(result, answers.get(result.content_sha256), of_u) for result in stated))
+    return RecomputeOutcome(
+        of_u, tuple(Compared(result, answers.get(result.content_sha256), of_u) for result in stated)
+    )
 
 
-def to_solve(stated: Sequence[Stated], solved: Mapping[str, Answer]) -> tuple[Stated, ...]:
+def to_solve(stated: Sequence[StatedResult], solved: Mapping[str, Answer]) -> tuple[StatedResult, ...]:
     """Return the recordings still to be solved: all without a result, failed ones included."""
     return tuple(result for result in stated if not isinstance(solved.get(result.content_sha256), RecomputedResult))
 

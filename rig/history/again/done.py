@@ -23,7 +23,7 @@ SIZE_MAX_BYTES = 1 << 32  # a recording has some thousand
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class RecomputeQuestion:
     """The program, settings and estimator (None: each procedure's own) of a recomputation."""
 
     rig_version: str
@@ -35,13 +35,13 @@ class Question:
         return json.dumps({"schema": SCHEMA, **asdict(self)})
 
 
-class Journal(AbstractContextManager["Journal"]):
+class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
     """The journal in an existing folder, begun or continued; `solved` are its answers, by their keys.
 
     Raise Refused `another_question`, and `report_folder` if it cannot be read or, at any time, written.
     """
 
-    def __init__(self, folder: Path, question: Question) -> None:
+    def __init__(self, folder: Path, question: RecomputeQuestion) -> None:
         self._path = folder / JOURNAL
         try:
             self.solved, whole_bytes = _read(self._path, question)
@@ -76,7 +76,7 @@ class Journal(AbstractContextManager["Journal"]):
         )
 
 
-def _read(path: Path, question: Question) -> tuple[Mapping[str, Answer], int]:
+def _read(path: Path, question: RecomputeQuestion) -> tuple[Mapping[str, Answer], int]:
     """Return the answers of a journal, and the number of bytes in complete lines; none without a journal."""
     solved, complete_bytes = dict[str, Answer](), 0
     if not path.exists():
@@ -97,7 +97,7 @@ def _read(path: Path, question: Question) -> tuple[Mapping[str, Answer], int]:
     return solved, complete_bytes
 
 
-def _same_question(path: Path, line: bytes, question: Question) -> None:
+def _same_question(path: Path, line: bytes, question: RecomputeQuestion) -> None:
     if line.decode(errors="replace").strip() != question.line():
         raise Refused(
             "another_question",

@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 
 from sqlalchemy import Connection, Row, Select, select
 
-from rig.history.again.answer import Stated
-from rig.history.entered.finished import Recording
+from rig.history.again.answer import StatedResult
+from rig.history.entered.finished import EnteredRecording
 from rig.history.entered.issued import Issued
 from rig.history.storage import schema
 from rig.history.store import History, Past, Selection, chosen, replaced
@@ -17,7 +17,7 @@ Value = TypeVar("Value")
 _RUN = schema.run.c
 
 
-def list_stated_results(history: History, selection: Selection) -> tuple[Stated, ...]:
+def list_stated_results(history: History, selection: Selection) -> tuple[StatedResult, ...]:
     """Return all valid results in the order of time, and replaced ones on which a certificate in force relies.
 
     Voided calibrations do not count, nor runs with no others. Runs without calibrations, such as a verification alone,
@@ -37,7 +37,7 @@ def list_stated_results(history: History, selection: Selection) -> tuple[Stated,
             _certificates(connection),
         )
     return tuple(
-        Stated(
+        StatedResult(
             row.id,
             row.content_sha256,
             row.started_utc,
@@ -54,10 +54,12 @@ def list_stated_results(history: History, selection: Selection) -> tuple[Stated,
     )
 
 
-def _recordings(connection: Connection) -> Mapping[int, tuple[Recording, ...]]:
+def _recordings(connection: Connection) -> Mapping[int, tuple[EnteredRecording, ...]]:
     columns = schema.recording.c
     query = select(columns.run_id, columns.name, columns.bytes, columns.sha256).order_by(columns.name)
-    return _group_by_run((row.run_id, Recording(row.name, row.bytes, row.sha256)) for row in _rows(connection, query))
+    return _group_by_run(
+        (row.run_id, EnteredRecording(row.name, row.bytes, row.sha256)) for row in _rows(connection, query)
+    )
 
 
 def _places(connection: Connection) -> Mapping[int, tuple[tuple[str, str], ...]]:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rig.history.again.answer import Compared, Move, Outcome, RecomputedResult, Unsolved
-from rig.history.again.done import Question
+from rig.history.again.answer import Compared, ParameterMove, RecomputedResult, RecomputeOutcome, Unsolved
+from rig.history.again.done import RecomputeQuestion
 from rig.history.documents import cell
 from rig.history.entered.issued import Issued
 from rig.history.store import Past
-from rig.history.terminal.fitting_table import Column, FittingTable
+from rig.history.terminal.fitting_table import FittingTable, TableColumn
 from rig.history.terminal.tables import value_text
 from rig.report.words.rounding import figures
 
@@ -53,7 +53,7 @@ STATE_WORDS = {
 }
 
 
-def again_csv(outcome: Outcome) -> str:
+def again_csv(outcome: RecomputeOutcome) -> str:
     """Return a line for each calibration, with its parameter that moved most; a run without any has one line."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
@@ -64,7 +64,7 @@ def again_csv(outcome: Outcome) -> str:
     return out.getvalue()
 
 
-def again_page(outcome: Outcome, question: Question, history: str) -> str:
+def again_page(outcome: RecomputeOutcome, question: RecomputeQuestion, history: str) -> str:
     """Return HTML that loads nothing from outside: the question, the numbers, and notable results."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -81,7 +81,7 @@ def again_page(outcome: Outcome, question: Question, history: str) -> str:
     )
 
 
-def counts(outcome: Outcome) -> Iterator[str]:
+def counts(outcome: RecomputeOutcome) -> Iterator[str]:
     """Yield the numbers in two or three lines."""
     unsolved = [f"{count} {STATE_WORDS[state]}" for state, count in sorted(outcome.unsolved.items())]
     unsolved += [f"{outcome.unreached} not reached"] if outcome.unreached else []
@@ -94,23 +94,23 @@ def counts(outcome: Outcome) -> Iterator[str]:
         yield f"certificates unconfirmed, because their recordings were not solved: {len(outcome.unconfirmed)}"
 
 
-def notable_table(outcome: Outcome, most: int) -> FittingTable:
+def notable_table(outcome: RecomputeOutcome, most: int) -> FittingTable:
     """Return the first notable results, in the order of time."""
     lines = list(_lines(outcome))[:most]
     columns = (
-        Column("number", [line["number"] for line in lines], number=True),
-        Column("day", [line["started"][:10] for line in lines], rank=3),
-        Column("serial", [line["serial"] for line in lines]),
-        Column("quantity", [line["quantity"] for line in lines], rank=4),
-        Column("verdict", [line["verdict"] for line in lines]),
-        Column("moved most", [line["moved"] for line in lines], rank=1),
-        Column("withdraw", [line["withdraw"] for line in lines], rank=2),
-        Column("why not solved", [line["why"] for line in lines], wraps=True, least=20),
+        TableColumn("number", [line["number"] for line in lines], number=True),
+        TableColumn("day", [line["started"][:10] for line in lines], rank=3),
+        TableColumn("serial", [line["serial"] for line in lines]),
+        TableColumn("quantity", [line["quantity"] for line in lines], rank=4),
+        TableColumn("verdict", [line["verdict"] for line in lines]),
+        TableColumn("moved most", [line["moved"] for line in lines], rank=1),
+        TableColumn("withdraw", [line["withdraw"] for line in lines], rank=2),
+        TableColumn("why not solved", [line["why"] for line in lines], wraps=True, least=20),
     )
     return FittingTable("needs attention", columns)
 
 
-def _lines(outcome: Outcome) -> Iterator[dict[str, str]]:
+def _lines(outcome: RecomputeOutcome) -> Iterator[dict[str, str]]:
     for comparison in outcome.notable:
         for past in comparison.stated.calibrations or (None,):
             yield _line(comparison, past)
@@ -142,7 +142,7 @@ def _verdict(compared: Compared) -> str:
     return f"{compared.stated.verdict}, now {compared.answer.verdict}{by}"
 
 
-def _move_words(move: Move) -> str:
+def _move_words(move: ParameterMove) -> str:
     if move.now is None:
         return f"{move.before.name}: no longer in the result"
     if move.shift >= move.growth:
@@ -150,7 +150,7 @@ def _move_words(move: Move) -> str:
     return f"U of {move.before.name} grew by {figures(move.growth)}"
 
 
-def _change(move: Move) -> str:
+def _change(move: ParameterMove) -> str:
     return value_text(move.before) + ("" if move.now is None else f" → {value_text(move.now)}") + f" {move.before.unit}"
 
 
@@ -158,7 +158,7 @@ def _numbers(certificates: tuple[Issued, ...]) -> str:
     return ", ".join(certificate.number for certificate in certificates)
 
 
-def _most_moved(compared: Compared, past: Past | None) -> Move | None:
+def _most_moved(compared: Compared, past: Past | None) -> ParameterMove | None:
     moves = () if past is None else compared.moves.get(past.id, ())
     return moves[0] if moves else None
 
@@ -198,7 +198,7 @@ def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
         yield columns
 
 
-def _move_columns(move: Move) -> dict[str, Any]:
+def _move_columns(move: ParameterMove) -> dict[str, Any]:
     now = move.now
     return {
         "parameter": move.before.name,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy import Connection, insert, select
 
-from rig.history.entered.finished import Finished
+from rig.history.entered.finished import FinishedRun
 from rig.history.storage import journal, schema
 from rig.history.storage.numbers import next_number
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rig.report.findings.followed import HistoryRecord
 
 
-def enter_run(connection: Connection, finished: Finished, content_sha256: str) -> int:
+def enter_run(connection: Connection, finished: FinishedRun, content_sha256: str) -> int:
     """Add a run with all that belongs to it; return its number."""
     from rig.history.entered.index import run_row
     from rig.report.kinds.registry import followed
@@ -44,7 +44,7 @@ def enter_run(connection: Connection, finished: Finished, content_sha256: str) -
     return run_id
 
 
-def note_place(connection: Connection, run_id: int, finished: Finished) -> None:
+def note_place(connection: Connection, run_id: int, finished: FinishedRun) -> None:
     """Add the location of the run's folder, unless it is known."""
     places = schema.location.c
     same = (places.run_id == run_id, places.computer == finished.computer, places.path == finished.path)

@@ -17,7 +17,7 @@ from rig.history.entered.issued import Issued, issue_certificate
 if TYPE_CHECKING:
     from rig.config.load import Loaded
     from rig.data.result_file import ResultDocument
-    from rig.report.certificate.statements import Stated
+    from rig.report.certificate.statements import StatedFacts
 
 PAGE, HEADER = "certificate.html", "calibration.h"
 DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
@@ -27,7 +27,7 @@ PAGE_MAX_BYTES = 64_000_000  # that of six sweeps has 30,000
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class EnteredRecording:
     """A recording's name in the run folder, its size, and its SHA-256 in hexadecimal."""
 
     name: str
@@ -36,7 +36,7 @@ class Recording:
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
+class FinishedRun:
     """A finished run.
 
     - `text`: result.json in compact form; `document`: its content.
@@ -54,7 +54,7 @@ class Finished:
     simulated: bool
     computer: str
     path: str
-    recordings: tuple[Recording, ...]
+    recordings: tuple[EnteredRecording, ...]
     operator: str | None = None
     note: str | None = None
     certificate: Issued | None = None
@@ -66,7 +66,7 @@ class Finished:
         return content_sha256(self.text)
 
 
-def read_finished_run(folder: Path, document: "ResultDocument | None" = None) -> Finished:
+def read_finished_run(folder: Path, document: "ResultDocument | None" = None) -> FinishedRun:
     """Return the run in `folder`, with its result.json or the `document` that was computed from its recordings.
 
     Raise the errors of `read_result`; OSError if a recording cannot be read.
@@ -74,7 +74,7 @@ def read_finished_run(folder: Path, document: "ResultDocument | None" = None) ->
     from rig.config.judging.judging_sections import HistorySection
     from rig.data.recording.provenance import calls_itself_simulated
     from rig.data.result_file import SIZE_MAX_BYTES, read_result
-    from rig.report.certificate.statements import Stated, of_configuration
+    from rig.report.certificate.statements import StatedFacts, of_configuration
 
     if document is None:
         document = read_result(folder)
@@ -85,8 +85,8 @@ def read_finished_run(folder: Path, document: "ResultDocument | None" = None) ->
     section = HistorySection() if loaded is None else loaded.config.history
     simulated = loaded is not None and loaded.simulated
     provenance = document.provenance
-    certificate = _certificate(folder, document, Stated() if loaded is None else of_configuration(loaded))
-    return Finished(
+    certificate = _certificate(folder, document, StatedFacts() if loaded is None else of_configuration(loaded))
+    return FinishedRun(
         text=compact(json.loads(text)),
         document=document,
         rig=section.rig or provenance.arm_serial_number,
@@ -124,14 +124,14 @@ def document_sha256(folder: Path, name: str) -> str | None:
     return hashlib.sha256(content).hexdigest()
 
 
-def recording_of(file: Path) -> Recording:
+def recording_of(file: Path) -> EnteredRecording:
     """Return a recording with its hash. Raise OSError, and UnfitFile for a file that does not belong to a run."""
     digest, size = hashlib.sha256(), 0
     with open_regular_file(file, RECORDING_MAX_BYTES) as stream:
         while chunk := stream.read(CHUNK_BYTES):
             digest.update(chunk)
             size += len(chunk)
-    return Recording(file.name, size, digest.hexdigest())
+    return EnteredRecording(file.name, size, digest.hexdigest())
 
 
 def compact(document: Any) -> str:
@@ -165,7 +165,7 @@ def read_configuration(folder: Path) -> "Loaded | None":
         return None
 
 
-def _certificate(folder: Path, document: "ResultDocument", stated: "Stated") -> Issued | None:
+def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts") -> Issued | None:
     """Return the certificate in the folder if it is exactly that of this result: its number alone proves nothing.
 
     An amended one is entered when it is made.

@@ -14,7 +14,7 @@ STROKES, ROUND_A_CELL = 1, 3  # of the frame: a stroke, and for each cell two sp
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class TableColumn:
     """A column with its `heading`. If columns do not fit, the one of the highest `rank` is omitted first; 0 stays.
 
     A `shorter` column replaces it before it is omitted. A column that `wraps` may use several lines, and is at least
@@ -25,7 +25,7 @@ class Column:
     cells: Sequence[str]
     rank: int = 0
     number: bool = False
-    shorter: "Column | None" = None
+    shorter: "TableColumn | None" = None
     wraps: bool = False
     least: int = 12
 
@@ -44,9 +44,9 @@ class FittingTable:
     """
 
     title: str
-    columns: Sequence[Column]
+    columns: Sequence[TableColumn]
 
-    def fitting(self, width: int) -> list[Column]:
+    def fitting(self, width: int) -> list[TableColumn]:
         """Return the columns that are shown in `width` cells; empty ones are omitted."""
         shown = [column for column in self.columns if any(column.cells)]
         while _total_width(shown) > width:
@@ -72,5 +72,5 @@ class FittingTable:
         yield table
 
 
-def _total_width(columns: Sequence[Column]) -> int:
+def _total_width(columns: Sequence[TableColumn]) -> int:
     return sum(column.width + ROUND_A_CELL for column in columns) + STROKES

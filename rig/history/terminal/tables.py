@@ -9,7 +9,7 @@ from rig.history.statistics.charts import FEWEST, Chart
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Kept, Past
 from rig.history.terminal.change_words import add_sign
-from rig.history.terminal.fitting_table import Column, FittingTable
+from rig.history.terminal.fitting_table import FittingTable, TableColumn
 from rig.history.terminal.spark import picture
 from rig.report.findings.followed import BIASES, SCALES, Parameter, is_scale
 from rig.report.words.rounding import figures, plus_minus
@@ -20,16 +20,16 @@ PPM = 1e6
 def calibrations_table(pasts: Sequence[Past]) -> FittingTable:
     """Return a table of calibrations, one line each: sensor, time, rig, verdict."""
     started = [past.started_utc.replace("T", " ")[:16] for past in pasts]
-    day = Column("day", [time[:10] for time in started], rank=2)
+    day = TableColumn("day", [time[:10] for time in started], rank=2)
     columns = (
-        Column("number", [str(past.id) for past in pasts], number=True),
-        Column("started (UTC)", started, rank=4, shorter=day),
-        Column("part", [past.part for past in pasts], rank=6),
-        Column("serial", [past.serial_number for past in pasts]),
-        Column("quantity", [past.quantity for past in pasts]),
-        Column("rig", [rig_in_words(past) for past in pasts], rank=5),
-        Column("verdict", [past.verdict if past.voided is None else f"{past.verdict}, void" for past in pasts]),
-        Column("notes", [_notes(past) for past in pasts], rank=3, wraps=True),
+        TableColumn("number", [str(past.id) for past in pasts], number=True),
+        TableColumn("started (UTC)", started, rank=4, shorter=day),
+        TableColumn("part", [past.part for past in pasts], rank=6),
+        TableColumn("serial", [past.serial_number for past in pasts]),
+        TableColumn("quantity", [past.quantity for past in pasts]),
+        TableColumn("rig", [rig_in_words(past) for past in pasts], rank=5),
+        TableColumn("verdict", [past.verdict if past.voided is None else f"{past.verdict}, void" for past in pasts]),
+        TableColumn("notes", [_notes(past) for past in pasts], rank=3, wraps=True),
     )
     return FittingTable("calibrations", columns)
 
@@ -37,14 +37,14 @@ def calibrations_table(pasts: Sequence[Past]) -> FittingTable:
 def trends_table(subject: Subject, trends: Sequence[Trend]) -> FittingTable:
     """Return a table of each parameter: its last value, drift, scatter and control chart, and its recall date."""
     columns = (
-        Column("parameter", [_add_unit(trend.name, trend.unit) for trend in trends]),
-        Column("trend", [picture(trend) for trend in trends], rank=1),
-        Column("last ± U", [value_text(trend.last) for trend in trends], number=True),
-        Column("runs", [str(trend.count) for trend in trends], rank=6, number=True),
-        Column("drift a year ± U", [_drift(trend) for trend in trends], rank=2, number=True),
-        Column("scatter", [_scatter(trend) for trend in trends], rank=5, number=True),
-        Column("chart", [_chart_words(trend.chart) for trend in trends], rank=3),
-        Column("recall", ["" if trend.recall is None else trend.recall.isoformat() for trend in trends], rank=4),
+        TableColumn("parameter", [_add_unit(trend.name, trend.unit) for trend in trends]),
+        TableColumn("trend", [picture(trend) for trend in trends], rank=1),
+        TableColumn("last ± U", [value_text(trend.last) for trend in trends], number=True),
+        TableColumn("runs", [str(trend.count) for trend in trends], rank=6, number=True),
+        TableColumn("drift a year ± U", [_drift(trend) for trend in trends], rank=2, number=True),
+        TableColumn("scatter", [_scatter(trend) for trend in trends], rank=5, number=True),
+        TableColumn("chart", [_chart_words(trend.chart) for trend in trends], rank=3),
+        TableColumn("recall", ["" if trend.recall is None else trend.recall.isoformat() for trend in trends], rank=4),
     )
     return FittingTable(title_of(subject), columns)
 
@@ -77,17 +77,19 @@ def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
     In a narrow terminal the values have no U, which E_n includes.
     """
 
-    def values(heading: str, parameters: Sequence[Parameter], rank: int) -> Column:
+    def values(heading: str, parameters: Sequence[Parameter], rank: int) -> TableColumn:
         texts = [value_text(parameter) for parameter in parameters]
-        short = Column(heading, [text.partition(" ±")[0] for text in texts], number=True)
-        return Column(f"{heading} ± U", texts, rank, number=True, shorter=short)
+        short = TableColumn(heading, [text.partition(" ±")[0] for text in texts], number=True)
+        return TableColumn(f"{heading} ± U", texts, rank, number=True, shorter=short)
 
     columns = (
-        Column("parameter", [_add_unit(change.name, change.unit) for change in changes]),
+        TableColumn("parameter", [_add_unit(change.name, change.unit) for change in changes]),
         values("before", [change.before for change in changes], 2),
         values("now", [change.now for change in changes], 1),
-        Column("difference", [add_sign(change.now.value - change.before.value) for change in changes], number=True),
-        Column("E_n", [_normalised_error(change) for change in changes], number=True),
+        TableColumn(
+            "difference", [add_sign(change.now.value - change.before.value) for change in changes], number=True
+        ),
+        TableColumn("E_n", [_normalised_error(change) for change in changes], number=True),
     )
     return FittingTable(title, columns)
 
@@ -97,10 +99,10 @@ def parameters_table(past: Past) -> FittingTable:
     parameters = past.parameters.values()
     combined = ["not known" if p.std_combined is None else figures(p.std_combined) for p in parameters]
     columns = (
-        Column("parameter", [_add_unit(p.name, p.unit) for p in parameters]),
-        Column("value ± U", [value_text(p) for p in parameters], number=True),
-        Column("u of noise", [figures(p.std_statistical) for p in parameters], rank=2, number=True),
-        Column("u of all", combined, rank=1, number=True),
+        TableColumn("parameter", [_add_unit(p.name, p.unit) for p in parameters]),
+        TableColumn("value ± U", [value_text(p) for p in parameters], number=True),
+        TableColumn("u of noise", [figures(p.std_statistical) for p in parameters], rank=2, number=True),
+        TableColumn("u of all", combined, rank=1, number=True),
     )
     return FittingTable(f"calibration {past.id}: {title_of(past.subject)}", columns)
 
@@ -126,11 +128,13 @@ def states_table(states: Iterable[RigState]) -> FittingTable:
     """Return a table of the rigs' states by their check standards."""
     rows = [(state, name, chart) for state in states for name, chart in state.charts.items()]
     columns = (
-        Column("rig", [state.rig for state, *_ in rows]),
-        Column("check standards", [", ".join(state.standards) for state, *_ in rows], rank=2, wraps=True, least=16),
-        Column("parameter", [name for _, name, _ in rows]),
-        Column("results", [str(chart.deviation.shape[-1]) for *_, chart in rows], rank=1, number=True),
-        Column("chart", [_chart_words(chart) for *_, chart in rows]),
+        TableColumn("rig", [state.rig for state, *_ in rows]),
+        TableColumn(
+            "check standards", [", ".join(state.standards) for state, *_ in rows], rank=2, wraps=True, least=16
+        ),
+        TableColumn("parameter", [name for _, name, _ in rows]),
+        TableColumn("results", [str(chart.deviation.shape[-1]) for *_, chart in rows], rank=1, number=True),
+        TableColumn("chart", [_chart_words(chart) for *_, chart in rows]),
     )
     return FittingTable("rigs by their check standards", columns)
 
@@ -139,11 +143,11 @@ def effects_table(effects: Mapping[str, Sequence[RigEffect]]) -> FittingTable:
     """Return a table of the differences between rigs."""
     rows = [(name, effect) for name, rig_effects in effects.items() for effect in rig_effects]
     columns = (
-        Column("parameter", [name for name, _ in rows]),
-        Column("rig", [effect.rig for _, effect in rows]),
-        Column("reads more than", [effect.reference for _, effect in rows]),
-        Column("by ± U", [_effect(name, effect) for name, effect in rows], number=True),
-        Column("shared sensors", [str(effect.sensors) for _, effect in rows], rank=1, number=True),
+        TableColumn("parameter", [name for name, _ in rows]),
+        TableColumn("rig", [effect.rig for _, effect in rows]),
+        TableColumn("reads more than", [effect.reference for _, effect in rows]),
+        TableColumn("by ± U", [_effect(name, effect) for name, effect in rows], number=True),
+        TableColumn("shared sensors", [str(effect.sensors) for _, effect in rows], rank=1, number=True),
     )
     return FittingTable("effects of rigs, separated from those of sensors", columns)
 

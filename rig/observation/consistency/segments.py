@@ -21,7 +21,7 @@ from rig.observation.observe import Observation, fit_response
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.coloured_noise import correlation_inflation
 from rig.observation.statistics.lines import LineSearch, find_lines, fit_columns, line_swing, waves
-from rig.observation.statistics.mean import Mean, Noise, weighted_means
+from rig.observation.statistics.mean import Mean, MeanNoise, weighted_means
 from rig.observation.statistics.tapered_weights import noise_at_zero
 
 # Not four: at the ends of quarters one of an encoder's waves that come twice a turn is zero, and no segment shows it.
@@ -165,7 +165,7 @@ def _segment_revolution(
     )
     vibrating = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
     noise_alone = residual - vibrating
-    noise = Noise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.freedom)
+    noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.freedom)
     segments = _average(
         division,
         motion,
@@ -216,7 +216,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
     return SegmentedAverage(average, segments if average.samples >= FEWEST_AT_REST else (), raw)
 
 
-def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> Noise:
+def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> MeanNoise:
     """Return the noise of readings with residuals (n, 3) after a fit of the segments' means and columns of lines."""
     dof = max(len(residuals) - segments - columns, 1)
     scatter = np.maximum(np.sum(residuals**2, axis=0) / dof, steps.variance)
@@ -224,11 +224,11 @@ def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) 
     if columns:
         at_zero = np.maximum(noise_at_zero(residuals), steps.variance)
         in_a_mean = np.where(at_zero < PREVAILS * scatter, at_zero, in_a_mean)
-    return Noise(scatter, in_a_mean, float(dof))
+    return MeanNoise(scatter, in_a_mean, float(dof))
 
 
 def _average(
-    division: _Division, motion: ArmMotion, *, weights: Array, residuals: Array, rates: Array, noise: Noise
+    division: _Division, motion: ArmMotion, *, weights: Array, residuals: Array, rates: Array, noise: MeanNoise
 ) -> tuple[Segment, ...]:
     """Return the segments with enough samples: readings and the flange's rates (m, 3) by the same weights (p, m)."""
     readings = division.readings_rad_s

@@ -46,7 +46,7 @@ LOW = 0.0  # of the data rate: as few low frequencies as possible, for a servo's
 
 
 @dataclass(frozen=True, slots=True)
-class Transfer:
+class WristTransfer:
     """A transfer in which only the wrists turned, averaged; times are on the clock of its recording.
 
     clock_offset_s: converts its times to the clock of the first recording. mean_rad_s (3,): mean of the readings.
@@ -68,12 +68,12 @@ class Transfer:
 
 def average_transfers(
     name: str, recordings: Sequence[ObservedRun], matrix: Array, site: Site, extension_m: Array
-) -> list[Transfer]:
+) -> list[WristTransfer]:
     """Average all transfers of a gyroscope of F (3, 3) mounted at `extension_m` (3,) from the flange, in its frame.
 
     Transfers with a missing sample or one out of range are left out.
     """
-    transfers = list[Transfer]()
+    transfers = list[WristTransfer]()
     for recording in recordings:
         stream = recording.stream(name)
         for interval in _find_transfers(recording.run, stream, recording.motion):
@@ -81,7 +81,7 @@ def average_transfers(
             readings, time_s = stream.readings_rad_s[inside], stream.time_s[inside]
             moving = interval.motion.rate(time_s) @ matrix.T
             transfers.append(
-                Transfer(
+                WristTransfer(
                     clock_offset_s=recording.clock_offset_s,
                     mean_rad_s=readings.mean(axis=0),
                     scatter_rad2_s2=_scatter(readings, time_s, interval.motion, site.down_m_s2),

@@ -21,7 +21,7 @@ from rig.data.recording.motion_file import TIME, Columns, samples_header
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.external.csv_windows import check_times
-from rig.observation.formats.csv_table import Mapped, Table, blank_cell, read_table
+from rig.observation.formats.csv_table import CsvTable, Mapped, blank_cell, read_table
 from rig.observation.formats.sample_files import readings_in
 from rig.observation.sampling import Sampling, even_times, find_sampling
 
@@ -85,7 +85,7 @@ def read_sample_table(
     return _drop_blanks(path, table, read, wanted)
 
 
-def _read(path: Path, table: Table, quantity: Quantity) -> NDArray[np.bool_]:
+def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
     """Return the rows (n,) that hold a quantity. Raise Refused `not_a_number` if some of its axes are blank."""
     blank = np.isnan([table.columns[name] for name in quantity.columns])
     if len(partly := np.flatnonzero(blank.any(axis=0) & ~blank.all(axis=0))):
@@ -97,7 +97,7 @@ def _read(path: Path, table: Table, quantity: Quantity) -> NDArray[np.bool_]:
 
 
 def _drop_blanks(
-    path: Path, table: Table, read: Mapping[Quantity, NDArray[np.bool_]], wanted: Sequence[Quantity]
+    path: Path, table: CsvTable, read: Mapping[Quantity, NDArray[np.bool_]], wanted: Sequence[Quantity]
 ) -> SampleTable:
     """Return the rows that hold all that is wanted. Raise Refused `blank_cells` if no row does, or only some do."""
     columns, time_s = dict(table.columns), table.columns[TIME]

@@ -33,7 +33,7 @@ class Mapped:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class CsvTable:
     """A file's `columns` (n,) by name, NaN for a blank cell, and the `lines` (n,) of its rows.
 
     Times count from `origin_s`, whole seconds: 0, except in files whose clock counts from 1970 or so.
@@ -66,7 +66,7 @@ def blank_cell(path: Path, name: str, line: int) -> Refused:
 
 def read_table(
     path: Path, header: Header, largest_mb: int, mapped: Mapped | None = None, origin_s: int | None = None
-) -> Table:
+) -> CsvTable:
     """Return the columns of a file by name, those of its header; of each group of optional columns all, or none.
 
     The first row holds the names. If it is divided by semicolons, as in spreadsheets with a decimal comma, or by tabs,
@@ -90,7 +90,7 @@ def read_table(
     *rows, last = parts
     columns = columns_of(rows)
     lines = columns.pop(LINE).astype(np.int64)
-    return Table(columns, lines, cast("dict[str, int]", last)["origin_s"])
+    return CsvTable(columns, lines, cast("dict[str, int]", last)["origin_s"])
 
 
 def csv_parts(

@@ -12,7 +12,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.statistics.coloured_noise import MEMORIES, fit_autoregression
 from rig.observation.statistics.lines import LineSearch, find_lines, fit_columns, waves
-from rig.observation.statistics.mean import Mean, Noise, mean_at_rest, weighted_means, whole
+from rig.observation.statistics.mean import Mean, MeanNoise, mean_at_rest, weighted_means, whole
 from rig.observation.statistics.tapered_weights import weights
 from rig.observation.windows import Window
 
@@ -54,11 +54,11 @@ def _columns(residuals: Array, search: LineSearch) -> Array:
     return waves(find_lines(residuals, search), np.arange(len(residuals)) / len(residuals), search.beats)
 
 
-def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> Noise:
+def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:
     """Return the noise of readings in these steps from residuals (n, 3) after a fit of `parameters` columns."""
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - parameters), steps.variance)
     inflations = [fit_autoregression(axis, memories) for axis in residuals.T]
-    return Noise(
+    return MeanNoise(
         scatter=scatter,
         in_a_mean=scatter * np.array([axis.factor for axis in inflations]),
         freedom=np.array([min(axis.freedom, len(residuals) - parameters) for axis in inflations]),

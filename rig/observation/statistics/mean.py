@@ -38,7 +38,7 @@ class Mean:
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class MeanNoise:
     """Noise of single readings in any unit, by axis.
 
     `scatter` (3,) is the variance of one reading, `in_a_mean` (3,) the part of it that counts in a long mean, `freedom`
@@ -92,7 +92,7 @@ def by_axis(dofs: Iterable[Array | float]) -> Array:
 
 
 def weighted_means(
-    readings: Array, groups: Array, weights: Array, *, smooth: Array, noise: Noise, steps: Steps
+    readings: Array, groups: Array, weights: Array, *, smooth: Array, noise: MeanNoise, steps: Steps
 ) -> tuple[Mean, ...]:
     """Return the means of p groups of readings by their weights: one group is a whole window, several are its segments.
 
@@ -108,7 +108,7 @@ def weighted_means(
 
 
 def _average_group(
-    readings: Array, group: NDArray[np.bool_], weights: Array, *, smooth: Array, noise: Noise, steps: Steps
+    readings: Array, group: NDArray[np.bool_], weights: Array, *, smooth: Array, noise: MeanNoise, steps: Steps
 ) -> Mean:
     rounding = rounding_left(readings[group], steps, smooth[group], noise.scatter)
     return Mean(
@@ -135,7 +135,7 @@ def even_mean(readings: Array, steps: Steps) -> Mean:
     """
     variance = np.maximum(readings.var(axis=0, ddof=1), steps.variance)
     coloured = [fit_autoregression(axis) for axis in (readings - readings.mean(axis=0)).T]
-    noise = Noise(
+    noise = MeanNoise(
         scatter=variance,
         in_a_mean=variance * np.array([axis.factor for axis in coloured]),
         freedom=np.array([axis.freedom for axis in coloured]),
@@ -167,7 +167,7 @@ def average_tapered(readings: Array, time_s: Array, window: Window, steps: Steps
     """
     variance = np.maximum(np.var(readings, axis=0, ddof=1), steps.variance)
     at_zero = np.minimum(noise_at_zero(readings), variance)
-    noise = Noise(scatter=variance, in_a_mean=at_zero, freedom=np.full(3, dof_at_zero(len(readings))))
+    noise = MeanNoise(scatter=variance, in_a_mean=at_zero, freedom=np.full(3, dof_at_zero(len(readings))))
     tapered = weights(time_s, window.start_s, window.end_s)[None]
     still = np.zeros(readings.shape)
     (mean,) = weighted_means(readings, whole(readings), tapered, smooth=still, noise=noise, steps=steps)

@@ -33,7 +33,7 @@ LARGEST_HEADERS = 8192  # bytes
 
 
 @dataclass(frozen=True, slots=True)
-class Address:
+class PageAddress:
     """The page's address: without a `port` the usual one, or any free one if that is taken."""
 
     host: str = ADDRESS
@@ -61,7 +61,9 @@ RUN = Page()
 
 
 @contextmanager
-def serving(feed: Source, control: Control, folder: Path | None, address: Address, shown: Page = RUN) -> Iterator[str]:
+def serving(
+    feed: Source, control: Control, folder: Path | None, address: PageAddress, shown: Page = RUN
+) -> Iterator[str]:
     """Show `feed` to browsers for the length of the block; yield the page's address, with the token.
 
     Without a `folder` there is no run to stop, and no certificate. If the page fails, it says so on stderr and ends:
@@ -145,7 +147,7 @@ def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | N
     return uvicorn.Server(config)
 
 
-def check(address: Address) -> None:
+def check(address: PageAddress) -> None:
     """Raise Refused `page_address` for an address that is invalid on any computer."""
     if address.host in ("", "0.0.0.0", "::", "*"):
         raise Refused(
@@ -169,7 +171,7 @@ def check(address: Address) -> None:
         )
 
 
-def _listen(address: Address) -> socket.socket:
+def _listen(address: PageAddress) -> socket.socket:
     """Return the listening socket for uvicorn."""
     ports = [PORT, 0] if address.port is None else [address.port]
     why: OSError | None = None

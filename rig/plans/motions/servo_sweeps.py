@@ -7,7 +7,7 @@ from rig.config.procedures.servo_procedure import ServoSixObservationSection
 from rig.config.procedures.servo_section import ServoSection
 from rig.motion.state import Joints
 from rig.motion.steps import TURN_RAD, Plan, Rest, Step, Sweep
-from rig.plans.motions.sweeps import Profile, Station, build_stages, connect_sweeps, sweep_about, trial
+from rig.plans.motions.sweeps import Profile, SweepPose, build_stages, connect_sweeps, sweep_about, trial
 from rig.plans.motions.ways import approach, pace_of
 
 MARGIN_RAD = math.radians(3)  # of constant speed at either end, for a shaft that lags
@@ -29,7 +29,7 @@ def plan_servo_six_observation(
     stage without remaining turns has no steps.
     """
     home = (math.radians(servo.home_deg),)
-    shaft, pace = Station(0, "shaft", home), pace_of(servo.transfer_speed_deg_s, procedure.acceleration_deg_s2)
+    shaft, pace = SweepPose(0, "shaft", home), pace_of(servo.transfer_speed_deg_s, procedure.acceleration_deg_s2)
     even_rad = TURN_RAD + math.radians(procedure.overtravel_deg) + 2 * MARGIN_RAD
     profile = Profile(TURN_RAD, even_rad, pace_of(procedure.speed_deg_s, procedure.acceleration_deg_s2))
     turns = [

@@ -22,7 +22,7 @@ from rig.motion.model import find_home, model_of
 from rig.motion.state import JOINT_NAMES, Joints
 from rig.motion.steps import Plan, Step, Sweep
 from rig.plans.motions.drift import drift_effect
-from rig.plans.motions.sweeps import Mounted, Profile, Station, build_stages, connect_sweeps, sweep_about, trial
+from rig.plans.motions.sweeps import Mounted, Profile, SweepPose, build_stages, connect_sweeps, sweep_about, trial
 from rig.plans.motions.ways import append_steps, approach, pace_of
 
 USUAL_ORDER: tuple[Wrist, ...] = ("wrist_3", "wrist_1", "wrist_2")  # that of the paper
@@ -38,7 +38,7 @@ WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wr
 class Order:
     """The `stations` one after the other, each with its `directions`, reversed every other time if it `alternates`."""
 
-    stations: tuple[Station, ...]
+    stations: tuple[SweepPose, ...]
     directions: tuple[tuple[Direction, ...], ...]
     alternates: bool
 
@@ -96,7 +96,7 @@ def _axes_of_items(mounted: Iterable[Mounted]) -> Iterator[Array]:
 def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Step]:
     """Yield a small turn of each joint that is to be swept, and back: it shows the item's mounting."""
     for joint, name in dict.fromkeys((sweep.joint, sweep.joint_name) for sweep in sweeps):
-        station = Station(joint, name, home)
+        station = SweepPose(joint, name, home)
         yield from trial(f"trial of {name}", f"back from the trial of {name}", station, TRIAL_RAD, TRIAL_PACE)
 
 
@@ -129,7 +129,7 @@ def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, 
     return tuple(_sweeps(chosen, procedure, procedure.repeats))
 
 
-def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -> tuple[Station, ...]:
+def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -> tuple[SweepPose, ...]:
     """Return the stations in the order of the wrists; those of wrist 1 with the others turned follow its own sweep.
 
     Wrist 2 is turned by 45° so that the flange comes away from the forearm, never towards it.
@@ -139,16 +139,16 @@ def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -
     stations = []
     for name in order:
         joint = JOINT_NAMES.index(name)
-        stations.append(Station(joint, name, home))
+        stations.append(SweepPose(joint, name, home))
         if joint == WRIST_1:
             stations += [
-                Station(joint, name, (*home[:WRIST_2], home[WRIST_2] + second, home[WRIST_3] + third))
+                SweepPose(joint, name, (*home[:WRIST_2], home[WRIST_2] + second, home[WRIST_3] + third))
                 for second, third in offsets
             ]
     return tuple(stations)
 
 
-def _list_orders(stations: tuple[Station, ...], procedure: SixSweepsSection) -> Iterator[Order]:
+def _list_orders(stations: tuple[SweepPose, ...], procedure: SixSweepsSection) -> Iterator[Order]:
     """Yield every permissible choice of directions, the paper's first."""
     if procedure.directions is not None:
         yield Order(stations, (procedure.directions,) * len(stations), alternates=False)
@@ -174,7 +174,7 @@ def _sweeps(order: Order, procedure: SixSweepsSection, repeats: int) -> list[Swe
 
 
 @lru_cache(maxsize=64)
-def _axis(station: Station, sign: int) -> Vector3:
+def _axis(station: SweepPose, sign: int) -> Vector3:
     """Return the joint's axis in the flange's frame: of a growing angle, or of a falling one with the sign -1."""
     x, y, z = (sign * axis for axis in flange_axes(station.pose_q_rad)[:, station.joint].tolist())
     return x, y, z

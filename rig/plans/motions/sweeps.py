@@ -15,7 +15,7 @@ Mounted = tuple[StageSection | ServoStageSection, Sequence[Sweep]]  # a stage of
 
 
 @dataclass(frozen=True, slots=True)
-class Station:
+class SweepPose:
     """A joint that is swept, and the pose around which it turns."""
 
     joint: int
@@ -37,7 +37,7 @@ class Profile:
     pace: Pace
 
 
-def sweep_about(index: int, station: Station, direction: Direction, axis_flange: Vector3, profile: Profile) -> Sweep:
+def sweep_about(index: int, station: SweepPose, direction: Direction, axis_flange: Vector3, profile: Profile) -> Sweep:
     """Return the sweep in that direction, in which the flange turns about that axis."""
     speed, acceleration = profile.pace.speed_rad_s, profile.pace.acceleration_rad_s2
     half, half_travel = profile.averaged_rad / 2, profile.even_rad / 2 + speed**2 / (2 * acceleration)
@@ -74,7 +74,7 @@ def connect_sweeps(
     yield from transfer("transfer home", pose, home, pace)
 
 
-def trial(name: str, return_name: str, station: Station, by_rad: float, pace: Pace) -> Iterator[Transfer]:
+def trial(name: str, return_name: str, station: SweepPose, by_rad: float, pace: Pace) -> Iterator[Transfer]:
     """Yield a small turn and back, with these names: it shows the item's mounting."""
     home, tried = station.pose_q_rad, station.rotate_joint(by_rad)
     for step in transfer(name, home, tried, pace):

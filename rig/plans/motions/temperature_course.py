@@ -18,7 +18,7 @@ REMEMBERS_S = 30.0  # integral time of the controller
 
 
 @dataclass(slots=True)
-class Course:
+class TemperatureCourse:
     """The course through the range from `from_c` to `to_c` with gaps of at most `max_step_k`; `sets` are the measured
     ones.
 

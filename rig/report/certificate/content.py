@@ -24,7 +24,7 @@ from rig.data.result_file import (
 )
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
-from rig.report.certificate.statements import Stated
+from rig.report.certificate.statements import StatedFacts
 from rig.report.entries.omitted import omitted_lines
 from rig.report.findings.characteristic import Term, terms
 from rig.report.findings.finding import Finding
@@ -36,7 +36,7 @@ from rig.turners.registry import words_of
 
 
 @dataclass(frozen=True, slots=True)
-class Gyroscope:
+class CertifiedGyroscope:
     """One calibrated gyroscope: its result, and its verification if there is one."""
 
     name: str
@@ -95,9 +95,9 @@ class Certificate:
     title: str
     marks: tuple[str, ...]
     issued: date
-    stated: Stated
+    stated: StatedFacts
     result: ResultDocument
-    gyroscopes: tuple[Gyroscope, ...]
+    gyroscopes: tuple[CertifiedGyroscope, ...]
     held_still: tuple[HeldStill, ...]
     verified: Mapping[str, VerificationEntry]
     conformity: tuple[CheckEntry, ...]
@@ -226,7 +226,7 @@ class Certificate:
 
 
 def certificate_of(
-    result: ResultDocument, stated: Stated, reversals: Mapping[str, ReversalEntry] = MappingProxyType({})
+    result: ResultDocument, stated: StatedFacts, reversals: Mapping[str, ReversalEntry] = MappingProxyType({})
 ) -> Certificate:
     """Return the certificate of a result; it depends on its arguments alone, its number too.
 
@@ -234,7 +234,7 @@ def certificate_of(
     """
     _check_same(result, reversals)
     gyroscopes = tuple(
-        Gyroscope(name, sensor, result.verification.get(name))
+        CertifiedGyroscope(name, sensor, result.verification.get(name))
         for name, sensor in result.gyroscopes.items()
         if sensor.role == "calibrate"
     )
@@ -265,12 +265,12 @@ def _file_words(file: FileEntry) -> str:
     return f"{file.name}, SHA-256 {file.sha256}"
 
 
-def is_simulated(result: ResultDocument, stated: Stated) -> bool:
+def is_simulated(result: ResultDocument, stated: StatedFacts) -> bool:
     """Return whether the laboratory was simulated, by the configuration or by the controller's own statement."""
     return stated.simulated or calls_itself_simulated(result.provenance.arm_software)
 
 
-def _number(result: ResultDocument, stated: Stated, reversals: Mapping[str, ReversalEntry]) -> str:
+def _number(result: ResultDocument, stated: StatedFacts, reversals: Mapping[str, ReversalEntry]) -> str:
     """Return the day and a part of the SHA-256 of the content: another content, another number."""
     content = f"{result.text()}\n{stated.site!r}\n{stated.certificate!r}\n{stated.simulated}"
     content += "".join(f"\n{name}: {reversal.model_dump_json()}" for name, reversal in reversals.items())
@@ -309,7 +309,7 @@ def _check_same(result: ResultDocument, reversals: Mapping[str, ReversalEntry]) 
         raise Refused("another_sensor", why, "Give one of the runs that `rig reversal` was given")
 
 
-def _marks(result: ResultDocument, stated: Stated, fitness: Sequence[CheckEntry]) -> Iterator[str]:
+def _marks(result: ResultDocument, stated: StatedFacts, fitness: Sequence[CheckEntry]) -> Iterator[str]:
     if is_simulated(result, stated):
         yield "Simulated laboratory: no real item was calibrated"
     if any(_find_incomplete(result)):
@@ -326,7 +326,7 @@ def _angles_rad(result: ResultDocument) -> Iterator[float]:
         yield from (turn.angle_rad for turn in verification.after.revolutions)
 
 
-def _traceable(result: ResultDocument, stated: Stated) -> bool:
+def _traceable(result: ResultDocument, stated: StatedFacts) -> bool:
     """Return whether time, the only standard of a gyroscope's scale, is traceable to a named reference.
 
     Arcs are not traceable: their angles are those of the encoders.
@@ -339,7 +339,7 @@ def _traceable(result: ResultDocument, stated: Stated) -> bool:
     return measured and compared and whole and stated.where.time_reference is not None
 
 
-def _find_held_still(result: ResultDocument, stated: Stated) -> Iterator[HeldStill]:
+def _find_held_still(result: ResultDocument, stated: StatedFacts) -> Iterator[HeldStill]:
     """Yield the sensors measured at rest, kind by kind.
 
     They are traceable if their standard was measured, with a stated uncertainty and origin.

@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.data.entries.budget import BudgetEntry
 from rig.data.entries.drift import DriftEntry
-from rig.data.quantity import Unit
+from rig.data.quantity import DisplayUnit
 from rig.data.result_file import GyroscopeEntry
 from rig.report.findings.finding import Finding
 from rig.report.findings.unexplained import (
@@ -26,7 +26,7 @@ NAMES, ROW, DECADES = 106.0, 13.0, 4
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class PlotPoint:
     """A residual and its bar, in pixels."""
 
     x: float
@@ -43,7 +43,7 @@ class Residuals:
     `shown` describes the points, `expectation` the bars, which are two standard deviations.
     """
 
-    points: tuple[Point, ...]
+    points: tuple[PlotPoint, ...]
     ticks: tuple[tuple[float, str], ...]
     zero: float
     split: float | None
@@ -91,10 +91,10 @@ def _draw(unexplained: Unexplained) -> Residuals:
     def height(value: float) -> float:
         return round(TOP + HEIGHT / 2 * (1 - value / unit.size / reach), 1)
 
-    def point(index: int, axis: int) -> Point:
+    def point(index: int, axis: int) -> PlotPoint:
         value, bar = values[index, axis], bars[index, axis]
         x = LEFT + across * (index + 0.5 + 0.22 * (axis - 1))
-        return Point(round(x, 1), height(value), height(value - bar), height(value + bar), axis)
+        return PlotPoint(round(x, 1), height(value), height(value - bar), height(value + bar), axis)
 
     points = tuple(point(index, axis) for index in range(len(values)) for axis in range(3))
     ticks = tuple(
@@ -105,7 +105,7 @@ def _draw(unexplained: Unexplained) -> Residuals:
     return Residuals(points, ticks, height(0.0), begins, unit.name, within, unexplained.shown, unexplained.expectation)
 
 
-def reach_in(largest: float, units: Sequence[Unit]) -> tuple[float, Unit]:
+def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, DisplayUnit]:
     """Return a round limit above `largest`, and its unit: the first in which `largest` is above 1."""
     unit = next((unit for unit in units if largest >= unit.size), units[-1])
     shown = largest / unit.size

@@ -20,7 +20,7 @@ NOTHING = CertificateSection()
 
 
 @dataclass(frozen=True, slots=True)
-class Stated:
+class StatedFacts:
     """The statements of the laboratory; None means "not stated". `simulated` is true for a simulated laboratory."""
 
     site: SiteSection | None = None
@@ -33,7 +33,7 @@ class Stated:
         return self.site or SiteSection()
 
 
-def stated_in(folder: Path, overrides: Sequence[str] = ()) -> Stated:
+def stated_in(folder: Path, overrides: Sequence[str] = ()) -> StatedFacts:
     """Return the statements of the run folder's configuration with `overrides`; of these alone if it has none.
 
     Raise Refused `unknown_setting` for an override of a measured quantity, and the errors of `load`.
@@ -50,11 +50,11 @@ def stated_in(folder: Path, overrides: Sequence[str] = ()) -> Stated:
     if path.exists():
         return of_configuration(load(path, overrides, sections=None))
     if not overrides:
-        return Stated()
+        return StatedFacts()
     stated = load_statement(overrides)
-    return Stated(stated.site, stated.certificate)
+    return StatedFacts(stated.site, stated.certificate)
 
 
-def of_configuration(loaded: Loaded) -> Stated:
+def of_configuration(loaded: Loaded) -> StatedFacts:
     """Return the statements on site and certificate of a configuration."""
-    return Stated(loaded.config.site, loaded.config.certificate, loaded.simulated)
+    return StatedFacts(loaded.config.site, loaded.config.certificate, loaded.simulated)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.entries.temperature import OverTemperatureEntry
-from rig.data.quantity import Quantity, Unit
+from rig.data.quantity import DisplayUnit, Quantity
 from rig.estimation.arrays import Array
 from rig.report.certificate.plots import HEIGHT, LEFT, RIGHT, TOP, WIDTH, reach_in
 from rig.report.tables.certificate import Pair, pair
 from rig.report.words.temperature_words import shown_rows
 
-FRACTIONS = (Unit("%", 1e-2), Unit("ppm", 1e-6))
+FRACTIONS = (DisplayUnit("%", 1e-2), DisplayUnit("ppm", 1e-6))
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class TemperatureRow:
     values: tuple[Pair, ...]
 
 
-def temperature_rows(entry: OverTemperatureEntry, unit: Unit) -> list[TemperatureRow]:
+def temperature_rows(entry: OverTemperatureEntry, unit: DisplayUnit) -> list[TemperatureRow]:
     """Return the rows with U, biases in `unit`."""
     return [
         TemperatureRow(
@@ -60,7 +60,7 @@ def bias_curves(entry: OverTemperatureEntry, quantity: Quantity) -> Curves:
     return _curves(entry, values, np.array([row.expanded_bias for row in entry.table]), quantity.residuals)
 
 
-def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Sequence[Unit]) -> Curves:
+def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Sequence[DisplayUnit]) -> Curves:
     reach, unit = reach_in(float((np.abs(values) + widths).max()), units)
     low, high = entry.range_c
 
@@ -91,5 +91,5 @@ def _across(temperature_c: float, low: float, high: float) -> float:
     return round(LEFT + 12 + (WIDTH - LEFT - RIGHT - 30) * (temperature_c - low) / (high - low), 1)
 
 
-def _height(value: float, unit: Unit, reach: float) -> float:
+def _height(value: float, unit: DisplayUnit, reach: float) -> float:
     return round(TOP + HEIGHT / 2 * (1 - value / unit.size / reach), 1)

@@ -14,7 +14,7 @@ from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
-from rig.report.exports.calibrations import Calibrations
+from rig.report.exports.calibrations import ExportedCalibrations
 from rig.report.exports.over_temperature import ardupilot_parameters, px4_parameters
 from rig.report.findings.corrected import Corrected
 from rig.report.kinds.registry import kinds
@@ -42,7 +42,7 @@ Parameters = Iterator[tuple[str, float]]
 Autopilot = Mapping[Quantity, Callable[[int, Corrected], Parameters]]
 
 
-def px4_files(calibrations: Calibrations) -> Mapping[str, str]:
+def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
     """Return `px4.params` as QGroundControl loads it: vehicle, component, name, value, type, between tabs."""
     lines = [
         *HEADING,
@@ -60,7 +60,7 @@ def px4_files(calibrations: Calibrations) -> Mapping[str, str]:
     return {"px4.params": "\n".join(lines) + "\n"}
 
 
-def ardupilot_files(calibrations: Calibrations) -> Mapping[str, str]:
+def ardupilot_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
     """Return `ardupilot.param`: name, value."""
     lines = [*HEADING, *OF_ARDUPILOT, *_lines(calibrations, ARDUPILOT, lambda name, value: f"{name},{value!r}")]
     if polynomials := calibrations.over_temperature:
@@ -74,7 +74,9 @@ def ardupilot_files(calibrations: Calibrations) -> Mapping[str, str]:
     return {"ardupilot.param": "\n".join(lines) + "\n"}
 
 
-def _lines(calibrations: Calibrations, autopilot: Autopilot, form: Callable[[str, float], str]) -> Iterator[str]:
+def _lines(
+    calibrations: ExportedCalibrations, autopilot: Autopilot, form: Callable[[str, float], str]
+) -> Iterator[str]:
     """Yield a line for each parameter, and comments on the sensor's calibration.
 
     Sensors are numbered by their order in the configuration; an accelerometer has its gyroscope's number. Raise Refused
@@ -94,7 +96,7 @@ def _lines(calibrations: Calibrations, autopilot: Autopilot, form: Callable[[str
     yield from (f"# {printable(line)}" for kind in kinds() for line in kind.unsolved(calibrations.result))
 
 
-def _number_imus(calibrations: Calibrations) -> dict[str, int]:
+def _number_imus(calibrations: ExportedCalibrations) -> dict[str, int]:
     """Return the number of each IMU; the first is 0."""
     names = dict.fromkeys(sensor.sensor for sensor in calibrations.sensors if sensor.quantity in IMU)
     return {name: i for i, name in enumerate(names)}

@@ -36,7 +36,7 @@ class Imu:
 
 
 @dataclass(frozen=True)
-class Calibrations:
+class ExportedCalibrations:
     """The `sensors` that a run calibrated, kind by kind, and polynomials of temperature by sensor and quantity."""
 
     result: ResultDocument
@@ -74,8 +74,8 @@ class Calibrations:
         )
 
 
-def calibrations(result: ResultDocument) -> Calibrations:
+def calibrations(result: ResultDocument) -> ExportedCalibrations:
     """Return the corrections of all kinds of results; references are left out."""
     corrections = (correct(finding) for _, correct, finding in outlets(result, lambda kind: kind.corrected))
     sensors = tuple(correction for correction in corrections if correction is not None)
-    return Calibrations(result, sensors, result.over_temperature)
+    return ExportedCalibrations(result, sensors, result.over_temperature)

@@ -9,7 +9,7 @@ from rig.estimation.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ExportTable:
     """Columns (n,) by name, which carries the unit, and their `meaning`."""
 
     name: str
@@ -17,7 +17,7 @@ class Table:
     meaning: str
 
 
-def readings_table(run: RunData, sensor: str, channels: Sequence[Channel], time_s: Array, meaning: str) -> Table:
+def readings_table(run: RunData, sensor: str, channels: Sequence[Channel], time_s: Array, meaning: str) -> ExportTable:
     """Return the readings of a sensor by `channels`, at times (n,), with their `meaning`."""
     recorded, columns = run.sensors[sensor], {"time_s": time_s}
     for channel in channels:
@@ -26,7 +26,7 @@ def readings_table(run: RunData, sensor: str, channels: Sequence[Channel], time_
     whose = f"{sensor}, {recorded.part} {recorded.serial_number}, {recorded.mode} readings"
     if recorded.has_axes:
         whose += " in the sensor's own axes"
-    return Table(sensor, columns, f"{whose}. {meaning}")
+    return ExportTable(sensor, columns, f"{whose}. {meaning}")
 
 
 def split(names: Sequence[str], columns: Array) -> dict[str, Array]:

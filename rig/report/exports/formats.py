@@ -8,11 +8,11 @@ if TYPE_CHECKING:  # the command line asks for the names alone
     from collections.abc import Sequence
     from pathlib import Path
 
-    from rig.report.exports.calibrations import Calibrations
+    from rig.report.exports.calibrations import ExportedCalibrations
     from rig.report.exports.recorded import Exported
 
     ReadingsWriter = Callable[[Sequence[Exported], Path], list[Path]]
-    CalibrationTexts = Callable[[Calibrations], Mapping[str, str]]
+    CalibrationTexts = Callable[[ExportedCalibrations], Mapping[str, str]]
 
 # `module:function`. Of readings: (recordings, folder) → the files written.
 OF_READINGS: Final[Mapping[str, str]] = {

@@ -8,18 +8,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rig.report.exports.calibrations import Calibrations, Imu
+from rig.report.exports.calibrations import ExportedCalibrations, Imu
 
 FORMAT_VERSION = "2.0.0"
 
 
-def imucal_files(calibrations: Calibrations) -> Mapping[str, str]:
+def imucal_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
     """Return one file for each IMU. Raise Refused `nothing_to_export`."""
     documents = {imu.name: _document(calibrations, imu) for imu in calibrations.imus}
     return {f"{name}_imucal.json": json.dumps(document, indent=2) + "\n" for name, document in documents.items()}
 
 
-def _document(calibrations: Calibrations, imu: Imu) -> dict[str, object]:
+def _document(calibrations: ExportedCalibrations, imu: Imu) -> dict[str, object]:
     acceleration, rates = imu.accelerometer, imu.gyroscope
     return {
         "cal_type": "Turntable",
@@ -39,7 +39,7 @@ def _document(calibrations: Calibrations, imu: Imu) -> dict[str, object]:
     }
 
 
-def _convention(calibrations: Calibrations, imu: Imu) -> list[str]:
+def _convention(calibrations: ExportedCalibrations, imu: Imu) -> list[str]:
     sentences = [
         "w = R_g^-1 K_g^-1 (m - K_ga a - b_g), in the right-angled frame nearest to the gyroscope's axes; b_g = -b"
     ]

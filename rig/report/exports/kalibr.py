@@ -10,11 +10,11 @@ import numpy as np
 import yaml
 
 from rig.estimation.arrays import Array
-from rig.report.exports.calibrations import Calibrations, Imu
+from rig.report.exports.calibrations import ExportedCalibrations, Imu
 from rig.report.exports.names import plain_names
 
 
-def kalibr_files(calibrations: Calibrations) -> Mapping[str, str]:
+def kalibr_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
     """Return for each IMU `…_imu.yaml` (noise) and `…_intrinsics.yaml`. Raise Refused `nothing_to_export`."""
     files = {}
     names = plain_names(imu.name for imu in calibrations.imus)
@@ -35,7 +35,7 @@ def triangular(matrix: Array) -> tuple[Array, Array]:
     return r.T * signs + 0.0, (q * signs).T  # no −0.0
 
 
-def _noise(calibrations: Calibrations, imu: Imu, topic: str) -> str:
+def _noise(calibrations: ExportedCalibrations, imu: Imu, topic: str) -> str:
     rates, forces = imu.gyroscope, imu.accelerometer
     parameters = {
         "rostopic": topic,
@@ -53,7 +53,7 @@ def _noise(calibrations: Calibrations, imu: Imu, topic: str) -> str:
     return _yaml(comments, {name: value for name, value in parameters.items() if value is not None})
 
 
-def _intrinsics(calibrations: Calibrations, imu: Imu, topic: str) -> str:
+def _intrinsics(calibrations: ExportedCalibrations, imu: Imu, topic: str) -> str:
     rates, forces = imu.gyroscope, imu.accelerometer
     intrinsics: dict[str, object] = {"model": "scale-misalignment", "rostopic": topic}
     to_body = np.eye(3)

@@ -18,7 +18,7 @@ from rig.estimation.arrays import Array
 from rig.observation.average import Average
 from rig.observation.by_hand.runs import microsecond_of
 from rig.observation.observed_run import ObservedRun, observe_runs
-from rig.report.exports.columns import Table, readings_table, split
+from rig.report.exports.columns import ExportTable, readings_table, split
 
 LOST = "Not here: counts, the board's and the computer's times, events, settings; they are in run.h5."
 LOST_OF_FILES = "Not here: statements that came with the files; they are in run.h5."
@@ -55,7 +55,7 @@ class Exported(Protocol):
         """Return the noise (3,) of one sample, for each interval in which the sensor was at rest."""
         ...
 
-    def tables(self) -> Iterator[Table]:
+    def tables(self) -> Iterator[ExportTable]:
         """Yield all tables of the recording."""
         ...
 
@@ -88,10 +88,10 @@ class WithMotion:
             return [dwell.reading.noise for dwell in sensor_observations.dwells]
         return [rest.noise_rad_s for rest in sensor_observations.rests]
 
-    def tables(self) -> Iterator[Table]:
+    def tables(self) -> Iterator[ExportTable]:
         """Yield the arm, then each sensor's readings, with accelerations in a table of their own, and its sweeps."""
         remark = f"Times are seconds of {self.clock}. {LOST}"
-        yield Table("arm", self.observed.motion.table(), f"Joint angles and rates, from the ground on. {remark}")
+        yield ExportTable("arm", self.observed.motion.table(), f"Joint angles and rates, from the ground on. {remark}")
         for name, sensor in self.run.sensors.items():
             forces = [
                 channel
@@ -104,7 +104,7 @@ class WithMotion:
                     table = readings_table(self.run, name, channels, self.time_s(name), more + remark)
                     yield replace(table, name=name + after)
             if sensor.measures(RATE):
-                yield Table(f"{name}_sweeps", self._sweeps(name), f"{TURNED} {remark}")
+                yield ExportTable(f"{name}_sweeps", self._sweeps(name), f"{TURNED} {remark}")
 
     def _sweeps(self, name: str) -> dict[str, Array]:
         observations = self.observed.sensors[name]
@@ -143,7 +143,7 @@ class ReadingsAlone:
         """Return no noise: the times at rest are unknown."""
         return ()
 
-    def tables(self) -> Iterator[Table]:
+    def tables(self) -> Iterator[ExportTable]:
         """Yield the readings of each sensor in one table, as `rig solve` reads them, and the motion of a file."""
         external = self.run.elsewhere
         remark = f"Times are seconds of {self.clock}. {LOST if external is None else LOST_OF_FILES}"
@@ -151,7 +151,9 @@ class ReadingsAlone:
             more = UPWARDS if sensor.measures(ACCELERATION) else ""
             yield readings_table(self.run, name, sensor.channels, self.time_s(name), more + remark)
         if external is not None and external.tells in MOTION:
-            yield Table(f"{external.item.name}_{external.tells}", external.motion, f"{MOTION[external.tells]} {remark}")
+            yield ExportTable(
+                f"{external.item.name}_{external.tells}", external.motion, f"{MOTION[external.tells]} {remark}"
+            )
 
 
 def exported(runs: Sequence[RunData]) -> tuple[Exported, ...]:

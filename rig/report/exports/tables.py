@@ -11,12 +11,12 @@ import numpy as np
 
 from rig.config.files.written_file import new_file, write_new
 from rig.estimation.arrays import Array
-from rig.report.exports.columns import Table
+from rig.report.exports.columns import ExportTable
 from rig.report.exports.names import plain_names
 from rig.report.exports.recorded import Exported
 
 
-def tables_of(recordings: Sequence[Exported]) -> Iterator[Table]:
+def tables_of(recordings: Sequence[Exported]) -> Iterator[ExportTable]:
     """Yield the tables of each recording; the second and later ones have its number."""
     for number, recording in enumerate(recordings, start=1):
         for table in recording.tables():
@@ -66,5 +66,5 @@ def write_mat(recordings: Sequence[Exported], folder: Path) -> list[Path]:
     return [path]
 
 
-def _columns(table: Table) -> dict[str, Array]:
+def _columns(table: ExportTable) -> dict[str, Array]:
     return {name: column[:, None] for name, column in table.columns.items()}

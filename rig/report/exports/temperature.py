@@ -13,13 +13,15 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.result_file import ResultDocument
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.report.exports.calibrations import Calibrations
+from rig.report.exports.calibrations import ExportedCalibrations
 from rig.report.findings.corrected import Corrected
 
 WATCHED = (RATE, ACCELERATION)  # a run of `bias_drift` measures their biases
 
 
-def at_temperature(calibrations: Calibrations, drift: ResultDocument, temperature_c: float) -> Calibrations:
+def at_temperature(
+    calibrations: ExportedCalibrations, drift: ResultDocument, temperature_c: float
+) -> ExportedCalibrations:
     """Return the calibrations with biases at `temperature_c`, by the slopes in `drift`.
 
     Raise Refused `another_sensor`, `temperature_slope_unknown`, `temperature_outside`.

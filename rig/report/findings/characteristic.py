@@ -7,7 +7,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 
 from rig.data.entries.result_types import Freedom
-from rig.data.quantity import Quantity, Unit
+from rig.data.quantity import DisplayUnit, Quantity
 from rig.report.findings.finding import Finding
 from rig.report.words.expanded import Expanded, expanded
 
@@ -30,7 +30,7 @@ class Units:
 
     si: str
     d_si: str
-    shown: Unit
+    shown: DisplayUnit
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ def _flat(numbers: Any) -> list[Any]:
     return list(np.ravel(numbers).tolist())
 
 
-def always(si: str, d_si: str, shown: Unit | None = None) -> Callable[[Quantity], Units]:
+def always(si: str, d_si: str, shown: DisplayUnit | None = None) -> Callable[[Quantity], Units]:
     """Return a unit that does not depend on the sensor's quantity; it is `shown` as it is unless another is given."""
-    units = Units(si, d_si, shown or Unit(si, 1.0))
+    units = Units(si, d_si, shown or DisplayUnit(si, 1.0))
     return lambda _: units

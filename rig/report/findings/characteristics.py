@@ -13,7 +13,7 @@ import numpy as np
 from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.installed_kinds import installed_kinds
-from rig.data.quantity import Quantity, Unit
+from rig.data.quantity import DisplayUnit, Quantity
 from rig.report.findings.characteristic import (
     Characteristic,
     Outlet,
@@ -33,7 +33,7 @@ def _bias_units(quantity: Quantity) -> Units:
 
 
 def _slope_units(quantity: Quantity) -> Units:
-    shown = Unit(f"{quantity.drift.name}/K", quantity.drift.size)
+    shown = DisplayUnit(f"{quantity.drift.name}/K", quantity.drift.size)
     return Units(f"{quantity.unit}/K", quantity.d_si + r"\kelvin\tothe{-1}", shown)
 
 
@@ -88,7 +88,7 @@ SLOPES: Final = Series("s", "the slope over temperature of the bias of {}", draw
 NON_ORTHOGONALITY: Final = Characteristic(
     "angles between the axes less a right one",
     ANGLES,
-    always("rad", r"\radian", Unit("°", pi / 180)),
+    always("rad", r"\radian", DisplayUnit("°", pi / 180)),
     read_fields("non_orthogonality", "rad"),
     Series("nonorth_", "the angle between {} and {}"),  # nonorth_yz, nonorth_zx, nonorth_xy
     {"terminal": LINES, "certificate": BLOCK, "page": NO_ROW, "exports": "it is in the matrix of the readings"},

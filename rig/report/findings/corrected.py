@@ -29,7 +29,7 @@ class Averaged(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class ReadingNoise:
     """Sample rate and `density` of white noise, unit/√Hz. None if the result does not contain it."""
 
     rate_hz: float | None
@@ -55,7 +55,7 @@ class Corrected:
     scale: Array
     matrix: Array
     offset: Array
-    noise: Noise
+    noise: ReadingNoise
     g_sensitivity: Array | None = None
     second_order: bool = False
 
@@ -76,7 +76,7 @@ class Corrected:
         return axes
 
 
-def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float], int]]) -> Noise:
+def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float], int]]) -> ReadingNoise:
     """Return the noise by averages, and by σ of one sample and the number of samples of each rest.
 
     The density is that of the noisiest axis, σ over √rate, as if it were white up to half the rate. It is None for
@@ -85,7 +85,7 @@ def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float],
     duration_s = sum(mean.duration_s for mean in means)
     rate_hz = sum(mean.samples for mean in means) / duration_s if duration_s > 0 else None
     if not at_rest or rate_hz is None:
-        return Noise(rate_hz, None)
+        return ReadingNoise(rate_hz, None)
     counts = [count for _, count in at_rest]
     squares = np.average([np.square(noise) for noise, _ in at_rest], axis=0, weights=counts)
-    return Noise(rate_hz, float(np.sqrt(squares.max() / rate_hz)))
+    return ReadingNoise(rate_hz, float(np.sqrt(squares.max() / rate_hz)))

@@ -11,7 +11,7 @@ from rich.table import Table
 from rig.analysis.outcome import Outcome
 from rig.config.judging.judging_sections import SiteSection
 from rig.data.entries.magnetometer import ReversalEntry
-from rig.data.quantity import Quantity, Unit
+from rig.data.quantity import DisplayUnit, Quantity
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.report.findings.characteristic import Characteristic, Term
@@ -56,7 +56,7 @@ class DisplayRow:
     sensor: str
     quantity: Quantity
     name: str
-    unit: Unit
+    unit: DisplayUnit
     numbers: AxisValues
     combined: bool
     scale: AxisValues | None = None

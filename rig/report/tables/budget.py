@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from rich.table import Table
 
 from rig.data.entries.budget import BudgetEntry
-from rig.data.quantity import Unit
+from rig.data.quantity import DisplayUnit
 from rig.estimation.gyroscope.budget import NOT_GIVEN
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.report.words.printed_budget import Line, lay_out_budget
@@ -30,7 +30,7 @@ def list_assumptions(budget: BudgetEntry) -> Iterator[str]:
             yield f"{line.name}: ± {line.half_width:.3g} {line.unit} is assumed: {line.source}"
 
 
-def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: Unit) -> Table:
+def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit) -> Table:
     """Return the budget of one scale factor and of one bias, in unit `bias`, as on the certificate."""
     printed = lay_out_budget(budget, scale, bias)
     k, b = printed.columns

@@ -24,7 +24,7 @@ NO_ANSWER = (0x00, 0xFF, 0xFFFF)  # readings of a bus without an answer, of one 
 
 
 @dataclass(frozen=True, slots=True)
-class BoardSensor:
+class BoardSensorRow:
     """A sensor that the firmware supports: its name in the configuration, if any, and its stored calibration."""
 
     info: SensorInfo
@@ -40,7 +40,7 @@ class BoardInfo:
     port: str
     identity: BoardIdentity
     status: BoardStatus
-    sensors: tuple[BoardSensor, ...]
+    sensors: tuple[BoardSensorRow, ...]
 
 
 def print_info(board: BoardInfo, *, as_json: bool) -> None:

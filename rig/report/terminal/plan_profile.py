@@ -12,7 +12,7 @@ SAME = 1e-6  # of directions, which are rounded
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class ProfilePoint:
     """A corner of a profile: the item's axis, the time, the angle, the rate, and what begins."""
 
     axis: str
@@ -22,7 +22,7 @@ class Point:
     what: str
 
 
-def profile(plan: Plan) -> list[Point]:
+def profile(plan: Plan) -> list[ProfilePoint]:
     """Return the corners of each axis's rate over time, axis after axis, from 0 s and 0°; rests follow sweeps.
 
     Motions between sweeps are left out: a table has its own. Angles grow by the right-hand rule about the named axis.
@@ -37,7 +37,7 @@ def profile(plan: Plan) -> list[Point]:
     return [point for axis, sweeps in by_axis.items() for point in _corners(axis, sweeps)]
 
 
-def _corners(axis: str, sweeps: list[tuple[Sweep, float]]) -> Iterator[Point]:
+def _corners(axis: str, sweeps: list[tuple[Sweep, float]]) -> Iterator[ProfilePoint]:
     at_s, angle_deg = 0.0, 0.0
     for sweep, rest_s in sweeps:
         sign = 1 if _leading_component(sweep.axis_flange) > 0 else -1
@@ -51,7 +51,7 @@ def _corners(axis: str, sweeps: list[tuple[Sweep, float]]) -> Iterator[Point]:
             (ramp_s, rate_deg_s * ramp_s / 2, 0.0, "at rest"),
         ):
             at_s, angle_deg = at_s + lasts_s, angle_deg + turned_deg
-            yield Point(axis, at_s, angle_deg, rate, what)
+            yield ProfilePoint(axis, at_s, angle_deg, rate, what)
         at_s += rest_s
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.entries.budget import IN_U, BudgetEntry, ContributorEntry
-from rig.data.quantity import Unit
+from rig.data.quantity import DisplayUnit
 from rig.estimation.arrays import SMALLEST_SIZE, divide_or_infinity
 from rig.report.words.rounding import figures, percent, power_of_ten, small
 
@@ -19,7 +19,7 @@ DIGITS = 3  # of a combined standard uncertainty: its parts are printed to the s
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class BudgetColumn:
     """The uncertainty of one value: its `index` among kx ky kz bx by bz, and the `unit` of all numbers."""
 
     index: int
@@ -51,11 +51,11 @@ class Line:
 class PrintedBudget:
     """The budgets of one scale factor and one bias: of the axes with the largest U, relative for scale factors."""
 
-    columns: tuple[Column, Column]
+    columns: tuple[BudgetColumn, BudgetColumn]
     lines: tuple[Line, ...]
 
 
-def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: Unit) -> PrintedBudget:
+def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit) -> PrintedBudget:
     """Return the budget, largest contributions first and negligible ones in one line, with biases in unit `bias`."""
     indices = printed_indices(budget, scale)
     sizes = [
@@ -102,8 +102,8 @@ class _Size:
         return f"{std * self.factor:.{self.decimals}f}"
 
 
-def _column(budget: BudgetEntry, index: int, size: _Size) -> Column:
-    return Column(
+def _column(budget: BudgetEntry, index: int, size: _Size) -> BudgetColumn:
+    return BudgetColumn(
         index,
         size.unit,
         size.text(budget.std[index]),

@@ -26,7 +26,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove
 from rig.observation.by_hand.runs import MICROSECOND_S, rotate_face
-from rig.plans.by_hand import ROUND, Wanted, next_instruction, still_open
+from rig.plans.by_hand import ROUND, WantedMoves, next_instruction, still_open
 from rig.runner.board.sensors import BoardSource, board_source
 from rig.runner.by_hand.session import drained
 
@@ -101,7 +101,7 @@ class FollowedSession:
     def _ask(self, wrong: Fault | None) -> None:
         """Ask for the next move of the list, which goes on until the board is content."""
         flips = self.moves
-        while (left := still_open(Wanted(flips, 0), self._taken, self._lay)).done:
+        while (left := still_open(WantedMoves(flips, 0), self._taken, self._lay)).done:
             flips += len(ROUND)
         instruction = next_instruction(left, self._lay[-1] if self._lay else None)
         again, why = (None, "") if wrong is None else (wrong.name, f"{wrong.what}. {wrong.remedy}.")

@@ -24,7 +24,7 @@ from rig.data.recording.hand_events import (
 )
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunData
-from rig.data.recording.settings import ByHand
+from rig.data.recording.settings import HandSettings
 from rig.errors import Fault
 from rig.estimation.by_hand.progress import SessionProgress, assess_progress
 from rig.estimation.by_hand.session import Move, Rest, SessionConditions
@@ -39,7 +39,7 @@ from rig.observation.by_hand.runs import (
     replay_runs,
     rotate_face,
 )
-from rig.plans.by_hand import Open, Wanted, next_instruction, still_open
+from rig.plans.by_hand import Open, WantedMoves, next_instruction, still_open
 from rig.runner.acquisition import Acquisition
 from rig.station.events import HandSeen, RunEvent
 
@@ -63,7 +63,7 @@ class HandSession:
     acquisition: Acquisition
     note: Callable[[OfTheHand], None]
     tell: Callable[[RunEvent], None]
-    settings: ByHand
+    settings: HandSettings
     name: str
     sensor: RecordedSensor
     told: SessionConditions
@@ -116,7 +116,7 @@ class HandSession:
 
     @property
     def _open(self) -> Open:
-        return still_open(Wanted(self.settings.flips, self.settings.turns), self._taken, self._lay)
+        return still_open(WantedMoves(self.settings.flips, self.settings.turns), self._taken, self._lay)
 
     def _feed(self, batches: Sequence[NDArray[Any]]) -> None:
         """Take the readings that came meanwhile."""

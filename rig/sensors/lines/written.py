@@ -12,7 +12,7 @@ ROUND = (1, 2, 2.5, 4, 5, 8, 10)
 
 
 @dataclass(frozen=True, slots=True)
-class Stated:
+class StatedProperties:
     """The user's statements on what no line shows, None for an open one; `by_hand`: for a session by hand."""
 
     serial_number: str | None = None
@@ -21,9 +21,11 @@ class Stated:
     by_hand: bool = False
 
 
-def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, user: Stated | None = None) -> str:
+def section(
+    shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, user: StatedProperties | None = None
+) -> str:
     """Return the YAML of `sensors`; `?` stands for what is to be looked up, and `rig check` refuses it by the key."""
-    user = user or Stated()
+    user = user or StatedProperties()
     lines: dict[str, object] = {"columns": _format_list(guess.columns)}
     if shape.keys:
         lines["keys"] = _format_list([_quote(key) for key in shape.keys])

@@ -39,7 +39,7 @@ NOT_PROVIDED: Mapping[str, Mapping[Field, Absent]] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ImuReading:
     """One message: its time in `UNIT_US`, rates (3,) rad/s, specific force (3,) m/s², temperature °C.
 
     `provided` are the fields with a new value; a temperature that is not among them is NaN.
@@ -57,7 +57,7 @@ def is_integer(imu: str) -> bool:
     return imu != "HIGHRES_IMU"
 
 
-def decode_reading(message: Any) -> Reading:
+def decode_reading(message: Any) -> ImuReading:
     """Decode a message of pymavlink. Its temperature is the IMU's own, in HIGHRES_IMU the barometer's."""
     kind = message.get_type()
     sent: Mapping[Field, Array] = {
@@ -72,7 +72,7 @@ def decode_reading(message: Any) -> Reading:
     integer = is_integer(kind)
     time = message.time_boot_ms if kind.startswith("SCALED_IMU") else message.time_usec
     celsius = float(sent["temperature"][0]) * (0.01 if integer else 1.0)
-    return Reading(
+    return ImuReading(
         time,
         _add_half_step(sent["rate"]) * MILLI if integer else sent["rate"],
         _add_half_step(sent["force"]) * MILLI * STANDARD_GRAVITY_M_S2 if integer else sent["force"],

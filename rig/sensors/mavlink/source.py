@@ -25,7 +25,7 @@ from rig.sensors.mavlink.readings import (
     MILLI,
     UNIT_US,
     Field,
-    Reading,
+    ImuReading,
     decode_reading,
     is_integer,
 )
@@ -72,7 +72,7 @@ class _ImuStream:
         """Describe the samples by the fields that the first messages provided."""
         self.description = describe(self.name, self.section, provides_temperature=self.thermometer.provides)
 
-    def take(self, message: Any, *, is_consecutive: bool) -> tuple[int, int, Reading] | None:
+    def take(self, message: Any, *, is_consecutive: bool) -> tuple[int, int, ImuReading] | None:
         """Return number, time and reading of a message; None for a copy. `is_consecutive`: none was lost before it."""
         reading = decode_reading(message)
         if not self.thermometer.provides:
@@ -87,7 +87,7 @@ class _ImuStream:
             self.intervals_us.append(self.counter.time_us - before_us)
         return self.counter.number, self.counter.time_us, reading
 
-    def samples(self, numbered: list[tuple[int, int, Reading]], first: int, host_time_s: float) -> NDArray[Any]:
+    def samples(self, numbered: list[tuple[int, int, ImuReading]], first: int, host_time_s: float) -> NDArray[Any]:
         """Return the samples of the readings, numbered from `first`."""
         numbers, times_us, readings = zip(*numbered, strict=True)
         samples = stamp_samples(
@@ -182,7 +182,7 @@ class MavlinkSource:
 
     def _take(self, messages: list[tuple[Any, bool]], host_time_s: float) -> None:
         """Pass on the samples of each IMU, on the reader's thread; before the start only judge the rates."""
-        readings: dict[str, list[tuple[int, int, Reading]]] = {}
+        readings: dict[str, list[tuple[int, int, ImuReading]]] = {}
         for message, is_consecutive in messages:
             kind = message.get_type()
             numbered_reading = self._imus[kind].take(message, is_consecutive=is_consecutive)

@@ -59,7 +59,7 @@ class RegisterBank:
 
 
 @dataclass(frozen=True, slots=True)
-class Identity:
+class RobotIdentity:
     """The controller's serial number and software version."""
 
     serial_number: str
@@ -71,7 +71,7 @@ class Robot:
 
     def __init__(
         self,
-        identity: Identity,
+        identity: RobotIdentity,
         motion: JointMotion,
         remote_control: bool,
         speed_slider: float,

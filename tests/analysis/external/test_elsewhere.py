@@ -13,7 +13,7 @@ import rig
 from rig.cli import main
 from rig.data.result_file import read_result
 from rig.report.certificate.content import certificate_of
-from rig.report.certificate.statements import Stated
+from rig.report.certificate.statements import StatedFacts
 from support.documents.certified import read
 from support.documents.dcc_rules import rule_faults, schema_faults
 from support.paths import DOCS
@@ -60,7 +60,7 @@ def kept(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 @pytest.mark.thorough
 def test_the_folder_holds_a_certificate_with_its_clauses(kept: tuple[Example, Path]) -> None:
     example, folder = kept
-    certificate = certificate_of(read_result(folder / "run"), Stated())
+    certificate = certificate_of(read_result(folder / "run"), StatedFacts())
     page = read(certificate)
     assert certificate.number in (folder / "run" / "certificate.html").read_text(encoding="utf-8")
     text = " ".join(page.text.split())

@@ -19,7 +19,7 @@ from rig.errors import Refused
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.report.certificate.content import is_simulated
 from rig.report.certificate.page import certificate_page
-from rig.report.certificate.statements import Stated, of_configuration, stated_in
+from rig.report.certificate.statements import StatedFacts, of_configuration, stated_in
 from rig.report.certificate.validity import list_omitted_rates
 from rig.report.entries.budget import budget_entry
 from rig.report.tables.coverage import coverage_sentence
@@ -91,8 +91,8 @@ KINDS = ("gyroscope", "accelerometer", "magnetometer", "drift", "everything", "v
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("stated", [LABORATORY, Stated()], ids=["said", "unsaid"])
-def test_every_clause_stands_there_with_words(kind: str, stated: Stated) -> None:
+@pytest.mark.parametrize("stated", [LABORATORY, StatedFacts()], ids=["said", "unsaid"])
+def test_every_clause_stands_there_with_words(kind: str, stated: StatedFacts) -> None:
     found = certificate(kinds()[kind], stated)
     page = read(found)
     silent = (
@@ -116,7 +116,7 @@ def test_every_uncertainty_that_is_printed_has_two_digits_and_its_value_the_same
 
 
 def test_what_replaces_what_is_said_by_an_amended_one() -> None:
-    amended = Stated(LABORATORY.site, LABORATORY.certificate.model_copy(update={"replaces": "RIG-1"}))
+    amended = StatedFacts(LABORATORY.site, LABORATORY.certificate.model_copy(update={"replaces": "RIG-1"}))
     assert "replaces RIG-1" in read(certificate(stated=amended)).under["7.8.8"]
     assert "7.8.8" not in read(certificate()).under
     assert certificate(stated=amended).number != certificate().number == certificate().number
@@ -148,7 +148,7 @@ def test_noise_is_not_called_uncertainty() -> None:
 
 
 def test_what_was_not_said_reads_so_and_nobody_is_invented() -> None:
-    silent = read(certificate(stated=Stated()))
+    silent = read(certificate(stated=StatedFacts()))
     for clause in ("7.8.2.1b", "7.8.2.1c", "7.8.2.1e", "7.8.2.1h", "7.8.2.1g", "7.8.2.1o"):
         assert "not stated" in silent.under[clause], clause
     said = read(certificate())
@@ -159,7 +159,7 @@ def test_what_was_not_said_reads_so_and_nobody_is_invented() -> None:
 
 def test_nobody_s_place_is_invented_from_an_address() -> None:
     assert LABORATORY.site is not None
-    silent = Stated(LABORATORY.site.model_copy(update={"place": None}), LABORATORY.certificate)
+    silent = StatedFacts(LABORATORY.site.model_copy(update={"place": None}), LABORATORY.certificate)
     assert read(certificate(stated=silent)).under["7.8.2.1c"].endswith("not stated")
     assert "room 2" in read(certificate()).under["7.8.2.1c"]
 
@@ -207,7 +207,7 @@ def test_the_arm_is_the_one_that_was_found_and_one_that_does_not_say_its_model_i
 
 def test_a_simulated_laboratory_is_told_across_every_page() -> None:
     document = result()
-    for stated, software in ((Stated(simulated=True), "5.14"), (LABORATORY, "URSoftware 5.14.0.0 (simulated)")):
+    for stated, software in ((StatedFacts(simulated=True), "5.14"), (LABORATORY, "URSoftware 5.14.0.0 (simulated)")):
         provenance = document.provenance.model_copy(update={"arm_software": software})
         simulated = document.model_copy(update={"provenance": provenance})
         assert is_simulated(simulated, stated)
@@ -262,8 +262,8 @@ def test_the_decision_rule_is_said(guard: float, words: str) -> None:
 
 
 def test_time_is_traceable_only_through_a_reference_that_is_named_and_was_compared() -> None:
-    unnamed = Stated(SiteSection(), CertificateSection())
-    simulated = Stated(LABORATORY.site, simulated=True)
+    unnamed = StatedFacts(SiteSection(), CertificateSection())
+    simulated = StatedFacts(LABORATORY.site, simulated=True)
     alone = result().model_copy(update={"clock": result().clock.model_copy(update={"comparisons": ()})})  # type: ignore[union-attr]
     assert certificate(compared(result())).traceable
     assert "traceable to the second" in read(certificate(compared(result()))).under["7.8.4.1c"]
@@ -297,7 +297,7 @@ def test_an_accelerometer_stands_there_with_its_uncertainty_and_its_budget() -> 
     assert (
         "9.81 m/s² by the laboratory's configuration, its origin: gravimeter, certificate 17" in page.under["7.8.4.1c"]
     )
-    silent = read(certificate(document, Stated()))
+    silent = read(certificate(document, StatedFacts()))
     assert "9.81 m/s² by the laboratory's configuration, its origin: not stated" in silent.under["7.8.4.1c"]
     alone = read(certificate(document.model_copy(update={"gyroscopes": {}})))
     assert "1.01235 ± 0.00022" in alone.text
@@ -456,7 +456,7 @@ def test_every_text_from_elsewhere_shows_as_text() -> None:
     words = ("laboratory", "address", "place", "time_reference", "gravity_reference", "magnetic_field_reference")
     said = dict.fromkeys(words, MARKUP)
     order = dict.fromkeys(("customer", "customer_address", "condition", "authorised_by", "replaces"), MARKUP)
-    stated = Stated(SiteSection(**said), CertificateSection(**order))
+    stated = StatedFacts(SiteSection(**said), CertificateSection(**order))
     document = hostile.model_copy(
         update={
             "gyroscopes": {MARKUP: hostile.gyroscopes["gyro"]},

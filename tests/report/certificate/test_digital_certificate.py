@@ -12,7 +12,7 @@ from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.errors import Refused
 from rig.estimation.statistics.coverage import coverage_factors
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.certificate.statements import Stated
+from rig.report.certificate.statements import StatedFacts
 from rig.report.tables.certificate import JOINT_FACTOR
 from rig.report.tables.dcc_results import JOINT_FACTOR_3
 from rig.report.tables.xml_parts import product
@@ -32,9 +32,9 @@ from support.paths import RECORDINGS
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
 HOSTILE = "a <b>&amp;\x00\x1b[31m ]]> \"'  "
-SILENT = Stated(SiteSection(country="DE"))
-SIMULATED = Stated(SiteSection(country="DE"), simulated=True)
-AMENDED = Stated(
+SILENT = StatedFacts(SiteSection(country="DE"))
+SIMULATED = StatedFacts(SiteSection(country="DE"), simulated=True)
+AMENDED = StatedFacts(
     LABORATORY.site.model_copy(update={"laboratory": HOSTILE}) if LABORATORY.site else None,
     CertificateSection.model_construct(
         **{**LABORATORY.certificate.model_dump(), "replaces": "RIG-1", "customer": HOSTILE, "condition": " "}
@@ -60,7 +60,7 @@ FAULTS = {
 @pytest.mark.parametrize(
     "stated", [LABORATORY, SILENT, SIMULATED, AMENDED], ids=["said", "unsaid", "simulated", "amended"]
 )
-def test_the_schema_finds_nothing_wrong(stated: Stated) -> None:
+def test_the_schema_finds_nothing_wrong(stated: StatedFacts) -> None:
     assert schema_faults(digital_certificate(certificate(stated=stated))) == []
 
 
@@ -68,13 +68,13 @@ def test_the_schema_finds_nothing_wrong(stated: Stated) -> None:
 @pytest.mark.parametrize(
     "stated", [LABORATORY, SILENT, SIMULATED, AMENDED], ids=["said", "unsaid", "simulated", "amended"]
 )
-def test_ptb_s_rules_find_nothing_wrong(stated: Stated) -> None:
+def test_ptb_s_rules_find_nothing_wrong(stated: StatedFacts) -> None:
     assert rule_faults(digital_certificate(certificate(stated=stated))) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stated", [LABORATORY, SILENT], ids=["said", "unsaid"])
-def test_accelerometers_and_verifications_are_valid_too(stated: Stated) -> None:
+def test_accelerometers_and_verifications_are_valid_too(stated: StatedFacts) -> None:
     verified = read_result(RECORDINGS / "verified").verification
     xml = digital_certificate(certificate(with_accelerometer().model_copy(update={"verification": verified}), stated))
     assert [len(each) for each in map(numbers, found(xml, "si:valueXMLList"))] == [3, 3, 6, 3, 9, 3, 3, 6, 3, 3, 3]
@@ -100,7 +100,7 @@ def test_scale_factors_and_biases_say_each_how_warm_their_item_was() -> None:
     }
 
 
-def of_everything(stated: Stated = LABORATORY, *, turned: bool = True) -> bytes:
+def of_everything(stated: StatedFacts = LABORATORY, *, turned: bool = True) -> bytes:
     document = everything()
     reversals = {"compass": reversal(document)} if turned else {}
     return digital_certificate(certificate(document, stated, reversals))
@@ -108,7 +108,7 @@ def of_everything(stated: Stated = LABORATORY, *, turned: bool = True) -> bytes:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stated", [LABORATORY, SIMULATED], ids=["said", "simulated"])
-def test_all_that_a_run_may_find_is_valid(stated: Stated) -> None:
+def test_all_that_a_run_may_find_is_valid(stated: StatedFacts) -> None:
     xml = of_everything(stated)
     assert rule_faults(xml) == []
     assert schema_faults(xml) == []
@@ -275,7 +275,7 @@ def half_known() -> ResultDocument:
             "only the noise part of the uncertainty",
         ),
         (lambda: certificate(result().model_copy(update={"gyroscopes": {}})), "calibrated nothing"),
-        (lambda: certificate(stated=Stated()), "country is not stated"),
+        (lambda: certificate(stated=StatedFacts()), "country is not stated"),
         (lambda: certificate(half_known()), "only a part of the uncertainty of lsm9ds1 LSM9DS1-001 is known"),
     ],
 )

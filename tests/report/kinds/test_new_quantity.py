@@ -16,7 +16,7 @@ from rig.cli import main
 from rig.data.entries.result_types import Freedom3, Vector3
 from rig.data.quantity import Quantity
 from rig.data.result_file import GyroscopeEntry, ResultDocument
-from rig.history.entered.finished import Finished, compact
+from rig.history.entered.finished import FinishedRun, compact
 from rig.history.entered.recomputed import not_given
 from rig.history.plots import draw_trends
 from rig.history.series import subjects, trends
@@ -146,7 +146,7 @@ def test_a_history_follows_it(document: ResultDocument, tmp_path: Path, capsys: 
     place, serial = str(tmp_path / "history.sqlite"), document.gyroscopes["gyro"].serial_number
     text = compact(json.loads(document.text()))
     with open_history(place) as history:
-        history.enter(Finished(text, document, "bench", (), False, "here", "/runs/1", ()))
+        history.enter(FinishedRun(text, document, "bench", (), False, "here", "/runs/1", ()))
         past = next(each for each in history.calibrations(Selection(serial_number=serial)) if each.quantity == "rate")
     names = list(past.parameters)
     assert names.index("gzz") < names.index("bow_x")  # after those of the rig's own

@@ -25,7 +25,7 @@ from rig.estimation.statistics.coverage import coverage_factors
 from rig.plans.recorded import judged, open_run
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.page import certificate_page
-from rig.report.certificate.statements import Stated
+from rig.report.certificate.statements import StatedFacts
 from rig.report.document import document_of
 from rig.report.tables.coverage import coverage_sentence
 from rig.report.terminal.table import print_outcome
@@ -37,7 +37,7 @@ from support.paths import DOCS, RECORDINGS
 from support.recordings.frozen import frozen
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
-GERMAN = Stated(SiteSection(country="DE"))
+GERMAN = StatedFacts(SiteSection(country="DE"))
 BUDGETED = [each for each in frozen() if "budget" in (each / "result.json").read_text(encoding="utf-8")]
 
 

@@ -12,7 +12,7 @@ from rig.data.recording.channel import thermometer_channel, triad_channel
 from rig.data.recording.events import Event
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault
-from rig.plans.motions.temperature_course import Course
+from rig.plans.motions.temperature_course import TemperatureCourse
 from rig.runner.acquisition import Acquisition
 from rig.runner.warming import Warming
 
@@ -32,7 +32,7 @@ def warmed(looks: Iterable[tuple[float, float]], k_per_min: float) -> None:
     acquisition = Acquisition()
     acquisition.expect("gyro", SENSOR)
     section = ThermalSection(from_c=20, to_c=60, max_rate_k_per_min=LIMIT_K_PER_MIN)
-    warming = Warming(section, acquisition, ignore, ("gyro",), None, 40.0, Course(20, 60, 5, True))
+    warming = Warming(section, acquisition, ignore, ("gyro",), None, 40.0, TemperatureCourse(20, 60, 5, True))
     heard_s = 0.0
     for board_s, controller_s in looks:
         while heard_s <= board_s:  # whatever the host did meanwhile, all that the board sent comes in its order

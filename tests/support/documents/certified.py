@@ -25,7 +25,7 @@ from rig.estimation.reference.reference_budget import KnownSize, Spread, referen
 from rig.motion.geometry import NOMINAL
 from rig.report.certificate.content import Certificate, certificate_of
 from rig.report.certificate.page import certificate_page
-from rig.report.certificate.statements import Stated
+from rig.report.certificate.statements import StatedFacts
 from rig.report.document import document_of
 from rig.report.entries.budget import budget_entry
 from support.recordings.synthetic_run import Setup, synthetic_run
@@ -33,7 +33,7 @@ from support.recordings.synthetic_run import Setup, synthetic_run
 CELLS = {"td", "th", "p", "div", "dd", "dt", "li", "h1", "h2", "h3", "caption"}
 VOID = {"meta", "br", "link", "img", "input", "hr", "base", "embed", "source"}
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-LABORATORY = Stated(
+LABORATORY = StatedFacts(
     SiteSection(
         laboratory="Bench Laboratory",
         address="1 Long Lane, Smallville",
@@ -328,7 +328,7 @@ def compared(document: ResultDocument) -> ResultDocument:
 
 def certificate(
     document: ResultDocument | None = None,
-    stated: Stated = LABORATORY,
+    stated: StatedFacts = LABORATORY,
     reversals: Mapping[str, ReversalEntry] = MappingProxyType({}),
 ) -> Certificate:
     """Of that result, by a laboratory that says all it can."""

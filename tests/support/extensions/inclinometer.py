@@ -18,7 +18,7 @@ from rig.analysis.check import fitness
 from rig.analysis.installed_kinds import OfKind
 from rig.analysis.outcome import Outcome
 from rig.data.entries.result_types import Entry
-from rig.data.quantity import Quantity, Unit
+from rig.data.quantity import DisplayUnit, Quantity
 from rig.data.recording.settings import Site
 from rig.data.result_file import ResultDocument
 from rig.errors import Fault
@@ -40,14 +40,14 @@ INCLINATION = Quantity(
     sensor="inclinometer",
     unit="rad",
     suffix="rad",
-    reading=Unit("°", DEGREE),
-    bias=Unit("mrad", 1e-3),
+    reading=DisplayUnit("°", DEGREE),
+    bias=DisplayUnit("mrad", 1e-3),
     decimals=3,
-    drift=Unit("µrad", 1e-6),
-    residuals=(Unit("mrad", 1e-3),),
+    drift=DisplayUnit("µrad", 1e-6),
+    residuals=(DisplayUnit("mrad", 1e-3),),
     walk="white noise",
     walk_suffix="rad_sqrt_s",
-    walk_unit=Unit("µrad √s", 1e-6),
+    walk_unit=DisplayUnit("µrad √s", 1e-6),
     steady=1e-3,
     d_si=r"\radian",
     axes="xy",

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from rig.data.result_file import ResultDocument
-from rig.history.entered.finished import Finished, compact, read_finished_run
+from rig.history.entered.finished import FinishedRun, compact, read_finished_run
 from rig.history.entered.issued import Issued
 from rig.history.store import History
 from support.paths import RECORDINGS
@@ -17,7 +17,7 @@ CALIBRATION = RECORDINGS / "six_observation"  # the quickest to solve: a twentie
 Change = Callable[[ResultDocument], ResultDocument]
 
 
-def keep(history: History, folder: Path, of: Path = CALIBRATION, change: Change | None = None) -> Finished:
+def keep(history: History, folder: Path, of: Path = CALIBRATION, change: Change | None = None) -> FinishedRun:
     """Copy recordings to `folder` and enter the result beside them, changed if so, as if begun a day after the last."""
     shutil.copytree(of, folder)
     run = read_finished_run(folder)
@@ -28,7 +28,7 @@ def keep(history: History, folder: Path, of: Path = CALIBRATION, change: Change 
     return run
 
 
-def certified(history: History, run: Finished, number: str, *, marks: str = "", replaces: str | None = None) -> None:
+def certified(history: History, run: FinishedRun, number: str, *, marks: str = "", replaces: str | None = None) -> None:
     """Note a certificate of that run, without a mark: what is to be relied on."""
     issued = Issued(number, "Calibration certificate", "2026-01-02", replaces, marks)
     assert history.certify(run.content_sha256, issued)

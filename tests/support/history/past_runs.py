@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from rig.data.result_file import ResultDocument, VectorEntry
-from rig.history.entered.finished import Finished, Recording, compact
+from rig.history.entered.finished import EnteredRecording, FinishedRun, compact
 from rig.history.store import open_history
 from support.documents.results import SENSOR, VERIFIED
 
@@ -27,10 +27,10 @@ def finished(
     check_standard: bool = False,
     passed: bool = True,
     solved_after_s: float = 60.0,
-) -> Finished:
+) -> FinishedRun:
     """One that began `day` days after the first."""
     text = document(day, scale, bias_rad_s, serial_number, rig, passed=passed, solved_after_s=solved_after_s)
-    return Finished(
+    return FinishedRun(
         text=compact(json.loads(text.text())),
         document=text,
         rig=rig,
@@ -38,7 +38,7 @@ def finished(
         simulated=False,
         computer="bench",
         path=f"/runs/{day}",
-        recordings=(Recording("run.h5", 3, "ab" * 32),),
+        recordings=(EnteredRecording("run.h5", 3, "ab" * 32),),
     )
 
 

@@ -17,7 +17,7 @@ from rig.data.recording.hand_events import (
     OfTheHand,
 )
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.settings import ByHand
+from rig.data.recording.settings import HandSettings
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.by_hand import HandSolution, SessionConditions, solve_by_hand
 from rig.estimation.by_hand.session import HandRecording
@@ -26,7 +26,7 @@ from rig.observation.by_hand.runs import NotCounted, range_of, readings_of
 from rig.observation.timebase import NOMINAL_DRIFT
 from rig.runner.acquisition import Acquisition
 from rig.runner.by_hand.session import HandSession
-from rig.world.operator import Operator
+from rig.world.operator import SimulatedOperator
 
 RATE_HZ, LOOK_S, LONGEST_S = 119.0, 0.2, 400.0
 PER_COUNT, PER_COUNT_M_S2 = float(np.radians(0.0175)), 5.98e-4
@@ -39,7 +39,7 @@ MATRIX = np.array([[0.85, 0.003, -0.002], [0.001, 0.865, 0.004], [0.002, -0.001,
 OFFSET, NOISE = np.array([0.0077, -0.01, -0.005]), 1.0e-3
 CREEP_RAD_S = np.radians([0.2, -0.15, 0.1])
 TOLD = SessionConditions(50.0, "the board's crystal")
-LIST = ByHand(flips=12, turns=3, rest_s=1.0, box_rad=float(np.radians(0.2)), closure_rad=float(np.radians(0.3)))
+LIST = HandSettings(flips=12, turns=3, rest_s=1.0, box_rad=float(np.radians(0.2)), closure_rad=float(np.radians(0.3)))
 
 
 @dataclass
@@ -48,7 +48,7 @@ class Table:
 
     seed: int
     mistakes: dict[str, float] = field(default_factory=dict)
-    settings: ByHand = LIST
+    settings: HandSettings = LIST
     hand: dict[str, Any] = field(default_factory=dict)
     creeps: int | None = None
     events: list[OfTheHand] = field(default_factory=list)
@@ -57,7 +57,9 @@ class Table:
     def __post_init__(self) -> None:
         sensors = {"gyro": {"scale": [1, 1, 1], "bias_rad_s": [0, 0, 0]}}
         hand = {"mistakes": self.mistakes, **self.hand}
-        self.operator = Operator(WorldSection.model_validate({"seed": self.seed, "sensors": sensors, "hand": hand}))
+        self.operator = SimulatedOperator(
+            WorldSection.model_validate({"seed": self.seed, "sensors": sensors, "hand": hand})
+        )
         self._random = np.random.default_rng([self.seed, 7])
         self.samples: list[np.ndarray] = []
         self._count = self._laid_down = 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.config.procedures.attitude_sets import SETS
 from rig.config.sensors.sensor_sections import MountingSection, mounting_matrix
-from rig.config.world.laboratory import SiteSection
+from rig.config.world.laboratory import WorldSiteSection
 from rig.config.world.magnetism import IronSection, SimulatedMagnetometerSection
 from rig.estimation.reference.magnetometer import Uniformity, uniformity
 from rig.estimation.reference.reference_model import KnownNorm
@@ -56,7 +56,7 @@ def seen(
     simulated = SimulatedMagnetometerSection.model_validate(TRUTH)
     mounted = MountedMagnetometer(section, simulated, offset_mm=(0.0, 0.0, extension_mm))
     field = build_magnetic_field(
-        SiteSection.model_validate({"magnetic_field_ut": FIELD_UT, "magnetic_dip_deg": 65.0} | dict(site or {})),
+        WorldSiteSection.model_validate({"magnetic_field_ut": FIELD_UT, "magnetic_dip_deg": 65.0} | dict(site or {})),
         [IronSection.model_validate(each) for each in iron],
     )
     poses = [list(frames([*ARM, *np.radians(wrists)])) for wrists in SETS["magnetic"]]

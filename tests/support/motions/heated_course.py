@@ -13,7 +13,7 @@ from rig.config.world.thermal import SimulatedThermalSection
 from rig.data.recording.thermal_events import SetMeasured
 from rig.estimation.arrays import Array
 from rig.estimation.temperature.over_temperature import RepeatedMeans
-from rig.plans.motions.temperature_course import Course, Ramp
+from rig.plans.motions.temperature_course import Ramp, TemperatureCourse
 from rig.world.board.heat import HeatedBody
 
 REFERENCE_C, FROM_C, TO_C, GAP_K = 35.0, 25.0, 45.0, 5.0
@@ -45,7 +45,7 @@ class Warmed:
 
 def warmed() -> Warmed:
     """The board taken up through its range by its heater and down again."""
-    body, course = HeatedBody(BOARD), Course(FROM_C, TO_C, GAP_K, both_directions=True)
+    body, course = HeatedBody(BOARD), TemperatureCourse(FROM_C, TO_C, GAP_K, both_directions=True)
     part, ramp, rows, starts, duty = (
         body.part("gyro"),
         Ramp(0.6 * GAP_K / SET_S, 1.0),

@@ -19,7 +19,7 @@ from rig.page.page_state import PageState
 from rig.page.rows import Look
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
-from rig.page.server.serving import Address, serving
+from rig.page.server.serving import PageAddress, serving
 from rig.station.events import ArmSeen, HandSeen, Progress, RunEvent, SamplesTaken, StepFinished, StepStarted
 from support.page.browser import text
 from support.page.told_runs import ABOUT, before_it_moves, look, moving, planned
@@ -110,7 +110,7 @@ def showing(
 ) -> Iterator[Telling]:
     """A page that has been loaded and told nothing yet."""
     feed = Feed(PageState(replace(about, may_answer=may_answer)))
-    with serving(feed, Control(may_answer=may_answer), folder, Address(port=0)) as url:
+    with serving(feed, Control(may_answer=may_answer), folder, PageAddress(port=0)) as url:
         driver.get(url if token else url.split("#")[0])
         telling = Telling(driver, feed)
         thread = threading.Thread(target=telling.go_on, daemon=True)
@@ -127,7 +127,7 @@ def main() -> None:
     feed = Feed(PageState(ABOUT))
     with (
         tempfile.TemporaryDirectory() as folder,
-        serving(feed, Control(may_answer=False), Path(folder), Address(port=0)) as url,
+        serving(feed, Control(may_answer=False), Path(folder), PageAddress(port=0)) as url,
     ):
         print(url, flush=True)
         for _ in count():

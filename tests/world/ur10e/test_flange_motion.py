@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from rig.config.world.laboratory import CalibrationSection, SiteSection
+from rig.config.world.laboratory import CalibrationSection, WorldSiteSection
 from rig.world.site import build_site
 from rig.world.ur10e.motion.flange_motion import find_flange_motion, find_motion, transfer_force
 from rig.world.ur10e.motion.forward_kinematics import flange_pose, flange_rate
@@ -52,7 +52,7 @@ def test_rate_and_force_are_the_derivatives_of_the_path_among_the_stars(
     q: tuple[float, ...], qd: tuple[float, ...], qdd: tuple[float, ...], offset_m: tuple[float, ...]
 ) -> None:
     """A thousand times the Earth's rate, so that what it does is far above what differences resolve."""
-    site = build_site(SiteSection(latitude_deg=40, heading_deg=70, base_tilt_deg=(3, -2)))
+    site = build_site(WorldSiteSection(latitude_deg=40, heading_deg=70, base_tilt_deg=(3, -2)))
     ground = 1000 * np.array(site.earth_rate_rad_s)
     site = type(site)(tuple(ground.tolist()), site.specific_force_m_s2)
 
@@ -83,14 +83,14 @@ def test_without_deviations_the_links_are_the_drawings() -> None:
     assert links() == NOMINAL
     assert [link.alpha_rad for link in NOMINAL] == np.radians(ALPHA).tolist()
     assert find_flange_motion(
-        (0.1,) * 6, (0.2,) * 6, (0.0,) * 6, NOMINAL, build_site(SiteSection())
+        (0.1,) * 6, (0.2,) * 6, (0.0,) * 6, NOMINAL, build_site(WorldSiteSection())
     ).rate_rad_s == flange_rate((0.1,) * 6, (0.2,) * 6)
 
 
 def test_arrays_of_instants_are_felt_as_single_ones() -> None:
     rng = np.random.default_rng(1)
     q, qd, qdd = rng.normal(size=(3, 6, 4))
-    arm, site = build_calibrated_links(CALIBRATION), build_site(SiteSection(latitude_deg=-33))
+    arm, site = build_calibrated_links(CALIBRATION), build_site(WorldSiteSection(latitude_deg=-33))
     turns = [(np.cos(q[j] + arm[j].theta_rad), np.sin(q[j] + arm[j].theta_rad)) for j in range(6)]
     all_at_once = find_motion(turns, list(qd), list(qdd), arm, site)
     for instant in range(4):
@@ -104,7 +104,7 @@ def test_arrays_of_instants_are_felt_as_single_ones() -> None:
 )
 def test_the_ground_turns_about_the_poles_axis(heading_deg: float, north: tuple[float, ...]) -> None:
     """At heading 90° the base's x axis looks east, so its y axis looks north."""
-    site = build_site(SiteSection(latitude_deg=52, heading_deg=heading_deg, gravity_m_s2=9.81))
+    site = build_site(WorldSiteSection(latitude_deg=52, heading_deg=heading_deg, gravity_m_s2=9.81))
     latitude = math.radians(52)
     expected = EARTH * (math.cos(latitude) * np.array(north) + math.sin(latitude) * np.array([0, 0, 1]))
     assert site.earth_rate_rad_s == pytest.approx(expected, abs=1e-12)
@@ -113,7 +113,7 @@ def test_the_ground_turns_about_the_poles_axis(heading_deg: float, north: tuple[
 
 def test_a_tilted_base_sees_gravity_and_the_pole_from_the_side() -> None:
     upright, tilted = (
-        build_site(SiteSection(latitude_deg=52, heading_deg=20, base_tilt_deg=tilt)) for tilt in ((0, 0), (2, -1))
+        build_site(WorldSiteSection(latitude_deg=52, heading_deg=20, base_tilt_deg=tilt)) for tilt in ((0, 0), (2, -1))
     )
     base = Rotation.from_euler("XY", [2, -1], degrees=True)  # first about x, then about the new y
     for name in ("earth_rate_rad_s", "specific_force_m_s2"):
@@ -121,4 +121,4 @@ def test_a_tilted_base_sees_gravity_and_the_pole_from_the_side() -> None:
 
 
 def test_without_a_latitude_the_ground_does_not_turn() -> None:
-    assert build_site(SiteSection()).earth_rate_rad_s == (0, 0, 0)
+    assert build_site(WorldSiteSection()).earth_rate_rad_s == (0, 0, 0)
