@@ -6,7 +6,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_fit import Explained
-from rig.estimation.gyroscope.vector_model import design_matrix, of_the_speed, regress
+from rig.estimation.gyroscope.vector_model import design_matrix, propagate_speed_std, regress
 from rig.estimation.reference import accelerometer_model, attitude_error, reference_model
 from rig.estimation.reference.accelerometer_model import Dwells, Movement
 from rig.estimation.reference.imu import ImuSolution
@@ -19,7 +19,7 @@ def residual_std_rad_s(explained: Explained) -> Array:
     """Return the standard deviations (N, 3) of the vector model's residuals: (1 − H) V (1 − H)ᵀ, hat matrix H."""
     inputs, solution = explained.seen, explained.solution
     rates, pull = inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.pull_m_s2
-    variances = inputs.variances_rad2_s2 + of_the_speed(rates, inputs.speed_std_rad_s, solution.matrix) ** 2
+    variances = inputs.variances_rad2_s2 + propagate_speed_std(rates, inputs.speed_std_rad_s, solution.matrix) ** 2
     shared = explained.bias.covariance(inputs.windows_s)
     design = design_matrix(rates, pull)
     _, inverse = regress(design, inputs.means_rad_s, variances, shared)

@@ -7,7 +7,7 @@ import numpy as np
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.stated_motion import MotionErrors, StatedMotion, motion_errors
-from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, places, regress
+from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, index_coefficients, regress
 from rig.estimation.reference.reference_budget import fewest_freedom
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 from rig.estimation.statistics.coverage import coverage_factors, effective_freedom
@@ -141,7 +141,7 @@ def counted(solution: VectorSolution, data: ExternalData) -> VectorSolution:
 def _gain(design: Array, means: Array, variances: Array) -> Array:
     """(12, N, 3) derivative of F, row by row, then c, with respect to each mean reading."""
     _, inverse = regress(design, means, variances)  # (3, 4, N)
-    of_matrix, _ = places(4)
+    of_matrix, _ = index_coefficients(4)
     gain = np.zeros((3, 4, len(means), 3))
     for axis in range(3):
         gain[axis, :, :, axis] = inverse[axis]

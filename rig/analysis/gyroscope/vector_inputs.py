@@ -12,7 +12,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Unknown
-from rig.estimation.gyroscope.earth_rate import EarthRate, Known
+from rig.estimation.gyroscope.earth_rate import EarthRate, EarthRatePrior
 from rig.estimation.gyroscope.own_errors import KnownSensor
 from rig.estimation.gyroscope.vector_fit import Seen
 from rig.motion.geometry import AXIS_ERRORS
@@ -188,10 +188,10 @@ def _visits(turns: Sequence[Observation]) -> list[list[int]]:
     return found
 
 
-def known_of(surroundings: Surroundings, name: str) -> Known:
+def known_of(surroundings: Surroundings, name: str) -> EarthRatePrior:
     """What is known of surroundings and sensor before the Earth's rate is looked for."""
     site, uncertainty = surroundings.site, surroundings.uncertainty
-    return Known(
+    return EarthRatePrior(
         up=np.array(site.up),
         latitude_rad=site.latitude_rad,
         g_sensitivity=uncertainty.stated_size("g_sensitivity_deg_s_g", name) > 0,

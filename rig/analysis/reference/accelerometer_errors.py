@@ -18,7 +18,7 @@ from rig.estimation.gyroscope.own_errors import (
     NONLINEARITY,
     OF_THE_PART,
     SCALE_OVER_TEMPERATURE,
-    from_their_mean,
+    subtract_mean,
     unseen_k,
 )
 from rig.estimation.reference.accelerometer_errors import AccelerometerErrors
@@ -123,7 +123,7 @@ def errors_of(
         norm_m_s2=STANDARD_GRAVITY_M_S2,
         bias_m_s2_k=MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k / STANDARD,
         scale_per_k=1e-6 * sheet.scale_ppm_k / STANDARD,
-        warmer_k=from_their_mean(np.array([piece.temperature_c for piece in pieces]), samples),
+        warmer_k=subtract_mean(np.array([piece.temperature_c for piece in pieces]), samples),
         unseen_k=unseen_k(temperature_step_k, windows_s, samples),
         windows_s=windows_s,
         instability_m_s2=MICRO_G_M_S2 * sheet.bias_instability_ug,

@@ -1,4 +1,4 @@
-"""Six or more averaged revolutions gathered into normal equations, and their solution with its covariance."""
+"""The normal equations of six or more averaged revolutions, and their solution with its covariance."""
 
 from dataclasses import dataclass
 from typing import Literal, Self
@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.six_observation import (
-    by_algorithm_1,
-    by_newton,
     design,
-    parameters,
+    extract_parameters,
     rank_deficient,
+    solve_by_algorithm_1,
+    solve_by_newton,
     solve_linear,
 )
 from rig.estimation.refusals import check_count, check_revolutions, check_unit
@@ -26,10 +26,11 @@ MAX_CONDITION = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Scale factors (3,), biases (3,) in rad/s, and how they were found.
+    """Scale factors (3,) and biases (3,) in rad/s of the six-observation model, with their covariance.
 
-    `covariance` (6, 6) stands in the order kx ky kz bx by bz: its blocks are in 1, rad/s and (rad/s)². `rank` and
-    `condition` are those of the scaled design; `iterations` counts Newton steps or passes of Algorithm 1.
+    - `covariance` (6, 6): in the order kx ky kz bx by bz, in units of 1, rad/s and (rad/s)².
+    - `rank` and `condition`: of the scaled design.
+    - `iterations`: Newton steps, or passes of Algorithm 1.
     """
 
     estimator: SixObservationEstimator
@@ -44,12 +45,15 @@ class Solution:
 
 @dataclass(frozen=True, slots=True)
 class Accumulator:
-    """The weighted normal equations of any number of revolutions, in constant memory; add each as it comes.
+    """Weighted normal equations of any number of revolutions, in constant memory.
 
-    With x̃ = [x 1]: `normal` (7, 7) = Σ w x̃ᵀx̃, `right` (7,) = Σ w ω² x̃. `moments` (3, 3, 7, 7) = Σ w² v_j m_j^a x̃ᵀx̃
-    for axis j and a = 0, 1, 2: the covariance needs them, because the variance of ω² − ‖K(m + b)‖² is
-    Σ_j 4 k_j⁴ (m_j + b_j)² v_j, and k and b are known only afterwards. `speed_noise` (7, 7) = Σ w² (2 ω σ_ω)² x̃ᵀx̃.
-    `geometry` (7, 7) = Σ x̃ᵀx̃ says what the sweeps can tell, however noisy they are.
+    With x̃ = [x 1], a mean reading m, its variance v, the speed ω and a weight w:
+
+    - `geometry` (7, 7) = Σ x̃ᵀx̃: the geometry of the sweeps, whatever their noise.
+    - `normal` (7, 7) = Σ w x̃ᵀx̃, `right` (7,) = Σ w ω² x̃.
+    - `moments` (3, 3, 7, 7) = Σ w² v_j m_j^a x̃ᵀx̃ for axis j and a = 0, 1, 2. The variance of ω² − ‖K(m + b)‖² is
+      Σ_j 4 k_j⁴ (m_j + b_j)² v_j, and k and b are known only after the solution.
+    - `speed_noise` (7, 7) = Σ w² (2 ω σ_ω)² x̃ᵀx̃.
     """
 
     geometry: Array
@@ -61,7 +65,7 @@ class Accumulator:
 
     @classmethod
     def empty(cls) -> Self:
-        """No revolution yet."""
+        """Return the sums of no revolution."""
         return cls(np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros((3, 3, 7, 7)), np.zeros((7, 7)), 0)
 
     def add(
@@ -72,11 +76,11 @@ class Accumulator:
         speed_std_rad_s: float = 0.0,
         weight: float | None = None,
     ) -> Self:
-        """The sums with one more revolution: mean (3,), variance of that mean (3,), mean speed 2π/T and its deviation.
+        """Return the sums with one more revolution.
 
-        The weight is the inverse variance of ω² − ‖m + b‖² for k = 1 and axes of equal noise, unless given (1 is what
-        SIX uses).
-        Raises Fault `not_finite`, `bad_speed`, `zero_reading`, `bad_variance`.
+        `mean_rad_s` (3,) with its `variance_rad2_s2` (3,), the mean speed 2π/T with its standard deviation. The default
+        weight is the inverse variance of ω² − ‖m + b‖² at k = 1 with equal noise on all axes; SIX uses 1. Raise Fault
+        `not_finite`, `bad_speed`, `zero_reading`, `bad_variance`.
         """
         mean = np.asarray(mean_rad_s, dtype=np.float64)
         variance = np.asarray(variance_rad2_s2, dtype=np.float64)
@@ -97,11 +101,11 @@ class Accumulator:
         )
 
     def solve(self, estimator: SixObservationEstimator = "newton") -> Solution:
-        """The parameters with their covariance.
+        """Return scale factors and biases with their covariance.
 
-        `newton` solves for readings counted from their mean, about −b: from zero, the design of Eq. (7) is singular
-        where ‖K b‖ = ω. `algorithm_1` counts from zero, as published. Raises Fault `too_few_observations`,
-        `rank_deficient`, `negative_square`, `algorithm_1_diverged`, `wrong_unit`.
+        `newton` centres the readings on their mean, about −b: uncentred, the design of Eq. (7) is singular if ‖K b‖ =
+        ω. `algorithm_1` uses them uncentred, as published. Raise Fault `too_few_observations`, `rank_deficient`,
+        `negative_square`, `algorithm_1_diverged`, `wrong_unit`.
         """
         check_count(self.count, 6, 6)
         centre = self.geometry[6, 3:6] / self.count
@@ -110,26 +114,26 @@ class Accumulator:
             raise rank_deficient("xyz"[weakest_axis])
         if estimator == "algorithm_1":
             centre = np.zeros(3)
-        move = _translation(centre)
-        normal, right = move @ self.normal @ move.T, move @ self.right
+        translation = _translation(centre)
+        normal, right = translation @ self.normal @ translation.T, translation @ self.right
         both_sides = np.stack([right[:6], normal[:6, 6]], axis=1)
         p, q = solve_linear(normal[:6, :6], both_sides).T
         if estimator == "newton":
-            beta, iterations = by_newton(p, q, float(right[6] / normal[6, 6]))
+            beta, iterations = solve_by_newton(p, q, float(right[6] / normal[6, 6]))
         else:
-            beta, iterations = by_algorithm_1(p, q)
-        scale, bias = parameters(beta)
+            beta, iterations = solve_by_algorithm_1(p, q)
+        scale, bias = extract_parameters(beta)
         check_unit(scale)
         covariance = self._covariance(scale, bias, centre)
         return Solution(estimator, scale, bias - centre, covariance, self.count, rank, condition, iterations)
 
-    def _condition(self, move: Array) -> tuple[int, float, int]:
-        """Rank and condition number of the design of translated readings, and the axis (0–2) it knows least about.
+    def _condition(self, translation: Array) -> tuple[int, float, int]:
+        """Return rank and condition number of the design after a translation, and its weakest axis (0–2).
 
-        Readings are measured in their own RMS length first, so that squares and linear terms compare while an axis
-        without signal stays small. Singular values below the largest / MAX_CONDITION do not count towards the rank.
+        Readings are scaled by their RMS length first: squares and linear terms become comparable, and an axis without
+        signal stays small. The rank counts the singular values above the largest / MAX_CONDITION.
         """
-        normal = move @ self.geometry @ move.T
+        normal = translation @ self.geometry @ translation.T
         length = np.sqrt(np.trace(normal[3:6, 3:6]) / self.count)
         unit = np.repeat([length**-2, length**-1], 3)
         values, vectors = np.linalg.eigh(normal[:6, :6] * np.outer(unit, unit))
@@ -140,16 +144,17 @@ class Accumulator:
         return rank, condition, int(np.argmax(weakest[:3] + weakest[3:]))
 
     def _covariance(self, scale: Array, bias: Array, centre: Array) -> Array:
-        """Covariance to first order in the means' errors e: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β.
+        """Return the covariance (6, 6) to first order in the errors e of the means.
 
-        `bias` is that of readings counted from `centre`; moving the origin leaves the covariance alone.
+        δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β. `bias` (3,) is that of readings less `centre` (3,); a
+        translation of the origin does not change the covariance.
         """
-        move = _translation(centre)[:6]
+        translation = _translation(centre)[:6]
         powers = np.stack([(bias - centre) ** 2, 2 * (bias - centre), np.ones(3)], axis=1) * 4 * scale[:, None] ** 4
-        noise = move @ (np.einsum("ja,jakl->kl", powers, self.moments) + self.speed_noise) @ move.T
+        noise = translation @ (np.einsum("ja,jakl->kl", powers, self.moments) + self.speed_noise) @ translation.T
         gamma_by_beta = np.concatenate([-(bias**2), bias])
-        normal = move @ self.normal
-        to_beta = np.linalg.inv(normal @ move.T + np.outer(normal[:, 6], gamma_by_beta))
+        normal = translation @ self.normal
+        to_beta = np.linalg.inv(normal @ translation.T + np.outer(normal[:, 6], gamma_by_beta))
         squares, linear = np.arange(3), np.arange(3, 6)
         to_parameters = np.zeros((6, 6))
         to_parameters[squares, squares] = 1 / (2 * scale)
@@ -161,10 +166,10 @@ class Accumulator:
 
 
 def _translation(centre: Array) -> Array:
-    """(7, 7) taking x̃ = [m² m 1] to that of m − c: (m − c)² = m² − 2 c m + c²."""
-    move = np.eye(7)
+    """Return the matrix (7, 7) that maps x̃ = [m² m 1] to that of m − c: (m − c)² = m² − 2 c m + c²."""
+    translation = np.eye(7)
     axes = np.arange(3)
-    move[axes, axes + 3] = -2 * centre
-    move[:3, 6] = centre**2
-    move[3:6, 6] = -centre
-    return move
+    translation[axes, axes + 3] = -2 * centre
+    translation[:3, 6] = centre**2
+    translation[3:6, 6] = -centre
+    return translation

@@ -1,7 +1,7 @@
 """Six-observation estimates of many runs at once, for studies: the equations of `six_observation`, vectorised.
 
-Runs stand along the first axis. What cannot be solved is NaN and not marked as converged, so one bad run does not stop
-fifteen thousand; the gates with names stand in `Accumulator.solve`, which does one run.
+Runs are along the first axis. A run without a solution is NaN and not marked as converged, so it does not stop the
+others; `Accumulator.solve` does one run and raises named faults.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from rig.estimation.gyroscope.six_observation import ALGORITHM_1_LIMIT, ALGORITH
 
 @dataclass(frozen=True, slots=True)
 class BatchSolution:
-    """Scale (R, 3), bias_rad_s (R, 3), iterations (R,) and whether each run converged (R,)."""
+    """Scale (R, 3), bias_rad_s (R, 3), iterations (R,) and the convergence of each run (R,)."""
 
     scale: Array
     bias_rad_s: Array
@@ -24,7 +24,7 @@ class BatchSolution:
 
 
 def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSolution:
-    """The closed form, with Newton steps on γ where speeds differ: `by_newton` for every run.
+    """Solve every run by the closed form, followed by Newton steps on γ if speeds differ, as `solve_by_newton` does.
 
     `means_rad_s` (R, N, 3); `speeds_rad_s` (N,) or (R, N).
     """
@@ -47,14 +47,14 @@ def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSoluti
             step = np.where(active, value / slope, step)
             gamma = np.where(active, gamma - step, gamma)
             steps += active
-        found = np.abs(step) <= 1e-13 * square
-        return _solution(p - gamma[:, None] * q, centre, steps, found)
+        converged = np.abs(step) <= 1e-13 * square
+        return _solution(p - gamma[:, None] * q, centre, steps, converged)
 
 
 def algorithm_1_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSolution:
-    """SIX, Algorithm 1, as published, for every run; `iterations` counts as `by_algorithm_1` does.
+    """Solve every run by SIX, Algorithm 1, as published; `iterations` counts as `solve_by_algorithm_1` does.
 
-    Shapes as in `newton_batch`: `means_rad_s` (R, N, 3), `speeds_rad_s` (N,) or (R, N).
+    `means_rad_s` (R, N, 3); `speeds_rad_s` (N,) or (R, N).
     """
     means = np.asarray(means_rad_s, dtype=np.float64)
     p, q, _ = _responses(means, speeds_rad_s)
@@ -63,48 +63,48 @@ def algorithm_1_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchS
     active, converged = np.ones(len(p), dtype=np.bool_), np.zeros(len(p), dtype=np.bool_)
     with np.errstate(all="ignore"):
         for _ in range(2, ALGORITHM_1_LIMIT):
-            at = np.flatnonzero(active)
-            if not len(at):
+            rows = np.flatnonzero(active)
+            if not len(rows):
                 break
-            gamma = np.sum(beta[at, 3:] ** 2 / (4 * beta[at, :3]), axis=1)
-            improved = p[at] - gamma[:, None] * q[at]
-            change = np.sum(np.abs(improved - beta[at]), axis=1)
+            gamma = np.sum(beta[rows, 3:] ** 2 / (4 * beta[rows, :3]), axis=1)
+            improved = p[rows] - gamma[:, None] * q[rows]
+            change = np.sum(np.abs(improved - beta[rows]), axis=1)
             done = change <= ALGORITHM_1_TOLERANCE
-            growing = ~done & ~(change < last_change[at])
-            beta[at], last_change[at] = improved, change
-            passes[at] += 1
-            converged[at[done]] = True
-            active[at[done | growing]] = False
+            growing = ~done & ~(change < last_change[rows])
+            beta[rows], last_change[rows] = improved, change
+            passes[rows] += 1
+            converged[rows[done]] = True
+            active[rows[done | growing]] = False
         return _solution(beta, np.zeros((len(p), 3)), passes, converged)
 
 
 def _responses(means: Array, speeds_rad_s: ArrayLike) -> tuple[Array, Array, Array]:
-    """p = X⁺ω² and q = X⁺1, (R, 6) each, and the mean squared speed (R,)."""
+    """Return p = X⁺ω² and q = X⁺1, (R, 6) each, and the mean squared speed (R,)."""
     runs, count, _ = means.shape
     x = design(means)
     square = np.broadcast_to(np.asarray(speeds_rad_s, dtype=np.float64) ** 2, (runs, count))
-    both = np.stack([square, np.ones((runs, count))], axis=-1)
+    right_sides = np.stack([square, np.ones((runs, count))], axis=-1)
     if count > 6:
         transposed = np.swapaxes(x, -1, -2)
-        x, both = transposed @ x, transposed @ both
-    answers = _solve(x, both)
-    return answers[..., 0], answers[..., 1], square.mean(axis=1)
+        x, right_sides = transposed @ x, transposed @ right_sides
+    solutions = _solve(x, right_sides)
+    return solutions[..., 0], solutions[..., 1], square.mean(axis=1)
 
 
 def _solve(matrices: Array, right: Array) -> Array:
-    """(R, 6, 2), NaN for a singular matrix."""
+    """Return the solutions (R, 6, 2) of linear systems, NaN for a singular matrix."""
     try:
         return np.asarray(np.linalg.solve(matrices, right), dtype=np.float64)
     except np.linalg.LinAlgError:
         usable = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
         usable = usable[np.linalg.matrix_rank(matrices[usable]) == 6]
-        answers = np.full_like(right, np.nan)
-        answers[usable] = np.linalg.solve(matrices[usable], right[usable])
-        return answers
+        solutions = np.full_like(right, np.nan)
+        solutions[usable] = np.linalg.solve(matrices[usable], right[usable])
+        return solutions
 
 
 def _solution(beta: Array, centre: Array, steps: NDArray[np.int64], solved: NDArray[np.bool_]) -> BatchSolution:
     squares = beta[:, :3]
-    good = solved & np.all(squares > 0, axis=1)
-    kept = np.where(good[:, None], beta, np.nan)
-    return BatchSolution(np.sqrt(kept[:, :3]), kept[:, 3:] / (2 * kept[:, :3]) - centre, steps, good)
+    valid = solved & np.all(squares > 0, axis=1)
+    beta = np.where(valid[:, None], beta, np.nan)
+    return BatchSolution(np.sqrt(beta[:, :3]), beta[:, 3:] / (2 * beta[:, :3]) - centre, steps, valid)

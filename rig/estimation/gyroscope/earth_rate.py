@@ -1,23 +1,23 @@
-"""The Earth's rate, found from sweeps and rests of a gyroscope that is good enough: TRIAX, section III-A, on an arm.
+"""The Earth's rate from sweeps and rests of a sufficiently stable gyroscope: TRIAX, section III-A, on an arm.
 
     m = F (ω + R ω_E) + c (+ G a) + B e
 
-R takes the arm's base frame into the flange's, ω_E (3,) is the Earth's rate in the base frame; F, c, G, e as in
-`rig.estimation.gyroscope.vector_fit`. Rests in many attitudes tell the bias from what turns with the flange. So does a
-sweep: of the Earth's rate only what lies along its axis is left in the mean of a turn. So 15 parameters are found: F, c
-and ω_E.
+R maps the arm's base frame to the flange's, ω_E (3,) is the Earth's rate in the base frame; F, c, G, e as in
+`rig.estimation.gyroscope.vector_fit`. Rests in many attitudes separate the bias from rates that turn with the flange.
+So does a sweep: in the mean of a revolution only the component of the Earth's rate along its axis remains. So 15
+parameters are estimated: F, c and ω_E.
 
-What an arm does wrong is among the e: its angles, as in `explained`, and how differently it stands each time, by which
-each sweep's axis leans for itself. A hundred microradians of that at 1 rad/s are 20 °/h across the axis, just where a
-sweep reads its bias alone, so the Earth's rate rests on the attitudes. The end of a turn that is timed wrongly is a
-wrong speed, along the axis.
+The arm's errors are among the e: its angles, as in `explain`, and its repeatability, which tilts the axis of each sweep
+independently. A tilt of a hundred microradians at 1 rad/s is 20 °/h across the axis, where a sweep determines only its
+bias, so the Earth's rate rests on the attitudes. An error in the end time of a revolution is a wrong speed, along the
+axis.
 
-Gravity and the Earth's axis both stand still in the room. A sensitivity G = λ F to gravity reads as an Earth's rate
-along the vertical does, so one of both must be known: G, which is zero for light in a fibre, or the vertical part of
-the Earth's rate, by the latitude.
+Gravity and the Earth's axis are both fixed in the room. A g-sensitivity G = λ F has the same effect as an Earth's rate
+along the vertical, so one of them must be given: G, which is zero for an optical gyroscope, or the vertical component
+of the Earth's rate, by the latitude.
 
-Whether the Earth was seen is for the readings to say: what was found must be large against its uncertainty, in which is
-what the bias did from one rest to the next, and it must be as large as the Earth's rate is.
+The readings decide if the Earth's rate was detected: the estimate must be large against its uncertainty, which includes
+the drift of the bias between rests, and it must agree with the Earth's rate.
 """
 
 from dataclasses import dataclass, replace
@@ -31,24 +31,24 @@ from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
 from rig.estimation.gyroscope.common_errors import CommonErrors
 from rig.estimation.gyroscope.nonlinearity import curvature
 from rig.estimation.gyroscope.vector_fit import Seen, solver
-from rig.estimation.gyroscope.vector_model import MAX_CONDITION, VectorSolution, design_matrix, of_the_speed
+from rig.estimation.gyroscope.vector_model import MAX_CONDITION, VectorSolution, design_matrix, propagate_speed_std
 from rig.estimation.statistics.bias_process import bias_process
 
-FREE_RAD_S = 100 * EARTH_RATE_RAD_S  # so large before that what the readings say is all that counts
-SEEN = 10.0  # standard deviations, in the direction in which it is known least
-AGREES = 4.0  # standard deviations from the Earth's rate
-MIN_LEVEL = 0.1  # sine of the angle between the vertical and what a heading is given of
+PRIOR_STD_RAD_S = 100 * EARTH_RATE_RAD_S  # so wide that only the readings count
+LEAST_RATIO = 10.0  # of the estimate to its largest standard deviation
+MAX_DEVIATION = 4.0  # from the Earth's rate, in standard deviations
+MIN_LEVEL = 0.1  # sine of the angle between the vertical and the base's x axis
 REMEDY = "Add rests in attitudes turned about two axes (procedure imu), or leave procedure.earth_rate at known"
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """What is known before, of arm and sensor.
+class EarthRatePrior:
+    """The given properties of arm and sensor.
 
-    `up` (3,): unit vector upwards in the base frame; `latitude_rad` where it is given; `g_sensitivity` whether the
-    sensor may be sensitive to gravity, which is to be found along then, with the vertical part of the Earth's rate
-    held to what it is at that latitude; `repeatability_rad` (one standard deviation, about each axis across the turn)
-    how differently the arm stands each time; `state_jitter_s` how well the end of a turn is timed.
+    `up` (3,): unit vector upwards in the base frame; `latitude_rad` if given; `g_sensitivity`: True if the sensor may
+    be sensitive to gravity, which is then estimated, with the vertical component of the Earth's rate fixed by the
+    latitude; `repeatability_rad`: standard deviation of the arm's return about each axis across the rotation;
+    `state_jitter_s`: standard deviation of the end time of a revolution.
     """
 
     up: Array
@@ -60,11 +60,11 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class EarthRate:
-    """The Earth's rate as found: `rate_rad_s` (3,) in the frame of the arm's base, `covariance_rad2_s2` (3, 3).
+    """The estimated Earth's rate: `rate_rad_s` (3,) in the frame of the arm's base, `covariance_rad2_s2` (3, 3).
 
-    `up` (3,) is upwards there; `vertical` says whether the vertical part was found or held to a known latitude.
-    `scatter` is the ratio of residuals to what was expected of them, of so many degrees of `freedom`; above 1 it has
-    widened the covariance.
+    `up` (3,) is upwards there; `vertical_held` is True if the vertical component was fixed by the latitude. `scatter`
+    is the RMS ratio of residuals to their expected standard deviation, with `freedom` degrees of freedom; above 1 it
+    multiplies the standard deviations (Birge ratio).
     """
 
     rate_rad_s: Array
@@ -76,47 +76,47 @@ class EarthRate:
 
     @property
     def norm_rad_s(self) -> float:
-        """Size of the Earth's rate that was found."""
+        """The norm of the estimated Earth's rate."""
         return float(np.linalg.norm(self.rate_rad_s))
 
     @property
     def norm_std_rad_s(self) -> float:
-        """Standard deviation of the Earth rate's size."""
+        """The standard deviation of the norm."""
         return self._std(self.rate_rad_s / self.norm_rad_s)
 
     @property
     def latitude_rad(self) -> float:
-        """Latitude by the rate's angle to the vertical; with the vertical part held, by the size of the level part."""
+        """The latitude by the rate's angle to the vertical; if that part is fixed, by the size of the level part."""
         return float(np.arcsin(self.up @ self.rate_rad_s / self.norm_rad_s))
 
     @property
     def latitude_std_rad(self) -> float:
-        """Standard deviation of the latitude, without how well `up` is known: a base that leans counts as latitude."""
+        """The standard deviation of the latitude without that of `up`: a tilt of the base counts as latitude."""
         latitude = self.latitude_rad
         slope = self.up - np.sin(latitude) * self.rate_rad_s / self.norm_rad_s
         return self._std(slope / (self.norm_rad_s * np.cos(latitude)))
 
     @property
     def heading_rad(self) -> float | None:
-        """Where the base's x axis points, from north over east; None where it points up or down."""
-        perpendicular_unit_vectors = self._level()
-        if perpendicular_unit_vectors is None:
+        """The direction of the base's x axis, from north over east; None if it is vertical."""
+        level = self._level()
+        if level is None:
             return None
-        ahead, left = perpendicular_unit_vectors
-        return float(np.arctan2(self.rate_rad_s @ left, self.rate_rad_s @ ahead))
+        ahead, to_left = level
+        return float(np.arctan2(self.rate_rad_s @ to_left, self.rate_rad_s @ ahead))
 
     @property
     def heading_std_rad(self) -> float | None:
-        """Standard deviation of the heading; None where the base's x axis points up or down."""
-        perpendicular_unit_vectors = self._level()
-        if perpendicular_unit_vectors is None:
+        """The standard deviation of the heading; None if the base's x axis is vertical."""
+        level = self._level()
+        if level is None:
             return None
-        ahead, left = perpendicular_unit_vectors
-        along, aside = float(self.rate_rad_s @ ahead), float(self.rate_rad_s @ left)
-        return self._std((along * left - aside * ahead) / (along**2 + aside**2))
+        ahead, to_left = level
+        forward, sideways = float(self.rate_rad_s @ ahead), float(self.rate_rad_s @ to_left)
+        return self._std((forward * to_left - sideways * ahead) / (forward**2 + sideways**2))
 
     def _level(self) -> tuple[Array, Array] | None:
-        """Unit vectors in the level plane: below the base's x axis, and to its left."""
+        """Return level unit vectors below the base's x axis and to its left; None if that axis is vertical."""
         ahead = np.array([1.0, 0.0, 0.0]) - self.up[0] * self.up
         size = float(np.linalg.norm(ahead))
         return None if size < MIN_LEVEL else (ahead / size, np.cross(self.up, ahead / size))
@@ -125,101 +125,105 @@ class EarthRate:
         return float(np.sqrt(slope @ self.covariance_rad2_s2 @ slope))
 
 
-def find_earth_rate(seen: Seen, nominal_mounting: Array, known: Known) -> EarthRate:
-    """The Earth's rate in the base frame. What `seen` says is known of it is not made use of.
+def find_earth_rate(inputs: Seen, nominal_mounting: Array, prior: EarthRatePrior) -> EarthRate:
+    """Return the Earth's rate in the base frame; `inputs.earth_rate_rad_s` is not used.
 
-    Raises Fault `earth_rate_and_g_sensitivity`, `earth_rate_not_observable`, and as the vector model does.
+    Raise Fault `earth_rate_and_g_sensitivity`, `earth_rate_not_observable`, and those of the vector model.
     """
-    held = np.zeros(3)
+    fixed = np.zeros(3)
     directions = np.eye(3)
-    if known.g_sensitivity and known.latitude_rad is not None:
-        held = EARTH_RATE_RAD_S * np.sin(known.latitude_rad) * known.up
-        directions = perpendicular_unit_vectors(known.up)
-    gravity = seen.gravity_m_s2 if known.g_sensitivity else None
-    _check_told(seen, directions, gravity)
-    pull = None if gravity is None else seen.pull_m_s2
-    fit = _fit(replace(seen, earth_rate_rad_s=held), nominal_mounting, directions, pull, known)
-    free, covariance = _of_the_earth(fit, len(directions))
+    if prior.g_sensitivity and prior.latitude_rad is not None:
+        fixed = EARTH_RATE_RAD_S * np.sin(prior.latitude_rad) * prior.up
+        directions = perpendicular_unit_vectors(prior.up)
+    gravity = inputs.gravity_m_s2 if prior.g_sensitivity else None
+    _check_identifiable(inputs, directions, gravity)
+    sensed_gravity = None if gravity is None else inputs.pull_m_s2
+    fit = _fit(replace(inputs, earth_rate_rad_s=fixed), nominal_mounting, directions, sensed_gravity, prior)
+    free, covariance = _extract_earth_rate(fit, len(directions))
     freedom = 3 * (fit.solution.observations - (4 if gravity is None else 7)) - len(directions)
-    scatter = _scatter(fit, freedom)
-    found = EarthRate(
-        rate_rad_s=held + free @ directions,
+    scatter = _find_scatter(fit, freedom)
+    earth = EarthRate(
+        rate_rad_s=fixed + free @ directions,
         covariance_rad2_s2=directions.T @ covariance @ directions * max(1.0, scatter) ** 2,
-        up=known.up,
+        up=prior.up,
         vertical_held=len(directions) < 3,
         scatter=scatter,
         freedom=max(freedom, 1),
     )
-    expected = float(np.sqrt(EARTH_RATE_RAD_S**2 - held @ held))
-    what = "its level part" if found.vertical_held else "it"
-    check_earth_seen(found.rate_rad_s - held, found.covariance_rad2_s2, expected, what)
-    return found
+    expected = float(np.sqrt(EARTH_RATE_RAD_S**2 - fixed @ fixed))
+    component = "its level part" if earth.vertical_held else "it"
+    check_earth_seen(earth.rate_rad_s - fixed, earth.covariance_rad2_s2, expected, component)
+    return earth
 
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """`expected_rad2_s2` (N, 3) is the variance each reading was expected to have."""
+    """The vector model with the Earth's rate; `expected_rad2_s2` (N, 3) are the expected variances of the residuals."""
 
     solution: VectorSolution
     errors: CommonErrors
     expected_rad2_s2: Array
 
 
-def _fit(seen: Seen, nominal_mounting: Array, directions: Array, gravity: Array | None, known: Known) -> _Fit:
-    """F, c, G, the arm's errors and, last of these, the Earth's rate along `directions` (d, 3) of the base."""
-    speeds = np.linalg.norm(seen.turns_rad_s, axis=1)
-    durations = np.diff(seen.windows_s).T[0]
-    timed = np.hypot(seen.speed_std_rad_s, np.sqrt(2) * known.state_jitter_s / durations * speeds)
-    of_the_arm = [np.zeros((0, *seen.means_rad_s.shape)) if seen.axis_errors_rad_s is None else seen.axis_errors_rad_s]
-    if known.repeatability_rad > 0:
-        of_the_arm.append(known.repeatability_rad * _leaning(seen.turns_rad_s))
-    turned = np.concatenate([*of_the_arm, FREE_RAD_S * np.moveaxis(seen.attitudes @ directions.T, -1, 0)])
-    several = len(seen.speeds_rad_s) > 1
+def _fit(inputs: Seen, mounting: Array, directions: Array, gravity: Array | None, prior: EarthRatePrior) -> _Fit:
+    """Fit F, c, G, the arm's errors and, last of these, the Earth's rate along `directions` (d, 3) of the base."""
+    speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
+    durations = np.diff(inputs.windows_s).T[0]
+    speed_std = np.hypot(inputs.speed_std_rad_s, np.sqrt(2) * prior.state_jitter_s / durations * speeds)
+    arm_errors = [
+        np.zeros((0, *inputs.means_rad_s.shape)) if inputs.axis_errors_rad_s is None else inputs.axis_errors_rad_s
+    ]
+    if prior.repeatability_rad > 0:
+        arm_errors.append(prior.repeatability_rad * _tilt_sweeps(inputs.turns_rad_s))
+    rate_errors = np.concatenate([*arm_errors, PRIOR_STD_RAD_S * np.moveaxis(inputs.attitudes @ directions.T, -1, 0)])
+    several = len(inputs.speeds_rad_s) > 1
 
     def effects(matrix: Array) -> Array:
-        bent = [curvature(matrix, seen.rates_rad_s)] if several else []
-        return np.concatenate([*bent, seen.own_patterns(matrix), turned @ matrix.T])
+        curved = [curvature(matrix, inputs.rates_rad_s)] if several else []
+        return np.concatenate([*curved, inputs.own_patterns(matrix), rate_errors @ matrix.T])
 
-    solve = solver(seen, nominal_mounting, gravity, timed, effects)
+    solve = solver(inputs, mounting, gravity, speed_std, effects)
     solution, errors = solve(None)
-    own = seen.variances_rad2_s2 + of_the_speed(seen.rates_rad_s, timed, solution.matrix) ** 2
-    design = design_matrix(seen.rates_rad_s, gravity)
-    means = seen.means_rad_s - errors.readings_rad_s
-    bias = bias_process(design, means, own, seen.windows_s, instability_rad_s=seen.instability_rad_s)
-    shared = bias.covariance(seen.windows_s)
+    variances = inputs.variances_rad2_s2 + propagate_speed_std(inputs.rates_rad_s, speed_std, solution.matrix) ** 2
+    design = design_matrix(inputs.rates_rad_s, gravity)
+    means = inputs.means_rad_s - errors.readings_rad_s
+    bias = bias_process(design, means, variances, inputs.windows_s, instability_rad_s=inputs.instability_rad_s)
+    shared = bias.covariance(inputs.windows_s)
     solution, errors = solve(shared)
-    return _Fit(solution, errors, own + np.diag(shared)[:, None])
+    return _Fit(solution, errors, variances + np.diag(shared)[:, None])
 
 
-def _of_the_earth(fit: _Fit, directions: int) -> tuple[Array, Array]:
-    """What was found of it along the directions (d,), and the covariance (d, d)."""
+def _extract_earth_rate(fit: _Fit, directions: int) -> tuple[Array, Array]:
+    """Return the Earth's rate along the directions (d,), and its covariance (d, d)."""
     sizes, covariance = fit.errors.sizes[-directions:], fit.errors.covariance[-directions:, -directions:]
-    return FREE_RAD_S * sizes, FREE_RAD_S**2 * covariance
+    return PRIOR_STD_RAD_S * sizes, PRIOR_STD_RAD_S**2 * covariance
 
 
-def _scatter(fit: _Fit, freedom: int) -> float:
-    """Residuals over their expected standard deviations, as an RMS; what the arm's errors take up is not counted."""
+def _find_scatter(fit: _Fit, freedom: int) -> float:
+    """Return the RMS of residuals over their expected standard deviations, without the dof that the arm's errors
+    absorb.
+    """
     squares = float(np.sum(fit.solution.residuals_rad_s**2 / fit.expected_rad2_s2))
     return float(np.sqrt(squares / freedom)) if freedom > 0 else 1.0
 
 
-def _leaning(turns_rad_s: Array) -> Array:
-    """(2 M, N, 3) what each of M sweeps' axes, leaning by one radian either way, adds to the rates (N, 3) alone."""
+def _tilt_sweeps(turns_rad_s: Array) -> Array:
+    """Return the effects (2 M, N, 3) on the rates of tilts by 1 rad of each of M sweeps about two directions."""
     patterns: list[Array] = []
-    for place in np.flatnonzero(turns_rad_s.any(axis=1)):
-        turn = turns_rad_s[place]
-        for way in perpendicular_unit_vectors(turn / np.linalg.norm(turn)):
+    for index in np.flatnonzero(turns_rad_s.any(axis=1)):
+        rate = turns_rad_s[index]
+        for axis in perpendicular_unit_vectors(rate / np.linalg.norm(rate)):
             patterns.append(np.zeros_like(turns_rad_s))
-            patterns[-1][place] = np.cross(way, turn)
+            patterns[-1][index] = np.cross(axis, rate)
     return np.array(patterns).reshape(-1, *turns_rad_s.shape)
 
 
-def _check_told(seen: Seen, directions: Array, gravity: Array | None) -> None:
-    """Whether sweeps and rests tell the Earth's rate beside all else, by a sensor as it should be."""
-    told, needed = _told(seen, directions, gravity)
-    if told.rank < needed and gravity is not None and len(directions) == 3:
-        without, fewer = _told(seen, directions, None)
-        if without.rank == fewer:
+def _check_identifiable(inputs: Seen, directions: Array, gravity: Array | None) -> None:
+    """Raise Fault unless sweeps and rests identify the Earth's rate with an ideal sensor."""
+    conditioning, parameters = _condition(inputs, directions, gravity)
+    if conditioning.rank < parameters and gravity is not None and len(directions) == 3:
+        without, fewer_parameters = _condition(inputs, directions, None)
+        if without.rank == fewer_parameters:
             raise Fault(
                 "earth_rate_and_g_sensitivity",
                 "the vertical part of the Earth's rate looks the same as a sensitivity to gravity, and "
@@ -227,41 +231,43 @@ def _check_told(seen: Seen, directions: Array, gravity: Array | None) -> None:
                 "Give site.latitude_deg, or uncertainty.g_sensitivity_deg_s_g: 0 for a gyroscope without "
                 "such a sensitivity",
             )
-    refusals.check_conditioning(told, needed, MAX_CONDITION, "the Earth's rate beside axes and bias", REMEDY)
+    refusals.check_conditioning(
+        conditioning, parameters, MAX_CONDITION, "the Earth's rate beside axes and bias", REMEDY
+    )
 
 
-def _told(seen: Seen, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
-    """Conditioning of the design (3 N, 3 p + d), all blocks of columns of one size, and how many it should tell."""
-    sweeps = seen.turns_rad_s / (np.linalg.norm(seen.turns_rad_s) / len(seen.turns_rad_s) ** 0.5 or 1.0)
-    pull = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)
-    own = np.kron(design_matrix(sweeps, pull), np.eye(3))
-    design = np.column_stack([own, (seen.attitudes @ directions.T).reshape(len(own), -1)])
-    needed = design.shape[1]
-    return refusals.condition_of(design, needed), needed
+def _condition(inputs: Seen, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
+    """Return the conditioning of the design (3 N, 3 p + d), column blocks scaled alike, and its number of columns."""
+    sweeps = inputs.turns_rad_s / (np.linalg.norm(inputs.turns_rad_s) / len(inputs.turns_rad_s) ** 0.5 or 1.0)
+    scaled_gravity = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)
+    sensor_columns = np.kron(design_matrix(sweeps, scaled_gravity), np.eye(3))
+    design = np.column_stack([sensor_columns, (inputs.attitudes @ directions.T).reshape(len(sensor_columns), -1)])
+    parameters = design.shape[1]
+    return refusals.condition_of(design, parameters), parameters
 
 
 def check_earth_seen(
-    free_rad_s: Array, covariance_rad2_s2: Array, expected_rad_s: float = EARTH_RATE_RAD_S, what: str = "it"
+    free_rad_s: Array, covariance_rad2_s2: Array, expected_rad_s: float = EARTH_RATE_RAD_S, component: str = "it"
 ) -> None:
-    """Whether what was found (3,) of the Earth's rate, or of a part of it, is as large as it is and known to a tenth.
+    """Check that an estimate (3,) of the Earth's rate, or a component, is significant and of the expected size.
 
-    Raises Fault `earth_rate_not_observable`.
+    Raise Fault `earth_rate_not_observable`.
     """
     free = float(np.linalg.norm(free_rad_s))
     worst = float(np.sqrt(np.linalg.eigvalsh(covariance_rad2_s2)[-1]))
-    if free < SEEN * worst:
+    if free < LEAST_RATIO * worst:
         raise Fault(
             "earth_rate_not_observable",
-            f"the gyroscope finds {what} to be {free / DEG_H:.3g} deg/h and knows it to {worst / DEG_H:.2g}, "
+            f"the gyroscope finds {component} to be {free / DEG_H:.3g} deg/h and knows it to {worst / DEG_H:.2g}, "
             f"not to a tenth",
             "Use a gyroscope with a steadier bias and less noise, or rest longer; give latitude and heading instead",
         )
-    along = free_rad_s / free
-    std = float(np.sqrt(along @ covariance_rad2_s2 @ along))
-    if abs(free - expected_rad_s) > AGREES * std:
+    direction = free_rad_s / free
+    std = float(np.sqrt(direction @ covariance_rad2_s2 @ direction))
+    if abs(free - expected_rad_s) > MAX_DEVIATION * std:
         raise Fault(
             "earth_rate_not_observable",
-            f"the gyroscope finds {what} to be {free / DEG_H:.4g} ± {std / DEG_H:.2g} deg/h, where "
+            f"the gyroscope finds {component} to be {free / DEG_H:.4g} ± {std / DEG_H:.2g} deg/h, where "
             f"{expected_rad_s / DEG_H:.4g} is right: something else turns with the attitude",
             "Look at the gyroscope's residuals, for warming and for a sensitivity to gravity; repeat the movement",
         )

@@ -1,7 +1,7 @@
-"""The six-observation model solved by Levenberg–Marquardt: what SIX compares Algorithm 1 with (Figs. 2 and 5).
+"""The six-observation model solved by Levenberg–Marquardt, with which SIX compares Algorithm 1 (Figs. 2 and 5).
 
-The residuals are ω² − ‖K (m + b)‖², Eqs. (2)–(4), weighted where weights are given, in the six parameters themselves,
-so that β0 needs no special care. With six sweeps the solution is that of `closed_form`, to rounding.
+The residuals are ω² − ‖K (m + b)‖², Eqs. (2)–(4), weighted if weights are given, in the six parameters themselves, so
+that β0 needs no special care. With six sweeps the solution is that of `closed_form`, to rounding.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from rig.estimation import refusals
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.six_observation import design, negative_square
 
-MAX_CONDITION = 40.0  # above `accumulator`'s 30: what only noise tells is left out before
+MAX_CONDITION = 40.0  # above `accumulator`'s 30: directions of pure noise are excluded before
 VANISHED = 0.05  # of the largest scale factor
 REMEDY = "Sweep every wrist in both directions; a second sweep in one direction cannot replace the other direction"
 
@@ -46,12 +46,12 @@ def solve_levenberg_marquardt(
     speed_std_rad_s: ArrayLike | None = None,
     weighted: bool = True,
 ) -> LevenbergMarquardtSolution:
-    """Least squares by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian, from k = 1, b = −(mean m).
+    """Solve by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian, from k = 1, b = −(mean m).
 
     `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings of N ≥ 6 sweeps and the variances of these means;
-    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; SIX weighs all alike.
+    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; SIX weights all alike.
 
-    Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
+    Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `lm_did_not_converge`, `rank_deficient`, `ill_conditioned`, `wrong_unit`,
     `negative_square`.
     """
@@ -64,8 +64,8 @@ def solve_levenberg_marquardt(
     refusals.check_duplicates(means)
     centred = means - means.mean(axis=0)
     length = float(np.sqrt(np.mean(np.sum(centred**2, axis=1))))
-    told = _conditioning(centred / length, float(np.sqrt(variances.max())) / length)
-    refusals.check_conditioning(told, 6, MAX_CONDITION, "scale or bias", REMEDY)
+    conditioning = _conditioning(centred / length, float(np.sqrt(variances.max())) / length)
+    refusals.check_conditioning(conditioning, 6, MAX_CONDITION, "scale or bias", REMEDY)
     refusals.check_unit(np.full(3, np.sqrt(np.mean(speeds**2)) / length))
     by_speed = (2 * speeds * speed_std) ** 2
     std = np.sqrt(4 * speeds**2 * variances.mean(axis=1) + by_speed) if weighted else np.ones(len(means))
@@ -76,21 +76,21 @@ def solve_levenberg_marquardt(
     def slope(theta: Array) -> Array:
         return -squared_rate_jacobian(theta, means) / std[:, None]
 
-    # From b = 0 the search runs off to infinity once the bias is about as large as the speed.
+    # From b = 0 the search diverges if the bias is about as large as the speed.
     start = np.concatenate([np.ones(3), -means.mean(axis=0)])
-    found = least_squares(
+    minimum = least_squares(
         residual, start, slope, method="lm", x_scale="jac", ftol=1e-15, xtol=1e-15, gtol=1e-15, max_nfev=1000
     )
-    if not found.success:
+    if not minimum.success:
         raise Fault(
             "lm_did_not_converge",
             "Levenberg–Marquardt did not find a minimum",
             "Use the estimator newton; check that the readings fit the speeds",
         )
-    theta = np.concatenate([np.abs(found.x[:3]), found.x[3:]])  # only k² is seen
+    theta = np.concatenate([np.abs(minimum.x[:3]), minimum.x[3:]])  # only k² is identifiable
     weakest = int(np.argmin(theta[:3]))
     if theta[weakest] < VANISHED * theta[:3].max():
-        raise negative_square(weakest)  # the search ends at k = 0, as near as a square can come to being negative
+        raise negative_square(weakest)  # k = 0 is the bound of a negative square
     refusals.check_unit(theta[:3])
     weighted_jacobian = slope(theta)
     gain = np.linalg.solve(weighted_jacobian.T @ weighted_jacobian, weighted_jacobian.T) / std
@@ -101,30 +101,30 @@ def solve_levenberg_marquardt(
         bias_rad_s=theta[3:],
         covariance=(gain * variance) @ gain.T,
         observations=len(means),
-        rank=told.rank,
-        condition=told.condition,
-        iterations=int(found.nfev),
+        rank=conditioning.rank,
+        condition=conditioning.condition,
+        iterations=int(minimum.nfev),
         warnings=refusals.warn_of_residuals(residuals, variance, len(means) - 6),
     )
 
 
 def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
-    """Conditioning of Eq. (7)'s design for readings less their mean, in their length; squares double the noise."""
+    """Return the conditioning of Eq. (7)'s design for centred readings of unit length; squares double the noise."""
     return refusals.condition_of(design(unit_means), 6, 2 * noise * float(np.sqrt(len(unit_means))))
 
 
 def squared_rate(theta: Array, means: Array) -> Array:
-    """‖K (m + b)‖² (N,) of mean readings (N, 3) for θ = [k b] (6,): SIX, Eqs. (1), (2)."""
+    """Return ‖K (m + b)‖² (N,) of mean readings (N, 3) for θ = [k b] (6,): SIX, Eqs. (1), (2)."""
     return np.asarray(np.sum((theta[:3] * (means + theta[3:])) ** 2, axis=-1), dtype=np.float64)
 
 
 def squared_rate_jacobian(theta: Array, means: Array) -> Array:
-    """(N, 6) derivative of `squared_rate` with respect to k and b."""
+    """Return the derivative (N, 6) of `squared_rate` with respect to k and b."""
     k, shifted = theta[:3], means + theta[3:]
     return np.concatenate([2 * k * shifted**2, 2 * k**2 * shifted], axis=-1)
 
 
 def squared_rate_variance(theta: Array, means: Array, variances: Array) -> Array:
-    """(N,) what the variances (N, 3) of the mean readings do to `squared_rate`, to first order."""
+    """Return the variance (N,) of `squared_rate` by those (N, 3) of the mean readings, to first order."""
     k, shifted = theta[:3], means + theta[3:]
     return np.asarray(np.sum(4 * k**4 * shifted**2 * variances, axis=-1), dtype=np.float64)

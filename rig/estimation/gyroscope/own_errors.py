@@ -1,8 +1,8 @@
-"""What a gyroscope may do beside the vector model, of which only the likely size is known: its data sheet says it.
+"""A gyroscope's errors outside the vector model, of which the data sheet states the likely size.
 
-It is not quite linear, and it feels how warm it is. Each is an error that many readings have in common
-(`rig.estimation.gyroscope.common_errors`): what sweeps and rests tell of it is taken out of the result, what they do
-not tell is a line of the budget.
+These are nonlinearity and sensitivity to temperature. Each is an error common to many readings
+(`rig.estimation.gyroscope.common_errors`): the result is corrected for the part that sweeps and rests determine, the
+rest is a contributor of the budget.
 """
 
 from collections.abc import Iterator
@@ -17,17 +17,18 @@ NONLINEARITY = "nonlinearity"
 BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
 OF_THE_PART = "what is known of the part"
 ROUNDING = "rounding of the readings"
-NOTHING_BESIDE = 1e-3  # of a mean's variance, that what means have in common by their rounding may be
+NEGLIGIBLE = 1e-3  # of a mean's variance: a smaller common rounding error
 
 
 @dataclass(frozen=True, slots=True)
 class KnownSensor:
-    """Half-widths as its data sheet states them, and how warm it was in each of N averages.
+    """Half-widths of errors by the data sheet, and the temperature of N averages.
 
-    `nonlinearity` is how far a reading may be off the best straight line, as a share of `full_scale_rad_s`: by its odd
-    part, and by its even part. `bias_rad_s_per_k` and `scale_per_k` are changes with temperature, `temperature_c` (N,)
-    is recorded in steps of `temperature_step_k`, NaN if nothing tells it; `temperature_words` say how it is known, if
-    no thermometer tells it. `instability_rad_s` is the least Allan deviation of its bias.
+    - `nonlinearity`: largest distance from the best straight line by either part, as a fraction of `full_scale_rad_s`.
+    - `bias_rad_s_per_k`, `scale_per_k`: changes with temperature.
+    - `temperature_c` (N,): recorded in steps of `temperature_step_k`, NaN if not recorded.
+    - `temperature_words`: its source, if no thermometer.
+    - `instability_rad_s`: the least Allan deviation of the bias.
     """
 
     nonlinearity: float
@@ -42,9 +43,9 @@ class KnownSensor:
 
 @dataclass(frozen=True, slots=True)
 class OwnError:
-    """A line of the budget: `patterns` (P, N, 3) rad/s in the readings for the `half_width`, which is in `unit`.
+    """A contributor of the budget: `patterns` (P, N, 3) rad/s in the readings for the `half_width`, which is in `unit`.
 
-    `source` says how that is known.
+    `source` explains the half-width.
     """
 
     name: str
@@ -55,34 +56,34 @@ class OwnError:
 
 
 def own_errors(
-    known: KnownSensor, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
+    sensor: KnownSensor, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
 ) -> Iterator[OwnError]:
-    """Errors of a sensor of F (3, 3) on a flange turning at `turns_rad_s` (N, 3), zero at rest, in `windows_s` (N, 2).
+    """Yield errors of a sensor of F (3, 3) at rates `turns_rad_s` (N, 3), zero at rest, in `windows_s` (N, 2).
 
-    Swept at one speed, scale is what it is at that speed along an axis: one that turned obliquely was slower, and so
-    its scale may differ. Several speeds tell the nonlinearity, whatever is known of it.
+    If all sweeps have one speed, the scale is that at this speed along an axis: an oblique rotation was slower, so its
+    scale may differ. Several speeds determine the nonlinearity themselves.
     """
     if len(speeds_rad_s) == 1:
-        bent = bending(matrix, turns_rad_s, known.full_scale_rad_s, speeds_rad_s[0])
-        sizes = known.nonlinearity / np.repeat([CUBE_MISSED, SQUARE_MISSED], 3)[:, None, None]
-        yield OwnError(NONLINEARITY, 100 * known.nonlinearity, "% of full scale", sizes * bent)
-    lasting = np.diff(windows_s)[:, 0]
-    source = "; ".join(filter(None, (OF_THE_PART, known.temperature_words)))
-    warmer_k = _warmer_k(known, windows_s, lasting)
-    patterns = known.bias_rad_s_per_k * np.einsum("kn,ij->kinj", warmer_k, np.eye(3))
-    by_k = float(np.degrees(known.bias_rad_s_per_k))
+        curved = bending(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])
+        sizes = sensor.nonlinearity / np.repeat([CUBE_MISSED, SQUARE_MISSED], 3)[:, None, None]
+        yield OwnError(NONLINEARITY, 100 * sensor.nonlinearity, "% of full scale", sizes * curved)
+    duration_s = np.diff(windows_s)[:, 0]
+    source = "; ".join(filter(None, (OF_THE_PART, sensor.temperature_words)))
+    warmer_k = _warmer_k(sensor, windows_s, duration_s)
+    patterns = sensor.bias_rad_s_per_k * np.einsum("kn,ij->kinj", warmer_k, np.eye(3))
+    by_k = float(np.degrees(sensor.bias_rad_s_per_k))
     yield OwnError(BIAS_OVER_TEMPERATURE, by_k, "°/s/K", patterns.reshape(6, -1, 3), source)
-    warmer_k = _warmer_k(known, windows_s, lasting * turns_rad_s.any(axis=1))
-    patterns = known.scale_per_k * np.einsum("kn,ni,ij->kinj", warmer_k, turns_rad_s @ matrix.T, np.eye(3))
-    yield OwnError(SCALE_OVER_TEMPERATURE, 1e6 * known.scale_per_k, "ppm/K", patterns.reshape(6, -1, 3), source)
+    warmer_k = _warmer_k(sensor, windows_s, duration_s * turns_rad_s.any(axis=1))
+    patterns = sensor.scale_per_k * np.einsum("kn,ni,ij->kinj", warmer_k, turns_rad_s @ matrix.T, np.eye(3))
+    yield OwnError(SCALE_OVER_TEMPERATURE, 1e6 * sensor.scale_per_k, "ppm/K", patterns.reshape(6, -1, 3), source)
 
 
 def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variances_rad2_s2: Array) -> Iterator[OwnError]:
-    """What rounding to steps does to means (N, 3) alike, by the standard uncertainty (N, 3) that it leaves in each.
+    """Yield the rounding error common to means (N, 3), by its standard uncertainty (N, 3) in each.
 
-    Means that are nearer to each other than the steps hide err together, such as those of all rests: no number of them
-    makes their rounding less. So an axis has an error for each group of such means, beside what each has for itself,
-    which is part of its variance (N, 3). What is nothing beside that is left out.
+    Means closer than the steps, such as those of all rests, have the same error: averaging does not reduce it. So an
+    axis has one error for each group of such means; the independent part is in their variance (N, 3). Negligible errors
+    are omitted.
     """
     roundings = np.broadcast_to(roundings_rad_s, means_rad_s.shape)
     patterns = []
@@ -93,29 +94,29 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
         for group in np.split(order, np.flatnonzero(apart) + 1):
             size = np.zeros(means_rad_s.shape)
             size[group, axis] = roundings[group, axis]
-            if np.any(size[group, axis] ** 2 > NOTHING_BESIDE * variances_rad2_s2[group, axis]):
+            if np.any(size[group, axis] ** 2 > NEGLIGIBLE * variances_rad2_s2[group, axis]):
                 patterns.append(np.sqrt(3) * size)
     if patterns:
         largest = float(np.degrees(np.max(patterns)))
         yield OwnError(ROUNDING, largest, "°/s", np.array(patterns), "the steps in which the readings come")
 
 
-def _warmer_k(known: KnownSensor, windows_s: Array, weights: Array) -> Array:
-    """(2, N) K above the mean by these weights: as recorded, and what the steps of that may hide."""
-    recorded = from_their_mean(known.temperature_c, weights)
-    return np.array([recorded, unseen_k(known.temperature_step_k, windows_s, weights)])
+def _warmer_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
+    """Return the temperature (2, N) in K above its weighted mean: as recorded, and the change hidden by its steps."""
+    recorded = subtract_mean(sensor.temperature_c, weights)
+    return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])
 
 
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
-    """(N,) K by which temperature may have changed evenly in the course of the run while its recorded steps did not.
+    """Return the change (N,) in K by which temperature may have drifted linearly within one recorded step.
 
-    By half a step either way, from the mean over the windows (N, 2) by their weights (N,).
+    It is ± half a step, about the mean over the windows (N, 2) by their weights (N,).
     """
     middle = windows_s.mean(axis=1)
-    return np.asarray(step_k * from_their_mean(middle, weights) / np.ptp(middle), dtype=np.float64)
+    return np.asarray(step_k * subtract_mean(middle, weights) / np.ptp(middle), dtype=np.float64)
 
 
-def from_their_mean(values: Array, weights: Array) -> Array:
-    """(N,) values less their mean by these weights; zero where they are not known, which is NaN."""
-    away: Array = np.nan_to_num(values - np.average(values, weights=weights))
-    return away
+def subtract_mean(values: Array, weights: Array) -> Array:
+    """Return values (N,) less their weighted mean; zero if they are unknown, which is NaN."""
+    deviation: Array = np.nan_to_num(values - np.average(values, weights=weights))
+    return deviation

@@ -1,17 +1,17 @@
 """Scale factors and biases of a triaxial gyroscope from averaged revolutions: the equations of the paper SIX.
 
-Model: g = K (m + b), K = diag(k), b in rad/s of the reading. SIX prints g = K m + b as Eq. (1), but Eqs. (3), (4)
-and Algorithm 1 are this one. Each revolution gives one equation ‖g‖² = ω², Eq. (4):
+Model: g = K (m + b), K = diag(k), b in rad/s of the reading. SIX prints g = K m + b as Eq. (1), but Eqs. (3), (4) and
+Algorithm 1 are this one. Each revolution gives one equation ‖g‖² = ω², Eq. (4):
 
     ω² = β0 + x β,   x = [mx² my² mz² mx my mz],   β = [k² …, 2 k² b …],   β0 = Σ k² b² = Σ β_l² / (4 β_s)
 
-with s the three squares and l the three linear terms. The columns of X stand squares first, in the order of β;
-Eq. (7) prints them the other way round. m is the mean reading of the revolution, squared afterwards: averaging m²,
-as Eq. (8) reads, adds the noise's variance to every square and shrinks the scale.
+with s the three squares and l the three linear terms. The columns of X have the squares first, in the order of β; Eq.
+(7) prints them the other way round. m is the mean reading of the revolution, squared afterwards: averaging m², as Eq.
+(8) reads, adds the noise's variance to every square and shrinks the scale.
 
-β depends on the unknown β0 = γ through one scalar only: β(γ) = p − γ q with p = X⁺ω² and q = X⁺1 (X⁺: least
-squares). Both solvers look for the γ that reproduces itself: `by_newton`, and `by_algorithm_1` as SIX publishes it.
-`rig.estimation.gyroscope.accumulator` brings them p and q from any number of revolutions.
+β depends on the unknown β0 = γ through one scalar only: β(γ) = p − γ q with p = X⁺ω² and q = X⁺1 (X⁺: least squares).
+Both solvers find the fixed point of γ: `solve_by_newton`, and `solve_by_algorithm_1` as SIX publishes it.
+`rig.estimation.gyroscope.accumulator` computes p and q from any number of revolutions.
 """
 
 import numpy as np
@@ -29,27 +29,27 @@ NEWTON_LIMIT = 20
 
 
 def design(means_rad_s: ArrayLike) -> Array:
-    """X (…, 6) = [mx² my² mz² mx my mz] of mean readings (…, 3) in rad/s: SIX, Eq. (7), with the squares first."""
+    """Return X (…, 6) = [mx² my² mz² mx my mz] of mean readings (…, 3) in rad/s: SIX, Eq. (7), squares first."""
     means = np.asarray(means_rad_s, dtype=np.float64)
     return np.concatenate([means * means, means], axis=-1)
 
 
 def closed_form(means_rad_s: Array, speed_rad_s: float) -> tuple[Array, Array]:
-    """Scale (3,) and bias (3,) from exactly six mean readings (6, 3) at one speed: one linear solve, no iteration.
+    """Return scale (3,) and bias (3,) from exactly six mean readings (6, 3) at one speed by one linear solve.
 
-    At one speed p = ω² q, hence γ = ω² Γ / (1 + Γ) with Γ = Σ q_l² / (4 q_s). This is the bare core, for a design
-    known to be good: the gates stand in `Accumulator.solve`. Raises Fault `rank_deficient`, `negative_square`.
+    At one speed p = ω² q, hence γ = ω² Γ / (1 + Γ) with Γ = Σ q_l² / (4 q_s). The design is not checked;
+    `Accumulator.solve` does that. Raise Fault `rank_deficient`, `negative_square`.
     """
     square = speed_rad_s * speed_rad_s
     q = solve_linear(design(means_rad_s), np.ones(6))
-    return parameters((square - _gamma_at_one_speed(q.tolist(), square)) * q)
+    return extract_parameters((square - _gamma_at_one_speed(q.tolist(), square)) * q)
 
 
-def by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, int]:
-    """β (6,) and the number of Newton steps on γ = Γ(p − γ q).
+def solve_by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, int]:
+    """Return β (6,) and the number of Newton steps on γ = Γ(p − γ q).
 
-    Starts at the closed form for the mean squared speed (rad²/s²), which is exact when all speeds are equal.
-    Converges whatever the size of the bias. Raises Fault `negative_square`.
+    The first iterate is the closed form for the mean squared speed (rad²/s²), which is exact if all speeds are equal.
+    It converges for any bias. Raise Fault `negative_square`.
     """
     ps, qs = p.tolist(), q.tolist()
     gamma = _gamma_at_one_speed(qs, square_rad2_s2)
@@ -70,12 +70,12 @@ def by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, int]:
     return p - gamma * q, steps
 
 
-def by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
-    """β (6,) and the number of passes by SIX, Algorithm 1, as published.
+def solve_by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
+    """Return β (6,) and the number of passes by SIX, Algorithm 1, as published.
 
-    β ← (XᵀX)⁻¹Xᵀ(ω² − γ) = p − γ q and γ ← Γ(β), beginning with γ = 0, until Σ|Δβ| ≤ 10⁻⁶; the first β is
-    pass 1. Each pass shrinks the step by β0 / (ω² − β0), so it converges only for β0 < ω²/2 (the paper's "β0 < 0.5"
-    is that at 1 rad/s). Raises Fault `algorithm_1_diverged` as soon as a step grows.
+    β ← (XᵀX)⁻¹Xᵀ(ω² − γ) = p − γ q and γ ← Γ(β), beginning with γ = 0, until Σ|Δβ| ≤ 10⁻⁶; the first β is pass 1. Each
+    pass shrinks the step by β0 / (ω² − β0), so it converges only for β0 < ω²/2 (the paper's "β0 < 0.5" is that at 1
+    rad/s). Raise Fault `algorithm_1_diverged` as soon as a step grows.
     """
     beta, last_change = p, np.inf
     for passes in range(2, ALGORITHM_1_LIMIT):
@@ -94,8 +94,11 @@ def by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
     )
 
 
-def parameters(beta: Array) -> tuple[Array, Array]:
-    """k = √β_s and b = β_l / (2 β_s), each (3,): the last lines of Algorithm 1. Raises Fault `negative_square`."""
+def extract_parameters(beta: Array) -> tuple[Array, Array]:
+    """Return k = √β_s and b = β_l / (2 β_s), (3,) each: the last lines of Algorithm 1.
+
+    Raise Fault `negative_square`.
+    """
     squares = beta[:3]
     for s, square in enumerate(squares.tolist()):
         if not square > 0:
@@ -104,7 +107,7 @@ def parameters(beta: Array) -> tuple[Array, Array]:
 
 
 def solve_linear(matrix: Array, right: Array) -> Array:
-    """The solution of a square system. Raises Fault `rank_deficient`."""
+    """Return the solution of a square system. Raise Fault `rank_deficient`."""
     try:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     except np.linalg.LinAlgError:
@@ -112,7 +115,7 @@ def solve_linear(matrix: Array, right: Array) -> Array:
 
 
 def rank_deficient(axis: str) -> Fault:
-    """The error for a design that leaves something undetermined."""
+    """Return the error for a design without full rank."""
     return Fault(
         "rank_deficient",
         f"the sweeps cannot separate scale and bias: {axis} was not swept in both directions",
@@ -121,6 +124,7 @@ def rank_deficient(axis: str) -> Fault:
 
 
 def _gamma_at_one_speed(q: list[float], square: float) -> float:
+    """Return γ = ω² Γ / (1 + Γ) of sweeps at one speed, as in `closed_form`. Raise Fault `negative_square`."""
     total = 0.0
     for s in range(3):
         if q[s] == 0:
@@ -130,7 +134,7 @@ def _gamma_at_one_speed(q: list[float], square: float) -> float:
 
 
 def negative_square(axis: int) -> Fault:
-    """The error for readings that no scale factor of axis 0, 1 or 2 explains."""
+    """Return the error for readings that no scale factor of axis 0, 1 or 2 explains."""
     return Fault(
         "negative_square",
         f"the squared scale factor of {'xyz'[axis]} is zero, negative or not a number",

@@ -1,7 +1,7 @@
-"""The uncertainty budget of the six-observation solution: what pushes readings pushes scale and bias by its response.
+"""The uncertainty budget of the six-observation solution by its response to the mean readings.
 
-That model knows speeds alone. So the direction in which an item was turned does not matter to it, however badly it was
-mounted; but it takes the sensor's axes to stand at right angles, which is one more thing that may be wrong.
+That model uses speeds alone, so it is insensitive to the direction of the rates and to the mounting; but it assumes
+orthogonal sensor axes, which adds a contributor.
 """
 
 from dataclasses import replace
@@ -18,46 +18,45 @@ from rig.estimation.statistics.bias_process import BiasProcess
 NOT_SQUARE = "angles between the axes"
 
 
-def six_observation_budget(explained: Explained, own: Solution, unknown: Unknown, axes_rad: float) -> Budget:
-    """The budget of `own`, which was solved from the sweeps alone of what is `explained`, weighted by their noise.
+def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown, axes_rad: float) -> Budget:
+    """Return the budget of `six`, solved from the sweeps of `explained` alone, weighted by their noise.
 
     `axes_rad` is the half-width of the angles between the sensor's axes about 90°.
     """
-    seen, solution = explained.seen, explained.solution
-    response = response_of(own, seen)
-    by_speed = np.einsum("qni,ni->qn", response, _of_speeds(seen, solution.matrix))
-    walking = _walking(explained.bias, response, seen.windows_s)
-    noise = np.einsum("qni,ni,pni->qp", response, seen.variances_rad2_s2, response)
-    instead = replace(
+    inputs, solution = explained.seen, explained.solution
+    response = response_of(six, inputs)
+    by_speed = np.einsum("qni,ni->qn", response, _propagate_speeds(inputs, solution.matrix))
+    drift = _propagate_drift(explained.bias, response, inputs.windows_s)
+    noise = np.einsum("qni,ni,pni->qp", response, inputs.variances_rad2_s2, response)
+    six_solution = replace(
         solution,
-        scale=own.scale,
-        bias_rad_s=own.bias_rad_s,
-        covariance=noise + by_speed @ by_speed.T + walking,
+        scale=six.scale,
+        bias_rad_s=six.bias_rad_s,
+        covariance=noise + by_speed @ by_speed.T + drift,
         response=response,
         g_sensitivity=None,
         g_sensitivity_covariance=None,
     )
-    of_readings = budget(replace(explained, solution=instead), unknown)
+    of_readings = budget(replace(explained, solution=six_solution), unknown)
     effects = np.einsum(
-        "qni,kni->kq", response, _leaning(seen.turns_rad_s @ solution.mounting.T, own.scale, axes_rad) / np.sqrt(3)
+        "qni,kni->kq", response, _tilt_axes(inputs.turns_rad_s @ solution.mounting.T, six.scale, axes_rad) / np.sqrt(3)
     )
     half_width, source = float(np.degrees(axes_rad)), "what is known of the part"
     square = Contributor(NOT_SQUARE, "B", "rectangular", half_width, "°", source, np.inf, effects.T @ effects)
-    known = [
+    contributors = [
         contributor for contributor in of_readings.contributors if contributor.name not in (AXES, REPEATABILITY, MOUNTS)
     ]
-    return replace(of_readings, contributors=(*known, square))
+    return replace(of_readings, contributors=(*contributors, square))
 
 
-def response_of(solution: Solution, seen: Seen) -> Array:
-    """(6, N, 3) derivative of scale and bias with respect to the mean readings; zero for rests, which do not count.
+def response_of(solution: Solution, inputs: Seen) -> Array:
+    """Return the derivative (6, N, 3) of scale and bias by the mean readings; zero for rests, which are not used.
 
-    To first order, as `Accumulator.solve` has the covariance: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e with
-    e = −2 Σ_j k_j² (m_j + b_j) δm_j.
+    To first order, as in `Accumulator.solve`: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e with e = −2 Σ_j k_j² (m_j + b_j) δm_j.
     """
-    turning = np.linalg.norm(seen.turns_rad_s, axis=1) > 0
-    means, variances = seen.means_rad_s[turning], seen.variances_rad2_s2[turning]
-    speeds, stds = np.linalg.norm(seen.turns_rad_s[turning], axis=1), seen.speed_std_rad_s[turning]
+    swept = np.linalg.norm(inputs.turns_rad_s, axis=1) > 0
+    means, variances = inputs.means_rad_s[swept], inputs.variances_rad2_s2[swept]
+    speeds, stds = np.linalg.norm(inputs.turns_rad_s[swept], axis=1), inputs.speed_std_rad_s[swept]
     weights = 1 / (4 * speeds**2 * variances.mean(axis=1) + (2 * speeds * stds) ** 2)
     centre = means.mean(axis=0)
     bias = solution.bias_rad_s + centre
@@ -71,33 +70,33 @@ def response_of(solution: Solution, seen: Seen) -> Array:
     to_parameters[linear, squares] = -bias / solution.scale**2
     to_parameters[linear, linear] = 1 / (2 * solution.scale**2)
     gain = to_parameters @ to_beta @ weighted
-    response = np.zeros((6, *seen.means_rad_s.shape))
-    response[:, turning] = gain[:, :, None] * (-2 * solution.scale**2 * (means + solution.bias_rad_s))
+    response = np.zeros((6, *inputs.means_rad_s.shape))
+    response[:, swept] = gain[:, :, None] * (-2 * solution.scale**2 * (means + solution.bias_rad_s))
     return response
 
 
-def _of_speeds(seen: Seen, matrix: Array) -> Array:
-    """(N, 3) what one standard deviation of each sweep's speed adds to its reading."""
-    size = np.linalg.norm(seen.turns_rad_s, axis=1, keepdims=True)
-    along = np.divide(seen.turns_rad_s, size, out=np.zeros(seen.turns_rad_s.shape), where=size > 0)
-    added: Array = seen.speed_std_rad_s[:, None] * along @ matrix.T
+def _propagate_speeds(inputs: Seen, matrix: Array) -> Array:
+    """Return the effect (N, 3) of one standard deviation of each sweep's speed on its reading."""
+    size = np.linalg.norm(inputs.turns_rad_s, axis=1, keepdims=True)
+    directions = np.divide(inputs.turns_rad_s, size, out=np.zeros(inputs.turns_rad_s.shape), where=size > 0)
+    added: Array = inputs.speed_std_rad_s[:, None] * directions @ matrix.T
     return added
 
 
-def _walking(bias: BiasProcess, response: Array, windows_s: Array) -> Array:
-    """(6, 6) what a bias that does not stand still adds."""
+def _propagate_drift(bias: BiasProcess, response: Array, windows_s: Array) -> Array:
+    """Return the covariance (6, 6) by the drift of the bias."""
     flicker = replace(bias, walk_rad_s_sqrt_s=0.0, scatter_rad_s=0.0)
     wandering = replace(bias, instability_rad_s=0.0)
     covariance: Array = np.sum(
-        [np.einsum("pni,nm,qmi->pq", response, each.covariance(windows_s), response) for each in (flicker, wandering)],
+        [np.einsum("pni,nm,qmi->pq", response, part.covariance(windows_s), response) for part in (flicker, wandering)],
         axis=0,
     )
     return covariance
 
 
-def _leaning(sensed: Array, scale: Array, angle_rad: float) -> Array:
-    """(3, N, 3) what is read when y leans towards x, z towards x, z towards y, by that angle; `sensed` (N, 3) rates."""
+def _tilt_axes(sensed: Array, scale: Array, angle_rad: float) -> Array:
+    """Return the effects (3, N, 3) of a tilt of y towards x, z towards x, z towards y on readings of rates (N, 3)."""
     patterns = np.zeros((3, *sensed.shape))
-    for place, (leaning, towards) in enumerate(((1, 0), (2, 0), (2, 1))):
-        patterns[place, :, leaning] = angle_rad * sensed[:, towards] / scale[leaning]
+    for row, (tilted, towards) in enumerate(((1, 0), (2, 0), (2, 1))):
+        patterns[row, :, tilted] = angle_rad * sensed[:, towards] / scale[tilted]
     return patterns

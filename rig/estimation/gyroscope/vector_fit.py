@@ -1,10 +1,10 @@
-"""The vector model with all that a recording tells beside the sweeps: gravity, the Earth's rate, a bias that wanders.
+"""The vector model with gravity, the Earth's rate, a drifting bias and errors of arm and sensor.
 
-Gravity stands still in the room and turns in the flange's frame, so attitudes tell what of a reading is sensitivity
-to it; at rest the sensor reads bias, Earth and gravity alone. In a sweep the flange circles about the swept axis, which
-a sensor feels as it feels gravity, and the arm knows both. Sweeps about more than three axes tell the angles between
-the sensor's axes from those between the arm's, sweeps at several speeds how nonlinear the sensor is. None of this is
-assumed: what sweeps and rests do not tell apart stays out of the model and belongs into the uncertainty.
+Gravity is fixed in the room and turns in the flange's frame, so attitudes separate g-sensitivity from bias; at rest the
+sensor reads bias, Earth's rate and gravity alone. In a sweep the flange circles about the swept axis with a centripetal
+acceleration that the arm's geometry determines. Sweeps about more than three axes separate the angles between the
+sensor's axes from those between the arm's, sweeps at several speeds determine the nonlinearity. None of this is
+assumed: effects that sweeps and rests do not separate are excluded from the model and belong to the uncertainty.
 """
 
 from collections.abc import Callable
@@ -18,31 +18,31 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.common_errors import CommonErrors, solve_with_common_errors
 from rig.estimation.gyroscope.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
 from rig.estimation.gyroscope.own_errors import KnownSensor, OwnError, own_errors, rounding_errors
-from rig.estimation.gyroscope.vector_model import VectorSolution, check_told, design_matrix, of_the_speed
+from rig.estimation.gyroscope.vector_model import VectorSolution, check_identifiable, design_matrix, propagate_speed_std
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process
 
-UNTOLD = ("rank_deficient", "ill_conditioned", "too_few_observations")  # what more columns than sweeps bear ends in
-TELLS = 0.25  # of the largest load: what is smaller has less than a sixteenth of its weight in the scale factor
+UNIDENTIFIABLE = ("rank_deficient", "ill_conditioned", "too_few_observations")  # faults of too many columns
+LEAST_LOAD = 0.25  # of the largest rate: a smaller one has less than a sixteenth of its weight in the scale
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What the vector model is made of: sweeps first, then rests, N in all.
+    """The inputs of the vector model: sweeps first, then rests, N in all.
 
-    `means_rad_s`, `variances_rad2_s2` (N, 3) of the noise alone; `turns_rad_s` (N, 3) rates of the flange in the room,
-    `earth_rate_rad_s` (3,) that of the room, in the base's frame, as far as it is known; `speed_std_rad_s` (N,);
-    `attitudes` (N, 3, 3) from the base into the flange; `gravity_m_s2` (N, 3) downwards, in the flange's frame;
-    `windows_s` (N, 2) on the clock of the first recording; `joints` (N) which of the arm's joints turned, None for a
-    rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
-    own angles, as far as it is known; `return_errors_rad_s` (P, N, 3) the same of joints that come back to an angle,
-    for each time they do; `encoder_errors_rad_s` (P, N, 3) the same of what encoders err
-    at the ends of arcs, None where all sweeps are whole turns; `mount_turns_rad` (3 S, N, 3) by which rotation vectors
-    an item that was mounted anew for S stages would sit off for one standard uncertainty of each of their mounts, None
-    where it stayed: of the stages but the first, which the first sweep is of, then of the first; `arms_m`
-    (N, 3) a way from the axis that turns to where the sensor is taken to sit, in the flange's frame, None where its own
-    motion is left out. `noise_freedom` (N, 3): with how many degrees of freedom the variances are known. `sensor` is
-    what is known of the sensor beforehand, None where nothing is. `ripples` (N,) are how unevenly each turned,
-    RMS as a share of its rate. `roundings_rad_s` (N, 3) is the standard uncertainty that rounding leaves in each mean.
+    - `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of their noise.
+    - `turns_rad_s` (N, 3): rates of the flange in the room; `earth_rate_rad_s` (3,): of the room, in the base frame.
+    - `speed_std_rad_s` (N,): standard deviations of the speeds.
+    - `attitudes` (N, 3, 3): from the base into the flange; `gravity_m_s2` (N, 3): downwards, in the flange's frame.
+    - `windows_s` (N, 2): on the clock of the first recording; `joints` (N): the joint that turned, None for a rest.
+    - `axis_errors_rad_s` (P, N, 3): effect of one standard uncertainty of each of the arm's angles on the rates.
+    - `return_errors_rad_s` (P, N, 3): the same for each return of a joint to an angle.
+    - `mount_turns_rad` (3 S, N, 3): rotation vectors of an item by one std of each mount of S stages (the first last).
+    - `arms_m` (N, 3): lever arm from the rotation axis to the sensor in the flange's frame, None to neglect it.
+    - `noise_freedom` (N, 3): degrees of freedom of the variances.
+    - `sensor`: the data sheet's properties, if any.
+    - `encoder_errors_rad_s` (P, N, 3): effect of encoders at the ends of arcs, None for whole revolutions.
+    - `ripples` (N,): RMS ripple of each rotation as a fraction of its rate.
+    - `roundings_rad_s` (N, 3): standard uncertainty of each mean by rounding.
     """
 
     means_rad_s: Array
@@ -72,31 +72,31 @@ class Seen:
 
     @property
     def rates_rad_s(self) -> Array:
-        """(N, 3) rates of the flange against the stars."""
+        """The inertial rates (N, 3) of the flange."""
         rates: Array = self.turns_rad_s + self.attitudes @ self.earth_rate_rad_s
         return rates
 
     @property
     def acceleration_m_s2(self) -> Array:
-        """(N, 3) acceleration of where the sensor is taken to sit, in the flange's frame."""
+        """The acceleration (N, 3) at the sensor's position, in the flange's frame."""
         return np.zeros(self.turns_rad_s.shape) if self.arms_m is None else self.centripetal_m_s2(self.arms_m)
 
     @property
     def pull_m_s2(self) -> Array:
-        """(N, 3) what is felt as gravity, in the flange's frame: gravity less the acceleration."""
+        """The apparent gravity (N, 3) in the flange's frame: gravity less the acceleration."""
         pull: Array = self.gravity_m_s2 - self.acceleration_m_s2
         return pull
 
     @property
     def instability_rad_s(self) -> float:
-        """The sensor's bias instability, zero where nothing is known of it."""
+        """The sensor's bias instability, zero if unknown."""
         return 0.0 if self.sensor is None else self.sensor.instability_rad_s
 
     @property
     def mount_errors_rad_s(self) -> Array | None:
-        """(3 S, N, 3) how far the turns would be off for one standard uncertainty of each of the mounts.
+        """The effects (3 S, N, 3) of one standard uncertainty of each mount on the rates.
 
-        The frame of the item is that of the first stage: by what that is off all others differ from it.
+        The frame of the item is that of the first stage, so an error of this mount changes all other stages.
         """
         if self.mount_turns_rad is None:
             return None
@@ -106,36 +106,36 @@ class Seen:
 
     @property
     def arm_errors_rad_s(self) -> Array:
-        """(P, N, 3) what all kinds of errors of the arm's angles add, and those of mounts last."""
+        """The effects (P, N, 3) of all kinds of errors of the arm's angles on the rates, with those of mounts last."""
         none = np.zeros((0, *self.means_rad_s.shape))
         kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s, self.mount_errors_rad_s)
         return np.concatenate([none, *(kind for kind in kinds if kind is not None)])
 
     def own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
-        """What a sensor of that F (3, 3) may do beside the model."""
+        """Return the errors outside the model of a sensor with that F (3, 3)."""
         if self.sensor is None:
             return ()
         rounded = rounding_errors(self.means_rad_s, self.roundings_rad_s, self.variances_rad2_s2)
-        own = own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s)
-        return (*own, *rounded)
+        stated = own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s)
+        return (*stated, *rounded)
 
     def own_patterns(self, matrix: Array) -> Array:
-        """(P, N, 3) what one standard deviation of each of the sensor's own errors adds."""
+        """Return the effects (P, N, 3) of one standard deviation of each of the sensor's own errors."""
         none = np.zeros((0, *self.means_rad_s.shape))
         return np.concatenate([none, *(own_error.patterns / np.sqrt(3) for own_error in self.own_errors(matrix))])
 
-    def centripetal_m_s2(self, way_m: Array) -> Array:
-        """(N, 3) acceleration at `way_m` (3,) or (N, 3) from the axis that turns, in the flange's frame."""
-        return centripetal_m_s2(self.turns_rad_s, way_m)
+    def centripetal_m_s2(self, lever_arm_m: Array) -> Array:
+        """Return the acceleration (N, 3) at a lever arm (3,) or (N, 3) from the rotation axis, flange's frame."""
+        return centripetal_m_s2(self.turns_rad_s, lever_arm_m)
 
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """The vector model's solution, how the bias wandered, and what both were found from.
+    """The solution of the vector model, the bias drift, and the inputs of both.
 
-    `nonlinearity` is None where all sweeps were made at one speed, for which the solution holds then. `mounts` (3 S,)
-    are the errors of the mounts as in `Seen`, in standard deviations of what was known of them before, and
-    `mounts_covariance` (3 S, 3 S) what is known of them now; S is 0 where the item stayed mounted as it was.
+    `nonlinearity` is None if all sweeps had one speed. `mounts` (3 S,) are the errors of the mounts as in `Seen`, in
+    prior standard deviations, with the posterior covariance `mounts_covariance` (3 S, 3 S); S is 0 without mounting
+    anew.
     """
 
     solution: VectorSolution
@@ -147,55 +147,54 @@ class Explained:
 
     @property
     def loads_rad_s(self) -> Array:
-        """(3, 2) smallest and largest rate along its x, y, z, either way, in the sweeps that tell its scale factors."""
-        along = np.abs(self.seen.turns_rad_s @ (self.solution.matrix * self.solution.scale[:, None]).T)
-        largest = along.max(axis=0)
-        smallest = np.where(along >= TELLS * largest, along, np.inf).min(axis=0)
+        """The least and largest rate (3, 2) along x, y, z, in either direction, of sweeps that determine its scale."""
+        sensed = np.abs(self.seen.turns_rad_s @ (self.solution.matrix * self.solution.scale[:, None]).T)
+        largest = sensed.max(axis=0)
+        smallest = np.where(sensed >= LEAST_LOAD * largest, sensed, np.inf).min(axis=0)
         loads: Array = np.column_stack([smallest, largest])
         return loads
 
 
-def centripetal_m_s2(turns_rad_s: Array, way_m: Array) -> Array:
-    """(…, 3) ω × (ω × p) of points that are `way_m` (…, 3) away from the axis of `turns_rad_s` (…, 3)."""
-    inwards: Array = np.cross(turns_rad_s, np.cross(turns_rad_s, way_m))
+def centripetal_m_s2(turns_rad_s: Array, lever_arm_m: Array) -> Array:
+    """Return ω × (ω × p) (…, 3) of lever arms p (…, 3) from the axis of the rates ω (…, 3)."""
+    inwards: Array = np.cross(turns_rad_s, np.cross(turns_rad_s, lever_arm_m))
     return inwards
 
 
-def explain(seen: Seen, nominal_mounting: Array, process: BiasProcess | None = None) -> Explained:
-    """Scale, bias and mounting, with gravity's share where the attitudes tell it.
+def explain(inputs: Seen, nominal_mounting: Array, process: BiasProcess | None = None) -> Explained:
+    """Return scale, bias and mounting, with the g-sensitivity if the attitudes determine it.
 
-    How the bias wanders is found from the means, but for a `process` that is known. Raises Fault as the vector model
-    does.
+    The bias drift is estimated from the means unless a `process` is given. Raise Fault as the vector model does.
     """
     try:
-        found = _explain(seen, nominal_mounting, seen.pull_m_s2, process)
-        # By the attitudes alone: circles that are a fiftieth of gravity would tell it, worse than it is known anyway.
-        check_told(seen.rates_rad_s, seen.gravity_m_s2)
-        return found
+        fit = _explain(inputs, nominal_mounting, inputs.pull_m_s2, process)
+        # By attitudes alone: centripetal accelerations, a fiftieth of gravity, are worse than the data sheet.
+        check_identifiable(inputs.rates_rad_s, inputs.gravity_m_s2)
+        return fit
     except Fault as fault:
-        if fault.name not in UNTOLD:
+        if fault.name not in UNIDENTIFIABLE:
             raise
-    return _explain(seen, nominal_mounting, None, process)
+    return _explain(inputs, nominal_mounting, None, process)
 
 
 def solver(
-    seen: Seen,
+    inputs: Seen,
     nominal_mounting: Array,
     gravity_m_s2: Array | None,
     speed_std_rad_s: Array,
     effects: Callable[[Array], Array],
 ) -> Callable[[Array | None], tuple[VectorSolution, CommonErrors]]:
-    """The vector model of what was seen, as a function of the covariance (N, N) its means share, if any.
+    """Return the vector model of the inputs as a function of the covariance (N, N) that the means share, if any.
 
-    `effects` are those of `solve_with_common_errors`, `gravity_m_s2` is what is felt as gravity, None where no
-    sensitivity to it is to be found.
+    `effects` are those of `solve_with_common_errors`, `gravity_m_s2` is the apparent gravity, None without
+    g-sensitivity.
     """
 
     def solve(shared: Array | None) -> tuple[VectorSolution, CommonErrors]:
         return solve_with_common_errors(
-            seen.means_rad_s,
-            seen.rates_rad_s,
-            seen.variances_rad2_s2,
+            inputs.means_rad_s,
+            inputs.rates_rad_s,
+            inputs.variances_rad2_s2,
             effects,
             speed_std_rad_s=speed_std_rad_s,
             gravity_m_s2=gravity_m_s2,
@@ -206,33 +205,33 @@ def solver(
     return solve
 
 
-def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None) -> Explained:
-    several = len(seen.speeds_rad_s) > 1
-    arm_errors = seen.arm_errors_rad_s
+def _explain(inputs: Seen, mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None) -> Explained:
+    several = len(inputs.speeds_rad_s) > 1
+    arm_errors = inputs.arm_errors_rad_s
 
-    def of_arm_and_speeds(matrix: Array) -> Array:
-        """(P, N, 3) effects on the readings, of one standard deviation each."""
-        curved = [curvature(matrix, seen.rates_rad_s)] if several else []
+    def arm_and_speed_patterns(matrix: Array) -> Array:
+        """Return the effects (P, N, 3) on the readings, of one standard deviation each."""
+        curved = [curvature(matrix, inputs.rates_rad_s)] if several else []
         return np.concatenate([arm_errors @ matrix.T, *curved])
 
     def effects(matrix: Array) -> Array:
-        return np.concatenate([of_arm_and_speeds(matrix), seen.own_patterns(matrix)])
+        return np.concatenate([arm_and_speed_patterns(matrix), inputs.own_patterns(matrix)])
 
-    solve = solver(seen, nominal_mounting, gravity_m_s2, seen.speed_std_rad_s, effects)
+    solve = solver(inputs, mounting, gravity_m_s2, inputs.speed_std_rad_s, effects)
     steady, errors = solve(None)
-    known, own = of_arm_and_speeds(steady.matrix), seen.own_patterns(steady.matrix)
-    of_the_speeds = of_the_speed(seen.rates_rad_s, seen.speed_std_rad_s, steady.matrix) ** 2
+    patterns, of_sensor = arm_and_speed_patterns(steady.matrix), inputs.own_patterns(steady.matrix)
+    speed_squares = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, steady.matrix) ** 2
     bias = process or bias_process(
-        design_matrix(seen.rates_rad_s, gravity_m_s2),
-        seen.means_rad_s - np.einsum("p,pni->ni", errors.sizes[: len(known)], known),
-        seen.variances_rad2_s2 + of_the_speeds,
-        seen.windows_s,
-        np.einsum("pni,pmi->inm", own, own) if len(own) else None,  # each is of one axis alone
-        instability_rad_s=seen.instability_rad_s,
+        design_matrix(inputs.rates_rad_s, gravity_m_s2),
+        inputs.means_rad_s - np.einsum("p,pni->ni", errors.sizes[: len(patterns)], patterns),
+        inputs.variances_rad2_s2 + speed_squares,
+        inputs.windows_s,
+        np.einsum("pni,pmi->inm", of_sensor, of_sensor) if len(of_sensor) else None,  # each acts on one axis alone
+        instability_rad_s=inputs.instability_rad_s,
     )
-    solution, errors = (steady, errors) if bias.steady else solve(bias.covariance(seen.windows_s))
-    curved = slice(len(arm_errors), len(known))
-    found = nonlinearity(errors.sizes[curved], errors.covariance[curved, curved]) if several else None
-    count = 0 if seen.mount_turns_rad is None else len(seen.mount_turns_rad)
+    solution, errors = (steady, errors) if bias.steady else solve(bias.covariance(inputs.windows_s))
+    curved = slice(len(arm_errors), len(patterns))
+    curve = nonlinearity(errors.sizes[curved], errors.covariance[curved, curved]) if several else None
+    count = 0 if inputs.mount_turns_rad is None else len(inputs.mount_turns_rad)
     mounts = slice(len(arm_errors) - count, len(arm_errors))
-    return Explained(solution, bias, seen, found, errors.sizes[mounts], errors.covariance[mounts, mounts])
+    return Explained(solution, bias, inputs, curve, errors.sizes[mounts], errors.covariance[mounts, mounts])

@@ -1,14 +1,15 @@
-"""The vector model: sweeps whose axes are known. The arm knows the direction it turns in, not only the speed.
+"""The vector model: sweeps about known axes. The arm gives the direction of a rate, not only the speed.
 
     m = F ω + c (+ G a),   F_i = a_i / k_i,   c = −b
 
 m is the mean reading (rad/s), ω the mean angular rate in the flange frame (unit axis × speed, zero for a rest), a_i the
-unit vector of sensor axis i in the flange frame. Of g = K (m + b), the convention of SIX, it is the version that knows
-the direction of g: k_i = 1 / ‖row i of F‖ and b = −c, so every sweep sees all three biases, and so does every rest.
-The mounting rotation and the non-orthogonality of the axes are found, not assumed. With gravity in the flange frame
-(m/s²) given, G (3×3, rad/s per m/s²) is the g-sensitivity.
+unit vector of sensor axis i in the flange frame. It is g = K (m + b), the convention of SIX, with a known direction of
+g: k_i = 1 / ‖row i of F‖ and b = −c, so every sweep and every rest determines all three biases. The mounting rotation
+and the non-orthogonality of the axes are estimated, not assumed. With gravity in the flange frame (m/s²) given, G (3×3,
+rad/s per m/s²) is the g-sensitivity.
 
-The equations are linear in F, c and G, one weighted regression for each axis: efficient when the noise is Gaussian.
+The equations are linear in F, c and G, one weighted regression for each axis (Aitken's generalised least squares):
+efficient if the noise is Gaussian.
 """
 
 from dataclasses import dataclass
@@ -44,18 +45,17 @@ REMEDY = "Sweep about three different axes, and turn the flange against gravity 
 
 @dataclass(frozen=True, slots=True)
 class VectorSolution:
-    """A gyroscope's calibration by the vector model, and how well it is known.
+    """A gyroscope's calibration by the vector model, with its covariance.
 
     - `scale` (3,), `bias_rad_s` (3,): g = K (m + b); `covariance` (6, 6) in the order kx ky kz bx by bz.
     - `matrix` (3, 3): F. `matrix_covariance` (12, 12): the rows of F, then c.
-    - `non_orthogonality_rad` (3,): by how much the angles between y and z, z and x, x and y fall short of 90°.
+    - `non_orthogonality_rad` (3,): 90° less the angles between y and z, z and x, x and y.
     - `mounting` (3, 3): the rotation from the flange frame to the sensor frame nearest to the three axes.
     - `angles_covariance_rad2` (6, 6): of `non_orthogonality_rad`, then of small turns of `mounting` about sensor x y z.
     - `g_sensitivity` (3, 3) in rad/s per m/s² and its (9, 9) covariance (row by row), or None.
     - `response` (6, N, 3): derivative of scale and bias with respect to the mean readings.
     - `residuals_rad_s` (N, 3): reading less model.
-    - `rank` is that of the scaled design, `condition` that of its part for axes and bias: how well sweeps and rests
-      tell these, whatever they tell of gravity.
+    - `rank`: of the scaled design; `condition`: of its part for axes and bias, without gravity.
     """
 
     scale: Array
@@ -99,13 +99,15 @@ def solve_vector_model(
 ) -> VectorSolution:
     """Solve m = F ω + c (+ G a) by weighted least squares.
 
-    `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of these means; `rates_rad_s` (N, 3):
-    the mean rate in the flange frame, zero for a rest; `speed_std_rad_s` (N,): how well its size is known;
-    `gravity_m_s2` (N, 3): the mean of what is felt as gravity, in the flange frame; `nominal_mounting` (3, 3): flange
-    to sensor, to be held to; `shared_covariance_rad2_s2` (N, N): of what the observations have in common beside their
-    own variances, as a bias that wanders, alike and independent for the three axes.
+    - `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of these means.
+    - `rates_rad_s` (N, 3): the mean rate in the flange frame, zero for a rest; `speed_std_rad_s` (N,): of its size.
+    - `gravity_m_s2` (N, 3): the mean apparent gravity, in the flange frame.
+    - `nominal_mounting` (3, 3): flange to sensor, to be compared with.
+    - `shared_covariance_rad2_s2` (N, N): covariance of the means beyond their own variances, as by bias drift, alike
+      and
+      independent for the three axes.
 
-    Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
+    Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
     `rank_deficient`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
     """
     means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
@@ -123,16 +125,16 @@ def solve_vector_model(
     check_signal(means[moving])
     check_duplicates(means[moving])
     scaled = design / _unit(design)
-    told = _check_told(scaled)
-    found = condition_of(scaled[:, :4], 4) if columns > 4 else told
+    conditioning = _check_identifiable(scaled)
+    axes_conditioning = condition_of(scaled[:, :4], 4) if columns > 4 else conditioning
 
     speed_noise = np.zeros_like(means)
     shared = None if shared_covariance_rad2_s2 is None else np.asarray(shared_covariance_rad2_s2, dtype=np.float64)
     coefficients, inverse = regress(design, means, variances, shared)
     if speed_std.any():
-        speed_noise = of_the_speed(rates, speed_std, coefficients[:3].T)
+        speed_noise = propagate_speed_std(rates, speed_std, coefficients[:3].T)
         coefficients, inverse = regress(design, means, variances + speed_noise**2, shared)
-        speed_noise = of_the_speed(rates, speed_std, coefficients[:3].T)
+        speed_noise = propagate_speed_std(rates, speed_std, coefficients[:3].T)
     raw = _raw_covariance(inverse, variances, speed_noise if speed_std.any() else None, shared)
 
     matrix = coefficients[:3].T
@@ -140,7 +142,7 @@ def solve_vector_model(
     axes = SensorAxes.of(matrix)
     check_unit(axes.scale)
     check_axes(axes.axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
-    of_matrix, of_gravity = places(columns)
+    of_matrix, of_gravity = index_coefficients(columns)
     matrix_covariance = raw[of_matrix[:, None], of_matrix]
     to_parameters = parameter_jacobian(matrix, axes.scale)
     residuals = means - design @ coefficients
@@ -158,15 +160,15 @@ def solve_vector_model(
         response=_response(to_parameters, inverse),
         residuals_rad_s=residuals,
         observations=count,
-        rank=told.rank,
-        condition=found.condition,
+        rank=conditioning.rank,
+        condition=axes_conditioning.condition,
         iterations=2 if speed_std.any() else 1,
         warnings=warn_of_residuals(residuals, _all_variances(variances, speed_noise, shared), 3 * (count - columns)),
     )
 
 
 def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> VectorBatch:
-    """The vector model of many runs at once, without gates: for studies whose design is known to be good.
+    """Solve the vector model of many runs at once, without checks: for studies of a design that is sound.
 
     `means_rad_s` (R, N, 3); `rates_rad_s` (N, 3) or (R, N, 3); `variances_rad2_s2` (N, 3), alike for all runs.
     """
@@ -176,24 +178,25 @@ def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances
     return VectorBatch(1 / np.linalg.norm(matrix, axis=-1), -coefficients[..., 3, :], matrix)
 
 
-def check_told(rates: Array, gravity: Array | None) -> None:
-    """Whether rates and gravity (N, 3) tell axes, bias and sensitivity to gravity from each other.
+def check_identifiable(rates: Array, gravity: Array | None) -> None:
+    """Check that rates and gravity (N, 3) identify axes, bias and g-sensitivity.
 
-    Raises Fault `rank_deficient`, `ill_conditioned`.
+    Raise Fault `rank_deficient`, `ill_conditioned`.
     """
     design = design_matrix(rates, gravity)
-    _check_told(design / _unit(design))
+    _check_identifiable(design / _unit(design))
 
 
-def _check_told(scaled: Array) -> Conditioning:
+def _check_identifiable(scaled: Array) -> Conditioning:
+    """Return the conditioning of a scaled design (N, p). Raise Fault as `check_identifiable` does."""
     columns = scaled.shape[1]
-    told = condition_of(scaled, columns)
-    check_conditioning(told, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
-    return told
+    conditioning = condition_of(scaled, columns)
+    check_conditioning(conditioning, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
+    return conditioning
 
 
 def design_matrix(rates: Array, gravity: Array | None) -> Array:
-    """Z (…, N, 4 or 7) = [ω 1 (a)]."""
+    """Return Z (…, N, 4 or 7) = [ω 1 (a)]."""
     blocks = [rates, np.ones((*rates.shape[:-1], 1))]
     if gravity is not None:
         require_shape("gravity", gravity, rates.shape)
@@ -202,7 +205,7 @@ def design_matrix(rates: Array, gravity: Array | None) -> Array:
 
 
 def _unit(design: Array) -> Array:
-    """(p,) the size of each block of columns, so that rate, one and gravity compare while a missing axis shows."""
+    """Return the size (p,) of each block of columns, so that blocks are comparable and a missing axis shows."""
     unit = np.ones(design.shape[1])
     squares = np.einsum("np,np->p", design, design)
     for block in (slice(0, 3), slice(4, None)):
@@ -211,21 +214,21 @@ def _unit(design: Array) -> Array:
 
 
 def regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
-    """Coefficients (…, p, 3) and the linear map (…, 3, p, N) that made them: one weighted regression for each axis."""
+    """Return coefficients (…, p, 3) and their linear map (…, 3, p, N): one weighted regression for each axis."""
     transposed = np.swapaxes(design, -1, -2)[..., None, :, :]
     if shared is None:
         weights = 1 / np.swapaxes(variances, -1, -2)  # (…, 3, N)
         weighted = transposed * weights[..., :, None, :]  # (…, 3, p, N)
     else:
-        noise = np.array([np.diag(own) for own in variances.T]) + shared
+        noise = np.array([np.diag(axis) for axis in variances.T]) + shared
         weighted = transposed @ np.linalg.inv(noise)
     inverse: Array = np.asarray(np.linalg.solve(weighted @ design[..., None, :, :], weighted), dtype=np.float64)
     coefficients: Array = np.einsum("...ipn,...ni->...pi", inverse, means)
     return coefficients, inverse
 
 
-def of_the_speed(rates: Array, speed_std: Array, matrix: Array) -> Array:
-    """(N, 3) what one standard deviation of the speed does to the readings, F û σ."""
+def propagate_speed_std(rates: Array, speed_std: Array, matrix: Array) -> Array:
+    """Return the effect (N, 3) of one standard deviation of the speed on the readings, F û σ."""
     speed = np.linalg.norm(rates, axis=1)
     axes = np.divide(rates, speed[:, None], out=np.zeros_like(rates), where=speed[:, None] > 0)
     noise: Array = speed_std[:, None] * (axes @ matrix.T)
@@ -233,7 +236,7 @@ def of_the_speed(rates: Array, speed_std: Array, matrix: Array) -> Array:
 
 
 def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None, shared: Array | None) -> Array:
-    """(3 p, 3 p) covariance of the coefficients, axis by axis; a wrong speed moves all three axes at once."""
+    """Return the covariance (3 p, 3 p) of the coefficients, axis by axis; a wrong speed changes all three axes."""
     columns, count = inverse.shape[1:]
     covariance = np.zeros((3, columns, 3, columns))
     if speed_noise is not None:
@@ -242,28 +245,28 @@ def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None,
     noise = inverse * variances.T[:, None]
     if shared is not None:
         noise = noise + inverse @ shared
-    each = np.arange(3)
-    covariance[each, :, each] += noise @ np.swapaxes(inverse, -1, -2)
+    axes = np.arange(3)
+    covariance[axes, :, axes] += noise @ np.swapaxes(inverse, -1, -2)
     raw: Array = covariance.reshape(3 * columns, 3 * columns)
     return raw
 
 
 @cache
-def places(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where F, row by row, then c stand among the coefficients axis by axis, (12,), and where G does, row by row."""
-    place = np.arange(3 * columns, dtype=np.intp).reshape(3, columns)
-    return np.concatenate([place[:, :3].ravel(), place[:, 3]]), place[:, 4:].ravel()
+def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the indices (12,) of F, row by row, and c among the coefficients axis by axis, and those of G."""
+    index = np.arange(3 * columns, dtype=np.intp).reshape(3, columns)
+    return np.concatenate([index[:, :3].ravel(), index[:, 3]]), index[:, 4:].ravel()
 
 
 def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -> Array:
-    """(N, 3) variances of each mean reading, whatever it comes from."""
-    alike = 0.0 if shared is None else np.diag(shared)[:, None]
-    everything: Array = variances + speed_noise**2 + alike
-    return everything
+    """Return the variances (N, 3) of each mean reading by all causes."""
+    common = 0.0 if shared is None else np.diag(shared)[:, None]
+    total: Array = variances + speed_noise**2 + common
+    return total
 
 
 def _response(to_parameters: Array, inverse: Array) -> Array:
-    """(6, N, 3) derivative of k and b with respect to each mean reading, from (6, 12) and the linear map (3, p, N)."""
+    """Return the derivative (6, N, 3) of k and b by the mean readings, from (6, 12) and the linear map (3, p, N)."""
     by_axis = np.concatenate([to_parameters[:, :9].reshape(6, 3, 3), to_parameters[:, 9:, None]], axis=2)
     response: Array = np.matmul(np.swapaxes(by_axis, 0, 1), inverse[:, :4]).transpose(1, 2, 0)
     return response

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.budget import NOISE, Budget, Contributor, found
+from rig.estimation.gyroscope.budget import NOISE, Budget, Contributor, evaluate_a
 from rig.estimation.reference.accelerometer_model import Dwells
 from rig.estimation.reference.attitude_error import AttitudeError, effects, whitening_with
 from rig.estimation.reference.reference_model import BIAS, SECOND, F, covariance_bound, jacobian
@@ -83,8 +83,8 @@ def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
 def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
     """(6, 6) covariance of scale and bias from a reference model's; b is in the reading, a gyroscope's is added."""
     to_parameters = scale_and_bias(matrix, scale, len(covariance))
-    found: Array = to_parameters @ covariance @ to_parameters.T
-    return found
+    propagated: Array = to_parameters @ covariance @ to_parameters.T
+    return propagated
 
 
 def fewest_freedom(response: Array, variances: Array, freedom: Array) -> float:
@@ -110,8 +110,8 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
     """What the readings tell, how well the reference's size is known, and what else there is."""
     noise = spread.response @ spread.noise @ spread.response.T
     told = [
-        found(NOISE, "scatter of the readings", noise, spread.known_noise),
-        found(
+        evaluate_a(NOISE, "scatter of the readings", noise, spread.known_noise),
+        evaluate_a(
             ATTITUDES,
             "what the readings say of them",
             spread.covariance - noise,
@@ -121,7 +121,9 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
     beyond = spread.chi_square / max(spread.freedom, 1) - 1.0
     if spread.freedom > 0 and beyond > 0.0:
         left = beyond * spread.covariance
-        told.append(found("what the model leaves", "residuals beside noise and attitudes", left, float(spread.freedom)))
+        told.append(
+            evaluate_a("what the model leaves", "residuals beside noise and attitudes", left, float(spread.freedom))
+        )
     return Budget((*told, _of_size(spread.scale, size), *others))
 
 

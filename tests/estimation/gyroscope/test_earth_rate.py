@@ -9,12 +9,12 @@ import pytest
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
-from rig.estimation.gyroscope.earth_rate import EarthRate, Known, find_earth_rate
+from rig.estimation.gyroscope.earth_rate import EarthRate, EarthRatePrior, find_earth_rate
 from rig.estimation.gyroscope.vector_fit import explain
 from rig.study.rate_table import GYRO_MATRIX
 from support.motions.earth_seen import KVH1775, LATITUDE_RAD, LSM9DS1, MPU9250, UP, Part, Session, Truth, recorded
 
-KNOWN = Known(UP, repeatability_rad=5e-5, state_jitter_s=2e-5)
+KNOWN = EarthRatePrior(UP, repeatability_rad=5e-5, state_jitter_s=2e-5)
 SENSITIVE = replace(KNOWN, g_sensitivity=True)
 AT_LATITUDE = replace(SENSITIVE, latitude_rad=LATITUDE_RAD)
 STRAIGHT = np.eye(3)
@@ -30,7 +30,7 @@ def found(session: Session, seed: int, known: str = "known") -> tuple[EarthRate,
     return find_earth_rate(seen, STRAIGHT, KNOWN if known == "known" else AT_LATITUDE), truth
 
 
-def refused(session: Session, seed: int, known: Known = KNOWN) -> str:
+def refused(session: Session, seed: int, known: EarthRatePrior = KNOWN) -> str:
     with pytest.raises(Fault) as caught:
         find_earth_rate(recorded(session, seed)[0], STRAIGHT, known)
     return caught.value.name
