@@ -12,12 +12,12 @@ DEFAULT_ESTIMATOR: Final = "vector"
 Choice = TypeVar("Choice", bound=str)
 
 
-def known_estimator(name: str) -> Estimator:
+def find_estimator(name: str) -> Estimator:
     """The estimator of that name. Raises Refused `unknown_estimator`."""
-    return estimator_among(ESTIMATORS, name)
+    return choose_estimator(ESTIMATORS, name)
 
 
-def estimator_among(choices: Sequence[Choice], name: str) -> Choice:
+def choose_estimator(choices: Sequence[Choice], name: str) -> Choice:
     """The one of that name. Raises Refused `unknown_estimator`."""
     for known in choices:
         if known == name:

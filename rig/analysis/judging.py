@@ -10,12 +10,12 @@ from rig.analysis.check import Check, unsolved_checks
 from rig.analysis.clock import ClockCheck
 from rig.analysis.consistency.contradictions import check_references, contradictions
 from rig.analysis.consistency.detection_limits import DetectionLimit
-from rig.analysis.estimators import Estimator, known_estimator
+from rig.analysis.estimators import Estimator, find_estimator
 from rig.analysis.gyroscope.board_averages import board_averages
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
-from rig.analysis.gyroscope.comparison import Reference, turns_of
+from rig.analysis.gyroscope.comparison import Reference, list_revolutions
 from rig.analysis.gyroscope.mounts import observe_as_mounted
-from rig.analysis.gyroscope.onboard_check import Agreement, agreement
+from rig.analysis.gyroscope.onboard_check import Agreement, check_arithmetic
 from rig.analysis.gyroscope.vector_inputs import lever_arms_m
 from rig.analysis.gyroscope.verification import Verification, verify
 from rig.analysis.installed_kinds import KindFound, kinds_on_arm
@@ -55,7 +55,7 @@ ResultT = TypeVar("ResultT")
 def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Outcome:
     """Solve and judge the recordings of a calibration, as `rig.analysis.analyses.calibrate` says."""
     settings = runs[0].settings
-    chosen = known_estimator(estimator)
+    chosen = find_estimator(estimator)
     recordings, mounts = observe_as_mounted(runs, settings)
     averages = [board_averages(name, recordings) for name in settings.to_calibrate] if settings.planned_sweeps else []
     if not recordings:
@@ -130,7 +130,7 @@ def _swept(
     results = solve_observed(runs[0].measuring(RATE), recordings, surroundings, estimator, settings.matrix_corrected)
     results, polynomials = _over_temperature(results, RATE, with_rate_polynomials, polynomials)
     among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings, settings)
-    onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
+    onboard = {name: check_arithmetic(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
         {name: results[name].solution for name in settings.to_calibrate},
         settings.limits,
@@ -235,7 +235,7 @@ def _gravity_left(
         solution = results[each].vector_model if each in results else None
         if not isinstance(solution, VectorSolution) or solution.g_sensitivity is None:
             return None
-        turns = turns_of(each, after)
+        turns = list_revolutions(each, after)
         attitudes = np.array([turn.average.attitude for turn in turns], dtype=np.float64)
         turned = np.array([turn.speed_rad_s * turn.axis_flange for turn in turns])
         pull = attitudes @ settings.site.down_m_s2 - centripetal_m_s2(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rig.analysis.consistency.detection_limits import DetectionLimit
     from rig.analysis.external.elsewhere import OfSensor
     from rig.analysis.gyroscope.calibration import SensorResult
-    from rig.analysis.gyroscope.mounts import FoundMount
+    from rig.analysis.gyroscope.mounts import EstimatedMount
     from rig.analysis.gyroscope.onboard_check import Agreement
     from rig.analysis.gyroscope.verification import Verification
     from rig.analysis.installed_kinds import KindFound
@@ -87,7 +87,7 @@ class Outcome:
     told_from_in_reference: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
     elsewhere: "Mapping[str, OfSensor]" = field(default_factory=dict)
     of_kinds: "tuple[KindFound, ...]" = ()
-    mounts: "tuple[FoundMount, ...]" = ()
+    mounts: "tuple[EstimatedMount, ...]" = ()
     polynomials: "Polynomials" = field(default_factory=dict)
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from rig.analysis.gyroscope.alignment import RelativeRotation
 from rig.analysis.gyroscope.comparison import Comparison, Reference
 from rig.analysis.gyroscope.comparison import compare as compare_readings
-from rig.analysis.gyroscope.verification import relative_mounting
+from rig.analysis.gyroscope.verification import fit_mounting
 from rig.data.quantity import RATE
 from rig.errors import Refused
 from rig.notebook.html import table
@@ -84,9 +84,7 @@ def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
     before = calibration.recordings if calibration is not None else ()
     raw = before or run.corrected
     standard = _correction_of(run, reference, raw)
-    rotation = relative_mounting(
-        sensor, standard, raw, calibration.results[sensor] if calibration is not None else None
-    )
+    rotation = fit_mounting(sensor, standard, raw, calibration.results[sensor] if calibration is not None else None)
     parts = (
         compare_readings(part, sensor, _correction_of(run, reference, part), rotation.matrix) if part else None
         for part in (before, run.corrected)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from rig.analysis.check import Check
-from rig.analysis.gyroscope.mounts import FoundMount
+from rig.analysis.gyroscope.mounts import EstimatedMount
 from rig.analysis.outcome import Origin, Outcome
 from rig.data.meaning import Meaning
 from rig.data.result_file import SCHEMA, CheckEntry, MountEntry, ProvenanceEntry, ResultDocument
@@ -40,9 +40,9 @@ def document_of(outcome: Outcome) -> ResultDocument:
     )
 
 
-def _mount(mount: FoundMount) -> MountEntry:
+def _mount(mount: EstimatedMount) -> MountEntry:
     return MountEntry.model_validate(
-        {"stage": mount.stage + 1, "rotation_rad": tuple(mount.turn_rad), "std_rad": tuple(mount.std_rad)}
+        {"stage": mount.stage + 1, "rotation_rad": tuple(mount.rotation_rad), "std_rad": tuple(mount.std_rad)}
     )
 
 

@@ -21,7 +21,7 @@ from rig.analysis.consistency.residual_tests import Statistic
 from rig.analysis.consistency.systematic_errors import build_error_patterns, collect_known_errors
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.analysis.gyroscope.mounts import observe_as_mounted
-from rig.analysis.gyroscope.segments import stack_segments, with_transfers
+from rig.analysis.gyroscope.segments import append_transfers, stack_segments
 from rig.analysis.reference.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.reference.magnetic_field import MagnetometerResult
 from rig.analysis.solvable import solvable
@@ -87,7 +87,7 @@ def contradictions(
         )
         matrix, extension_m = explained.solution.matrix, np.array(settings.extension_m)
         transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
-        with_transfers_averaged = with_transfers(segments, transfers, windows, explained)
+        with_transfers_averaged = append_transfers(segments, transfers, windows, explained)
         allowance = build_error_patterns(known_errors, segments, with_transfers_averaged, matrix)
         tested = gyroscope_checks.check_gyroscope(segments, matrix, false_alarm_probability, allowance)
         sensor = recordings[0].run.sensors[name]

@@ -8,7 +8,7 @@ import numpy as np
 from rig.analysis.consistency.alternatives import FAULT_MODES, Means
 from rig.analysis.consistency.reference_alternatives import FAULT_MODES as REFERENCE_FAULT_MODES
 from rig.analysis.gyroscope.calibration import SensorResult
-from rig.analysis.gyroscope.vector_inputs import unknown_of
+from rig.analysis.gyroscope.vector_inputs import list_uncertainties
 from rig.analysis.surroundings import Surroundings
 from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault
@@ -41,7 +41,7 @@ def find_gyroscope_limits(
     if explained is None:
         return
     means, mounting = _means_of_solve(explained), np.array(result.sensor.mounting)
-    inputs = unknown_of(surroundings, name, result.earth)
+    inputs = list_uncertainties(surroundings, name, result.earth)
     for mode in FAULT_MODES:
         if (size := sizes.get(mode.what)) is None:
             continue

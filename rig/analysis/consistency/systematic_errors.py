@@ -13,7 +13,7 @@ import numpy as np
 from rig.analysis.consistency.gyroscope_checks import ErrorPatterns
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.segments import Segments
-from rig.analysis.gyroscope.vector_inputs import WAVE_SHARE, unknown_of
+from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION, list_uncertainties
 from rig.analysis.surroundings import Surroundings
 from rig.config.judging.judged_by import OfSensor
 from rig.data.recording.settings import Uncertainty
@@ -114,7 +114,7 @@ def build_known_errors(
     steady = np.array([angle.startswith(("twist", "zero")) for angle in ANGLES])
     cube, square = (uncertainty.stated_size(what, name) / 100 / np.sqrt(3) for what in CURVE)
     return KnownErrors(
-        angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
+        angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_FRACTION),
         repeatability_rad=uncertainty.repeatability_std_rad,
         encoder_rad=uncertainty.angle_std_rad if arcs else 0.0,
         mount_rad=float(np.radians(uncertainty.mount_deg) / np.sqrt(3)),
@@ -146,7 +146,7 @@ def build_error_patterns(
 
 def _earth(surroundings: Surroundings, name: str, earth_rate: EarthRate | None) -> Array:
     """Return the unknown part of the Earth's rate (3, k) in rad/s."""
-    unknown = unknown_of(surroundings, name, earth_rate)
+    unknown = list_uncertainties(surroundings, name, earth_rate)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, directions = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         return np.asarray(directions * np.sqrt(size.clip(min=0.0)), dtype=np.float64)

@@ -96,5 +96,5 @@ def _find_transfers(plan: Plan, motion: ArmMotion) -> list[MotionInterval]:
         time_s for measuring_step in measuring_steps(plan) for time_s in (measuring_step.start_s, measuring_step.end_s)
     ]
     edges_s = [0.0, *measured_s, float(motion.time_s[-1])]
-    with_transfers = [find_transfer(motion, *between_s) for between_s in zip(edges_s[::2], edges_s[1::2], strict=True)]
-    return [transfer for transfer in with_transfers if transfer is not None and is_by_wrists(transfer)]
+    transfers = [find_transfer(motion, *between_s) for between_s in zip(edges_s[::2], edges_s[1::2], strict=True)]
+    return [transfer for transfer in transfers if transfer is not None and is_by_wrists(transfer)]

@@ -14,7 +14,7 @@ from rig.analysis.consistency.systematic_errors import build_error_patterns, bui
 from rig.analysis.design.cut_plan import PlannedSegments, plan_segments
 from rig.analysis.design.planned_motion import PlannedRun, plan_run
 from rig.analysis.design.planned_reference import list_accelerometers, predict_readings
-from rig.analysis.gyroscope.vector_inputs import known_sensor
+from rig.analysis.gyroscope.vector_inputs import describe_sensor
 from rig.config.models import ArmSection, RigConfig
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.config.sensors.sensor_sections import SensorSection, mounting_matrix
@@ -84,7 +84,7 @@ def _gyroscope_limits(
         arcs=run.settings.has_arcs,
         jitter_s=0.0,
         earth_rad_s=unknown_earth_rate(is_known=run.site.earth_rate_rad_s is not None or run.settings.finds_earth_rate),
-        sensor=known_sensor(run.known, name, full_scale_rad_s, np.zeros(len(times_s)), 0.0),
+        sensor=describe_sensor(run.known, name, full_scale_rad_s, np.zeros(len(times_s)), 0.0),
         temperature_times_s=times_s,
     )
     limits = predict_detection_limits(

@@ -26,7 +26,7 @@ StepT_co = TypeVar("StepT_co", bound=Step, covariant=True)
 class PlannedRun:
     """A recording that a plan will give, of a chain of joints (`arm`), and the stated errors.
 
-    Its clock begins `since_s` after that of the run's first recording.
+    Its clock begins `clock_offset_s` after that of the run's first recording.
     """
 
     plan: Plan
@@ -34,7 +34,7 @@ class PlannedRun:
     settings: RunSettings
     site: Site
     known: Uncertainty
-    since_s: float = 0.0
+    clock_offset_s: float = 0.0
 
 
 def plan_run(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> PlannedRun:

@@ -22,7 +22,7 @@ from rig.analysis.design.planned_motion import (
     time_steps_of,
 )
 from rig.analysis.gyroscope.calibration import solve_six_observation
-from rig.analysis.gyroscope.vector_inputs import Part, known_sensor, put_together, unknown_of
+from rig.analysis.gyroscope.vector_inputs import RecordingPart, combine_recordings, describe_sensor, list_uncertainties
 from rig.analysis.surroundings import Surroundings
 from rig.config.models import RigConfig
 from rig.config.procedures.servo_section import ServoSection
@@ -70,8 +70,8 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
         run.site, uncertainty, _clock(uncertainty, on_board=sensor.on_board), jitter_s, run.settings.extension_m
     )
     parts = [_part(config, stage, sensor, turner) for stage in _stages(run)]
-    inputs = put_together(parts, surroundings)
-    constant_sensor = known_sensor(
+    inputs = combine_recordings(parts, surroundings)
+    constant_sensor = describe_sensor(
         uncertainty, name, float(np.radians(sensor.range_deg_s)), np.full(len(inputs.windows_s), ROOM_C), STEP_K
     )
     off_deg = MOUNTING_OFFSET_DEG if inputs.mount_turns_rad is None else uncertainty.mount_deg
@@ -79,7 +79,7 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
         inputs, means_rad_s=_simulate_readings(inputs, _mounting_rotation(off_deg) @ mounting), sensor=constant_sensor
     )
     explained = explain(inputs, mounting, BiasProcess(0.0, 0.0, 0, constant_sensor.instability_rad_s))
-    uncertainty_inputs = unknown_of(surroundings, name, None)
+    uncertainty_inputs = list_uncertainties(surroundings, name, None)
     if not scatters:
         return budget(explained, uncertainty_inputs)
     turns = [turn for part in parts for turn in part.turns]
@@ -120,11 +120,11 @@ def _stages(run: PlannedRun) -> Iterator[PlannedRun]:
     begins, clock_offset_s = [stage.begins for stage in run.plan.stages] or [0], 0.0
     for number, (first, last) in enumerate(zip(begins, [*begins[1:], len(run.plan.steps)], strict=True)):
         stage_plan = replace(run.plan, steps=run.plan.steps[first:last], stages=())
-        yield replace(run, plan=stage_plan, settings=replace(run.settings, stage=number), since_s=clock_offset_s)
+        yield replace(run, plan=stage_plan, settings=replace(run.settings, stage=number), clock_offset_s=clock_offset_s)
         clock_offset_s += stage_plan.duration_s + 2 * STANDING_S + REMOUNTING_S
 
 
-def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, turner: TurnerIdentity) -> Part:
+def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, turner: TurnerIdentity) -> RecordingPart:
     """Return the turns and rests of a recording."""
     turns = [
         _turn(sweep, run, sensor, _scatter(config, sweep.step, turner)) for sweep in time_steps_of(run.plan, Sweep)
@@ -140,7 +140,7 @@ def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, turner: Tur
     ]
     usable = [rest for rest in at_rest if (rest.end_s - rest.start_s) * sensor.rate_hz >= MIN_SAMPLES_AT_REST]
     rests = [_average(rest, run, sensor) for rest in usable]
-    return Part(turns, rests, run.since_s, run.settings.stage, np.array(run.settings.mount))
+    return RecordingPart(turns, rests, run.clock_offset_s, run.settings.stage, np.array(run.settings.mount))
 
 
 def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average:

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rig.analysis.estimators import estimator_among
+from rig.analysis.estimators import choose_estimator
 from rig.analysis.external.increments import InIncrements, solve_turning
 from rig.analysis.external.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.external.placed_equations import Equations
@@ -120,7 +120,7 @@ def _check_noisy(placements: Placements, quantity: Quantity) -> None:
 
 def known_method(name: str | None) -> Chosen | None:
     """Raises Refused `unknown_estimator`."""
-    return None if name is None else estimator_among(CHOICES, name)
+    return None if name is None else choose_estimator(CHOICES, name)
 
 
 def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:

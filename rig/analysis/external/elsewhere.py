@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.analysis.by_hand.gyroscope import solve_hand_samples
 from rig.analysis.check import Check, fitness, unsolved_checks
-from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
+from rig.analysis.estimators import ESTIMATORS, Estimator, choose_estimator
 from rig.analysis.external.attitudes import InAttitudes, Result, known_method, solve_placed
 from rig.analysis.external.increments import InIncrements
 from rig.analysis.external.left_out import notes_on_reading, notes_on_turns, omitted_in_attitudes
@@ -119,12 +119,12 @@ def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:
 
 def _by_hand(read: ReadElsewhere, name: str | None) -> OfSensor:
     if name not in (None, "by_hand"):
-        estimator_among(("by_hand",), str(name))
+        choose_estimator(("by_hand",), str(name))
     return OfSensor(read.item, solve_hand_samples(read.item, _samples(read), read.motion), None, {}, {})
 
 
 def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:
-    chosen = None if name is None else estimator_among(BY_SWEEPS, name)
+    chosen = None if name is None else choose_estimator(BY_SWEEPS, name)
     data, polynomials = average_sweeps(_samples(read), read.motion), None
     if reference_c is not None and data.turned is not None:
         raise Refused(

@@ -1,6 +1,6 @@
-"""The check of the board's own average of each sweep against the computer's mean of the same turn. Pure.
+"""The check of the board's own average of each sweep against the computer's mean of the same sweep. Pure.
 
-A mean of readings beside a mean rate that does not belong to it shows here, and nowhere in the residuals.
+It detects a mean of readings that is paired with the wrong mean rate, which no residual shows.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ LIMIT = 6.0  # standard deviations of the mean; both have its noise in common, a
 def board_averages(sensor: str, recordings: Sequence[ObservedRun]) -> tuple[Check, ...]:
     """Return the checks of every sweep whose averages contradict each other, or one of all of them.
 
-    None where the board averaged nothing. The value is the largest difference of the three axes over the standard
+    None if the board averaged nothing. The value is the largest difference of the three axes over the standard
     deviation of the computer's mean.
     """
     deviations = compare_board_means(sensor, recordings)

@@ -1,4 +1,4 @@
-"""From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
+"""The path from recordings to a gyroscope's calibration, which a run and `rig solve` share. Pure."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -6,9 +6,9 @@ from itertools import combinations
 
 import numpy as np
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, known_estimator
+from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, find_estimator
 from rig.analysis.gyroscope.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
-from rig.analysis.gyroscope.vector_inputs import known_of, see, unknown_of
+from rig.analysis.gyroscope.vector_inputs import collect_inputs, list_given, list_uncertainties
 from rig.analysis.surroundings import Surroundings
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
@@ -38,17 +38,15 @@ VECTOR, NEWTON, ALGORITHM_1, EARTH_RATE = "vector", "newton", "algorithm_1", "ea
 
 @dataclass(frozen=True, slots=True)
 class SensorResult:
-    """One sensor's calibration and what it rests on.
+    """One gyroscope's calibration and its origins.
 
-    `explained` is the vector model with gravity and a wandering bias, None where it has no solution. The
-    `uncertainty` is that of the chosen solution, where it is the vector model's or `newton`'s; there is none of
-    another estimator.
-
-    `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
-    `six_observation` (exact) and `algorithm_1`, the paper's own. There is one time base for each recording that took
-    part. `corrected_by` is what the board and `calibration.h` make of it. `earth` is the Earth's rate as the sensor
-    estimates it, None where it was not to. `by_hand` is there where a hand turned it. `faults` say why there is none of
-    these, by the estimator's name (VECTOR, NEWTON, ALGORITHM_1) and EARTH_RATE.
+    - `solution`: by the chosen estimator; `uncertainty` its budget, which the vector model and `newton` have.
+    - `vector_model`, `six_observation` (exact), `algorithm_1` (SIX): the other solutions from the same observations.
+    - `explained`: the vector model with gravity and bias drift, None if it has no solution.
+    - `observations`, `rests`, `time_bases`: averages of sweeps and rests; one time base for each recording.
+    - `corrected_by`: the correction on the board and in `calibration.h`.
+    - `earth`: the Earth's rate, None if it was not estimated; `by_hand`: the solution if a hand turned the sensor.
+    - `faults`: why one of these is missing, by the estimator (VECTOR, NEWTON, ALGORITHM_1) or EARTH_RATE.
     """
 
     sensor: RecordedSensor | Item
@@ -68,42 +66,42 @@ class SensorResult:
 
     @property
     def serial_number(self) -> str:
-        """Serial number of the sensor that was calibrated."""
+        """The serial number of the sensor."""
         return self.sensor.serial_number
 
     @property
     def scale(self) -> Array:
-        """(3,) scale factors by the chosen estimator: rate = scale × (reading + bias)."""
+        """The scale factors (3,) by the chosen estimator: rate = scale × (reading + bias)."""
         return self.solution.scale
 
     @property
     def bias_rad_s(self) -> Array:
-        """(3,) biases by the chosen estimator."""
+        """The biases (3,) by the chosen estimator."""
         return self.solution.bias_rad_s
 
     @property
     def correction(self) -> CorrectionKind:
-        """Whether the axes are corrected each for itself or by the whole matrix."""
+        """The kind of the correction: axis by axis, or by the whole matrix."""
         return self.corrected_by.kind
 
     @property
     def correction_matrix(self) -> Array:
-        """(3, 3) M of g = M (m + b)."""
+        """The matrix M (3, 3) of g = M (m + b)."""
         return self.corrected_by.matrix
 
     @property
     def temperature_c(self) -> float | None:
-        """Mean over the samples of all sweeps; None where no thermometer told it."""
+        """The mean over the samples of all sweeps; None without a thermometer."""
         averages = [observation.average for observation in self.observations]
         if not averages or np.isnan([average.temperature_c for average in averages]).any():
             return None
         return float(np.average([a.temperature_c for a in averages], weights=[a.samples for a in averages]))
 
 
-def observe_recordings(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
-    """All recordings of one calibration; those without a finished sweep add nothing.
+def observe_recordings(runs: Sequence[RunData], rotations: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
+    """Return the observations of all recordings of one calibration; those without a finished sweep add nothing.
 
-    The thresholds are those of the first recording; `turned` is as of `observe_runs`. Raises Refused
+    The thresholds are those of the first recording; `rotations` as in `observe_runs`. Raise Refused
     `different_sensors`; Fault `duplicated_observation` and as `observe_run` does.
     """
     if any(run.sensors != runs[0].sensors for run in runs):
@@ -113,7 +111,7 @@ def observe_recordings(runs: Sequence[RunData], turned: Mapping[int, Array] = AS
             "Solve them one by one",
         )
     _check_recordings(runs)
-    return observe_runs(runs, turned)
+    return observe_runs(runs, rotations)
 
 
 def solve_observed(
@@ -123,14 +121,14 @@ def solve_observed(
     estimator: str = DEFAULT_ESTIMATOR,
     matrix_corrected: Collection[str] = (),
 ) -> dict[str, SensorResult]:
-    """Calibrate each of `sensors` from all recordings, which were made in these `surroundings`.
+    """Calibrate `sensors` from all recordings, which were made in these `surroundings`.
 
-    The whole matrix corrects the readings of those in `matrix_corrected`, if the estimator is the vector model: the
-    others take the axes to stand at right angles. Whatever the estimator, the sweeps must bear the six-observation
-    solution: a plan that lacks a direction is refused.
-    Raises Refused `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
+    The sensors in `matrix_corrected` are corrected by the whole matrix if the estimator is the vector model; the others
+    as if their axes were orthogonal. With every estimator the sweeps must suffice for the six-observation solution: a
+    plan that lacks a direction is refused. Raise Refused `unknown_estimator`; Fault `duplicated_observation` and as the
+    estimators do.
     """
-    chosen = known_estimator(estimator)
+    chosen = find_estimator(estimator)
     return {
         name: _solve_sensor(name, sensor, recordings, surroundings, chosen, whole_matrix=name in matrix_corrected)
         for name, sensor in sensors.items()
@@ -154,11 +152,11 @@ def _solve_sensor(
     six_observation = solve_six_observation(observations, "newton")
     faults = dict[str, Fault]()
     earth_rate: EarthRate | None = None
-    seen = see(recordings, name, surroundings)
+    inputs = collect_inputs(recordings, name, surroundings)
     if surroundings.finds_earth_rate:
-        known = known_of(surroundings, name)
-        earth_rate = attempt(faults, EARTH_RATE, lambda: find_earth_rate(seen, mounting, known))
-    explained = attempt(faults, VECTOR, lambda: explain(_with(earth_rate, seen), mounting))
+        given_values = list_given(surroundings, name)
+        earth_rate = attempt(faults, EARTH_RATE, lambda: find_earth_rate(inputs, mounting, given_values))
+    explained = attempt(faults, VECTOR, lambda: explain(_add_earth_rate(inputs, earth_rate), mounting))
     vector_model = None if explained is None else explained.solution
     algorithm_1 = attempt(faults, ALGORITHM_1, lambda: solve_six_observation(observations, "algorithm_1"))
     solutions: dict[str, Estimate | None] = {VECTOR: vector_model, NEWTON: six_observation, ALGORITHM_1: algorithm_1}
@@ -176,7 +174,7 @@ def _solve_sensor(
             solution,
             explained,
             surroundings,
-            unknown_of(surroundings, name, earth_rate, sensor.stamp_std_s),
+            list_uncertainties(surroundings, name, earth_rate, sensor.stamp_std_s),
             name,
         ),
         six_observation=six_observation,
@@ -184,7 +182,7 @@ def _solve_sensor(
         observations=observations,
         rests=rests,
         time_bases=tuple(part.time_base for part in parts),
-        corrected_by=_correction(solution, whole_matrix=whole_matrix),
+        corrected_by=_choose_correction(solution, whole_matrix=whole_matrix),
         earth=earth_rate,
         faults=faults,
     )
@@ -193,7 +191,7 @@ def _solve_sensor(
 def _budget_of(
     solution: Estimate, explained: Explained, surroundings: Surroundings, unknown: Unknown, name: str
 ) -> Budget | None:
-    """Return the budget of the chosen solution of the sensor `name`; there is one of two estimators."""
+    """Return the budget of the chosen solution of the sensor `name`; two estimators have one."""
     if isinstance(solution, VectorSolution):
         return budget(explained, unknown)
     if isinstance(solution, Solution) and solution.estimator == "newton":
@@ -202,12 +200,12 @@ def _budget_of(
     return None
 
 
-def _with(earth_rate: EarthRate | None, seen: Seen) -> Seen:
-    """Return what is explained with the Earth's rate that was estimated; else with what the site says, if anything."""
-    return seen if earth_rate is None else replace(seen, earth_rate_rad_s=earth_rate.rate_rad_s)
+def _add_earth_rate(inputs: Seen, earth_rate: EarthRate | None) -> Seen:
+    """Return the inputs with the estimated Earth's rate; without one, with that of the site, if it is stated."""
+    return inputs if earth_rate is None else replace(inputs, earth_rate_rad_s=earth_rate.rate_rad_s)
 
 
-def _correction(solution: Estimate, *, whole_matrix: bool) -> Correction:
+def _choose_correction(solution: Estimate, *, whole_matrix: bool) -> Correction:
     if whole_matrix and isinstance(solution, VectorSolution):
         return matrix_correction(solution)
     return diagonal_correction(solution.scale)
@@ -216,7 +214,7 @@ def _correction(solution: Estimate, *, whole_matrix: bool) -> Correction:
 def solve_observations(
     observations: Sequence[Observation], estimator: Estimator, rests: Sequence[Average] = ()
 ) -> Estimate:
-    """Scale and bias by any of the estimators; only the vector model makes use of rests."""
+    """Return scale and bias by any of the estimators; only the vector model uses rests."""
     if estimator == "vector":
         return solve_vector(observations, rests)
     if estimator == "levenberg_marquardt":
@@ -227,7 +225,7 @@ def solve_observations(
 def solve_vector(
     observations: Sequence[Observation], rests: Sequence[Average], nominal_mounting: Array | None = None
 ) -> VectorSolution:
-    """The vector model of sweeps about known axes and of rests. Raises Fault as `solve_vector_model` does."""
+    """Return the vector model of sweeps about known axes and of rests. Raise Fault as `solve_vector_model` does."""
     averages = [*(observation.average for observation in observations), *rests]
     rates = [observation.speed_rad_s * observation.axis_flange for observation in observations]
     return solve_vector_model(
@@ -240,7 +238,7 @@ def solve_vector(
 
 
 def solve_six_observation(observations: Sequence[Observation], estimator: SixObservationEstimator) -> Solution:
-    """Accumulate and solve: weighted by inverse variance, or all alike where the paper's algorithm is asked for."""
+    """Return the six-observation solution, weighted by inverse variance; the paper's algorithm has equal weights."""
     accumulated = Accumulator.empty()
     for observation in observations:
         average = observation.average
@@ -264,12 +262,12 @@ def _solve_levenberg_marquardt(observations: Sequence[Observation]) -> Levenberg
 
 
 def _check_recordings(runs: Sequence[RunData]) -> None:
-    """Raises Fault `duplicated_observation`: a recording given twice is no run that repeats its sweeps."""
+    """Raise Fault `duplicated_observation` if two recordings have the same samples of a sweep."""
     for run, other in combinations(runs, 2):
-        again = finished_sweeps(run) & finished_sweeps(other)
-        if again and all(np.array_equal(samples, other.samples[name]) for name, samples in run.samples.items()):
+        repeated = finished_sweeps(run) & finished_sweeps(other)
+        if repeated and all(np.array_equal(samples, other.samples[name]) for name, samples in run.samples.items()):
             raise Fault(
                 "duplicated_observation",
-                f"two recordings hold the same samples of sweep {min(again)}",
+                f"two recordings hold the same samples of sweep {min(repeated)}",
                 "Give each recording once",
             )

@@ -1,8 +1,8 @@
-"""A gyroscope's readings beside those of a reference: sample by sample, and turn by turn.
+"""The comparison of a gyroscope's readings with those of a reference, sample by sample and revolution by revolution.
 
-The reference's readings, corrected with its own calibration, are turned into the frame of the sensor under test and
-interpolated at that sensor's times. Each sensor stands on the arm's clock by its own time base, so the delays of their
-filters cancel. What is left is the sensor's error, plus both parts' noise.
+The reference's readings, corrected by its own calibration, are rotated into the frame of the sensor under test and
+interpolated at that sensor's times. Every sensor has its own time base to the arm's clock, so the delays of their
+filters cancel. The difference is the sensor's error, plus the noise of both.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.gyroscope.alignment import mean_rates
+from rig.analysis.gyroscope.alignment import collect_mean_rates
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.cubic_spline import CubicSpline
@@ -28,7 +28,7 @@ MIN_COVERED = 0.9  # of the samples of the movement
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """The sensor `name` whose calibration is known: rate = scale (3,) × (reading + bias_rad_s (3,))."""
+    """The sensor `name` with its calibration: rate = scale (3,) × (reading + bias_rad_s (3,))."""
 
     name: str
     scale: Array
@@ -36,18 +36,18 @@ class Reference:
 
     @property
     def correction_matrix(self) -> Array:
-        """(3, 3) matrix K that corrects readings."""
+        """The matrix K (3, 3) that corrects readings."""
         return np.diag(self.scale)
 
 
-def turns_of(sensor: str, recordings: Sequence[ObservedRun]) -> list[Observation]:
-    """All revolutions as a sensor saw them."""
+def list_revolutions(sensor: str, recordings: Sequence[ObservedRun]) -> list[Observation]:
+    """Return the observations of a sensor in all revolutions."""
     return [turn for recording in recordings for turn in recording.sensors[sensor].revolutions]
 
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """Reading less reference over a number of samples, axis by axis: mean, RMS and largest magnitude, (3,) rad/s."""
+    """Reading less reference over a number of samples: mean, RMS and largest magnitude of each axis, (3,) rad/s."""
 
     samples: int
     mean_rad_s: Array
@@ -56,17 +56,18 @@ class Deviation:
 
     @property
     def mse_rad2_s2(self) -> Array:
-        """(3,) the mean square, (rad/s)²."""
+        """The mean square (3,) in (rad/s)²."""
         mean_square: Array = self.rms_rad_s**2
         return mean_square
 
 
 @dataclass(frozen=True, slots=True)
 class RevolutionError:
-    """Mean reading less mean reference over one whole turn, (3,) rad/s, and what noise leaves uncertain of it.
+    """Mean reading less mean reference over one revolution or arc, (3,) rad/s, and its standard deviation.
 
-    Or over an arc: `angle_rad` is how far the joint turned. `gravity_rad_s` (3,) is what of it gravity adds to the
-    reading, None where no calibration tells.
+    - `sweep`, `joint_name`, `direction`: the motion; `angle_rad` the joint's angle, None for a whole revolution.
+    - `error_rad_s`, `std_rad_s` (3,): the difference, and what noise contributes.
+    - `gravity_rad_s` (3,): the part of the error that gravity explains, None if no calibration determines it.
     """
 
     sweep: int
@@ -80,13 +81,15 @@ class RevolutionError:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A sensor's readings beside the reference's, over the whole movement: sweeps, rests, and the ways between.
+    """A sensor's readings and the reference's over the whole movement: sweeps, rests and transfers.
 
-    `time_s` (n,) is controller time; `reading_rad_s` and `reference_rad_s` (n, 3) are in the sensor's frame. `movement`
-    counts all n samples, `sweeps` those of the sweeps with their ramps. `noise_rad_s` (3,) is the standard deviation of
-    the difference while the arm rests: both parts' noise, the RMS of a perfect calibration; None without rests.
-    `delay_s` is by how much the sensor's filter lags the reference's, one for each recording, with `delay_std_s`; there
-    are none where no one clock stamps the samples of both.
+    - `time_s` (n,): controller time; `reading_rad_s`, `reference_rad_s` (n, 3): in the sensor's frame.
+    - `movement`: over all n samples; `sweeps`: over those of the sweeps with their ramps.
+    - `noise_rad_s` (3,): standard deviation of the difference at rest, from both sensors' noise: the RMS of a perfect
+      calibration; None without rests.
+    - `revolutions`: the errors of each.
+    - `delay_s`, `delay_std_s`: of the sensor's filter behind the reference's, one for each recording; none if no common
+      clock stamps the samples.
     """
 
     time_s: Array
@@ -107,28 +110,28 @@ def compare(
     rotation: Array,
     gravity_rad_s: Array | None = None,
 ) -> Comparison:
-    """The readings of `sensor` as they were recorded beside the reference's; `rotation` (3, 3) turns the latter.
+    """Return the comparison of a sensor's recorded readings with the reference's.
 
-    `gravity_rad_s` (N, 3) is what gravity adds to the readings of each revolution, where that is known.
-    Raises Fault `no_overlap`, `different_clocks`.
+    `rotation` (3, 3) takes the latter into the sensor's frame. `gravity_rad_s` (N, 3): the effect of gravity on the
+    readings of each revolution, if it is known. Raise Fault `no_overlap`, `different_clocks`.
     """
-    parts = [_part(recording, sensor, reference, rotation) for recording in recordings]
+    parts = [_align_recording(recording, sensor, reference, rotation) for recording in recordings]
     return Comparison(
         time_s=np.concatenate([part.time_s for part in parts]),
         reading_rad_s=np.concatenate([part.reading for part in parts]),
         reference_rad_s=np.concatenate([part.reference for part in parts]),
-        movement=_deviation([part.error[part.sweeping | part.resting] for part in parts]),
-        sweeps=_deviation([part.error[part.sweeping] for part in parts]),
-        noise_rad_s=_noise([part.error[rest] for part in parts for rest in part.still]),
-        revolutions=_revolution_errors(recordings, sensor, reference, rotation, gravity_rad_s),
+        movement=_summarise([part.error[part.sweeping | part.resting] for part in parts]),
+        sweeps=_summarise([part.error[part.sweeping] for part in parts]),
+        noise_rad_s=_estimate_noise([part.error[rest] for part in parts for rest in part.still]),
+        revolutions=_compare_revolutions(recordings, sensor, reference, rotation, gravity_rad_s),
         delay_s=tuple(part.delay.delay_s for part in parts if part.delay),
         delay_std_s=tuple(part.delay.std_s for part in parts if part.delay),
     )
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
-    """One recording's share of a comparison, with masks (n,): of all sweeps, all rests, and the middle of each rest."""
+class _AlignedRecording:
+    """One recording's part of a comparison, with masks (n,): of all sweeps, all rests, and the middle of each rest."""
 
     time_s: Array
     reading: Array
@@ -144,11 +147,11 @@ class _Part:
         return difference
 
 
-def _part(recording: ObservedRun, sensor: str, reference: Reference, rotation: Array) -> _Part:
-    delay = _delay(recording, sensor, reference.name)
-    tested, known = recording.stream(sensor), recording.stream(reference.name)
+def _align_recording(recording: ObservedRun, sensor: str, reference: Reference, rotation: Array) -> _AlignedRecording:
+    delay = _find_delay(recording, sensor, reference.name)
+    tested, reference_stream = recording.stream(sensor), recording.stream(reference.name)
     movement = mask_movement(recording.run, tested.time_s)
-    used = movement.moving & _surrounded(tested.time_s, known.time_s)
+    used = movement.moving & _mask_covered(tested.time_s, reference_stream.time_s)
     if not used.sum() > MIN_COVERED * movement.moving.sum():
         raise Fault(
             "no_overlap",
@@ -157,10 +160,10 @@ def _part(recording: ObservedRun, sensor: str, reference: Reference, rotation: A
             "Check the reference's wiring and its data-ready line, then repeat the verification",
         )
     time_s = tested.time_s[used]
-    return _Part(
+    return _AlignedRecording(
         time_s=time_s,
         reading=tested.readings_rad_s[used],
-        reference=_interpolated(known, reference, time_s) @ rotation.T,
+        reference=_interpolate(reference_stream, reference, time_s) @ rotation.T,
         sweeping=movement.sweeping[used],
         resting=movement.resting[used],
         still=tuple(rest[used] for rest in movement.still),
@@ -168,32 +171,32 @@ def _part(recording: ObservedRun, sensor: str, reference: Reference, rotation: A
     )
 
 
-def _delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | None:
-    found = recording.delay(sensor, behind=reference)
-    if found is not None and abs(found.delay_s) > MAX_DELAY_S:
+def _find_delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | None:
+    delay = recording.delay(sensor, behind=reference)
+    if delay is not None and abs(delay.delay_s) > MAX_DELAY_S:
         raise Fault(
             "different_clocks",
-            f"the time stamps of sensor and reference are {abs(found.delay_s):.2f} s apart for one movement",
+            f"the time stamps of sensor and reference are {abs(delay.delay_s):.2f} s apart for one movement",
             "Record both with the same board",
         )
-    return found
+    return delay
 
 
-def _surrounded(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
-    """Which times (n,) have one of `by_s` (m,) closely before and after them."""
+def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
+    """Return which times (n,) have one of `by_s` (m,) closely before and after them."""
     after = np.searchsorted(by_s, time_s)
     gaps = np.diff(by_s, prepend=-np.inf, append=np.inf)
     close: NDArray[np.bool_] = gaps[after] <= MAX_GAP * np.median(gaps)
     return close
 
 
-def _interpolated(known: Stream, reference: Reference, time_s: Array) -> Array:
-    """(n, 3) the reference's corrected rate at other times: a cubic spline, for a chord cuts the vibration's crests."""
-    rate = reference.scale * (known.readings_rad_s + reference.bias_rad_s)
-    return CubicSpline(known.time_s, rate)(time_s)
+def _interpolate(stream: Stream, reference: Reference, time_s: Array) -> Array:
+    """Return the reference's corrected rate (n, 3) at other times, by a cubic spline: chords would clip vibrations."""
+    rate = reference.scale * (stream.readings_rad_s + reference.bias_rad_s)
+    return CubicSpline(stream.time_s, rate)(time_s)
 
 
-def _deviation(errors: Sequence[Array]) -> Deviation:
+def _summarise(errors: Sequence[Array]) -> Deviation:
     error = np.concatenate(errors)
     return Deviation(
         samples=len(error),
@@ -203,8 +206,8 @@ def _deviation(errors: Sequence[Array]) -> Deviation:
     )
 
 
-def _noise(rests: Sequence[Array]) -> Array | None:
-    """Standard deviation (3,) within the rests, each about its own mean."""
+def _estimate_noise(rests: Sequence[Array]) -> Array | None:
+    """Return the standard deviation (3,) within the rests about their own means."""
     long_enough = [rest for rest in rests if len(rest) >= MIN_SAMPLES_AT_REST]
     if not long_enough:
         return None
@@ -213,15 +216,16 @@ def _noise(rests: Sequence[Array]) -> Array | None:
     return noise
 
 
-def _revolution_errors(
+def _compare_revolutions(
     recordings: Sequence[ObservedRun], sensor: str, reference: Reference, rotation: Array, gravity_rad_s: Array | None
 ) -> tuple[RevolutionError, ...]:
-    turns = turns_of(sensor, recordings)
-    tested, known = mean_rates(turns), mean_rates(turns_of(reference.name, recordings), reference).turned(rotation)
-    errors = tested.rate_rad_s - known.rate_rad_s
-    stds = np.sqrt(np.diagonal(tested.covariance_rad2_s2 + known.covariance_rad2_s2, axis1=1, axis2=2))
-    held = [None] * len(turns) if gravity_rad_s is None else gravity_rad_s
+    turns = list_revolutions(sensor, recordings)
+    tested = collect_mean_rates(turns)
+    expected = collect_mean_rates(list_revolutions(reference.name, recordings), reference).rotate(rotation)
+    errors = tested.rate_rad_s - expected.rate_rad_s
+    stds = np.sqrt(np.diagonal(tested.covariance_rad2_s2 + expected.covariance_rad2_s2, axis1=1, axis2=2))
+    gravity_effects = [None] * len(turns) if gravity_rad_s is None else gravity_rad_s
     return tuple(
         RevolutionError(turn.sweep, turn.joint_name, turn.direction, error, std, gravity, turn.angle_rad)
-        for turn, error, std, gravity in zip(turns, errors, stds, held, strict=True)
+        for turn, error, std, gravity in zip(turns, errors, stds, gravity_effects, strict=True)
     )

@@ -1,8 +1,8 @@
-"""Host and board solve the same observations: what the board found, held against double precision. Pure.
+"""The comparison of the board's own solution with one in double precision from the same observations. Pure.
 
-Both average the very same samples (the board says which it used) and are told the same speeds, so what differs is only
-the board's arithmetic. Where a sample was lost on the way to the host, which would outweigh that, the board's own mean
-stands in. The run's own calibration is another matter: it weighs, takes the vibration out and knows the rests
+Both average the same samples (the board reports which it used) and use the same speeds, so they differ by the board's
+arithmetic only. If a sample was lost on its way to the host, whose effect would be larger, the board's own mean
+replaces the host's. The run's own calibration differs from both: it has weights, removes vibration and uses rests
 (`rig.analysis.gyroscope.calibration`).
 """
 
@@ -27,11 +27,12 @@ BIAS_LIMIT_RAD_S = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """A sensor's calibration by the board beside the same in double precision; None where either has no solution.
+    """A sensor's calibration by the board and in double precision; None if either has no solution.
 
-    `solutions` are the board's by method. `scale_difference` is relative, `bias_difference_rad_s`
-    absolute, each the largest of three axes, for the closed form. `not_observed` says which sweeps the board has no
-    observation of, and why.
+    - `solutions`: the board's, by method.
+    - `not_observed`: the sweeps of which the board has no observation, and why.
+    - `host_scale`, `host_bias_rad_s` (3,): in double precision.
+    - `scale_difference` (relative), `bias_difference_rad_s`: the largest of three axes, for the closed form.
     """
 
     solutions: Mapping[str, BoardSolved]
@@ -42,7 +43,7 @@ class Agreement:
     bias_difference_rad_s: float | None
 
     def checks(self, sensor: str) -> tuple[Check, ...]:
-        """The two checks of the verdict: no board may be trusted whose arithmetic was not seen to be right."""
+        """Return the two checks of the verdict: unconfirmed arithmetic of a board does not pass."""
         scale, bias = self.scale_difference, self.bias_difference_rad_s
         return (
             fitness(sensor, "rate", "board_scale", scale, SCALE_LIMIT, parameter="scale"),
@@ -50,11 +51,11 @@ class Agreement:
         )
 
 
-def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
-    """Compare for one sensor over all recordings of a run, of which the last holds the board's solutions."""
-    solutions = {event.solution.method: event for event in _of(runs[-1], sensor) if isinstance(event, BoardSolved)}
-    not_observed = _not_observed(runs[-1], sensor)
-    host = _solve(_observations(runs, sensor))
+def check_arithmetic(runs: Sequence[RunData], sensor: str) -> Agreement:
+    """Compare board and host for one sensor over all recordings of a run; the last has the board's solutions."""
+    solutions = {event.solution.method: event for event in _events(runs[-1], sensor) if isinstance(event, BoardSolved)}
+    not_observed = _list_unobserved(runs[-1], sensor)
+    host = _solve(_list_observations(runs, sensor))
     board = solutions.get("closed_form")
     if host is None or board is None or board.solution.status != "solved":
         scale, bias = (None, None) if host is None else host
@@ -73,7 +74,7 @@ def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
 def check_observed(run: RunData, sensors: Iterable[str]) -> None:
     """Raise Fault `board_missed_sweep` if the board has no observation of a sweep: a resumed run repeats it."""
     for sensor in sensors:
-        if missed := _not_observed(run, sensor):
+        if missed := _list_unobserved(run, sensor):
             raise Fault(
                 "board_missed_sweep",
                 f"the board could not average, for {sensor}, {'; '.join(missed)}",
@@ -81,77 +82,76 @@ def check_observed(run: RunData, sensors: Iterable[str]) -> None:
             )
 
 
-def _not_observed(run: RunData, sensor: str) -> tuple[str, ...]:
+def _list_unobserved(run: RunData, sensor: str) -> tuple[str, ...]:
     return tuple(
-        f"sweep {event.sweep}: {event.reason}" for event in _of(run, sensor) if isinstance(event, BoardNotObserved)
+        f"sweep {event.sweep}: {event.reason}" for event in _events(run, sensor) if isinstance(event, BoardNotObserved)
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Observation:
-    """What the board solved from: mean reading (3,) and speed; `averaged` when the host averaged the reading itself."""
+    """An observation of the board: mean reading (3,) and speed; `averaged` if the host averaged it too."""
 
     mean_rad_s: Array
     speed_rad_s: float
     averaged: bool
 
 
-def _observations(runs: Sequence[RunData], sensor: str) -> list[_Observation]:
-    """Every observation the board solved from, by the recorded samples."""
-    found: list[_Observation] = []
-    for event in _of(runs[-1], sensor):
+def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_Observation]:
+    """Return every observation that the board solved from, by the recorded samples."""
+    observations: list[_Observation] = []
+    for event in _events(runs[-1], sensor):
         if isinstance(event, BoardObserved):
-            found.append(_observation(runs[-1], event))
+            observations.append(_average_observation(runs[-1], event))
         elif isinstance(event, BoardRecalled):
-            found.append(_recalled(runs[:-1], event))
-    return found
+            observations.append(_recall_observation(runs[:-1], event))
+    return observations
 
 
-def _recalled(earlier: Sequence[RunData], recalled: BoardRecalled) -> _Observation:
-    """What the newest of the earlier recordings says of it; a mean that is not a number where none does."""
+def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _Observation:
+    """Return a recalled observation from the newest recording that has it; not-a-number if none has."""
     for run in reversed(earlier):
-        if seen := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
-            return _observation(run, seen[recalled.sweep])
+        if earlier_observations := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
+            return _average_observation(run, earlier_observations[recalled.sweep])
     return _Observation(np.full(3, np.nan), np.nan, averaged=False)
 
 
-def _observation(run: RunData, seen: BoardObserved) -> _Observation:
-    samples, observed = run.samples[seen.sensor], seen.observation
+def _average_observation(run: RunData, event: BoardObserved) -> _Observation:
+    samples, observed = run.samples[event.sensor], event.observation
     times_us = samples["board_time_us"]
     used = slice(*np.searchsorted(times_us, [observed.start_us, observed.end_us]).tolist())
     missing = observed.samples - (used.stop - used.start)
-    if 0 < missing <= _lost(samples["sequence"][max(used.start - 1, 0) : used.stop + 1]):
-        return _Observation(np.array(observed.mean_rad_s), seen.speed_rad_s, averaged=False)
-    gyroscope = run.sensors[seen.sensor].channel(RATE)
+    if 0 < missing <= _count_missing(samples["sequence"][max(used.start - 1, 0) : used.stop + 1]):
+        return _Observation(np.array(observed.mean_rad_s), event.speed_rad_s, averaged=False)
+    gyroscope = run.sensors[event.sensor].channel(RATE)
     counts = gyroscope.counts(samples)[used]
     mean = counts.mean(axis=0) if missing == 0 and len(counts) else np.full(3, np.nan)
-    return _Observation(gyroscope.convert(mean), seen.speed_rad_s, averaged=True)
+    return _Observation(gyroscope.convert(mean), event.speed_rad_s, averaged=True)
 
 
-def _of(run: RunData, sensor: str) -> Iterator[OfTheBoard]:
-    """What a recording says of the board's own calibration of a sensor, in order."""
+def _events(run: RunData, sensor: str) -> Iterator[OfTheBoard]:
+    """Return the events of the board's own calibration of a sensor, in order."""
     for recorded in run.events:
         if isinstance(recorded.event, OfTheBoard) and recorded.event.sensor == sensor:
             yield recorded.event
 
 
-def _lost(sequence: NDArray[np.uint32]) -> int:
-    """How many numbers are missing in a sequence, which is counted modulo 2³²."""
+def _count_missing(sequence: NDArray[np.uint32]) -> int:
+    """Return how many numbers a sequence modulo 2³² lacks."""
     return int(np.sum(np.diff(sequence).astype(np.int64) - 1))
 
 
 def _solve(observations: Sequence[_Observation]) -> tuple[Array, Array] | None:
-    """Scale and bias as the board computes them, every observation with the same weight.
+    """Return scale and bias by the board's method, with equal weights.
 
-    None where that cannot be: too few observations, other samples than the board says it used, or not one mean that
-    the host could check.
+    None with too few observations, with other samples than the board reports, or if the host could check no mean.
     """
     accumulated = Accumulator.empty()
     if not any(observation.averaged for observation in observations):
         return None
     try:
-        for seen in observations:
-            accumulated = accumulated.add(seen.mean_rad_s, np.ones(3), seen.speed_rad_s, weight=1.0)
+        for observation in observations:
+            accumulated = accumulated.add(observation.mean_rad_s, np.ones(3), observation.speed_rad_s, weight=1.0)
         solution = accumulated.solve()
     except Fault:
         return None

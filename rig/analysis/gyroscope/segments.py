@@ -1,4 +1,4 @@
-"""All segments of a sensor's revolutions and rests in one table, with what arm and site made it sense in each. Pure."""
+"""The table of all segments of a sensor's revolutions and rests, with the rates and gravity that it sensed. Pure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,16 +18,16 @@ from rig.observation.consistency.transfers import WristTransfer
 class Segments:
     """N segments of revolutions and rests, and the readings that they were averaged from.
 
-    sweep (N,): index of the revolution, −1 of a rest; transfers between sweeps and rests count down from −2.
-    position (N,): from −1 in the first segment of a window to 1 in the last.
-    means_rad_s, variances_rad2_s2 (N, 3): mean readings and their variances.
-    rates_rad_s (N, 3): angular rate of the flange in inertial space, in its frame.
-    gravity_m_s2 (N, 3): gravity as it is sensed, less the acceleration of the sensor, in that frame.
-    attitudes (N, 3, 3): from the base into that frame.
-    speed_std (N,): standard deviation of the mean speed, relative to it.
-    times_s (N, 2): start and end on the clock of the first recording; `intervals` are on that of their own.
-    roundings_rad_s (N, 3): standard uncertainty that rounding leaves in each mean.
-    unexplained_rad2_s2 (N, 3): part of the variances, of what neither arm nor noise explains.
+    - sweep (N,): index of the revolution, −1 of a rest; transfers between sweeps and rests count down from −2.
+    - position (N,): from −1 in the first segment of a window to 1 in the last.
+    - means_rad_s, variances_rad2_s2 (N, 3): mean readings and their variances.
+    - rates_rad_s (N, 3): angular rate of the flange in inertial space, in its frame.
+    - gravity_m_s2 (N, 3): gravity as it is sensed, less the acceleration of the sensor, in that frame.
+    - attitudes (N, 3, 3): from the base into that frame.
+    - speed_std (N,): relative standard deviation of the mean speed.
+    - times_s (N, 2): start and end on the clock of the first recording; `intervals` are on that of their own.
+    - roundings_rad_s (N, 3): standard uncertainty of each mean by rounding.
+    - unexplained_rad2_s2 (N, 3): part of the variances that neither arm nor noise explains.
     """
 
     sweep: NDArray[np.intp]
@@ -48,12 +48,12 @@ class Segments:
 def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, site: Site) -> Segments:
     """Return the segments of a gyroscope's windows, in the order in which `explained` was made from them.
 
-    The Earth's rate is that of `explained`: known by the site, or estimated.
+    The Earth's rate is that of `explained`: given by the site, or estimated.
     """
-    seen = explained.seen
-    placed = list(zip(windows, seen.windows_s[:, 0], seen.acceleration_m_s2, strict=True))
+    inputs = explained.seen
+    placed = list(zip(windows, inputs.windows_s[:, 0], inputs.acceleration_m_s2, strict=True))
     segments = [segment for window in windows for segment in window.segments]
-    rates = [segment.rate_rad_s + segment.attitude @ seen.earth_rate_rad_s for segment in segments]
+    rates = [segment.rate_rad_s + segment.attitude @ inputs.earth_rate_rad_s for segment in segments]
     return Segments(
         sweep=np.array([window.readings.sweep for window in windows for _ in window.segments]),
         position=np.array([segment.position for segment in segments]),
@@ -78,16 +78,16 @@ def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, si
     )
 
 
-def with_transfers(
+def append_transfers(
     segments: Segments,
     transfers: Sequence[WristTransfer],
     windows: Sequence[SegmentedAverage],
     explained: Explained,
 ) -> Segments:
-    """Return the segments, and each transfer as one; their sweeps count down from below `REST`.
+    """Return the segments with each transfer as one more; their sweeps count down from below `REST`.
 
-    Their noise is that of the other segments, for as long as they last, or their own where that is more, and what a
-    vibration leaves of which the rests beside either end tell. `windows` are those of the segments.
+    Their noise is that of the other segments over their duration, or their own if that is more, plus the effect of
+    vibration, estimated in the rests at either end. `windows` are those of the segments.
     """
     if not transfers:
         return segments
@@ -100,7 +100,7 @@ def with_transfers(
     noise = density / duration_s
     unexplained = np.maximum([transfer.scatter_rad2_s2 for transfer in transfers] - noise, 0.0)
     roundings = np.array([transfer.rounding_rad2_s2 for transfer in transfers])
-    vibration = _swings(windows, explained, times_s) / duration_s**2
+    vibration = _vibration_changes(windows, explained, times_s) / duration_s**2
     earth_rad_s = explained.seen.earth_rate_rad_s
     rates = [transfer.rate_rad_s + transfer.attitude @ earth_rad_s for transfer in transfers]
     return replace(
@@ -122,8 +122,9 @@ def with_transfers(
     )
 
 
-def _swings(windows: Sequence[SegmentedAverage], explained: Explained, times_s: Array) -> Array:
-    """Return (M, 3) rad² by which what vibrates differs from start to end of M transfers, by the rest nearest to each.
+def _vibration_changes(windows: Sequence[SegmentedAverage], explained: Explained, times_s: Array) -> Array:
+    """Return the variance (M, 3) in rad² of a vibration's change from start to end of M transfers, by the nearest
+    rests.
 
     times_s (M, 2): start and end of the transfers on the clock of the first recording.
     """

@@ -1,4 +1,4 @@
-"""From recordings and their surroundings to what the vector model and its budget are made of."""
+"""The inputs of the vector model and its budget, from recordings and their surroundings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,33 +21,33 @@ from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.mean import by_axis
 
-ZEROS = tuple(place for place, name in enumerate(AXIS_ERRORS) if name.startswith("zero"))
-SAME_AXIS = 1 - 1e-6  # of the scalar product: the joints beside it stand where they were to 1.4 mrad
-WAVE_SHARE = 0.3  # of the error of a joint's zero, what its encoder errs once or twice a turn; assumed
+ZEROS = tuple(index for index, name in enumerate(AXIS_ERRORS) if name.startswith("zero"))
+SAME_AXIS = 1 - 1e-6  # of the scalar product: other joints returned to 1.4 mrad
+WAVE_FRACTION = 0.3  # of the error of a joint's zero: an encoder's error once or twice a revolution; assumed
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """What one recording adds of a sensor: its turns and rests, and when its clock began by that of the first.
+class RecordingPart:
+    """One recording's averages of a sensor: revolutions and rests, and its clock's offset to that of the first.
 
     The item was mounted anew for each `stage`; `mount` (3, 3) takes the flange's frame into the item's.
     """
 
     turns: Sequence[Observation]
     rests: Sequence[Average]
-    since_s: float
+    clock_offset_s: float
     stage: int
     mount: Array | None
 
 
-def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> Seen:
-    """Put together what the arm knows of each average of a sensor, in all recordings of a run.
+def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> Seen:
+    """Return the arm's motion in each average of a sensor, in all recordings of a run, with the readings.
 
-    Speeds by a controller's clock that runs too fast are too small by that.
+    A controller's clock that runs too fast makes its speeds too small; they are corrected.
     """
     run = recordings[0].run
     parts = [
-        Part(
+        RecordingPart(
             recording.sensors[sensor].revolutions,
             recording.sensors[sensor].rests,
             recording.clock_offset_s,
@@ -56,140 +56,143 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         )
         for recording in recordings
     ]
-    seen = put_together(parts, surroundings)
+    inputs = combine_recordings(parts, surroundings)
     averages = [average for part in parts for average in (turn.average for turn in part.turns)]
     averages += [rest for part in parts for rest in part.rests]
-    return replace(seen, sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages))
+    return replace(inputs, sensor=_describe_recorded(surroundings, sensor, run.sensors[sensor], averages))
 
 
-def put_together(parts: Sequence[Part], surroundings: Surroundings) -> Seen:
-    """What all parts of a run tell, the turns before the rests, without what is known of the sensor."""
+def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surroundings) -> Seen:
+    """Return the inputs of all parts of a run, revolutions before rests, without those of the sensor."""
     site, extension_m = surroundings.site, np.array(surroundings.extension_m)
-    turns = [(turn, part.since_s) for part in parts for turn in part.turns]
-    rests = [(rest, part.since_s) for part in parts for rest in part.rests]
-    placed = [*((turn.average, since_s) for turn, since_s in turns), *rests]
-    averages = [average for average, _ in placed]
+    turns = [(turn, part.clock_offset_s) for part in parts for turn in part.turns]
+    rests = [(rest, part.clock_offset_s) for part in parts for rest in part.rests]
+    windows = [*((turn.average, offset_s) for turn, offset_s in turns), *rests]
+    averages = [average for average, _ in windows]
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
-    turned = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
-    arms_m = np.concatenate([lever_arms_m(each.turns, extension_m, each.mount) for each in parts])
-    mounted = [part.stage for part in parts for _ in part.turns]
+    rates_rad_s = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
+    lever_arms = np.concatenate([lever_arms_m(part.turns, extension_m, part.mount) for part in parts])
+    stages = [part.stage for part in parts for _ in part.turns]
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     return Seen(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
         variances_rad2_s2=np.array([average.variance_rad2_s2 - average.drift_rad2_s2 for average in averages]),
-        turns_rad_s=np.concatenate([turned * (1 + surroundings.clock.error), np.zeros((len(rests), 3))]),
+        turns_rad_s=np.concatenate([rates_rad_s * (1 + surroundings.clock.error), np.zeros((len(rests), 3))]),
         earth_rate_rad_s=earth,
         speed_std_rad_s=np.array([*(turn.speed_std_rad_s for turn, _ in turns), *np.zeros(len(rests))]),
         attitudes=attitudes,
         gravity_m_s2=attitudes @ site.down_m_s2,
-        windows_s=np.array([(average.start_s + since_s, average.end_s + since_s) for average, since_s in placed]),
+        windows_s=np.array([(average.start_s + offset_s, average.end_s + offset_s) for average, offset_s in windows]),
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
         axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
         return_errors_rad_s=_return_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
-        mount_turns_rad=mount_turns(mounted, len(rests), surroundings.uncertainty.mount_deg),
-        arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
+        mount_turns_rad=list_mount_rotations(stages, len(rests), surroundings.uncertainty.mount_deg),
+        arms_m=np.concatenate([lever_arms, np.zeros((len(rests), 3))]),
         noise_freedom=by_axis(average.freedom for average in averages),
         ripples=np.array([*(turn.ripple for turn, _ in turns), *np.zeros(len(rests))]),
         roundings_rad_s=np.sqrt(by_axis(average.rounding_rad2_s2 for average in averages)),
     )
 
 
-def _sensor_of(
+def _describe_recorded(
     surroundings: Surroundings, name: str, sensor: RecordedSensor, averages: Sequence[Average]
 ) -> KnownSensor:
     temperature_c = np.array([average.temperature_c for average in averages])
-    known = known_sensor(surroundings.uncertainty, name, sensor.range_rad_s, temperature_c, sensor.unseen_change_k)
-    return replace(known, temperature_words=sensor.temperature_words)
+    stated = describe_sensor(surroundings.uncertainty, name, sensor.range_rad_s, temperature_c, sensor.unseen_change_k)
+    return replace(stated, temperature_words=sensor.temperature_words)
 
 
-def known_sensor(
-    known: Uncertainty, name: str, full_scale_rad_s: float, temperature_c: Array, temperature_step_k: float
+def describe_sensor(
+    uncertainty: Uncertainty, name: str, full_scale_rad_s: float, temperature_c: Array, temperature_step_k: float
 ) -> KnownSensor:
-    """Return what is stated of the sensor `name` of that range, and how warm it was in each average (N,)."""
+    """Return what is stated of the sensor `name` with that range, and its temperature in each average (N,)."""
     return KnownSensor(
-        nonlinearity=known.stated_size("nonlinearity_percent", name) / 100,
+        nonlinearity=uncertainty.stated_size("nonlinearity_percent", name) / 100,
         full_scale_rad_s=full_scale_rad_s,
-        bias_rad_s_per_k=float(np.radians(known.stated_size("bias_deg_s_k", name))),
-        scale_per_k=PPM * known.stated_size("scale_ppm_k", name),
-        instability_rad_s=float(np.radians(known.stated_size("bias_instability_deg_h", name) / 3600)),
+        bias_rad_s_per_k=float(np.radians(uncertainty.stated_size("bias_deg_s_k", name))),
+        scale_per_k=PPM * uncertainty.stated_size("scale_ppm_k", name),
+        instability_rad_s=float(np.radians(uncertainty.stated_size("bias_instability_deg_h", name) / 3600)),
         temperature_c=temperature_c,
         temperature_step_k=temperature_step_k,
     )
 
 
 def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array | None = None) -> Array:
-    """Return (M, 3) from the axis that turns to where the sensors sit, in the item's frame; zero where no arm tells.
+    """Return the lever arms (M, 3) from the axis of rotation to the sensors, in the item's frame; zero without an arm.
 
-    The `mount` (3, 3) takes the flange's frame, in which the extension stands, into the item's; None: they are one.
+    The `mount` (3, 3) takes the flange's frame, which the extension refers to, into the item's; None: they are one.
     """
     mounted_m = extension_m if mount is None else mount @ extension_m
-    known_m = [turn.arm_m + mounted_m if turn.arm_m is not None else np.zeros(3) for turn in turns]
-    return np.reshape(known_m, (-1, 3))
+    lever_arms = [turn.arm_m + mounted_m if turn.arm_m is not None else np.zeros(3) for turn in turns]
+    return np.reshape(lever_arms, (-1, 3))
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
-    """(P, N, 3) errors as in `Seen`, of the arm's angles, which may be off by `axis_deg` either way."""
+    """Return the errors (P, N, 3) as in `Seen` of the arm's angles, whose half-width is `axis_deg`."""
     steady = np.array([name.startswith(("twist", "zero")) for name in AXIS_ERRORS])
-    std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE)
-    off = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]
-    return np.concatenate([np.swapaxes(off, 0, 1), np.zeros((len(std), rests, 3))], axis=1)
+    std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_FRACTION)
+    errors = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]
+    return np.concatenate([np.swapaxes(errors, 0, 1), np.zeros((len(std), rests, 3))], axis=1)
 
 
-def _return_errors(turns: Sequence[Observation], rests: int, known: Uncertainty) -> Array:
-    """(P, N, 3) errors as in `Seen`: joints that turn a sweep's axis come back a little elsewhere every time."""
+def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array:
+    """Return the errors (P, N, 3) as in `Seen` of joints that return to a sweep's axis with limited repeatability."""
     errors = np.array([turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None])
-    leaning = known.repeatability_std_rad * np.swapaxes(errors[:, ZEROS], 0, 1)
-    visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _visits(turns)])
-    off = (visits[:, None, :, None] * leaning).reshape(-1, len(turns), 3)
-    off = off[off.any(axis=(1, 2))]
-    return np.concatenate([off, np.zeros((len(off), rests, 3))], axis=1)
+    tilts = uncertainty.repeatability_std_rad * np.swapaxes(errors[:, ZEROS], 0, 1)
+    visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _group_by_axis(turns)])
+    every = (visits[:, None, :, None] * tilts).reshape(-1, len(turns), 3)
+    effective = every[every.any(axis=(1, 2))]
+    return np.concatenate([effective, np.zeros((len(effective), rests, 3))], axis=1)
 
 
-def _encoder_errors(turns: Sequence[Observation], rests: int, known: Uncertainty) -> Array | None:
-    """(P, N, 3) errors as in `Seen`, of what a joint's encoder errs at each mark where arcs begin or end.
+def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array | None:
+    """Return the errors (P, N, 3) as in `Seen` of a joint's encoder at each angle where arcs begin or end.
 
-    Sweeps one way and the other have the same marks, so the same errors: these are no noise, and repeats do not lessen
-    them. None where all sweeps are whole turns, which end at the mark where they began.
+    Sweeps in both directions have the same ends, so the same errors: these are no noise, and repeats do not average
+    them out. None if all sweeps are whole revolutions, which end at the angle where they began.
     """
     arcs = [None if turn.arc_rad is None else (turn.joint_name, *turn.arc_rad) for turn in turns]
     marks = list(dict.fromkeys((arc[0], end) for arc in arcs if arc is not None for end in arc[1:]))
     if not marks:
         return None
-    off = np.zeros((len(marks), len(turns) + rests, 3))
-    for place, (turn, arc) in enumerate(zip(turns, arcs, strict=True)):
+    errors = np.zeros((len(marks), len(turns) + rests, 3))
+    for index, (turn, arc) in enumerate(zip(turns, arcs, strict=True)):
         if arc is not None:
             joint, low, high = arc
-            by_one = known.angle_std_rad / (high - low) * turn.speed_rad_s * turn.axis_flange
-            off[marks.index((joint, high)), place] += by_one
-            off[marks.index((joint, low)), place] -= by_one
-    return off
+            by_one = uncertainty.angle_std_rad / (high - low) * turn.speed_rad_s * turn.axis_flange
+            errors[marks.index((joint, high)), index] += by_one
+            errors[marks.index((joint, low)), index] -= by_one
+    return errors
 
 
-def mount_turns(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
-    """(3 S, N, 3) turns as in `Seen`, of an item that may sit off its mount by `mount_deg` about each axis; or None."""
+def list_mount_rotations(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
+    """Return the rotations (3 S, N, 3) as in `Seen` of an item off its mount by `mount_deg` about any axis.
+
+    None with one stage.
+    """
     first, *others = dict.fromkeys(stages)
     if not others:
         return None
     by_axis = np.radians(mount_deg) / np.sqrt(3) * np.eye(3)[:, None, :]
-    own = [np.where(np.equal(stages, stage)[:, None], by_axis, 0.0) for stage in (*others, first)]
-    found = np.concatenate(own)
-    return np.concatenate([found, np.zeros((len(found), rests, 3))], axis=1)
+    per_stage = [np.where(np.equal(stages, stage)[:, None], by_axis, 0.0) for stage in (*others, first)]
+    rotations = np.concatenate(per_stage)
+    return np.concatenate([rotations, np.zeros((len(rotations), rests, 3))], axis=1)
 
 
-def _visits(turns: Sequence[Observation]) -> list[list[int]]:
-    """The places of sweeps that follow each other about one axis."""
-    found: list[list[int]] = [[0]]
-    for place, (last, turn) in enumerate(pairwise(turns), start=1):
+def _group_by_axis(turns: Sequence[Observation]) -> list[list[int]]:
+    """Return the indices of consecutive sweeps about one axis, group by group."""
+    groups: list[list[int]] = [[0]]
+    for index, (last, turn) in enumerate(pairwise(turns), start=1):
         if turn.joint_name == last.joint_name and abs(turn.axis_flange @ last.axis_flange) > SAME_AXIS:
-            found[-1].append(place)
+            groups[-1].append(index)
         else:
-            found.append([place])
-    return found
+            groups.append([index])
+    return groups
 
 
-def known_of(surroundings: Surroundings, name: str) -> EarthRatePrior:
-    """What is known of surroundings and sensor before the Earth's rate is looked for."""
+def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
+    """Return what is stated of surroundings and sensor before the Earth's rate is estimated."""
     site, uncertainty = surroundings.site, surroundings.uncertainty
     return EarthRatePrior(
         up=np.array(site.up),
@@ -200,29 +203,29 @@ def known_of(surroundings: Surroundings, name: str) -> EarthRatePrior:
     )
 
 
-def unknown_of(
+def list_uncertainties(
     surroundings: Surroundings, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> Unknown:
-    """Return what no recording shows of the surroundings of the sensor `name`, and the Earth's rate it found.
+    """Return the uncertainties that no recording of the sensor `name` shows, and that of the estimated Earth's rate.
 
-    `stamp_std_s` is as of `RecordedSensor`.
+    `stamp_std_s` as in `RecordedSensor`.
     """
-    known, clock = surroundings.uncertainty, surroundings.clock
+    uncertainty, clock = surroundings.uncertainty, surroundings.clock
     return Unknown(
         clock_std=clock.std,
         clock_freedom=clock.freedom,
-        clock_half_width=None if clock.comparisons else PPM * known.controller_clock_ppm,
+        clock_half_width=None if clock.comparisons else PPM * uncertainty.controller_clock_ppm,
         clock_source="held against "
         + (" and ".join(comparison.by for comparison in clock.comparisons) or "no other clock"),
         state_jitter_s=surroundings.state_jitter_s,
         state_jitter_freedom=surroundings.state_jitter_freedom,
-        axis_rad=float(np.radians(known.axis_deg)),
-        repeatability_rad=float(np.radians(known.repeatability_deg)),
-        angle_std_rad=0.0 if known.angle_std_deg is None else known.angle_std_rad,
-        mount_rad=float(np.radians(known.mount_deg)),
+        axis_rad=float(np.radians(uncertainty.axis_deg)),
+        repeatability_rad=float(np.radians(uncertainty.repeatability_deg)),
+        angle_std_rad=0.0 if uncertainty.angle_std_deg is None else uncertainty.angle_std_rad,
+        mount_rad=float(np.radians(uncertainty.mount_deg)),
         stamp_std_s=stamp_std_s or 0.0,
-        sensor_offset_m=known.sensor_offset_mm / 1000,
-        g_sensitivity_rad_s_per_g=float(np.radians(known.stated_size("g_sensitivity_deg_s_g", name))),
+        sensor_offset_m=uncertainty.sensor_offset_mm / 1000,
+        g_sensitivity_rad_s_per_g=float(np.radians(uncertainty.stated_size("g_sensitivity_deg_s_g", name))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
         earth_freedom=np.inf if earth_rate is None else earth_rate.freedom,

@@ -1,8 +1,8 @@
-"""Calibrated readings against a sensor that is known: SIX, Section IV-B, Tables IV and V.
+"""The verification of calibrated readings by a reference sensor: SIX, Section IV-B, Tables IV and V.
 
-How the two sensors sit to each other comes from the calibration's revolutions, so that the verification stays a test of
-them. Only a rotation is taken out: what the board's correction leaves of axes that are not at right angles, and
-cross-axis errors of either part, stay in.
+The rotation between the two sensors comes from the calibration's revolutions, so the verification remains a test of
+them. Only this rotation is removed: the non-orthogonality that the board's correction leaves and the cross-axis errors
+of both sensors remain.
 """
 
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.gyroscope.alignment import AlignedCalibration, RelativeRotation, mean_rates, relative_rotation
-from rig.analysis.gyroscope.comparison import Comparison, Reference, compare, turns_of
+from rig.analysis.gyroscope.alignment import LinearCalibration, RelativeRotation, collect_mean_rates, fit_rotation
+from rig.analysis.gyroscope.comparison import Comparison, Reference, compare, list_revolutions
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -21,10 +21,10 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The sensor before its calibration (None where that was not recorded) and with it, by one relative rotation.
+    """The sensor before its calibration (None if that was not recorded) and with it, by one relative rotation.
 
-    `reference_error_rad_s` is the largest by which the reference itself misses the arm: the magnitude of its mean rate
-    over a revolution against 2π/T, and over a rest against zero.
+    `reference_error_rad_s` is the reference's own largest error against the arm: the magnitude of its mean rate over a
+    revolution against 2π/T, and over a rest against zero.
     """
 
     sensor: str
@@ -40,18 +40,19 @@ def verify(
     reference: Reference,
     after: Sequence[ObservedRun],
     before: Sequence[ObservedRun] = (),
-    calibration: AlignedCalibration | None = None,
+    calibration: LinearCalibration | None = None,
     *,
     gravity_rad_s: tuple[Array, Array] | None = None,
 ) -> Verification:
-    """Judge the readings that the board has calibrated (`after`) by the reference beside it.
+    """Compare the readings that the board has calibrated (`after`) with those of the reference.
 
-    `before` are the recordings of raw readings that the `calibration` was made from; they tell how the two sensors sit
-    to each other. Without them `after` itself tells it. `gravity_rad_s` (N, 3) is what gravity adds to the corrected
-    readings of sensor and reference in the revolutions of `after`, where the calibration found it.
+    - `before`: recordings of raw readings that the `calibration` was made from; they determine the rotation between the
+      sensors. Without them `after` does.
+    - `gravity_rad_s`, two of (N, 3): gravity's effect on the corrected readings of sensor and reference in the
+      revolutions of `after`, if the calibration estimated it.
 
-    Raises Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
-    `different_clocks`, and as `relative_rotation` does.
+    Raise Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
+    `different_clocks`, and as `fit_rotation` does.
     """
     if not after:
         raise Fault("nothing_to_compare", "no sweep was finished in the recording", "Let the whole movement finish")
@@ -60,43 +61,43 @@ def verify(
             _check_recorded(recording.run, sensor, readings)
             _check_recorded(recording.run, reference.name, "raw")
     _check_complete([recording.run for recording in after])
-    rotation = relative_mounting(sensor, reference, before or after, calibration if before else None)
+    rotation = fit_mounting(sensor, reference, before or after, calibration if before else None)
     return Verification(
         sensor,
         reference,
-        _against_the_arm(after, reference),
+        _reference_error(after, reference),
         rotation,
         compare(before, sensor, reference, rotation.matrix) if before else None,
-        compare(after, sensor, reference, rotation.matrix, _apart(gravity_rad_s, rotation.matrix)),
+        compare(after, sensor, reference, rotation.matrix, _gravity_difference(gravity_rad_s, rotation.matrix)),
     )
 
 
-def _apart(gravity_rad_s: tuple[Array, Array] | None, rotation: Array) -> Array | None:
-    """(N, 3) how far gravity takes the sensor's readings from the reference's."""
+def _gravity_difference(gravity_rad_s: tuple[Array, Array] | None, rotation: Array) -> Array | None:
+    """Return the difference (N, 3) of sensor's and reference's readings by gravity."""
     if gravity_rad_s is None:
         return None
-    of_sensor, of_reference = gravity_rad_s
-    apart: Array = of_sensor - of_reference @ rotation.T
-    return apart
+    on_sensor, on_reference = gravity_rad_s
+    difference: Array = on_sensor - on_reference @ rotation.T
+    return difference
 
 
-def relative_mounting(
-    sensor: str, reference: Reference, recordings: Sequence[ObservedRun], calibration: AlignedCalibration | None
+def fit_mounting(
+    sensor: str, reference: Reference, recordings: Sequence[ObservedRun], calibration: LinearCalibration | None
 ) -> RelativeRotation:
-    """How a sensor sits to the reference, by the revolutions of these recordings; None is for calibrated readings.
+    """Return the rotation from reference to sensor by the revolutions of these recordings.
 
-    Raises Fault as `relative_rotation` does.
+    No `calibration` is for readings that are calibrated. Raise Fault as `fit_rotation` does.
     """
     described = recordings[0].run.sensors
-    return relative_rotation(
-        mean_rates(turns_of(sensor, recordings), calibration),
-        mean_rates(turns_of(reference.name, recordings), reference),
+    return fit_rotation(
+        collect_mean_rates(list_revolutions(sensor, recordings), calibration),
+        collect_mean_rates(list_revolutions(reference.name, recordings), reference),
         np.array(described[sensor].mounting) @ np.array(described[reference.name].mounting).T,
     )
 
 
 def _check_complete(runs: Sequence[RunData]) -> None:
-    """A movement that was broken off has not verified the directions it never turned in."""
+    """Raise Fault `incomplete_verification` unless all planned sweeps were finished."""
     planned = len(runs[0].settings.planned_sweeps)
     done = len(frozenset[int]().union(*map(finished_sweeps, runs)))
     if done < planned:
@@ -107,13 +108,14 @@ def _check_complete(runs: Sequence[RunData]) -> None:
         )
 
 
-def _against_the_arm(recordings: Sequence[ObservedRun], reference: Reference) -> float:
-    """How far the reference is off at most, by what the arm did; magnitudes, for its mounting does not matter here."""
-    turns = turns_of(reference.name, recordings)
-    of_turns = np.linalg.norm(mean_rates(turns, reference).rate_rad_s, axis=1) - [turn.speed_rad_s for turn in turns]
-    means = [rest.mean_rad_s for seen in recordings for rest in seen.sensors[reference.name].rests]
-    of_rests = np.linalg.norm(reference.scale * (np.reshape(means, (-1, 3)) + reference.bias_rad_s), axis=1)
-    return float(np.abs([*of_turns, *of_rests]).max())
+def _reference_error(recordings: Sequence[ObservedRun], reference: Reference) -> float:
+    """Return the reference's largest error against the arm; magnitudes, as its mounting does not matter here."""
+    turns = list_revolutions(reference.name, recordings)
+    rates_rad_s = np.linalg.norm(collect_mean_rates(turns, reference).rate_rad_s, axis=1)
+    in_sweeps = rates_rad_s - [turn.speed_rad_s for turn in turns]
+    means = [rest.mean_rad_s for recording in recordings for rest in recording.sensors[reference.name].rests]
+    at_rest = np.linalg.norm(reference.scale * (np.reshape(means, (-1, 3)) + reference.bias_rad_s), axis=1)
+    return float(np.abs([*in_sweeps, *at_rest]).max())
 
 
 def _check_recorded(run: RunData, sensor: str, mode: str) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.gyroscope.vector_inputs import WAVE_SHARE
+from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
 from rig.motion.geometry import WRIST_1, DenavitHartenberg, angle_waves, flange_attitude, flange_errors
@@ -51,7 +51,7 @@ def arm_turns(stood: Sequence[Stood], arm: DenavitHartenberg, mounting: Array) -
 
 def _shares() -> Array:
     """(18,) what an error of the arm's takes of each of its wrists' errors."""
-    return np.tile(np.where(np.arange(ERRORS) < STEADY, 1.0, WAVE_SHARE), 3)
+    return np.tile(np.where(np.arange(ERRORS) < STEADY, 1.0, WAVE_FRACTION), 3)
 
 
 def _all_turns(stood: Sequence[Stood], arm: DenavitHartenberg, mounting: Array) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.gyroscope.calibration import SensorResult
-from rig.analysis.gyroscope.vector_inputs import see
+from rig.analysis.gyroscope.vector_inputs import collect_inputs
 from rig.analysis.reference.acceleration import AccelerometerResult
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
@@ -137,7 +137,7 @@ def _together(
 def _rates(
     recordings: Sequence[ObservedRun], name: str, surroundings: Surroundings, reference_c: float
 ) -> tuple[list[ObservedRun], OverTemperature]:
-    known = see(recordings, name, surroundings)
+    known = collect_inputs(recordings, name, surroundings)
     parts = [recording.sensors[name] for recording in recordings]
     averages = [turn.average for part in parts for turn in part.revolutions]
     averages += [rest for part in parts for rest in part.rests]

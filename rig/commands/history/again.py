@@ -63,7 +63,7 @@ def again(options: Namespace, solve: Solve = solved_again) -> int:
 
 
 def _question(options: Namespace) -> RecomputeQuestion:
-    from rig.analysis.estimators import known_estimator
+    from rig.analysis.estimators import find_estimator
 
     if options.jobs < 1:
         raise Refused("bad_option", f"--jobs {options.jobs} is too small", "Give 1 or more")
@@ -74,7 +74,7 @@ def _question(options: Namespace) -> RecomputeQuestion:
     for item in options.overrides:
         find_setting(item)
     if options.estimator is not None:
-        known_estimator(options.estimator)
+        find_estimator(options.estimator)
     return RecomputeQuestion(VERSION, tuple(options.overrides), options.estimator)
 
 

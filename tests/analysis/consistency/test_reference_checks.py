@@ -24,7 +24,7 @@ from support.recordings.reference_p_values import p_values
 NORM = 9.80665
 JOINTS = joints_rad(EIGHTEEN)
 WRIST_1 = 3
-WAVE_SHARE = 0.3
+WAVE_FRACTION = 0.3
 SMALL = 0.25  # p-values
 EVERY = ("bias_changed", "scale_changed", "loose_mounting", "even_term", "odd_term", "asymmetry", "residuals")
 
@@ -139,7 +139,7 @@ def test_what_a_wrist_errs_by_is_told_as_such_an_arm_makes_it() -> None:
     patterns = arm_patterns(truth.theta(), movement, stood(axes), known)
     of_dwells = 3 * len(JOINTS)
     for error, pattern in enumerate(patterns):
-        expected = pattern / (1.0 if error % 6 < 2 else WAVE_SHARE)
+        expected = pattern / (1.0 if error % 6 < 2 else WAVE_FRACTION)
         changed = (read(_off(error, size)) - movement.readings().ravel()) / size
         np.testing.assert_allclose(changed[:of_dwells], expected[:of_dwells], atol=1e-3)
         np.testing.assert_allclose(changed[of_dwells:], expected[of_dwells:], atol=0.2)  # r does not turn with a flange

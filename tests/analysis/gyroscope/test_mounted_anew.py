@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.gyroscope.calibration import solve_observed
-from rig.analysis.gyroscope.mounts import FoundMount, observe_as_mounted
+from rig.analysis.gyroscope.mounts import EstimatedMount, observe_as_mounted
 from rig.analysis.surroundings import surroundings_of
 from rig.data.recording.settings import settings_from_json
 from rig.estimation.arrays import Array
@@ -26,7 +26,7 @@ BY_ONE_JOINT = (
 )
 
 
-def solved(setup: Setup, seed: int, off_deg: Array) -> tuple[Array, Budget, tuple[FoundMount, ...]]:
+def solved(setup: Setup, seed: int, off_deg: Array) -> tuple[Array, Budget, tuple[EstimatedMount, ...]]:
     """(3,) errors of the scale, the budget, and the mounts that were found."""
     runs, scale = drawn_stages(seed, KIND, setup, off_deg)
     recordings, mounts = observe_as_mounted(runs, runs[0].settings)
@@ -54,7 +54,7 @@ def test_how_the_item_was_mounted_off_is_found() -> None:
     off_deg = np.array([[0.0, 0.0, 0.0], [1.0, -0.5, 0.8]])
     _, budget, (mount,) = solved(staged(Setup(), TWO), 3, off_deg)
     assert mount.stage == 1
-    assert mount.turn_rad == pytest.approx(-np.radians(off_deg[1]), abs=4 * float(mount.std_rad.max()))
+    assert mount.rotation_rad == pytest.approx(-np.radians(off_deg[1]), abs=4 * float(mount.std_rad.max()))
     assert mount.std_rad.max() < np.radians(OFF_DEG) / 10
     line = next(each for each in budget.contributors if each.name == "mounting anew")
     assert line.half_width == OFF_DEG

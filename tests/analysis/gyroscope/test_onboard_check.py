@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from firmware_host.answers import BoardObservation, BoardSolution
-from rig.analysis.gyroscope.onboard_check import agreement, check_observed
+from rig.analysis.gyroscope.onboard_check import check_arithmetic, check_observed
 from rig.data.recording.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event, Recorded
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
@@ -61,7 +61,7 @@ def with_events(run: RunData, events: Sequence[Event]) -> RunData:
 
 def double_precision(run: RunData) -> tuple[np.ndarray, np.ndarray]:
     """What the host makes of the same observations."""
-    found = agreement([with_events(run, observed(run, range(6)))], "gyro")
+    found = check_arithmetic([with_events(run, observed(run, range(6)))], "gyro")
     assert found.host_scale is not None and found.host_bias_rad_s is not None
     return found.host_scale, found.host_bias_rad_s
 
@@ -69,7 +69,7 @@ def double_precision(run: RunData) -> tuple[np.ndarray, np.ndarray]:
 def test_a_board_that_rounds_to_single_precision_agrees(run: RunData) -> None:
     scale, bias = double_precision(run)
     board = solved(triple(scale.astype(np.float32)), triple(bias.astype(np.float32)))
-    found = agreement([with_events(run, [*observed(run, range(6)), board])], "gyro")
+    found = check_arithmetic([with_events(run, [*observed(run, range(6)), board])], "gyro")
     assert all(check.passed for check in found.checks("gyro"))
 
 
@@ -81,7 +81,7 @@ def test_a_board_that_computes_wrongly_fails_by_name(
 ) -> None:
     scale, bias = double_precision(run)
     board = solved(triple(scale * np.array([1, factor, 1])), triple(bias + np.array([0, 0, shift_rad_s])))
-    found = agreement([with_events(run, [*observed(run, range(6)), board])], "gyro")
+    found = check_arithmetic([with_events(run, [*observed(run, range(6)), board])], "gyro")
     assert [check.name for check in found.checks("gyro") if not check.passed] == [failing]
 
 
@@ -92,7 +92,7 @@ def test_a_board_without_a_solution_is_not_measured_and_fails(run: RunData) -> N
         [*observed(run, range(6)), solved((0, 0, 0), (0, 0, 0), "not_converged")],
     ]
     for events in without:
-        checks = agreement([with_events(run, events)], "gyro").checks("gyro")
+        checks = check_arithmetic([with_events(run, events)], "gyro").checks("gyro")
         assert [(check.value, check.passed) for check in checks] == [(None, False)] * 2
 
 
@@ -109,7 +109,7 @@ def test_a_resumed_run_recalls_what_was_observed_before(run: RunData) -> None:
     first = with_events(run, observed(run, [0, 1, 2]))
     recalled = [BoardRecalled("gyro", sweep) for sweep in (0, 1, 2)]
     second = with_events(run, [*recalled, *observed(run, [3, 4, 5]), solved(triple(scale), triple(bias))])
-    found = agreement([first, second], "gyro")
+    found = check_arithmetic([first, second], "gyro")
     assert all(check.passed for check in found.checks("gyro"))
     assert found.scale_difference == pytest.approx(0, abs=1e-12)
 
@@ -119,7 +119,7 @@ def test_a_recall_of_what_no_recording_holds_is_not_checked_and_fails(run: RunDa
     alone = with_events(
         run, [BoardRecalled("gyro", 0), *observed(run, range(1, 6)), solved(triple(scale), triple(bias))]
     )
-    assert not any(check.passed for check in agreement([alone], "gyro").checks("gyro"))
+    assert not any(check.passed for check in check_arithmetic([alone], "gyro").checks("gyro"))
 
 
 def test_a_sample_lost_on_the_way_is_no_disagreement(run: RunData) -> None:
@@ -134,10 +134,10 @@ def test_a_sample_lost_on_the_way_is_no_disagreement(run: RunData) -> None:
     def without(some: Sequence[int]) -> RunData:
         return replace(seen, samples={"gyro": np.delete(samples, some)})
 
-    found = agreement([without(inside[:1])], "gyro")
+    found = check_arithmetic([without(inside[:1])], "gyro")
     assert found.scale_difference is not None and found.scale_difference < 1e-6
     assert all(check.passed for check in found.checks("gyro"))
-    assert agreement([without(inside)], "gyro").scale_difference is None  # not one mean is left to check
+    assert check_arithmetic([without(inside)], "gyro").scale_difference is None  # not one mean is left to check
 
 
 def test_a_board_that_averages_other_samples_than_it_says_fails(run: RunData) -> None:
@@ -147,7 +147,7 @@ def test_a_board_that_averages_other_samples_than_it_says_fails(run: RunData) ->
         for one in observed(run, range(6))
         if isinstance(one, BoardObserved)
     ]
-    found = agreement([with_events(run, [*claimed, solved(triple(scale), triple(bias))])], "gyro")
+    found = check_arithmetic([with_events(run, [*claimed, solved(triple(scale), triple(bias))])], "gyro")
     assert not any(check.passed for check in found.checks("gyro"))
 
 
@@ -157,7 +157,7 @@ def test_a_sweep_the_board_missed_is_told(run: RunData) -> None:
     unsolved = solved((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "too_few_observations", sweeps=5)
     events: list[Event] = [*observed(run, range(5)), missed, unsolved]
     result = solve_runs([run])["gyro"]
-    entry = sensor_entry(result, "calibrate", agreement([with_events(run, events)], "gyro"))
+    entry = sensor_entry(result, "calibrate", check_arithmetic([with_events(run, events)], "gyro"))
     console = Console(width=120, record=True)
     print_result(result_document({"gyro": entry}, passed=False), console)
     shown = console.export_text()

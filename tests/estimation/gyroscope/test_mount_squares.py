@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.analysis.gyroscope.vector_inputs import mount_turns
+from rig.analysis.gyroscope.vector_inputs import list_mount_rotations
 from rig.config.procedures.stage_section import rotation_by
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import MOUNTS, Budget, Unknown, budget
@@ -38,7 +38,7 @@ def solved(off_rad: Array, axes: Array, matrix: Array) -> tuple[Array, Budget]:
         windows_s=windows,
         joints=(*["wrist_3"] * len(turns), None),
         axis_errors_rad_s=np.zeros((0, count, 3)),
-        mount_turns_rad=mount_turns(stages.tolist(), 1, MOUNT_DEG),
+        mount_turns_rad=list_mount_rotations(stages.tolist(), 1, MOUNT_DEG),
     )
     found = explain(seen, np.eye(3))
     return found.solution.scale - 1 / np.linalg.norm(matrix, axis=1), budget(found, UNKNOWN)

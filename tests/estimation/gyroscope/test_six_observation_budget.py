@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_six_observation
-from rig.analysis.gyroscope.vector_inputs import see
+from rig.analysis.gyroscope.vector_inputs import collect_inputs
 from rig.analysis.surroundings import surroundings_of
 from rig.estimation.gyroscope.accumulator import Solution
 from rig.estimation.gyroscope.six_observation_budget import response_of
@@ -23,7 +23,7 @@ def turns() -> Turns:
     observations = recordings[0].sensors["gyro"].revolutions
     surroundings = surroundings_of(recordings, recordings[0].run.settings)
     assert surroundings is not None
-    return observations, solve_six_observation(observations, "newton"), see(recordings, "gyro", surroundings)
+    return observations, solve_six_observation(observations, "newton"), collect_inputs(recordings, "gyro", surroundings)
 
 
 @pytest.mark.slow

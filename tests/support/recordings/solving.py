@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR, known_estimator
+from rig.analysis.estimators import DEFAULT_ESTIMATOR, find_estimator
 from rig.analysis.gyroscope.calibration import SensorResult, observe_recordings, solve_observed
 from rig.analysis.surroundings import surroundings_of
 from rig.data.recording.run_file import RunData
@@ -12,7 +12,7 @@ def solve_runs(
     runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, matrix_corrected: Sequence[str] = ()
 ) -> dict[str, SensorResult]:
     """Calibrate every sensor from one recording, or from all recordings of a run that was resumed."""
-    chosen = known_estimator(estimator)  # before the work of observing
+    chosen = find_estimator(estimator)  # before the work of observing
     recordings = observe_recordings(runs)
     surroundings = surroundings_of(recordings, runs[0].settings)
     return solve_observed(runs[0].sensors, recordings, surroundings, chosen, matrix_corrected)

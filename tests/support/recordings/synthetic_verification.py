@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.gyroscope.alignment import AlignedCalibration
+from rig.analysis.gyroscope.alignment import LinearCalibration
 from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
 from support.recordings.recorded import with_channel
@@ -49,7 +49,7 @@ TRUTH = Stored(np.array(SCALE), np.array(BIAS_RAD_S))
 def recording(
     setup: Setup,
     *,
-    stored: AlignedCalibration | None = None,
+    stored: LinearCalibration | None = None,
     reference: Setup = REFERENCE,
     lag_s: float = 0.0,
     axes: Array | None = None,
