@@ -79,7 +79,9 @@ class Trend:
 
     @cached_property
     def line(self) -> Fitted | None:
-        """Value at the first result, and change per day; None also for a span of less than `DRIFT_DAYS`."""
+        """The straight line over time (value at the first result, slope per day); None with too few results or a short
+        span.
+        """
         if not self.enough or np.ptp(self.days) < DRIFT_DAYS:
             return None
         return fit(np.stack([np.ones(self.count), self.days], axis=1), self.values, self.std)

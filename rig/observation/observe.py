@@ -286,9 +286,9 @@ def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
 
 
 def _check_frozen(readings: Array, rate_read: Array, expected_rad_s: Array, where: str) -> None:
-    """Raise Fault `stuck_axis` if a turned axis repeats one reading that is not its rate, however coarse its steps.
+    """Raise Fault `stuck_axis` if an axis repeats one reading that differs from its expected rate.
 
-    The readings (n, 3) have the mean `rate_read` (3,); the nominal mounting gives `expected_rad_s` (3,).
+    Coarse steps alone do not raise it.
     """
     still = np.ptp(readings, axis=0) == 0
     misread = np.abs(rate_read - expected_rad_s) > FROZEN * np.linalg.norm(expected_rad_s)

@@ -33,7 +33,7 @@ class RecordedRun:
 
     @property
     def movement(self) -> tuple[RunData, ...]:
-        """Recordings of the first movement."""
+        """The calibration's recordings or, without any, the verification's."""
         return self.raw or self.corrected
 
     def only_raw(self) -> "RecordedRun":

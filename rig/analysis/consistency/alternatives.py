@@ -91,10 +91,10 @@ def changes(segments: Segments, axis_rates: Array) -> Alternatives:
 
 
 def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> dict[str, Array | None]:
-    """Return columns (3, N, k) of differences between directions, sweeps and rests, by the check's name.
+    """Return the design columns (3, N, k) of differences between directions, sweeps and rests, by the check's name.
 
-    `whole` (3, N, k) are free levels of the sweeps. None stands for all residuals, but these include the scatter within
-    sweeps, from which the bias drift is estimated.
+    `whole` (3, N, k) gives each sweep its own level. With None the check `residuals` uses all residuals, including the
+    scatter within sweeps.
     """
     columns_by_name: dict[str, Array | None] = {
         "cw_against_ccw": split_per_axis(np.abs(axis_rates)),

@@ -93,7 +93,11 @@ class _Tested:
 def check_gyroscope(
     segments: Segments, matrix: Array, false_alarm_probability: float, allowance: ErrorPatterns
 ) -> TestResults:
-    """Return every statistic with its critical value, each with that false-alarm probability; `matrix` (3, 3) is F."""
+    """Test the model of a gyroscope against each alternative, find outlier sweeps, and compute detection limits.
+
+    Faults that persist (`changes`) are tested with the transfers between segments, `differences` without. Each test has
+    that false-alarm probability; `matrix` (3, 3) is F.
+    """
     axis_rates = segments.rates_rad_s @ matrix.T
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
     bias = _estimate_bias_process(segments, axis_rates, _steady_columns(segments), scatter)

@@ -150,9 +150,10 @@ def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_va
 
 
 def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[float, int]:
-    """Return the largest deviation in standard deviations of the noise, and the number of bits that cause spikes.
+    """Return the largest deviation in units of the noise, and the number of axes whose spikes are one power of two.
 
-    The noise is half a step at least. The first readings are omitted, as the filter of a quiet sensor has not settled.
+    The noise includes vibration and is half a step at least; such spikes come from one bit. The first readings are
+    omitted, as the filter of a quiet sensor has not settled.
     """
     half = step_counts / 2
     farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]

@@ -110,7 +110,7 @@ def build_known_errors(
     temperature_times_s: Array,
     stamp_s: float = 0.0,
 ) -> KnownErrors:
-    """Return the known errors of the sensor `name` of that range."""
+    """Return the standard uncertainties of all modelled error sources of gyroscope `name` with that full scale."""
     steady = np.array([angle.startswith(("twist", "zero")) for angle in ANGLES])
     cube, square = (uncertainty.stated_size(what, name) / 100 / np.sqrt(3) for what in CURVE)
     return KnownErrors(
@@ -145,7 +145,7 @@ def build_error_patterns(
 
 
 def _earth(surroundings: Surroundings, name: str, earth_rate: EarthRate | None) -> Array:
-    """Return the unknown part of the Earth's rate (3, k) in rad/s."""
+    """Return the uncertainty of the Earth's rate as k independent vectors of one standard deviation, (3, k), rad/s."""
     unknown = list_uncertainties(surroundings, name, earth_rate)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, directions = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
@@ -336,7 +336,9 @@ def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, c
 
 
 def _temperature_patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> list[Array]:
-    """Return the patterns of one standard deviation of bias and scale over temperature."""
+    """Return the rate errors of all segments by one standard deviation of the slopes of bias and scale over
+    temperature.
+    """
     if known_errors.sensor is None:
         return []
     inside, order = segments.times_s.mean(axis=1), np.argsort(known_errors.temperature_times_s)

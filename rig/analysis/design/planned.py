@@ -33,9 +33,9 @@ class DetectionLimits:
 
 
 def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> DetectionLimits:
-    """Return the detection limits of all sensors to calibrate except magnetometers; of accelerometers on an arm only.
+    """Predict the detection limits of the gyroscopes to calibrate and, on an arm, of the accelerometers.
 
-    For a nominal `turner`, and a sensor as in its data sheet, whose bias drift is its flicker. For a plan over
+    Assumes a nominal `turner` and the data sheet's noise, with flicker as the only bias drift. Of a plan over
     temperature one set is evaluated.
     """
     if turner.joints == 0:

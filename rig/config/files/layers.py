@@ -162,6 +162,6 @@ def _override(
 
 
 def _example(item: str) -> str:
-    """Return the correct spelling of `a.b:value`, or any example."""
+    """Return the override `item` with "=" for ":", or a fixed example if it has no value."""
     path, colon, value = item.partition(":")
     return f"{path.strip()}={value.strip()}" if colon and value.strip() else "procedure.speed_deg_s=30"

@@ -200,7 +200,7 @@ class SixObservationSection(SixSweepsSection):
 
     @property
     def mountings(self) -> tuple[StageSection, ...]:
-        """The stages that the file names."""
+        """The mountings of the item, one per entry of `procedure.stages`."""
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:

@@ -120,7 +120,7 @@ def positive(value: float) -> float:
 
 
 def list_numbers(values: Sequence[float]) -> str:
-    """Return numbers as a list in words."""
+    """Return numbers separated by commas: `125, 250, 500`."""
     return ", ".join(f"{value:g}" for value in values)
 
 

@@ -55,9 +55,10 @@ def false_alarm_of_each(of_all: float, tests: int) -> float:
 
 
 def joint_factors(values: int, freedom: ArrayLike, probability: float) -> Array:
-    """Return the k by which so many `values` ± k u hold all true values at once, with that `probability` at least.
+    """Return the simultaneous coverage factor: k so that all of `values` intervals ± k u hold their true values.
 
-    `freedom` are degrees of freedom of any shape; for one value and `PROBABILITY` it is `coverage_factors`.
+    With a probability of 95.45 % at least, by Bonferroni's inequality. `freedom`: degrees of freedom of any shape; for
+    one value k is that of `coverage_factors`.
     """
     whole, tail = _whole(freedom), false_alarm_of_each(1 - probability, values) / 2
     factors = np.full(np.shape(freedom), -NormalDist().inv_cdf(tail))

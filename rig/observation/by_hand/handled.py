@@ -149,7 +149,7 @@ class Segmenter:
 
     @property
     def handled(self) -> HandRecording:
-        """The session so far, to the last rest that has settled."""
+        """The recording, with its rests and moves up to the last rest that lasted `SETTLED_S`."""
         session = self._session
         count = len(session.rests)
         while count and session.rests[count - 1].end_s - session.rests[count - 1].start_s < SETTLED_S - 2 * MARGIN_S:

@@ -152,7 +152,10 @@ def _still(turning: Turning) -> NDArray[np.bool_]:
 
 
 def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes:
-    """Return all fixes of the rows, whether or not the gyroscope can be integrated between them."""
+    """Group the reference's attitudes into fixes: start and end of each row at rest, and one per window between rests.
+
+    `placement` is equal for both ends of a rest; whether the gyroscope can be integrated between them is not yet known.
+    """
     rows_s = turning.rows_s
     passed = np.cumsum(still)
     interval = 2 * passed - still  # odd: a row at rest; even: what lies between two of these

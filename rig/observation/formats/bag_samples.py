@@ -120,7 +120,7 @@ def _open_bag(path: Path) -> Iterator[Any]:
 
 
 def _check_metadata(path: Path) -> None:
-    """Raise ValueError for metadata that is longer than that of any bag, by bytes or by the values that it holds."""
+    """Raise ValueError if the metadata file is implausibly large: more than `METADATA_BYTES` or `METADATA_VALUES`."""
     import yaml
 
     if (size := path.stat().st_size) > METADATA_BYTES:

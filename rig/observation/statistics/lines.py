@@ -185,9 +185,10 @@ def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Arr
 
 
 def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, beats: int) -> Array:
-    """Return the lines refined by their phase: by the growing columns a quarter of a cycle behind. `fixed` ones stay.
+    """Return the frequencies of spectral lines, in cycles, refined from their phase drift.
 
-    A line that shows in its sidebands alone has no phase, and stays as it is.
+    The drift is the part of the amplitude that grows in quadrature. The first `fixed` lines are kept. A line that shows
+    only in its sidebands has no phase and is kept, too.
     """
     for _ in range(PASSES):
         sizes = fit_columns(waves(cycles, fraction, beats), residuals).reshape(len(cycles), column_count(beats), -1)

@@ -30,7 +30,7 @@ def guard_routes(routes: Sequence[Route], door: Door, connections: Connections) 
 
 
 def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
-    """Return the addresses for spectators; `home` is the page that opens first."""
+    """Return the read-only routes: page, static files, stream of events."""
 
     async def stream(request: Request) -> Response:
         if not door.may_look(request.headers):

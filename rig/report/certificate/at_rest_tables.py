@@ -53,7 +53,9 @@ def field_rows(entry: MagnetometerEntry) -> list[AxisRow]:
 
 
 def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
-    """Return the sensor's own bias and the arm's field in its axes, as first mounted, in µT with U."""
+    """Return one row per magnetometer axis: scale, bias and the arm's field in µT, in axes of the first mounting, with
+    U.
+    """
     scale = expanded(entry.scale_std, entry.scale_degrees_of_freedom).widths
     bias = expanded(entry.bias_std_t, entry.bias_degrees_of_freedom).widths
     field = expanded(entry.arm_field_std_t, entry.arm_field_degrees_of_freedom).widths

@@ -200,7 +200,7 @@ def _crc(backwards: bytes | memoryview) -> bytes:
 
 
 def _gather_messages(data: bytes, starts: Mapping[bytes, list[int]]) -> NDArray[Any]:
-    """Return the messages at `starts`, the positions by header, in their order in the data."""
+    """Decode the messages and return them in stream order; `starts` maps each header to its byte positions."""
     parts, part_positions = [], []
     for name, header in _HEADERS.items():
         if not starts[header]:

@@ -29,7 +29,10 @@ class HandCourse:
 
 
 def move(start: Array, end: Array, vector: Array, habits: Habits, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return times from 0 on and rates of a move from `start` to `end` (3, 3), by `vector` (3,) in body axes."""
+    """Simulate a hand that turns the body from attitude `start` to `end` (3, 3); return times and body rates.
+
+    `vector` (3,) is the rotation vector between them, in body axes.
+    """
     angle = float(np.linalg.norm(vector))
     axis = vector / angle
     grasp_s, rock_s = rng.uniform(*GRASP_S), rng.uniform(*ROCK_S)

@@ -288,9 +288,10 @@ class _Child:
         return confirmed
 
     def abandon(self) -> NoReturn:
-        """Stop the arm, which is now unsupervised, and leave.
+        """Stop the arm, which nobody supervises any more, and exit.
 
-        Over the client only if no port of the controller confirms the end of the program.
+        The program is stopped over the controller's ports; only if none confirms it, the arm is braked by the RTDE
+        client.
         """
         if self._holds_arm:
             # The client's stop may wait forever for a controller that is gone; the system's alarm ends that.

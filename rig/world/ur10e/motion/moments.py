@@ -45,7 +45,10 @@ def find_load(
     links: Links,
     bodies: Bodies,
 ) -> Load:
-    """Return the load for joint angles, speeds, accelerations (rad, s) and a payload in the flange's axes."""
+    """Return joint torques, the payload's wrench in the flange's frame and the arm's momentum: inverse dynamics.
+
+    For joint angles, speeds and accelerations (rad, s) and a payload in the flange's axes.
+    """
     q, qd, qdd = (np.array(values) for values in joints)
     masses, centres_m = np.array([*bodies.masses_kg, payload_kg]), np.array([*bodies.centres_m, payload_centre_m])
     rotations, positions = _frames(q, links)
