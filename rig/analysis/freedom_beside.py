@@ -61,8 +61,8 @@ def of_second_order(result: AccelerometerResult) -> Array | None:
 
 def of_field_angles(result: MagnetometerResult) -> Array:
     """Return the (3,) degrees of freedom of a magnetometer's non-orthogonality."""
-    response = response_in_attitudes(result.solution, result.seen)
-    return _of_axes(result, response, np.diag(result.seen.variances_m2_s4.ravel()))
+    response = response_in_attitudes(result.solution, result.measurements)
+    return _of_axes(result, response, np.diag(result.measurements.variances_m2_s4.ravel()))
 
 
 def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:

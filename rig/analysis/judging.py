@@ -30,13 +30,7 @@ from rig.analysis.temperature.over_temperature import (
     with_acceleration_polynomials,
     with_rate_polynomials,
 )
-from rig.analysis.verdict import (
-    acceleration_checks,
-    clock_checks,
-    drift_checks,
-    judge,
-    verification_checks,
-)
+from rig.analysis.verdict import acceleration_checks, clock_checks, drift_checks, judge, verification_checks
 from rig.config.judging.judged_by import DecisionRule
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recording.run_file import RunData

@@ -12,8 +12,8 @@ from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.consistency.reference_checks import check_reference
 from rig.analysis.consistency.residual_tests import Statistic
 from rig.analysis.reference.acceleration import AccelerometerResult
-from rig.analysis.reference.accelerometer_errors import pieces_of
-from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns
+from rig.analysis.reference.accelerometer_errors import list_windows
+from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns
 from rig.analysis.reference.magnetic_field import MagnetometerResult
 from rig.analysis.reference.reference_budgets import drift_patterns, lag_pattern
 from rig.data.quantity import ACCELERATION, FIELD
@@ -84,13 +84,13 @@ def read_accelerometer(
     """Return an accelerometer's readings in a run, in the order of its solution, with its stated `uncertainty`."""
     matrix = result.solution.matrix
     dwells = [dwell for recording in recordings for dwell in raw_acceleration_dwells(name, recording, matrix)]
-    segments = pieces_of(name, recordings, result.dwells)
+    segments = list_windows(name, recordings, result.dwells)
     solution, movement, theta = result.solution, result.movement, result.solution.theta
     sensor, channel = result.sensor, result.sensor.channel(ACCELERATION)
     flicker_m_s2 = MICRO_G_M_S2 * uncertainty.stated_size("acceleration_bias_instability_ug", name)
     lag = lag_pattern(movement, 1e-3 * uncertainty.acceleration_lag_ms) / np.sqrt(3)
     delta_rad = solution.attitude_error.std_rad
-    arm = Known(recordings[0].motion.kinematics, uncertainty.axis_deg, np.array(sensor.mounting), delta_rad)
+    arm = StatedArm(recordings[0].motion.kinematics, uncertainty.axis_deg, np.array(sensor.mounting), delta_rad)
     return ReferenceReadings(
         digits=find_digits(sensor, ACCELERATION, [recording.run.samples[name] for recording in recordings]),
         counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],
@@ -100,14 +100,14 @@ def read_accelerometer(
             theta=theta,
             movement=movement,
             error_patterns=np.concatenate(
-                [lag, arm_patterns(theta, movement, [segment.stood for segment in segments], arm)]
+                [lag, arm_patterns(theta, movement, [segment.posture for segment in segments], arm)]
             ),
             times_s=np.array([segment.window_s for segment in segments]).mean(axis=1),
             second_order=solution.second_order_s2_m is not None,
         ),
         segments=[
             _name_dwell(segment.number)
-            if segment.stood.wrist is None
+            if segment.posture.wrist is None
             else SegmentName(DISTURBED_SWEEP, sweep=segment.number)
             for segment in segments
         ],
@@ -119,15 +119,15 @@ def read_magnetometer(
     name: str, recordings: Sequence[ObservedRun], result: MagnetometerResult, uncertainty: Uncertainty
 ) -> ReferenceReadings:
     """Return a magnetometer's readings in a run, which has no sweeps."""
-    solution, movement = result.solution, Movement(result.seen, NO_SWEEPS)
+    solution, movement = result.solution, Movement(result.measurements, NO_SWEEPS)
     channel = result.sensor.channel(FIELD)
     dwells = [dwell for recording in recordings for dwell in raw_field_dwells(name, recording)]
     theta = np.zeros(PARAMETERS)
     theta[: LEVER.start] = solution.theta
-    drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
+    drift, _ = drift_patterns(solution.matrix, result.measurements.attitudes, result.drift)
     mounting = np.array(result.sensor.mounting)
-    arm = Known(recordings[0].motion.kinematics, uncertainty.axis_deg, mounting, solution.attitude_std_rad)
-    patterns_of_arm = arm_patterns(theta, movement, [Stood(dwell.q_rad) for dwell in dwells], arm)
+    arm = StatedArm(recordings[0].motion.kinematics, uncertainty.axis_deg, mounting, solution.attitude_std_rad)
+    patterns_of_arm = arm_patterns(theta, movement, [Posture(dwell.q_rad) for dwell in dwells], arm)
     return ReferenceReadings(
         digits=find_digits(result.sensor, FIELD, [recording.run.samples[name] for recording in recordings]),
         counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],

@@ -6,9 +6,9 @@ import numpy as np
 
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.design.planned_motion import PlannedRun, Timed, predict_attitude, predict_revolution, time_steps_of
-from rig.analysis.reference.acceleration import held_out, sweeps_of
-from rig.analysis.reference.accelerometer_errors import Piece, Sheet, errors_of, sheet_of
-from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns, arm_turns
+from rig.analysis.reference.acceleration import select_held_out, stack_sweeps
+from rig.analysis.reference.accelerometer_errors import Datasheet, ReferenceWindow, list_sensor_errors, read_datasheet
+from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns, list_arm_rotations
 from rig.analysis.reference.reference_budgets import lag_pattern
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_catalogue import PARTS
@@ -34,9 +34,9 @@ class PlannedAccelerometer:
     range_m_s2: float
 
     @property
-    def sheet(self) -> Sheet:
+    def datasheet(self) -> Datasheet:
         """The errors beside the model that the data sheet allows."""
-        return sheet_of(self.run.known, self.name, self.range_m_s2)
+        return read_datasheet(self.run.known, self.name, self.range_m_s2)
 
 
 def list_accelerometers(config: RigConfig, run: PlannedRun) -> list[PlannedAccelerometer]:
@@ -59,7 +59,7 @@ def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
         accelerometer.run.settings.second_order,
     )
     noise_m_s2_sqrt_hz = PARTS[accelerometer.sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2
-    held_out_dwells = held_out(run.settings.planned_dwells)
+    held_out_dwells = select_held_out(run.settings.planned_dwells)
     dwells = [dwell for dwell in time_steps_of(run.plan, Dwell) if dwell.step.index not in held_out_dwells]
     sweeps = time_steps_of(run.plan, Sweep)
     swept = [_predict_sweep(sweep, run.arm, noise_m_s2_sqrt_hz) for sweep in sweeps]
@@ -71,28 +71,28 @@ def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
             variances_m2_s4=np.array([np.full(3, noise_m_s2_sqrt_hz**2 / dwell.step.duration_s) for dwell in dwells]),
             attitudes=np.array([predict_attitude(dwell, run.arm, mounting).T for dwell in dwells]),
         ),
-        sweeps_of(swept, mounting),
+        stack_sweeps(swept, mounting),
         run.known.repeatability_std_rad,
     )
     segments = [*map(_segment, dwells), *map(_segment, sweeps)]
-    poses = [segment.stood for segment in segments]
+    poses = [segment.posture for segment in segments]
     movement = replace(
         _with_predicted_readings(theta, movement),
-        own=errors_of(accelerometer.sheet, segments, 0.0, second_order=second_order),
-        arm_turns=arm_turns(poses, run.arm, mounting),
+        own=list_sensor_errors(accelerometer.datasheet, segments, 0.0, second_order=second_order),
+        arm_turns=list_arm_rotations(poses, run.arm, mounting),
     )
     lag = lag_pattern(movement, 1e-3 * run.known.acceleration_lag_ms) / np.sqrt(3)
-    arm_errors = arm_patterns(theta, movement, poses, Known(run.arm, run.known.axis_deg, mounting, 0.0))
+    arm_errors = arm_patterns(theta, movement, poses, StatedArm(run.arm, run.known.axis_deg, mounting, 0.0))
     middles_s = np.array([sum(segment.window_s) / 2 for segment in segments])
     return ReferenceModel(theta, movement, np.concatenate([lag, arm_errors]), middles_s, second_order=second_order)
 
 
-def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> Piece:
+def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> ReferenceWindow:
     """Return a dwell or a sweep at constant temperature."""
     step = timed_step.step
     wrist = step.joint - WRIST_1 if isinstance(step, Sweep) else None
     q_rad = step.first_q_rad if isinstance(step, Sweep) else step.q_rad
-    return Piece(step.index, timed_step.window_s, 1, 0.0, Stood(np.array(q_rad), wrist))
+    return ReferenceWindow(step.index, timed_step.window_s, 1, 0.0, Posture(np.array(q_rad), wrist))
 
 
 def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_sqrt_hz: float) -> SweptAcceleration:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.analysis.design.planned_motion import plan_run
 from rig.analysis.design.planned_reference import PlannedAccelerometer, list_accelerometers, predict_readings
-from rig.analysis.reference.reference_budgets import accelerometer_lines
+from rig.analysis.reference.reference_budgets import combine_errors
 from rig.config.models import RigConfig
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import scale_of
@@ -57,7 +57,7 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
         dof,
     )
     lag_s = 1e-3 * run.known.acceleration_lag_ms
-    return accelerometer_lines(spread, model.theta, movement, run.site, lag_s, sheet=accelerometer.sheet)
+    return combine_errors(spread, model.theta, movement, run.site, lag_s, datasheet=accelerometer.datasheet)
 
 
 def _new_fraction(dof: Uncertainty) -> float:

@@ -12,7 +12,7 @@ from rig.analysis.external.increments import InIncrements, solve_turning
 from rig.analysis.external.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.external.placed_equations import Equations
 from rig.analysis.installed_kinds import OfKind
-from rig.analysis.reference.triad import Triad, check_mounted, check_seen, known_field, known_gravity
+from rig.analysis.reference.triad import Triad, check_identifiable, check_mounted, field_reference, gravity_reference
 from rig.data.installed_kinds import installed_kinds
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.settings import Elsewhere, Site
@@ -50,9 +50,9 @@ class InAttitudes:
 
     solution: TriaxialSolution
     triad: Triad
-    beside: Attempts[Method, TriaxialSolution]
+    other_methods: Attempts[Method, TriaxialSolution]
     budget: Budget
-    seen: Dwells
+    measurements: Dwells
     reference_fault: Fault | None = None
     laid: LaidDown | None = None
     elsewhere: int = 0
@@ -88,7 +88,7 @@ def solve_placed(
         if quantity in solvers and not isinstance(placements, Fault):
             of_kind: OfKind = solvers[quantity](name, placements, site)
             return of_kind
-        known = known_gravity(site) if quantity == ACCELERATION else known_field(site, "--field-t, in tesla")
+        known = gravity_reference(site) if quantity == ACCELERATION else field_reference(site, "--field-t, in tesla")
         if isinstance(placements, Fault):
             raise placements
         chosen = "attitude_weighted" if method is None or method == "increments" else method
@@ -128,8 +128,10 @@ def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InA
     if not any_mounting:
         check_mounted(solution.matrix)
     budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance}, float(equations.freedom.min()))
-    beside = equations.beside(method, *get_args(EqualWeights))
-    return InAttitudes(solution, Triad.of(solution), beside, budget, equations.seen, _not_the_earth(solution))
+    other_methods = equations.beside(method, *get_args(EqualWeights))
+    return InAttitudes(
+        solution, Triad.from_solution(solution), other_methods, budget, equations.measurements, _not_the_earth(solution)
+    )
 
 
 def _of_placements(
@@ -147,17 +149,17 @@ def _of_placements(
         )
         solution = _as_laid_down(solution, laid)
     if solution.second_order is not None:
-        check_seen(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
+        check_identifiable(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
     if not any_mounting:
         check_mounted(solution.matrix)
     causes = {NOISE: solution.covariance} if laid is None else laid.causes
     budget = budget_by_causes(solution.matrix, causes, noise_freedom(solution, equations))
     return InAttitudes(
         solution,
-        Triad.of(solution),
+        Triad.from_solution(solution),
         equations.beside(method, *METHODS),
         budget,
-        equations.seen,
+        equations.measurements,
         laid=laid,
         elsewhere=len(elsewhere.windows),
         moving=moving,

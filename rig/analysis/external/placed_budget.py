@@ -30,7 +30,7 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
 
 def noise_freedom(solution: TriaxialSolution, equations: Equations) -> float:
     """Degrees of freedom of the noise's part in scale and bias, the fewest of the six, by how the readings weigh."""
-    response = response_in_attitudes(solution, equations.seen)
+    response = response_in_attitudes(solution, equations.measurements)
     told = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
     return fewest_freedom(told, equations.variances.ravel(), equations.freedom.ravel())
 

@@ -67,7 +67,7 @@ class Equations:
         )
 
     @property
-    def seen(self) -> Dwells:
+    def measurements(self) -> Dwells:
         """What was read in which attitude."""
         return Dwells(self.means, self.variances, self.attitudes)
 

@@ -1,4 +1,4 @@
-"""What an arm that is not quite where it says does to readings in attitudes: a few errors, shared by all of them."""
+"""The effect of the arm's errors on readings in attitudes: a few errors that all readings share."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,70 +14,70 @@ ERRORS, STEADY = 6, 2  # of each wrist; of these, its twist and its zero; the ot
 
 
 @dataclass(frozen=True, slots=True)
-class Stood:
-    """The arm's angles (6,) in a dwell, or where a sweep's are counted from; which wrist it turns (0 to 2), if any."""
+class Posture:
+    """The arm's angles (6,) in a dwell, or at the start of a sweep, and the wrist that this turns (0 to 2), if any."""
 
     q_rad: Array
     wrist: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """The arm as it says it is, by how much its angles may be off either way, the sensor's nominal mounting (3, 3).
+class StatedArm:
+    """The stated kinematics, the half-width of its angles, and the sensor's nominal mounting (3, 3).
 
-    `found_rad` is how far off the readings say it is, a standard deviation: it may be a poorer arm than was stated.
+    `estimated_rad` is the standard deviation that the readings show: the arm may be worse than stated.
     """
 
     arm: DenavitHartenberg
     axis_deg: float
     mounting: Array
-    found_rad: float
+    estimated_rad: float
 
 
-def arm_patterns(theta: Array, movement: Movement, stood: Sequence[Stood], known: Known) -> Array:
-    """(18, 3 K) change of the readings by one standard uncertainty of each of the wrists' errors."""
+def arm_patterns(theta: Array, movement: Movement, postures: Sequence[Posture], stated: StatedArm) -> Array:
+    """Return the change (18, 3 K) of the readings by one standard uncertainty of each of the wrists' errors."""
     by_turns = turned(theta, replace(movement, sweeps=movement.sweeps.alone()))
-    stated_rad = np.radians(known.axis_deg) / np.sqrt(3) * _shares()
-    std_rad = np.maximum(stated_rad, known.found_rad)
-    patterns: Array = std_rad[:, None] * (_all_turns(stood, known.arm, known.mounting) @ by_turns.T)
+    stated_rad = np.radians(stated.axis_deg) / np.sqrt(3) * _error_fractions()
+    std_rad = np.maximum(stated_rad, stated.estimated_rad)
+    patterns: Array = std_rad[:, None] * (_stack_rotations(postures, stated.arm, stated.mounting) @ by_turns.T)
     return patterns
 
 
-def arm_turns(stood: Sequence[Stood], arm: DenavitHartenberg, mounting: Array) -> Array:
-    """(18, 3 N + 10 M) `arm_turns` of a `Movement`, for an arm that is off by δ = 1."""
-    turns: Array = _shares()[:, None] * _all_turns(stood, arm, mounting)
-    return turns
+def list_arm_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounting: Array) -> Array:
+    """Return the `arm_turns` (18, 3 N + 10 M) of a `Movement`, for an arm with an error of δ = 1."""
+    rotations: Array = _error_fractions()[:, None] * _stack_rotations(postures, arm, mounting)
+    return rotations
 
 
-def _shares() -> Array:
-    """(18,) what an error of the arm's takes of each of its wrists' errors."""
+def _error_fractions() -> Array:
+    """Return the part (18,) that each of the wrists' errors has of the arm's error."""
     return np.tile(np.where(np.arange(ERRORS) < STEADY, 1.0, WAVE_FRACTION), 3)
 
 
-def _all_turns(stood: Sequence[Stood], arm: DenavitHartenberg, mounting: Array) -> Array:
-    return np.concatenate([_turns(each, arm, mounting) for each in stood], axis=1)
+def _stack_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounting: Array) -> Array:
+    return np.concatenate([_rotations(posture, arm, mounting) for posture in postures], axis=1)
 
 
-def _turns(stood: Stood, arm: DenavitHartenberg, mounting: Array) -> Array:
-    """(18, 3 or 10) sizes of the errors that `effects` knows of a dwell or a sweep, by radian of each wrist's."""
-    in_base = flange_errors(stood.q_rad, arm)
-    in_flange = in_base @ (mounting @ flange_attitude(stood.q_rad, arm)).T
-    if stood.wrist is None:
+def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Array:
+    """Return the sizes (18, 3 or 10) of errors in a dwell or a sweep, as in `effects`, by radian of each wrist's."""
+    in_base = flange_errors(posture.q_rad, arm)
+    in_flange = in_base @ (mounting @ flange_attitude(posture.q_rad, arm)).T
+    if posture.wrist is None:
         return in_flange.reshape(-1, OWN_ERRORS)
-    found = np.zeros((*in_base.shape[:2], SHARED_ERRORS))
+    sizes = np.zeros((*in_base.shape[:2], SHARED_ERRORS))
     for wrist in range(len(in_base)):
-        beyond = wrist > stood.wrist
-        found[wrist, :, slice(0, 3) if beyond else slice(3, TURNS)] = in_flange[wrist] if beyond else in_base[wrist]
-    found[stood.wrist, 0, :TURNS] = [*in_flange[stood.wrist, 0], 0.0, 0.0, 0.0]  # the twist lies beyond its joint
-    found[stood.wrist, STEADY:] = 0.0
-    found[stood.wrist, STEADY:, TURNS:] = _counted_from(float(stood.q_rad[WRIST_1 + stood.wrist]))
-    return found.reshape(-1, SHARED_ERRORS) / SHARE
+        distal = wrist > posture.wrist
+        sizes[wrist, :, slice(0, 3) if distal else slice(3, TURNS)] = in_flange[wrist] if distal else in_base[wrist]
+    sizes[posture.wrist, 0, :TURNS] = [*in_flange[posture.wrist, 0], 0.0, 0.0, 0.0]  # the twist is distal to its joint
+    sizes[posture.wrist, STEADY:] = 0.0
+    sizes[posture.wrist, STEADY:, TURNS:] = _waves_from(float(posture.q_rad[WRIST_1 + posture.wrist]))
+    return sizes.reshape(-1, SHARED_ERRORS) / SHARE
 
 
-def _counted_from(angle_rad: float) -> Array:
-    """(4, 4) waves of an angle by those of what it has grown from here."""
+def _waves_from(angle_rad: float) -> Array:
+    """Return the waves of an angle (4, 4) by those of its change from here."""
     cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
-    found: Array = np.zeros((4, 4))
-    found[:2, :2] = [[cos, -sin], [sin, cos]]
-    found[2:, 2:] = [[cos_2, -sin_2], [sin_2, cos_2]]
-    return found
+    waves: Array = np.zeros((4, 4))
+    waves[:2, :2] = [[cos, -sin], [sin, cos]]
+    waves[2:, 2:] = [[cos_2, -sin_2], [sin_2, cos_2]]
+    return waves

@@ -1,4 +1,4 @@
-"""Three axes that were held still in known attitudes to gravity or a field of known size: what both kinds share."""
+"""Three axes in known attitudes to gravity or a field of known size: common to accelerometers and magnetometers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
 from rig.observation.reference.acceleration import DwellReading
 from rig.observation.statistics.mean import StaticReading
 
-BESIDE: tuple[Method, ...] = ("maximum_likelihood", "as_published")  # whose solutions stand beside the chosen one
-SEEN = 3.0  # standard deviations that the largest second-order term must have
+COMPARED: tuple[Method, ...] = ("maximum_likelihood", "as_published")  # reported with the chosen one
+IDENTIFIABLE = 3.0  # standard deviations that the largest second-order term must have
 
 
 @dataclass(frozen=True, slots=True)
 class Triad:
     """Three axes by a solution's matrix F and bias, and by its covariance alone.
 
-    `scale` (3,) is 1/‖row of F‖, `covariance` (6, 6) that of scale and bias. The `correction_matrix` M (3, 3) leads
-    from a reading less its bias to the right-angled frame nearest to the axes.
+    - `scale` (3,): 1/‖row of F‖; `covariance` (6, 6): of scale and bias.
+    - `correction_matrix` M (3, 3): from a reading less its bias to the orthogonal frame nearest to the axes.
     """
 
     scale: Array
@@ -37,8 +37,8 @@ class Triad:
     correction_matrix: Array
 
     @staticmethod
-    def of(solution: ImuSolution | TriaxialSolution) -> "Triad":
-        """The axes that a solution has."""
+    def from_solution(solution: ImuSolution | TriaxialSolution) -> "Triad":
+        """Return the axes of a solution."""
         axes = SensorAxes.of(solution.matrix)
         return Triad(
             axes.scale,
@@ -49,13 +49,13 @@ class Triad:
         )
 
 
-def known_gravity(site: Site) -> KnownNorm:
-    """What is known at a place of the specific force at rest, the opposite of gravity: it points up."""
+def gravity_reference(site: Site) -> KnownNorm:
+    """Return the reference of an accelerometer at rest: the specific force, which opposes gravity and points up."""
     return KnownNorm(site.gravity_m_s2, np.array(site.up))
 
 
-def known_field(site: Site, key: str) -> KnownNorm:
-    """What is known of the field at a place. Raises Fault `field_strength_unknown`; `key` is how to say its size."""
+def field_reference(site: Site, key: str) -> KnownNorm:
+    """Return the field at the site. Raise Fault `field_strength_unknown`; `key` is the option that states its size."""
     if site.magnetic_field_t is None:
         raise Fault(
             "field_strength_unknown",
@@ -66,8 +66,8 @@ def known_field(site: Site, key: str) -> KnownNorm:
     return KnownNorm(site.magnetic_field_t, up if site.magnetic_field_upwards else -up)
 
 
-def seen_in(dwells: Sequence[DwellReading | StaticReading], mounting: Array) -> Dwells:
-    """The dwells in the nominal mounting's axes; the mean of rotations that hardly differ shrinks by encoder steps."""
+def stack_dwells(dwells: Sequence[DwellReading | StaticReading], mounting: Array) -> Dwells:
+    """Return the dwells in the nominal mounting's axes; attitudes are means of rotations, so nearly orthogonal."""
     return Dwells(
         np.array([dwell.reading.mean for dwell in dwells]),
         np.array([dwell.reading.variance for dwell in dwells]),
@@ -76,14 +76,14 @@ def seen_in(dwells: Sequence[DwellReading | StaticReading], mounting: Array) -> 
 
 
 def check_mounted(matrix: Array) -> None:
-    """Raises Fault `swapped_axes`, `mirrored_axis`, `wrong_mounting` where F is not that of the nominal mounting."""
+    """Raise Fault `swapped_axes`, `mirrored_axis`, `wrong_mounting` if F is not that of the nominal mounting."""
     check_axes(SensorAxes.of(matrix).axes, np.eye(3))
 
 
-def check_seen(second_order: Array, std: Array, remedy: str) -> None:
-    """Whether any of the terms φ (3,) that were asked for is told. Raises Fault `second_order_not_seen`."""
+def check_identifiable(second_order: Array, std: Array, remedy: str) -> None:
+    """Raise Fault `second_order_not_seen` unless one of the terms φ (3,) is significant by its `std` (3,)."""
     largest = float(np.max(np.abs(second_order) / std))
-    if largest < SEEN:
+    if largest < IDENTIFIABLE:
         raise Fault(
             "second_order_not_seen", f"no second-order term is beyond {largest:.1f} of its standard deviations", remedy
         )

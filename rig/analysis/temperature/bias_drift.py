@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from rig.analysis.reference.triad import known_gravity
+from rig.analysis.reference.triad import gravity_reference
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import RunSettings, Site
@@ -161,7 +161,7 @@ def acceleration_drift(repeats: Sequence[Sequence[Stand]], site: Site, *, second
             means[repeat],
             attitudes[repeat],
             variances[repeat],
-            known_gravity(site),
+            gravity_reference(site),
             second_order=second_order,
             method="attitude_weighted",
         )

@@ -61,7 +61,7 @@ def triad_entry(
         covariance_units=models.quantity.parameter_units,
         **_attitude_error(result.solution.attitude_error),
         dwells=[_dwell_entry(models, *row) for row in zip(dwells, *residuals, strict=True)],
-        other_methods=result.beside.by_key(partial(_other_entry, models), error_entry),
+        other_methods=result.other_methods.by_key(partial(_other_entry, models), error_entry),
         **more,
     )  # fmt: skip
 
@@ -71,7 +71,7 @@ def attitudes_entry(
 ) -> EntryT:
     """Return the entry of a sensor that was calibrated by attitudes alone."""
     solution = result.solution
-    residuals = solution.residuals, attitude_residual_std(solution, result.seen)
+    residuals = solution.residuals, attitude_residual_std(solution, result.measurements)
     bias = {models.quantity.named("bias"): solution.bias}
     return triad_entry(models, result, sensor, residuals, estimator=solution.method, **bias, **more)
 

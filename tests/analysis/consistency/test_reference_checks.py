@@ -10,7 +10,7 @@ from scipy.stats import ksone
 
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.consistency.reference_checks import check_reference
-from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns
+from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import DELAY, LEVER, NO_SWEEPS, Movement
@@ -47,11 +47,11 @@ def moved(truth: Truth, arm: Poses, density_ug: float, rng: np.random.Generator,
     return Movement(recorded_dwells(truth, arm, JOINTS, density_ug, rng), swept)
 
 
-def stood(axes: int) -> list[Stood]:
+def stood(axes: int) -> list[Posture]:
     turned = planned(axes) if axes else ()
     return [
-        *map(Stood, JOINTS),
-        *(Stood(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned),
+        *map(Posture, JOINTS),
+        *(Posture(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned),
     ]
 
 
@@ -61,7 +61,7 @@ def read_of(movement: Movement, axes: int, axis_rad: float) -> ReferenceModel:
     theta = np.concatenate([found.matrix.ravel(), found.reference_m_s2, found.bias_m_s2, np.zeros(7)])
     if found.lever_arm_m is not None:
         theta[LEVER], theta[DELAY] = found.lever_arm_m, found.delay_s
-    known = Known(NOMINAL, float(np.degrees(np.sqrt(3) * axis_rad)), np.eye(3), found.attitude_error.std_rad)
+    known = StatedArm(NOMINAL, float(np.degrees(np.sqrt(3) * axis_rad)), np.eye(3), found.attitude_error.std_rad)
     swept_s = 8.0 * np.arange(len(movement.sweeps.speeds_rad_s))
     times_s = np.concatenate([100 + 5.0 * np.arange(len(JOINTS)), swept_s])
     return ReferenceModel(
@@ -135,7 +135,7 @@ def test_what_a_wrist_errs_by_is_told_as_such_an_arm_makes_it() -> None:
         return moved(truth, poses, 1e-9, np.random.default_rng(1), axes).readings().ravel()
 
     movement = moved(truth, flange_pose, 1e-9, np.random.default_rng(1), axes)
-    known = Known(NOMINAL, float(np.degrees(np.sqrt(3))), np.eye(3), 0.0)
+    known = StatedArm(NOMINAL, float(np.degrees(np.sqrt(3))), np.eye(3), 0.0)
     patterns = arm_patterns(truth.theta(), movement, stood(axes), known)
     of_dwells = 3 * len(JOINTS)
     for error, pattern in enumerate(patterns):

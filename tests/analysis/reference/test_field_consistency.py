@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import kstest
 
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
-from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns
+from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns
 from rig.analysis.reference.reference_budgets import UNTESTED_DRIFT_T, drift_patterns
 from rig.config.procedures.attitude_sets import MAGNETIC
 from rig.estimation.reference.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Dwells, Movement
@@ -36,9 +36,9 @@ def read_of(seed: int) -> ReferenceModel:
     theta = np.zeros(PARAMETERS)
     theta[: LEVER.start] = found.theta
     movement = Movement(Dwells(means, variances, told), NO_SWEEPS)
-    arm_known = Known(NOMINAL, float(np.degrees(np.sqrt(3) * ARM_RAD)), np.eye(3), found.attitude_std_rad)
+    arm_known = StatedArm(NOMINAL, float(np.degrees(np.sqrt(3) * ARM_RAD)), np.eye(3), found.attitude_std_rad)
     drift, _ = drift_patterns(found.matrix, told, None)
-    of_arm = arm_patterns(theta, movement, [Stood(each) for each in JOINTS], arm_known)
+    of_arm = arm_patterns(theta, movement, [Posture(each) for each in JOINTS], arm_known)
     times_s = np.linspace(0.0, 5.0 * len(JOINTS), len(JOINTS))
     return ReferenceModel(theta, movement, np.concatenate([drift / np.sqrt(3), of_arm]), times_s, second_order=False)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.analysis.reference.accelerometer_errors import Sheet, sheet_of
+from rig.analysis.reference.accelerometer_errors import Datasheet, read_datasheet
 from rig.analysis.reference.reference_budgets import accelerometer_budget, magnetometer_budget
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.data.quantity import ACCELERATION
@@ -200,13 +200,13 @@ def test_a_sheet_is_what_the_recording_says() -> None:
     known, sensor = recording.settings.uncertainty, recording.sensors["gyro"]
     range_m_s2 = sensor.channel(ACCELERATION).range
     assert known is not None and range_m_s2 is not None
-    assert sheet_of(known, "gyro", range_m_s2) == Sheet(0.5, 2.0, 1.5, 260, 30)
+    assert read_datasheet(known, "gyro", range_m_s2) == Datasheet(0.5, 2.0, 1.5, 260, 30)
     said = known.model_copy(update={
         "acceleration_nonlinearity_percent": {"gyro": 0.1}, "acceleration_nonlinear_over_g": {"gyro": 1.0},
         "acceleration_bias_mg_k": {"gyro": 0.2}, "acceleration_scale_ppm_k": {"gyro": 30.0},
         "acceleration_bias_instability_ug": {"gyro": 4.0},
     })  # fmt: skip
-    assert sheet_of(said, "gyro", range_m_s2) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
+    assert read_datasheet(said, "gyro", range_m_s2) == Datasheet(0.1, 1.0, 0.2, 30.0, 4.0)
 
 
 @pytest.mark.parametrize(

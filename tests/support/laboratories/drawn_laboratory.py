@@ -94,10 +94,10 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
 
 def seen_vibration(rng: np.random.Generator) -> dict[str, float]:
     """Of the servo, beside the one that no encoder sees; what is drawn after it is what it was without."""
-    of_its_own = rng.spawn(1)[0]
+    separate_sensor_errors = rng.spawn(1)[0]
     return {
-        "vibration_measured_rms_rad_s": float(of_its_own.uniform(0, 0.002)),
-        "vibration_measured_hz": float(of_its_own.uniform(8, 30)),
+        "vibration_measured_rms_rad_s": float(separate_sensor_errors.uniform(0, 0.002)),
+        "vibration_measured_hz": float(separate_sensor_errors.uniform(8, 30)),
     }
 
 

@@ -7,8 +7,14 @@ import numpy as np
 
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.consistency.reference_checks import check_reference
-from rig.analysis.reference.accelerometer_errors import MILLI_G, STANDARD, Piece, Sheet, errors_of
-from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns, arm_turns
+from rig.analysis.reference.accelerometer_errors import (
+    MILLI_G,
+    STANDARD,
+    Datasheet,
+    ReferenceWindow,
+    list_sensor_errors,
+)
+from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns, list_arm_rotations
 from rig.analysis.reference.reference_budgets import accelerometer_budget
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.config.sensors.sensor_catalogue import PARTS
@@ -70,10 +76,10 @@ class Session:
         return replace(self, movement=movement, parameters=self.parameters + then)
 
 
-def sheet_of(part: str) -> Sheet:
+def sheet_of(part: str) -> Datasheet:
     """What is known of an accelerometer of that kind."""
     known = PARTS[part]
-    return Sheet(
+    return Datasheet(
         known.acceleration_nonlinearity_percent,
         known.acceleration_nonlinear_over_g or RANGES_G[part],
         known.acceleration_bias_mg_k,
@@ -104,13 +110,16 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
     start_s = BETWEEN_S * np.concatenate([len(turned) + np.arange(len(JOINTS)), np.arange(len(turned))])
     length_s = np.repeat([DWELL_S, SWEEP_S], [len(JOINTS), len(turned)])
     warm_c = 22 + warmer_k * np.sin(start_s / 60 + rng.uniform(0, 2 * np.pi))
-    stood = [*map(Stood, JOINTS), *(Stood(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned)]
+    stood = [
+        *map(Posture, JOINTS),
+        *(Posture(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned),
+    ]
     pieces = [
-        Piece(number, (start, start + length), round(SAMPLE_RATE_HZ * length), warm, place)
+        ReferenceWindow(number, (start, start + length), round(SAMPLE_RATE_HZ * length), warm, place)
         for number, (start, length, warm, place) in enumerate(zip(start_s, length_s, warm_c, stood, strict=True))
     ]
-    own = errors_of(sheet, pieces, STEPS_K[part], second_order=False)
-    movement = replace(straight, own=own, arm_turns=arm_turns(stood, NOMINAL, np.eye(3)))
+    own = list_sensor_errors(sheet, pieces, STEPS_K[part], second_order=False)
+    movement = replace(straight, own=own, arm_turns=list_arm_rotations(stood, NOMINAL, np.eye(3)))
     session = Session(part, truth, movement, _parameters(truth, np.zeros(3)), arm_rad)
 
     def within(half_width: float) -> Array:
@@ -140,7 +149,9 @@ def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
         own_shares=OWN_SHARES,
     )
     freedom = np.full(movement.readings().size, AVERAGED)
-    budget = accelerometer_budget(solution, movement, SITE, 0.0, sheet=sheet_of(session.part), noise_freedom=freedom)
+    budget = accelerometer_budget(
+        solution, movement, SITE, 0.0, datasheet=sheet_of(session.part), noise_freedom=freedom
+    )
     found = np.concatenate([1 / np.linalg.norm(solution.matrix, axis=1), solution.bias_m_s2])
     return solution, budget, found - session.parameters
 
@@ -148,8 +159,13 @@ def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
 def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
     """What is held against itself."""
     turned = planned(AXES)
-    stood = [*map(Stood, JOINTS), *(Stood(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned)]
-    known = Known(NOMINAL, float(np.degrees(STANDARD * session.arm_rad)), np.eye(3), solution.attitude_error.std_rad)
+    stood = [
+        *map(Posture, JOINTS),
+        *(Posture(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned),
+    ]
+    known = StatedArm(
+        NOMINAL, float(np.degrees(STANDARD * session.arm_rad)), np.eye(3), solution.attitude_error.std_rad
+    )
     patterns = arm_patterns(solution.theta, session.movement, stood, known)
     return ReferenceModel(solution.theta, session.movement, patterns, session.times_s, second_order=False)
 
