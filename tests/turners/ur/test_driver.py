@@ -249,7 +249,7 @@ def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laborator
     wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_one_that_it_leaves_behind_a_stop_that_was_seen_is_stopped_too(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
         arm.take_control(PAYLOAD)
@@ -285,7 +285,7 @@ def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_long_before_t
         assert on_its_way(laboratory)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_hung_child_is_answered_by_a_stop_also_when_no_descriptor_is_left(laboratory: WorldHandle) -> None:
     others = set(multiprocessing.active_children())
     with Arm(laboratory.host) as arm, ExitStack() as used:
@@ -333,7 +333,7 @@ def test_ctrl_c_stops_the_arm_at_once_and_goes_on_to_the_caller(laboratory: Worl
         assert fault.value.name == "arm_stopped"
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_three_ctrl_c_at_once_end_with_how_the_arm_was_left(world: World) -> None:
     laboratory = world({"world": {"time_scale": 1}})  # braking takes longer than the three
 
