@@ -14,7 +14,7 @@ from rig.estimation.design.attitude_design import (
     expected_stds,
     g_efficiency,
 )
-from rig.estimation.reference.attitude_error import effects, whitening_with
+from rig.estimation.reference.attitude_error import effects, find_whiteners
 from rig.estimation.reference.reference_model import KnownNorm, weighted_jacobian
 from rig.estimation.reference.triaxial import solve_triaxial
 from support.motions.arm_attitudes import attitudes_of, joints_rad
@@ -82,7 +82,7 @@ def test_no_other_eighteen_of_the_grid_are_noticeably_better() -> None:
     attitudes, theta = flange_to_base(grid), np.array([*np.eye(3).ravel(), *UP, 0.0, 0.0, 0.0])
     still = np.zeros((len(grid), 3))
     noise = np.full_like(still, (KVH / G) ** 2 / 10)
-    white = whitening_with(noise, effects(theta, attitudes, still), np.full(len(grid), 1e-3))
+    white = find_whiteners(noise, effects(theta, attitudes, still), np.full(len(grid), 1e-3))
     rows = weighted_jacobian(theta, attitudes, still, white, norm_known=True).reshape(len(grid), 3, -1)
     each = information(rows)
     best = log_determinant(each, exchange_search(each, 18, np.random.default_rng(0), starts=10))

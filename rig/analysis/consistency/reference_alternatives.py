@@ -10,8 +10,8 @@ import numpy as np
 
 from rig.analysis.consistency.residual_tests import Alternatives, FaultMode
 from rig.estimation.arrays import Array
-from rig.estimation.reference.accelerometer_model import SECOND, Movement, cross, felt, jacobian
-from rig.estimation.reference.reading_errors import in_sweeps, of_pieces, of_sensor, per_axis
+from rig.estimation.reference.accelerometer_model import SECOND, Movement, cross, find_force, jacobian
+from rig.estimation.reference.reading_errors import per_axis, project_errors, repeat_by_segment, select_sweeps
 from rig.estimation.reference.reference_model import REFERENCE, matrix
 
 
@@ -42,18 +42,18 @@ class ReferenceModel:
 
 def alternatives(model: ReferenceModel) -> Alternatives:
     """Return the columns (3 K, k) of each alternative, by the check's name; None stands for all residuals."""
-    s, f, time = felt(model.theta, model.movement), matrix(model.theta), _time(model)
+    s, f, time = find_force(model.theta, model.movement), matrix(model.theta), _time(model)
     columns: dict[str, Array | None] = {
         "bias_changed": bias_drift_columns(model),
         "scale_changed": per_axis((s @ f.T) * time[:, None]),
         "loose_mounting": ((f @ -cross(s)) * time[:, None, None]).reshape(-1, 3),
         "even_term": jacobian(model.theta, model.movement)[:, SECOND],
-        "odd_term": of_sensor(model.theta, model.movement, lambda component: component**3),
-        "asymmetry": of_sensor(model.theta, model.movement, np.abs),
+        "odd_term": project_errors(model.theta, model.movement, lambda component: component**3),
+        "asymmetry": project_errors(model.theta, model.movement, np.abs),
         "residuals": None,
     }
     if model.dwells and model.sweeps:
-        columns["sweeps_against_dwells"] = in_sweeps(model.movement)
+        columns["sweeps_against_dwells"] = select_sweeps(model.movement)
     return columns
 
 
@@ -72,7 +72,7 @@ def bias_drift_columns(model: ReferenceModel) -> Array:
 
 def _time(model: ReferenceModel) -> Array:
     """Return the times (K,) of the middles, from −1 to 1."""
-    middle = of_pieces(model.times_s, model.movement)
+    middle = repeat_by_segment(model.times_s, model.movement)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
     return time
 
@@ -80,7 +80,7 @@ def _time(model: ReferenceModel) -> Array:
 def _half_step(model: ReferenceModel) -> Array:
     """Return (K, 1): ½ in the second half of the time, −½ in the first: a change half-way, about its mean."""
     middle = (model.times_s.min() + model.times_s.max()) / 2
-    return of_pieces(np.where(model.times_s > middle, 0.5, -0.5), model.movement)[:, None]
+    return repeat_by_segment(np.where(model.times_s > middle, 0.5, -0.5), model.movement)[:, None]
 
 
 def _dwell_columns(model: ReferenceModel) -> Array:
@@ -91,7 +91,7 @@ def _dwell_columns(model: ReferenceModel) -> Array:
 
 def _axis_components(model: ReferenceModel) -> Array:
     """Return the components (K, 3) of the reference along the sensor's axes."""
-    component: Array = felt(model.theta, model.movement) @ matrix(model.theta).T
+    component: Array = find_force(model.theta, model.movement) @ matrix(model.theta).T
     return component
 
 
@@ -100,7 +100,7 @@ def _bend_pattern(change: Callable[[Array], Array]) -> Callable[[ReferenceModel]
 
     def patterns(model: ReferenceModel) -> Array:
         size = float(np.linalg.norm(model.theta[REFERENCE]))
-        return of_sensor(model.theta, model.movement, lambda component: size * change(component / size))
+        return project_errors(model.theta, model.movement, lambda component: size * change(component / size))
 
     return patterns
 
@@ -121,7 +121,7 @@ FAULT_MODES: tuple[FaultMode[ReferenceModel], ...] = (  # (3 K, k) each
     FaultMode(
         "the sensor turns on the flange half-way", "loose_mounting", "rad",
         lambda model: (
-            (matrix(model.theta) @ -cross(felt(model.theta, model.movement))) * _half_step(model)[:, :, None]
+            (matrix(model.theta) @ -cross(find_force(model.theta, model.movement))) * _half_step(model)[:, :, None]
         ).reshape(-1, 3),
     ),
     FaultMode("an even part, of v²/g", "even_term", "1", _bend_pattern(np.square)),
@@ -131,7 +131,10 @@ FAULT_MODES: tuple[FaultMode[ReferenceModel], ...] = (  # (3 K, k) each
         _bend_pattern(lambda component: np.abs(component) / 2),
     ),
     FaultMode(
-        "another bias in sweeps than in dwells", "sweeps_against_dwells", None, lambda model: in_sweeps(model.movement)
+        "another bias in sweeps than in dwells",
+        "sweeps_against_dwells",
+        None,
+        lambda model: select_sweeps(model.movement),
     ),
     FaultMode("another reading in one dwell", "disturbed_dwell", None, _dwell_columns),
 )  # fmt: skip

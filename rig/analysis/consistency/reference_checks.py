@@ -29,10 +29,10 @@ from rig.analysis.consistency.residual_tests import (
 )
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import effects, predicted
-from rig.estimation.reference.attitude_error import likeliest
+from rig.estimation.reference.attitude_error import maximise_likelihood
 from rig.estimation.reference.imu_fit import slopes
 from rig.estimation.reference.reading_errors import noise
-from rig.estimation.reference.shared_errors import apart, information
+from rig.estimation.reference.shared_errors import decorrelate, information
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class WhitenedReference:
         from scipy.special import chdtri
 
         model = self._extend_model(nuisance)
-        delta_rad, base_likelihood = likeliest(self.growth, self.residuals, model)
+        delta_rad, base_likelihood = maximise_likelihood(self.growth, self.residuals, model)
         if columns is None:
             freedom = len(self.residuals) - model.shape[1]
             residuals = self._whiten_residuals(model, delta_rad)[1]
@@ -78,7 +78,7 @@ class WhitenedReference:
         new = remaining_directions(orthonormal_basis(model), self.rotation @ columns)
         if not new.shape[1]:
             return None
-        _, extended_likelihood = likeliest(self.growth, self.residuals, model, new)
+        _, extended_likelihood = maximise_likelihood(self.growth, self.residuals, model, new)
         return 2 * (base_likelihood - extended_likelihood), self._limit(model, new, delta_rad, false_alarm_probability)
 
     def minimal_detectable_size(
@@ -119,7 +119,7 @@ class WhitenedReference:
 
     def _estimate_delta(self, model: Array) -> float:
         """Return δ from the residuals of the model."""
-        return likeliest(self.growth, self.residuals, model)[0]
+        return maximise_likelihood(self.growth, self.residuals, model)[0]
 
     def _whiten_residuals(self, model: Array, delta_rad: float) -> tuple[Array, Array]:
         """Return the model's basis and residuals, whitened with δ."""
@@ -195,11 +195,12 @@ def _detection_limits(
 def _whiten_readings(readings: ReferenceModel, *, drifting: bool) -> WhitenedReference:
     """Return the readings and the model of a reference, whitened and decoupled."""
     theta, movement = readings.theta, readings.movement
-    decoupled = apart(
+    decoupled = decorrelate(
         noise(theta, movement) + readings.error_patterns.T @ readings.error_patterns, effects(theta, movement)
     )
     model = slopes(theta, movement, second_order=readings.second_order)
     if drifting:
         model = np.column_stack([model, bias_drift_columns(readings)])
     residuals = (movement.readings() - predicted(theta, movement)).ravel()
-    return WhitenedReference(decoupled.turn @ residuals, decoupled.turn @ model, decoupled.turn, decoupled.growth)
+    whitener = decoupled.transform
+    return WhitenedReference(whitener @ residuals, whitener @ model, whitener, decoupled.growth)

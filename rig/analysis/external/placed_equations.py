@@ -12,7 +12,7 @@ from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import Dwells
 from rig.estimation.reference.attitude_error import Placed
-from rig.estimation.reference.reference_model import Known, KnownNorm, KnownVector
+from rig.estimation.reference.reference_model import KnownNorm, KnownVector, ReferencePrior
 from rig.estimation.reference.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.observation.external.attitude_import import PlacedReadings, Rows
 from rig.observation.external.placements import Placements
@@ -29,7 +29,7 @@ class Equations:
     variances: Array
     attitudes: Array
     std_rad: Array | None
-    known: Known
+    known: ReferencePrior
     freedom: Array
     second_order: bool = False
 

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.reference.attitude_error import effects, whitening_with
+from rig.estimation.reference.attitude_error import effects, find_whiteners
 from rig.estimation.reference.reference_model import (
     BIAS,
     REFERENCE,
@@ -116,7 +116,7 @@ def expected_stds(
     theta, count = _ideal(reference_m_s2, order), len(attitudes)
     v_bar = np.zeros((count, 3))
     variances = np.repeat(noise_m_s2[:, None] ** 2, 3, axis=1)
-    white = whitening_with(variances, effects(theta, attitudes, v_bar), np.full(count, attitude_std_rad))
+    white = find_whiteners(variances, effects(theta, attitudes, v_bar), np.full(count, attitude_std_rad))
     bound = covariance_bound(theta, attitudes, v_bar, white, norm_known=True)
     between = np.zeros((3, len(theta)))  # about F = 1 the cosine between two axes is the sum of their two elements
     for row, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):

@@ -2,8 +2,8 @@
 
     a_m = F (s + F̄ s²) + b,   s = −Rᵀ g
 
-s is the specific force, what an accelerometer feels: at rest the opposite of gravity. Eq. (10) writes g for it and
-Eq. (11) −Rᵀ g in the first-order term; in the second-order term the sign does not matter. F̄ = diag(φ).
+s is the specific force: at rest the opposite of gravity. Eq. (10) writes g for it and Eq. (11) −Rᵀ g in the first-order
+term; in the second-order term the sign does not matter. F̄ = diag(φ).
 """
 
 import numpy as np
@@ -15,9 +15,9 @@ MODEL = "a_m = F (s + φ s²) + b, s = −Rᵀ g"
 
 
 def specific_force(readings_m_s2: ArrayLike, matrix: Array, bias_m_s2: Array, second_order_s2_m: Array | None) -> Array:
-    """Calibrated readings s (…, 3), m/s²: the smaller root of φ s² + s = F⁻¹ (a_m − b); φ (3,) may be None."""
+    """Return the specific force s (…, 3) in m/s²: the smaller root of φ s² + s = F⁻¹ (a_m − b); φ (3,) or None."""
     linear = (np.asarray(readings_m_s2, dtype=np.float64) - bias_m_s2) @ np.linalg.inv(matrix).T
     if second_order_s2_m is None:
         return np.asarray(linear, dtype=np.float64)
-    # The usual formula divides by φ, which may be zero; this one is the same root.
+    # The usual formula divides by φ, which may be zero; this form of the same root does not.
     return np.asarray(2 * linear / (1 + np.sqrt(1 + 4 * second_order_s2_m * linear)), dtype=np.float64)

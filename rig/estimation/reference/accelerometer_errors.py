@@ -1,13 +1,12 @@
-"""What an accelerometer adds to its readings of which only the likely size is known before: bending, and drift.
+"""An accelerometer's errors with prior variances: nonlinearity, temperature and bias drift.
 
-Its reading r is not quite linear in the specific force v along its axis, and its scale and bias follow its temperature:
+Its reading r is slightly nonlinear in the specific force v along its axis, and scale and bias follow its temperature:
 
     r = (1 + κ ΔT) v + φ v² + χ (v³ − g² v) + b + β ΔT + w(t)
 
-φ, χ, β and κ of each axis are zero on average, w is flicker and a random walk. The scale so is that of the readings at
-1 g up and 1 g down, which φ and χ leave alone, and b the reading at 0 g, as makers of such parts have both (ST DS12140,
-section 4.6.1 and 4.6.2); both at the mean temperature of the readings, b with the mean of w over the time that is
-looked at.
+φ, χ, β and κ of each axis are zero on average, w is flicker and a random walk. So the scale is that of the readings at
+1 g up and 1 g down, which φ and χ do not change, and b the reading at 0 g, as data sheets define both (ST DS12140,
+sections 4.6.1 and 4.6.2); both at the mean temperature of the readings, b with the mean of w over their time.
 """
 
 from dataclasses import dataclass, replace
@@ -19,17 +18,16 @@ from rig.estimation.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class AccelerometerErrors:
-    """One standard uncertainty of each, alike for all axes, and what was recorded in dwells and sweeps (K' of them).
+    """One standard uncertainty of each error, alike for all axes, and the records of K' dwells and sweeps.
 
-    - `even_s2_m` φ, zero where it is looked for; `odd_s4_m2` χ; `norm_m_s2` g.
-    - `bias_m_s2_k` β, `scale_per_k` κ; `warmer_k` (K',) is ΔT as recorded, `unseen_k` (K',) what the recorded steps may
-      hide of it.
-    - `windows_s` (K', 2): when each began and ended.
+    - `even_s2_m` φ, zero if it is estimated; `odd_s4_m2` χ; `norm_m_s2` g.
+    - `bias_m_s2_k` β, `scale_per_k` κ; `warmer_k` (K',): ΔT as recorded, `unseen_k` (K',): hidden by the recorded
+      steps.
+    - `windows_s` (K', 2): begin and end of each.
     - `instability_m_s2`: the least Allan deviation of the flicker in w.
 
-    Beside these, as the readings themselves say: `walk_m_s2_sqrt_s`, what w walks in a second; `louder` (K',), the
-    variance of a dwell or sweep that was disturbed for itself, in that of its noise; `turning_m_s2`, by how much the
-    bias is another in all sweeps.
+    Estimated from the readings: `walk_m_s2_sqrt_s`, the random walk of w; `louder` (K',), the extra variance of a
+    disturbed dwell or sweep, relative to its noise; `turning_m_s2`, the difference of the bias in all sweeps.
     """
 
     even_s2_m: float
@@ -45,13 +43,13 @@ class AccelerometerErrors:
     louder: Array | None = None
     turning_m_s2: float = 0.0
 
-    def without(self, piece: int) -> "AccelerometerErrors":
-        """The errors in all but one dwell or sweep."""
-        left = np.arange(len(self.warmer_k)) != piece
+    def without(self, segment: int) -> "AccelerometerErrors":
+        """Return the errors in all but one dwell or sweep, by its index `segment`."""
+        remaining = np.arange(len(self.warmer_k)) != segment
         return replace(
             self,
-            warmer_k=self.warmer_k[left],
-            unseen_k=self.unseen_k[left],
-            windows_s=self.windows_s[left],
+            warmer_k=self.warmer_k[remaining],
+            unseen_k=self.unseen_k[remaining],
+            windows_s=self.windows_s[remaining],
             louder=None,
         )

@@ -1,25 +1,25 @@
-"""What an accelerometer on an arm's flange feels: at rest in attitudes, and in sweeps by their first harmonic.
+"""The readings of an accelerometer on an arm's flange: at rest in attitudes, and in sweeps by their first harmonic.
 
     m = F (s + φ s²) + b,   s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)
 
-in flange coordinates; F holds the mounting. v_ref is the specific force at rest, in base coordinates; p goes from the
-axis that turns to the flange, the arm knows it; r, the lever arm, from the flange to the sensor.
+in flange coordinates; F includes the mounting. v_ref is the specific force at rest, in base coordinates; p, from the
+rotation axis to the flange, is given by the arm; r, the lever arm, from the flange to the sensor.
 
-A joint that turns by θ about the flange-fixed axis a, from the attitude R₀, at the constant rate ω, is felt as a mean,
-a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = ω² (a aᵀ − 1) (p + r):
+If a joint turns by θ about the flange-fixed axis a, from the attitude R₀, at the constant rate ω, the specific force
+has a mean, a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = ω² (a aᵀ − 1) (p + r):
 
     mean: a (a·u) + c,   cosine: cos ψ (u − a (a·u)) + sin ψ a × u,   sine: sin ψ (u − a (a·u)) − cos ψ a × u
 
-A joint turns unevenly. The weights that make mean, cosine and sine of the readings make those of ω² and of α as the
-encoders have them (`Sweeps.turning_rad2_s2`), and c is each of these times (a aᵀ − 1) (p + r) and a × (p + r). What the
-lag changes in an uneven turn is that ω² and α are those of τ before, and that gravity turned by (ω − ω₀) τ less.
+A joint turns unevenly. The weights that form mean, cosine and sine of the readings form those of ω² and of α by the
+encoders (`Sweeps.turning_rad2_s2`), and c is each of these times (a aᵀ − 1) (p + r) and a × (p + r). In uneven
+rotation, the lag changes ω² and α to those of τ before, and the rotation of gravity by (ω − ω₀) τ.
 
-ψ = ω τ is what the joint turns while the accelerometer lags behind the clock of its time stamps: with opposite signs
-for opposite directions. Where a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. What the
-filter takes of the size, (ω τ)²/2 at most, is left out: 14 ppm at 60°/s and 5 ms.
+ψ = ω τ is the joint's rotation during the lag τ of the accelerometer behind the clock of its time stamps: with opposite
+signs for opposite directions. If a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. The
+filter's attenuation, (ω τ)²/2 at most, is neglected: 14 ppm at 60°/s and 5 ms.
 
-Dwells and sweeps are one list of K = N + 3 M vectors: the N dwells, then mean, cosine and sine of each of M sweeps.
-θ (22,) holds F row by row, v_ref, b, r, τ and φ.
+Dwells and sweeps are one list of K = N + 3 M vectors: the N dwells, then mean, cosine and sine of each of M sweeps. θ
+(22,) contains F row by row, v_ref, b, r, τ and φ.
 """
 
 from dataclasses import dataclass, replace
@@ -34,12 +34,12 @@ from rig.estimation.reference.reference_model import BIAS, REFERENCE, matrix
 
 LEVER, DELAY, SECOND = slice(15, 18), 18, slice(19, 22)
 PARAMETERS = 22
-OWN_ERRORS = 3  # of a dwell: a small turn of the flange
-SHARED_ERRORS = 10  # of a station: a small turn in the flange's frame, one in the base's, four waves of the angle
-TURNS = 6  # of these ten, both turns
-OWN_SHARE = 0.2  # of δ², in what is off anew in each dwell; the others are what each wrist always errs by
+OWN_ERRORS = 3  # of a dwell: a small rotation of the flange
+SHARED_ERRORS = 10  # of a station: a small rotation in the flange's frame, one in the base's, four waves of the angle
+TURNS = 6  # of these ten: both rotations
+OWN_SHARE = 0.2  # of δ²: errors independent in each dwell; the others are constant errors of the wrists
 CROSS = np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), 1, 2)  # [v]× of the axes
-SHARE = 0.5**0.5  # of δ, in each: so both turns together are off as far as a dwell is, and so are all waves together
+SHARE = 0.5**0.5  # of δ, in each: both rotations together, and all waves, have the size of a dwell's error
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +55,13 @@ class Dwells:
 class Sweeps:
     """Whole revolutions at nearly constant speed.
 
-    - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z;
-      `covariances_m2_s4` (M, 9, 9) of these nine, row by row. `rig.estimation.reference.sweep_harmonics` makes both.
-    - `axes_flange` (M, 3): unit vector of a growing angle; `speeds_rad_s` (M,): negative where the angle falls.
-    - `attitudes` (M, 3, 3): flange to base where the angle is counted from.
+    - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z, with the
+    - `covariances_m2_s4` (M, 9, 9) of these nine, row by row, by `rig.estimation.reference.sweep_harmonics`.
+    - `axes_flange` (M, 3): unit vector of a growing angle; `speeds_rad_s` (M,): negative if the angle falls.
+    - `attitudes` (M, 3, 3): flange to base at the angle zero.
     - `arms_m` (M, 3): p, from the axis to the flange's origin, in flange coordinates.
-    - `stations` (M,): a number for each joint and pose; sweeps of one station, both ways, share the arm's errors.
-    - `turning_rad2_s2` (M, 6, 3): mean, cosine and sine of how the joint turned: see
-      `rig.estimation.reference.sweep_harmonics.FirstHarmonic`.
+    - `stations` (M,): a number for each joint and pose; sweeps of one station, in either direction, share errors.
+    - `turning_rad2_s2` (M, 6, 3): mean, cosine and sine of the joint's motion, as in `FirstHarmonic`.
     """
 
     harmonics_m_s2: Array
@@ -75,7 +74,7 @@ class Sweeps:
     stations: NDArray[np.intp]
 
     def alone(self) -> "Sweeps":
-        """The sweeps, each at a station of its own."""
+        """Return the sweeps with a separate station for each."""
         return replace(self, stations=np.arange(len(self.stations)))
 
 
@@ -96,11 +95,11 @@ NO_SWEEPS = Sweeps(
 class Movement:
     """Dwells and sweeps together.
 
-    `repeatability_rad`: the standard deviation of the small turns by which each sweep is off for itself, about each
-    axis, where those of one station share all else: a joint that is come to from the other side stands elsewhere.
-    `own`: what the sensor itself adds; None of sensors of which nothing is known.
-    `arm_turns` (P, 3 N + 10 M): what P errors of the arm's do to each dwell and sweep, by δ, as `effects` counts their
-    turns; None where nothing is known of the arm but that it errs. `own_share` of δ² is off anew in each dwell.
+    - `repeatability_rad`: standard deviation of the independent rotations of each sweep; a station shares all other
+      errors.
+    - `own`: errors of the sensor itself; None if unknown.
+    - `arm_turns` (P, 3 N + 10 M): effects of P errors of the arm by δ, in the order of `effects`; None if unknown.
+    - `own_share`: the fraction of δ² that is independent in each dwell.
     """
 
     dwells: Dwells
@@ -111,80 +110,84 @@ class Movement:
     own_share: float = OWN_SHARE
 
     def without(self, dwell: int) -> "Movement":
-        """The movement with all but one dwell."""
-        left = np.arange(len(self.dwells.readings_m_s2)) != dwell
-        kept, places = self.dwells, np.arange(OWN_ERRORS * dwell, OWN_ERRORS * (dwell + 1))
+        """Return the movement with all but one dwell."""
+        remaining = np.arange(len(self.dwells.readings_m_s2)) != dwell
+        dwells, columns = self.dwells, np.arange(OWN_ERRORS * dwell, OWN_ERRORS * (dwell + 1))
         return replace(
             self,
-            dwells=Dwells(kept.readings_m_s2[left], kept.variances_m2_s4[left], kept.attitudes[left]),
+            dwells=Dwells(
+                dwells.readings_m_s2[remaining], dwells.variances_m2_s4[remaining], dwells.attitudes[remaining]
+            ),
             own=None if self.own is None else self.own.without(dwell),
-            arm_turns=None if self.arm_turns is None else np.delete(self.arm_turns, places, axis=1),
+            arm_turns=None if self.arm_turns is None else np.delete(self.arm_turns, columns, axis=1),
         )
 
     def readings(self) -> Array:
-        """(K, 3) readings in dwells, then the harmonics of sweeps, m/s²."""
+        """Return the readings (K, 3) in dwells, then the harmonics of sweeps, m/s²."""
         return np.concatenate([self.dwells.readings_m_s2, self.sweeps.harmonics_m_s2.reshape(-1, 3)])
 
     def noise(self) -> Array:
-        """(3 K, 3 K) covariance of the readings' noise."""
-        own = self.dwells.variances_m2_s4.size
-        whole = np.zeros((own + 9 * len(self.sweeps.speeds_rad_s),) * 2)
-        whole[:own, :own] = np.diag(self.dwells.variances_m2_s4.ravel())
-        for sweep, covariance in enumerate(self.sweeps.covariances_m2_s4):
-            place = slice(own + 9 * sweep, own + 9 * sweep + 9)
-            whole[place, place] = covariance
-        return whole
+        """Return the covariance (3 K, 3 K) of the readings' noise."""
+        still = self.dwells.variances_m2_s4.size
+        noise = np.zeros((still + 9 * len(self.sweeps.speeds_rad_s),) * 2)
+        noise[:still, :still] = np.diag(self.dwells.variances_m2_s4.ravel())
+        for sweep, of_sweep in enumerate(self.sweeps.covariances_m2_s4):
+            block = slice(still + 9 * sweep, still + 9 * sweep + 9)
+            noise[block, block] = of_sweep
+        return noise
 
-    def pieces(self) -> list[slice]:
-        """Where the readings of each dwell stand among all 3 K, then those of each sweep."""
-        still, swept = len(self.dwells.readings_m_s2), len(self.sweeps.speeds_rad_s)
-        first = [3 * dwell for dwell in range(still)] + [3 * still + 9 * sweep for sweep in range(swept + 1)]
+    def segments(self) -> list[slice]:
+        """Return the slice of each dwell among all 3 K readings, then those of each sweep."""
+        still, turning = len(self.dwells.readings_m_s2), len(self.sweeps.speeds_rad_s)
+        first = [3 * dwell for dwell in range(still)] + [3 * still + 9 * sweep for sweep in range(turning + 1)]
         return [slice(*ends) for ends in pairwise(first)]
 
     def constant(self) -> Array:
-        """(K,) 1 where the bias is read, 0 in a cosine and a sine."""
+        """Return 1 for a reading that contains the bias, 0 for a cosine and a sine (K,)."""
         return np.concatenate(
             [np.ones(len(self.dwells.readings_m_s2)), np.tile([1.0, 0.0, 0.0], len(self.sweeps.speeds_rad_s))]
         )
 
 
 def predicted(theta: Array, movement: Movement) -> Array:
-    """(K, 3) readings of the model."""
-    s = felt(theta, movement)
+    """Return the readings (K, 3) of the model."""
+    s = find_force(theta, movement)
     readings: Array = (s + theta[SECOND] * _product(s, s, movement)) @ matrix(theta).T
     return readings + movement.constant()[:, None] * theta[BIAS]
 
 
-def felt(theta: Array, movement: Movement) -> Array:
-    """s (K, 3), what is felt in dwells and sweeps."""
-    gravity, lever = of_gravity(theta[DELAY], movement), of_lever(theta[DELAY], movement)
+def find_force(theta: Array, movement: Movement) -> Array:
+    """Return the specific force s (K, 3) in dwells and sweeps."""
+    gravity, lever = project_reference(theta[DELAY], movement), project_lever_arm(theta[DELAY], movement)
     s: Array = gravity @ theta[REFERENCE] + lever @ theta[LEVER]
-    return s + of_arms(theta[DELAY], movement)
+    return s + find_flange_acceleration(theta[DELAY], movement)
 
 
-def of_gravity(delay_s: float, movement: Movement) -> Array:
-    """(K, 3, 3) what takes v_ref to what is felt of it."""
+def project_reference(delay_s: float, movement: Movement) -> Array:
+    """Return the matrices (K, 3, 3) that map v_ref to its part of the specific force."""
     sweeps = movement.sweeps
     to_flange = np.swapaxes(sweeps.attitudes, -1, -2)
-    along = sweeps.axes_flange[:, :, None] * sweeps.axes_flange[:, None, :]
-    across, turned = np.eye(3) - along, cross(sweeps.axes_flange)
+    parallel = sweeps.axes_flange[:, :, None] * sweeps.axes_flange[:, None, :]
+    across, rotated = np.eye(3) - parallel, cross(sweeps.axes_flange)
     phase = sweeps.speeds_rad_s * delay_s
     cos, sin = np.cos(phase)[:, None, None], np.sin(phase)[:, None, None]
-    waves = np.stack([along, cos * across + sin * turned, sin * across - cos * turned], axis=1) @ to_flange[:, None]
-    waves = waves + delay_s * _turned_unevenly(waves, sweeps)
+    waves = (
+        np.stack([parallel, cos * across + sin * rotated, sin * across - cos * rotated], axis=1) @ to_flange[:, None]
+    )
+    waves = waves + delay_s * _differentiate_lag(waves, sweeps)
     return np.concatenate([np.swapaxes(movement.dwells.attitudes, -1, -2), waves.reshape(-1, 3, 3)])
 
 
-def _turned_unevenly(waves: Array, sweeps: Sweeps) -> Array:
-    """Return (M, 3, …) what a second of lag changes in waves (M, 3, …) of the angle, beside a turn at the mean rate."""
+def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
+    """Return the change (M, 3, …) of waves (M, 3, …) of the angle per second of lag, without the mean rate's."""
     by_wave = (len(waves), 3, *(1,) * (waves.ndim - 2))
     cosine, sine = (sweeps.turning_rad2_s2[:, row] / sweeps.speeds_rad_s[:, None] for row in (4, 5))
     changed: Array = sine.reshape(by_wave) * waves[:, 1:2] - cosine.reshape(by_wave) * waves[:, 2:]
     return changed
 
 
-def of_lever(delay_s: float, movement: Movement) -> Array:
-    """(K, 3, 3) what takes the lever arm to the acceleration of turning: at constant speed in a sweep's mean alone."""
+def project_lever_arm(delay_s: float, movement: Movement) -> Array:
+    """Return the matrices (K, 3, 3) that map the lever arm to its acceleration: at constant speed, in means alone."""
     sweeps, now, change = movement.sweeps, slice(0, 2), slice(2, 4)
     turning = sweeps.turning_rad2_s2
     phase = (delay_s * sweeps.speeds_rad_s)[:, None, None]
@@ -192,7 +195,7 @@ def of_lever(delay_s: float, movement: Movement) -> Array:
 
 
 def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
-    """(K, 3, 3) what takes a lever arm to its acceleration by ω² and α (M, 2, 3) in sweeps."""
+    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration by ω² and α (M, 2, 3) in sweeps."""
     axes = movement.sweeps.axes_flange
     centripetal, euler = axes[:, :, None] * axes[:, None, :] - np.eye(3), cross(axes)
     squares, accelerations = np.moveaxis(turning_rad2_s2, 1, 0)[..., None, None]
@@ -200,26 +203,26 @@ def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
     return np.concatenate([np.zeros((len(movement.dwells.readings_m_s2), 3, 3)), waves.reshape(-1, 3, 3)])
 
 
-def of_arms(delay_s: float, movement: Movement) -> Array:
-    """(K, 3) acceleration by which the flange itself turns, m/s²."""
-    acceleration: Array = (of_lever(delay_s, movement) @ _arms(np.zeros(3), movement))[..., 0]
+def find_flange_acceleration(delay_s: float, movement: Movement) -> Array:
+    """Return the acceleration (K, 3) of the flange itself in m/s²."""
+    acceleration: Array = (project_lever_arm(delay_s, movement) @ _arms(np.zeros(3), movement))[..., 0]
     return acceleration
 
 
 def _arms(lever_m: Array, movement: Movement) -> Array:
-    """(K, 3, 1) from the axis of each sweep to the sensor; zero in dwells."""
+    """Return the lever arms (K, 3, 1) from the axis of each sweep to the sensor; zero in dwells."""
     still = np.zeros((len(movement.dwells.readings_m_s2), 3))
     return np.concatenate([still, np.repeat(movement.sweeps.arms_m + lever_m, 3, axis=0)])[..., None]
 
 
-def _by_delay(theta: Array, movement: Movement) -> Array:
-    """Return (K, 3) the derivative of what is felt by the delay."""
+def _differentiate_delay(theta: Array, movement: Movement) -> Array:
+    """Return the derivative (K, 3) of the specific force by the delay."""
     sweeps = movement.sweeps
     evenly = replace(movement, sweeps=replace(sweeps, turning_rad2_s2=np.zeros_like(sweeps.turning_rad2_s2)))
-    waves = _waves(of_gravity(theta[DELAY], evenly) @ theta[REFERENCE], movement)
+    waves = _waves(project_reference(theta[DELAY], evenly) @ theta[REFERENCE], movement)
     speeds = sweeps.speeds_rad_s[:, None]
     even = np.stack([np.zeros_like(waves[:, 0]), -speeds * waves[:, 2], speeds * waves[:, 1]], axis=1)
-    uneven = _turned_unevenly(waves, sweeps) + theta[DELAY] * _turned_unevenly(even, sweeps)
+    uneven = _differentiate_lag(waves, sweeps) + theta[DELAY] * _differentiate_lag(even, sweeps)
     later = -speeds[..., None] * sweeps.turning_rad2_s2[:, 2:4]
     changes: Array = (_around_axes(later, movement) @ _arms(theta[LEVER], movement))[..., 0]
     changes[len(movement.dwells.readings_m_s2) :] += (even + uneven).reshape(-1, 3)
@@ -227,90 +230,91 @@ def _by_delay(theta: Array, movement: Movement) -> Array:
 
 
 def jacobian(theta: Array, movement: Movement) -> Array:
-    """(3 K, 22) derivative of the readings with respect to θ."""
-    s, gravity = felt(theta, movement), of_gravity(theta[DELAY], movement)
+    """Return the derivative (3 K, 22) of the readings with respect to θ."""
+    s, gravity = find_force(theta, movement), project_reference(theta[DELAY], movement)
     square = _product(s, s, movement)
     columns = np.zeros((*s.shape, PARAMETERS))
     for axis in range(3):
         columns[:, axis, 3 * axis : 3 * axis + 3] = s + theta[SECOND] * square
         columns[:, axis, BIAS.start + axis] = movement.constant()
     columns[..., REFERENCE] = _read(gravity, s, theta, movement)
-    columns[..., LEVER] = _read(of_lever(theta[DELAY], movement), s, theta, movement)
-    columns[..., DELAY] = _read(_by_delay(theta, movement)[..., None], s, theta, movement)[..., 0]
+    columns[..., LEVER] = _read(project_lever_arm(theta[DELAY], movement), s, theta, movement)
+    columns[..., DELAY] = _read(_differentiate_delay(theta, movement)[..., None], s, theta, movement)[..., 0]
     columns[..., SECOND] = matrix(theta) * square[:, None, :]
     return columns.reshape(-1, PARAMETERS)
 
 
 def effects(theta: Array, movement: Movement) -> Array:
-    """(3 K, P) change of the readings by each of the arm's errors, per radian; P = 3 N + 10 for each station.
+    """Return the effect (3 K, P) of each of the arm's errors on the readings, per radian; P = 3 N + 10 per station.
 
-    A dwell has three of its own. All points of a station's sweeps share ten: small turns of the flange and of the base,
-    and waves of the joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic is kept. Where
-    the wrists' errors are known by kind they follow, shared by all.
+    A dwell has three of its own. All points of a station's sweeps share ten: small rotations of the flange and of the
+    base, and waves of the joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic remains.
+    If the wrists' errors are known by kind, they follow, shared by all.
     """
-    return shared_out(*new_and_always(theta, movement), movement.own_share)
+    return combine_effects(*split_effects(theta, movement), movement.own_share)
 
 
-def new_and_always(theta: Array, movement: Movement) -> tuple[Array, Array | None]:
-    """The columns of `effects` by what is off anew each time, and by what each wrist always errs by, if it is known."""
-    own = turned(theta, movement)
+def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None]:
+    """Return the columns of `effects` by independent errors, and by constant errors of the wrists, if known."""
+    independent = turned(theta, movement)
     if movement.arm_turns is None:
-        return own, None
-    return own, turned(theta, replace(movement, sweeps=movement.sweeps.alone())) @ movement.arm_turns.T
+        return independent, None
+    return independent, turned(theta, replace(movement, sweeps=movement.sweeps.alone())) @ movement.arm_turns.T
 
 
-def shared_out(own: Array, always: Array | None, own_share: float) -> Array:
-    """(3 K, P) columns of the arm's errors, of δ² as the new ones and those of always share it."""
-    if always is None:
-        return own
-    return np.concatenate([np.sqrt(own_share) * own, np.sqrt(1 - own_share) * always], axis=1)
+def combine_effects(independent: Array, constant: Array | None, fraction: float) -> Array:
+    """Return the columns (3 K, P) of the arm's errors: a fraction of δ² is independent, the rest is constant."""
+    if constant is None:
+        return independent
+    return np.concatenate([np.sqrt(fraction) * independent, np.sqrt(1 - fraction) * constant], axis=1)
 
 
 def turned(theta: Array, movement: Movement) -> Array:
-    """How the readings change with small turns of dwells and stations, each for itself."""
+    """Return the effect of independent small rotations of each dwell and station on the readings."""
     count, sweeps = len(movement.dwells.readings_m_s2), movement.sweeps
-    gravity, s = of_gravity(theta[DELAY], movement), felt(theta, movement)
-    stations, places = np.unique(sweeps.stations, return_inverse=True)
+    gravity, s = project_reference(theta[DELAY], movement), find_force(theta, movement)
+    stations, indices = np.unique(sweeps.stations, return_inverse=True)
     changes = np.zeros((len(gravity), 3, OWN_ERRORS * count + SHARED_ERRORS * len(stations)))
-    for dwell, own in enumerate(cross(s[:count])):
-        changes[dwell, :, OWN_ERRORS * dwell : OWN_ERRORS * (dwell + 1)] = own
-    in_base, pulled = gravity[count:] @ cross(theta[REFERENCE]), gravity[count:] @ theta[REFERENCE]
-    shared = SHARE * np.concatenate([cross(s[count:]), in_base, _of_angle(pulled, theta, sweeps)], axis=2)
-    for row, place in enumerate(np.repeat(places, 3)):
-        first = OWN_ERRORS * count + SHARED_ERRORS * place
+    for dwell, columns in enumerate(cross(s[:count])):
+        changes[dwell, :, OWN_ERRORS * dwell : OWN_ERRORS * (dwell + 1)] = columns
+    in_base, apparent = gravity[count:] @ cross(theta[REFERENCE]), gravity[count:] @ theta[REFERENCE]
+    shared = SHARE * np.concatenate([cross(s[count:]), in_base, _differentiate_angle(apparent, theta, sweeps)], axis=2)
+    for row, index in enumerate(np.repeat(indices, 3)):
+        first = OWN_ERRORS * count + SHARED_ERRORS * index
         changes[count + row, :, first : first + SHARED_ERRORS] = shared[row]
     return _read(changes, s, theta, movement).reshape(3 * len(gravity), -1)
 
 
-def _of_angle(pulled: Array, theta: Array, sweeps: Sweeps) -> Array:
-    """(3 M, 3, 4) change of what is felt by waves w of the angle: gravity `pulled` turns by w, the rate grows by ω w′.
+def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array:
+    """Return the change (3 M, 3, 4) of the specific force by waves w of the angle.
 
-    Gravity by w times the derivative of its first harmonic; centripetal 2 ω² w′ (a aᵀ − 1) (p + r) and Euler
-    ω² w″ a × (p + r) have a first harmonic for the waves once a turn. What the delay changes in this is left out.
+    Gravity `apparent` turns by w times the derivative of its first harmonic, the rate grows by ω w′; centripetal 2 ω²
+    w′ (a aᵀ − 1) (p + r) and Euler ω² w″ a × (p + r) have a first harmonic for the waves of one period per revolution.
+    The change of this with the delay is neglected.
     """
     axes, arms, squares = sweeps.axes_flange, sweeps.arms_m + theta[LEVER], sweeps.speeds_rad_s[:, None] ** 2
-    _, cos, sin = np.moveaxis(pulled.reshape(-1, 3, 3), 1, 0)
+    _, cos, sin = np.moveaxis(apparent.reshape(-1, 3, 3), 1, 0)
     centripetal = squares * (axes * np.sum(axes * arms, axis=1, keepdims=True) - arms)
-    euler, nothing = squares * np.cross(axes, arms), np.zeros_like(arms)
+    euler, zeros = squares * np.cross(axes, arms), np.zeros_like(arms)
     waves = [
         (sin / 2, -euler, -2 * centripetal),
         (-cos / 2, 2 * centripetal, -euler),
-        (nothing, sin / 2, cos / 2),
-        (nothing, -cos / 2, sin / 2),
+        (zeros, sin / 2, cos / 2),
+        (zeros, -cos / 2, sin / 2),
     ]
     return np.moveaxis(np.array(waves), (0, 1, 2), (3, 1, 0)).reshape(-1, 3, 4)
 
 
 def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
-    """What changes (K, 3, P) of s (K, 3) change in the readings."""
+    """Return the change (K, 3, P) of the readings by changes (K, 3, P) of s (K, 3)."""
     if not theta[SECOND].any():
         return np.asarray(matrix(theta) @ changes, dtype=np.float64)
-    grown: Array = changes + 2 * theta[SECOND][:, None] * _product(s[..., None], changes, movement)
-    return np.asarray(matrix(theta) @ grown, dtype=np.float64)
+    nonlinear: Array = changes + 2 * theta[SECOND][:, None] * _product(s[..., None], changes, movement)
+    return np.asarray(matrix(theta) @ nonlinear, dtype=np.float64)
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """(K, 3, …) element by element; in a sweep that of two waves, of which the first harmonic is kept."""
+    """Return the product (K, 3, …) by element; in a sweep that of two waves, truncated to the first harmonic."""
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_waves(one, movement), 1, 0)
     others = np.moveaxis(_waves(other, movement), 1, 0)
@@ -326,10 +330,10 @@ def _product(one: Array, other: Array, movement: Movement) -> Array:
 
 
 def _waves(vectors: Array, movement: Movement) -> Array:
-    """(M, 3, …) mean, cosine and sine out of the list of (K, …)."""
+    """Return mean, cosine and sine (M, 3, …) of a list (K, …)."""
     return vectors[len(movement.dwells.readings_m_s2) :].reshape(-1, 3, *vectors.shape[1:])
 
 
 def cross(vectors: Array) -> Array:
-    """(…, 3, 3) matrices [v]×."""
+    """Return the matrices [v]× (…, 3, 3) of vectors (…, 3)."""
     return np.asarray((vectors @ CROSS.reshape(3, 9)).reshape(*vectors.shape, 3), dtype=np.float64)

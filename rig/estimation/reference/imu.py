@@ -1,10 +1,9 @@
-"""An accelerometer calibrated on an arm from sweeps and attitudes together.
+"""Calibration of an accelerometer on an arm from sweeps and attitudes together.
 
 The model is that of `rig.estimation.reference.accelerometer_model`. F, b, the direction of v_ref, the lever arm r, the
-delay τ and, where wanted, φ are found together, by weighted least squares; the weights allow for an arm that is not
-quite where it says. Each dwell is turned by small angles of its own, the points of a sweep by errors that they share,
-all of the common size δ: restricted likelihood over dwells and sweeps together finds it
-(`rig.estimation.reference.shared_errors`).
+delay τ and, if requested, φ are estimated together by generalised least squares with the covariance of the arm's
+attitude errors. Each dwell has independent small rotations, the points of a sweep share errors, all of the common size
+δ: restricted maximum likelihood over dwells and sweeps estimates it (`rig.estimation.reference.shared_errors`).
 """
 
 from collections.abc import Sequence
@@ -33,10 +32,17 @@ from rig.estimation.reference.accelerometer_model import (
     turned,
 )
 from rig.estimation.reference.attitude_error import AttitudeError
-from rig.estimation.reference.imu_fit import Fit, as_expected, free_ways, held_still, most_likely, sizes_of
+from rig.estimation.reference.imu_fit import (
+    Fit,
+    find_free_directions,
+    list_fixed,
+    most_likely,
+    refit_with_components,
+    sizes_of,
+)
 from rig.estimation.reference.linear_start import MAX_CONDITION, REMEDY, linear_start
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, matrix
-from rig.estimation.reference.shared_errors import with_uncertainty
+from rig.estimation.reference.shared_errors import add_uncertainty
 from rig.estimation.reference.triaxial import check_trustworthy
 
 MODEL = "m = F (s + φ s²) + b, s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)"
@@ -47,15 +53,14 @@ class ImuSolution:
     """An accelerometer's calibration from dwells and sweeps.
 
     - `matrix` F (3, 3), `bias_m_s2` b (3,), `reference_m_s2` v_ref (3,) in base coordinates.
-    - `lever_arm_m` r (3,) in the flange's frame and `delay_s` τ, None without sweeps; `second_order_s2_m` φ (3,) or
-      None.
-    - `covariance` (22, 22): the rows of F, v_ref, b, r, τ, φ (`rig.estimation.reference.accelerometer_model`); zero for
-      what was held. `response` (22, 3 K): how they change with the readings.
+    - `lever_arm_m` r (3,) in the flange's frame and `delay_s` τ, None without sweeps.
+    - `second_order_s2_m` φ (3,) or None.
+    - `covariance` (22, 22): of F by rows, v_ref, b, r, τ, φ; zero for fixed ones. `response` (22, 3 K): by the
+      readings.
     - `attitude_error`: δ of the arm, about each axis.
-    - `dwell_residuals_m_s2` (N, 3): reading less model; `chi_square` of these and of the sweeps', which
-      left `freedom`.
-    - `rank`, `condition`: of the readings' derivatives, each column in its own size.
-    - `own`: what the sensor adds, with what the readings say of it; None where nothing is known. `own_share`: of δ².
+    - `dwell_residuals_m_s2` (N, 3): reading less model; `chi_square` of these and the sweeps', with its `freedom`.
+    - `rank`, `condition`: of the readings' derivatives, each column scaled to its norm.
+    - `own`: the sensor's own errors with those estimated; None if unknown. `own_share`: independent fraction of δ².
     """
 
     matrix: Array
@@ -79,14 +84,14 @@ class ImuSolution:
 
     @property
     def theta(self) -> Array:
-        """(22,) parameters as `rig.estimation.reference.accelerometer_model` orders them."""
-        found = np.zeros(PARAMETERS)
-        found[: LEVER.start] = np.concatenate([self.matrix.ravel(), self.reference_m_s2, self.bias_m_s2])
+        """The parameters (22,) in the order of `rig.estimation.reference.accelerometer_model`."""
+        theta = np.zeros(PARAMETERS)
+        theta[: LEVER.start] = np.concatenate([self.matrix.ravel(), self.reference_m_s2, self.bias_m_s2])
         if self.lever_arm_m is not None:
-            found[LEVER], found[DELAY] = self.lever_arm_m, self.delay_s
+            theta[LEVER], theta[DELAY] = self.lever_arm_m, self.delay_s
         if self.second_order_s2_m is not None:
-            found[SECOND] = self.second_order_s2_m
-        return found
+            theta[SECOND] = self.second_order_s2_m
+        return theta
 
 
 def solve_imu(
@@ -103,34 +108,34 @@ def solve_imu(
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
-    `gravity_m_s2` is the size of v_ref, `up` (3,) says to which side of the base it points, roughly.
-    `repeatability_rad`, `own`, `arm_turns`: see `Movement`; of `own_shares` the readings tell which.
+    `gravity_m_s2` is the size of v_ref, `up` (3,) the half-space of the base that it points to. `repeatability_rad`,
+    `own`, `arm_turns`: see `Movement`; the readings decide between `own_shares`.
 
-    Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
+    Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
-    `mirrored_axis`, `attitude_untrustworthy`; ValueError for a wrong shape, or axes that are no unit vectors.
+    `mirrored_axis`, `attitude_untrustworthy`; ValueError for a wrong shape, or axes that are not unit vectors.
     """
     movement = Movement(dwells, sweeps, repeatability_rad, own, arm_turns)
-    held = held_still(movement, second_order=second_order)
-    needed = PARAMETERS - 1 - len(held)
-    _check(movement, needed)
+    fixed = list_fixed(movement, second_order=second_order)
+    parameters = PARAMETERS - 1 - len(fixed)
+    _check(movement, parameters)
     with refusals.convergence_required():
         start = linear_start(movement, gravity_m_s2, np.asarray(up, dtype=np.float64))
-        columns = jacobian(start, movement) @ free_ways(start, held)
-        told = refusals.condition_of(columns / sizes_of(columns), needed)
-        what = "some of F, bias, reference, lever arm and delay"
-        refusals.check_conditioning(told, needed, MAX_CONDITION, what, REMEDY)
-        fit = most_likely(start, movement, held, None)
+        columns = jacobian(start, movement) @ find_free_directions(start, fixed)
+        conditioning = refusals.condition_of(columns / sizes_of(columns), parameters)
+        parts = "some of F, bias, reference, lever arm and delay"
+        refusals.check_conditioning(conditioning, parameters, MAX_CONDITION, parts, REMEDY)
+        fit = most_likely(start, movement, fixed, None)
         if own is not None:
-            movement, fit = as_expected(fit, movement, own, held, own_shares)
+            movement, fit = refit_with_components(fit, movement, own, fixed, own_shares)
         covariance, response = fit.covariance(), fit.response()
-        _check_attitudes(start, movement, held, fit)
+        _check_attitudes(start, movement, fixed, fit)
     f = matrix(fit.theta)
     refusals.check_unit(scale_of(f))
     refusals.check_handedness(f)
     residuals = movement.readings() - predicted(fit.theta, movement)
-    white = fit.readings.white(fit.std_rad) @ residuals.ravel()
-    count, swept, freedom = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s) > 0, len(white) - needed
+    whitened = fit.readings.whitener(fit.std_rad) @ residuals.ravel()
+    count, swept, freedom = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s) > 0, len(whitened) - parameters
     return ImuSolution(
         matrix=f,
         bias_m_s2=fit.theta[BIAS],
@@ -140,41 +145,44 @@ def solve_imu(
         second_order_s2_m=fit.theta[SECOND] if second_order else None,
         covariance=covariance,
         response=response,
-        attitude_error=with_uncertainty(fit.readings, fit.std_rad, fit.jacobian),
+        attitude_error=add_uncertainty(fit.readings, fit.std_rad, fit.jacobian),
         dwell_residuals_m_s2=residuals[:count],
-        chi_square=float(white @ white),
+        chi_square=float(whitened @ whitened),
         freedom=freedom,
-        rank=told.rank,
-        condition=told.condition,
+        rank=conditioning.rank,
+        condition=conditioning.condition,
         iterations=fit.iterations,
         own=movement.own,
         own_share=movement.own_share,
-        warnings=refusals.warn_of_residuals(white, np.ones_like(white), freedom),
+        warnings=refusals.warn_of_residuals(whitened, np.ones_like(whitened), freedom),
     )
 
 
-def _check_attitudes(start: Array, movement: Movement, held: list[int], fit: Fit) -> None:
-    """Raises Fault where attitudes are off: all, or the dwell that fits worst where enough others are left to tell."""
+def _check_attitudes(start: Array, movement: Movement, fixed: list[int], fit: Fit) -> None:
+    """Raise Fault if attitudes are wrong: all, or the worst dwell if enough others remain to show it."""
     enough = len(movement.dwells.readings_m_s2) > 0 and movement.readings().size - 3 > fit.free.shape[1] + 3
-    check_trustworthy(fit.std_rad, lambda: _furthest_off(start, movement, held, fit), enough=enough)
+    check_trustworthy(fit.std_rad, lambda: _find_worst_dwell(start, movement, fixed, fit), enough=enough)
 
 
-def _furthest_off(start: Array, movement: Movement, held: list[int], fit: Fit) -> tuple[int, float, float]:
-    """The dwell that fits worst, by how much the others say it is off, rad, and their own δ."""
+def _find_worst_dwell(start: Array, movement: Movement, fixed: list[int], fit: Fit) -> tuple[int, float, float]:
+    """Return the dwell that fits worst, its error in rad by the others, and their own δ."""
     count = len(movement.dwells.readings_m_s2)
     residuals = (movement.readings() - predicted(fit.theta, movement))[:count]
-    off_by = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)
-    spread = movement.dwells.variances_m2_s4[..., None] * np.eye(3) + fit.std_rad**2 * off_by @ off_by.swapaxes(1, 2)
+    rotations = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)
+    spread = movement.dwells.variances_m2_s4[..., None] * np.eye(3) + fit.std_rad**2 * rotations @ rotations.swapaxes(
+        1, 2
+    )
     misfit = np.sum(residuals * np.linalg.solve(spread, residuals[..., None])[..., 0], axis=1)
     worst = int(np.argmax(misfit))
-    rest = most_likely(start, movement.without(worst), held, None)
+    rest = most_likely(start, movement.without(worst), fixed, None)
     missed = (movement.readings() - predicted(rest.theta, movement))[worst]
-    own = turned(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
-    off = np.linalg.lstsq(own, missed, rcond=1e-6)[0]  # about the reference itself nothing can be told
-    return worst, float(np.linalg.norm(off)), rest.std_rad
+    rotation = turned(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
+    error_rad = np.linalg.lstsq(rotation, missed, rcond=1e-6)[0]  # rotations about the reference are not identifiable
+    return worst, float(np.linalg.norm(error_rad)), rest.std_rad
 
 
-def _check(movement: Movement, needed: int) -> None:
+def _check(movement: Movement, parameters: int) -> None:
+    """Raise ValueError or Fault for inputs of a wrong shape, number, value or rank."""
     dwells, sweeps = movement.dwells, movement.sweeps
     count, swept = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s)
     shapes = (
@@ -191,7 +199,7 @@ def _check(movement: Movement, needed: int) -> None:
     )
     for name, array, shape in shapes:
         refusals.require_shape(name, array, shape)
-    refusals.check_count(count + 3 * swept, -(-needed // 3), needed)
+    refusals.check_count(count + 3 * swept, -(-parameters // 3), parameters)
     refusals.check_finite(**{name: array for name, array, _ in shapes})
     refusals.check_variances(dwells.variances_m2_s4)
     refusals.check_variances(np.asarray(np.linalg.eigvalsh(sweeps.covariances_m2_s4), dtype=np.float64))

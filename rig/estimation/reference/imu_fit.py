@@ -1,4 +1,4 @@
-"""The most likely θ of `rig.estimation.reference.accelerometer_model`, and how well the readings tell it."""
+"""The maximum likelihood estimate of θ of `rig.estimation.reference.accelerometer_model`, and its information."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,45 +14,45 @@ from rig.estimation.reference.accelerometer_model import (
     PARAMETERS,
     SECOND,
     Movement,
+    combine_effects,
     effects,
     jacobian,
-    new_and_always,
     predicted,
-    shared_out,
+    split_effects,
 )
 from rig.estimation.reference.attitude_error import PASSES, SETTLED
-from rig.estimation.reference.reading_errors import in_sweeps, noise, walking
+from rig.estimation.reference.reading_errors import noise, select_sweeps, walking
 from rig.estimation.reference.reference_model import REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions
-from rig.estimation.reference.shared_errors import Apart, apart, likeliest_error
+from rig.estimation.reference.shared_errors import Decorrelation, decorrelate, estimate_common_error
 from rig.estimation.statistics.expected_sizes import Scattered, expected_disturbances, expected_sizes
 
-# Of one disturbed dwell or sweep in a run against none, and of another bias in all sweeps, before the readings say so.
+# Prior odds of one disturbed dwell or sweep in a run against none, and of another bias in all sweeps.
 ODDS = 1 / 19
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """θ (22,), how readings are told apart, J (3 K, q) of what is free, its directions (22, q), δ, and the steps."""
+    """θ (22,), decorrelated readings, J (3 K, q) of the free directions (22, q), δ, and the iterations."""
 
     theta: Array
-    readings: Apart
+    readings: Decorrelation
     jacobian: Array
     free: Array
     std_rad: float
     iterations: int
 
     def covariance(self) -> Array:
-        """(22, 22) covariance of θ by the Fisher information."""
+        """Return the covariance (22, 22) of θ by the Fisher information."""
         return np.asarray(self.free @ self._inverse() @ self.free.T, dtype=np.float64)
 
     def response(self) -> Array:
-        """(22, 3 K): how θ changes with the readings."""
-        white = self.readings.white(self.std_rad)
-        return np.asarray(self.free @ self._inverse() @ (white @ self.jacobian).T @ white, dtype=np.float64)
+        """Return the derivative (22, 3 K) of θ by the readings."""
+        whitener = self.readings.whitener(self.std_rad)
+        return np.asarray(self.free @ self._inverse() @ (whitener @ self.jacobian).T @ whitener, dtype=np.float64)
 
     def _inverse(self) -> Array:
-        """(q, q) inverse of the Fisher information."""
-        weighted = self.readings.white(self.std_rad) @ self.jacobian
+        """Return the inverse (q, q) of the Fisher information."""
+        weighted = self.readings.whitener(self.std_rad) @ self.jacobian
         size = np.linalg.norm(weighted, axis=0)
         inverse: Array = np.linalg.inv((weighted / size).T @ (weighted / size)) / np.outer(size, size)
         return inverse
@@ -61,49 +61,54 @@ class Fit:
 def covariance_bound(
     theta: Array, movement: Movement, attitude_std_rad: float, *, second_order: bool = False
 ) -> tuple[Array, Array]:
-    """(22, 22) Cramér–Rao bound at the true θ (22,) and δ, for movement and noise as given, and (22, 3 K) the response.
+    """Return the Cramér–Rao bound (22, 22) at the true θ (22,) and δ, and the response (22, 3 K).
 
-    The readings themselves do not matter.
+    It depends on movement and noise, not on the readings themselves.
     """
-    free = free_ways(theta, held_still(movement, second_order=second_order))
-    readings = apart(noise(theta, movement), effects(theta, movement))
+    free = find_free_directions(theta, list_fixed(movement, second_order=second_order))
+    readings = decorrelate(noise(theta, movement), effects(theta, movement))
     fit = Fit(theta, readings, jacobian(theta, movement) @ free, free, attitude_std_rad, 0)
     return fit.covariance(), fit.response()
 
 
 def slopes(theta: Array, movement: Movement, *, second_order: bool) -> Array:
-    """(3 K, q) derivative of the readings in the ways θ (22,) may move."""
-    return np.asarray(jacobian(theta, movement) @ free_ways(theta, held_still(movement, second_order=second_order)))
+    """Return the derivative (3 K, q) of the readings in the free directions of θ (22,)."""
+    return np.asarray(
+        jacobian(theta, movement) @ find_free_directions(theta, list_fixed(movement, second_order=second_order))
+    )
 
 
-def most_likely(start: Array, movement: Movement, held: list[int], attitude_std_rad: float | None) -> Fit:
-    """The most likely θ and δ from `start` (22,), alternately, until δ stands still; `held` elements of θ stay."""
+def most_likely(start: Array, movement: Movement, fixed: list[int], attitude_std_rad: float | None) -> Fit:
+    """Return θ and δ of maximum likelihood from `start` (22,), by alternating steps until δ converges.
+
+    `fixed`: indices of elements of θ that keep their value.
+    """
     theta, steps = start, 0
     delta, last = attitude_std_rad or 0.0, np.inf
-    readings = apart(noise(theta, movement), effects(theta, movement))
+    readings = decorrelate(noise(theta, movement), effects(theta, movement))
     for _ in range(PASSES):
-        theta, taken = _least_squares(theta, movement, held, readings.white(delta))
-        steps += taken
+        theta, iterations = _least_squares(theta, movement, fixed, readings.whitener(delta))
+        steps += iterations
         if attitude_std_rad is not None or abs(delta - last) <= SETTLED * delta:
             break
-        slopes = jacobian(theta, movement) @ free_ways(theta, held)
+        slopes = jacobian(theta, movement) @ find_free_directions(theta, fixed)
         residuals = (movement.readings() - predicted(theta, movement)).ravel()
-        readings = apart(noise(theta, movement), effects(theta, movement))
-        last, delta = delta, likeliest_error(readings, residuals, slopes)
-    free = free_ways(theta, held)
+        readings = decorrelate(noise(theta, movement), effects(theta, movement))
+        last, delta = delta, estimate_common_error(readings, residuals, slopes)
+    free = find_free_directions(theta, fixed)
     return Fit(theta, readings, jacobian(theta, movement) @ free, free, delta, steps)
 
 
-def _least_squares(theta: Array, movement: Movement, held: list[int], white: Array) -> tuple[Array, int]:
-    """θ by Gauss–Newton, and the steps it took."""
+def _least_squares(theta: Array, movement: Movement, fixed: list[int], whitener: Array) -> tuple[Array, int]:
+    """Return θ by Gauss–Newton steps, and their number."""
     readings, norm = movement.readings(), np.linalg.norm(theta[REFERENCE])
-    rounding = 1e-13 * float(np.linalg.norm(white @ readings.ravel()))
+    rounding = 1e-13 * float(np.linalg.norm(whitener @ readings.ravel()))
     steps, moved = 0, np.inf
     while steps < STEP_LIMIT and moved > STEP_TOLERANCE + rounding:
-        free = free_ways(theta, held)
-        slopes = white @ jacobian(theta, movement) @ free
+        free = find_free_directions(theta, fixed)
+        slopes = whitener @ jacobian(theta, movement) @ free
         size = sizes_of(slopes)
-        residuals = white @ (readings - predicted(theta, movement)).ravel()
+        residuals = whitener @ (readings - predicted(theta, movement)).ravel()
         step = np.linalg.lstsq(slopes / size, residuals)[0]
         theta = theta + free @ (step / size)
         theta[REFERENCE] *= norm / np.linalg.norm(theta[REFERENCE])
@@ -111,43 +116,43 @@ def _least_squares(theta: Array, movement: Movement, held: list[int], white: Arr
     return theta, steps
 
 
-def as_expected(
-    fit: Fit, movement: Movement, own: AccelerometerErrors, held: list[int], own_shares: Sequence[float]
+def refit_with_components(
+    fit: Fit, movement: Movement, sensor: AccelerometerErrors, fixed: list[int], own_shares: Sequence[float]
 ) -> tuple[Movement, Fit]:
-    """Movement and fit with the sizes to be expected by what the fit leaves, and disturbances."""
-    left = (movement.readings() - predicted(fit.theta, movement)).ravel()
-    known, alike = noise(fit.theta, movement), np.diag(movement.noise())
-    of_arm = partial(shared_out, *new_and_always(fit.theta, movement))
-    scattered = Scattered(left, fit.jacobian, known, of_arm, walking(own, movement), alike)
-    sizes = expected_sizes(scattered, own_shares)
-    unit = float(np.sqrt(np.median(alike)))
-    alone = [np.diag(np.sqrt(alike))[:, piece] for piece in movement.pieces()]
-    causes = [*alone, unit * in_sweeps(movement)]
-    odds = [*np.full(len(alone), ODDS / len(alone)), ODDS]
-    *louder, turning = expected_disturbances(scattered, sizes, causes, odds)
+    """Return movement and fit with the expected variance components by the residuals, and disturbances."""
+    residuals = (movement.readings() - predicted(fit.theta, movement)).ravel()
+    modelled, variances = noise(fit.theta, movement), np.diag(movement.noise())
+    of_arm = partial(combine_effects, *split_effects(fit.theta, movement))
+    scattered = Scattered(residuals, fit.jacobian, modelled, of_arm, walking(sensor, movement), variances)
+    components = expected_sizes(scattered, own_shares)
+    unit = float(np.sqrt(np.median(variances)))
+    separate = [np.diag(np.sqrt(variances))[:, segment] for segment in movement.segments()]
+    causes = [*separate, unit * select_sweeps(movement)]
+    odds = [*np.full(len(separate), ODDS / len(separate)), ODDS]
+    *louder, turning = expected_disturbances(scattered, components, causes, odds)
     disturbed = replace(
-        own, walk_m_s2_sqrt_s=sizes.walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
+        sensor, walk_m_s2_sqrt_s=components.walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
     )
-    movement = replace(movement, own=disturbed, own_share=sizes.own_share)
-    found = most_likely(fit.theta, movement, held, sizes.std_rad)
-    readings = apart(noise(found.theta, movement), effects(found.theta, movement))
-    return movement, replace(found, readings=readings, iterations=fit.iterations + found.iterations)
+    movement = replace(movement, own=disturbed, own_share=components.own_share)
+    refit = most_likely(fit.theta, movement, fixed, components.std_rad)
+    readings = decorrelate(noise(refit.theta, movement), effects(refit.theta, movement))
+    return movement, replace(refit, readings=readings, iterations=fit.iterations + refit.iterations)
 
 
-def held_still(movement: Movement, *, second_order: bool) -> list[int]:
-    """The elements of θ that are not looked for."""
-    held = [] if second_order else list(range(PARAMETERS))[SECOND]
-    return held if len(movement.sweeps.speeds_rad_s) else [*range(LEVER.start, LEVER.stop), DELAY, *held]
+def list_fixed(movement: Movement, *, second_order: bool) -> list[int]:
+    """Return the indices of the elements of θ that are not estimated."""
+    fixed = [] if second_order else list(range(PARAMETERS))[SECOND]
+    return fixed if len(movement.sweeps.speeds_rad_s) else [*range(LEVER.start, LEVER.stop), DELAY, *fixed]
 
 
-def free_ways(theta: Array, held: list[int]) -> Array:
-    """(22, q) the ways θ may move: v_ref across itself, what is held not at all."""
-    whole = free_directions(theta, norm_known=True)
-    free: Array = np.delete(whole, [each - 1 for each in held], axis=1)  # one column of v_ref stands before them
+def find_free_directions(theta: Array, fixed: list[int]) -> Array:
+    """Return the free directions (22, q) of θ: those of v_ref are perpendicular to it; the `fixed` have none."""
+    directions = free_directions(theta, norm_known=True)
+    free: Array = np.delete(directions, [index - 1 for index in fixed], axis=1)  # v_ref has one column fewer
     return free
 
 
 def sizes_of(columns: Array) -> Array:
-    """(q,) norms of columns; 1 for a column of zeros."""
+    """Return the norms of columns (q,); 1 for a column of zeros."""
     sizes: Array = np.linalg.norm(columns, axis=0)
     return np.where(sizes > 0, sizes, 1.0)

@@ -1,17 +1,25 @@
-"""Where the fit of sweeps and attitudes starts: the linear problem of TRIAX, Eqs. (4), (5), with the lever arm in it.
+"""The initial values of the fit of sweeps and attitudes: the linear problem of TRIAX, Eqs. (4), (5), with the lever
+arm.
 
     F⁻¹ m − A v_ref − L (p + r) − b* = 0,   b* = F⁻¹ b
 
-A and L take v_ref and the lever arm to what is felt of them (`rig.estimation.reference.accelerometer_model`), without
-delay. L p is known, which would make the problem inhomogeneous with a scale of its own; it is a few percent of gravity,
-so F L p is taken from the readings with the F of a first solution that has left it out.
+A and L map v_ref and the lever arm to the specific force (`rig.estimation.reference.accelerometer_model`), without
+delay. L p is given, which would make the problem inhomogeneous with a scale of its own; it is a few percent of gravity,
+so F L p is subtracted from the readings with the F of a first solution without it.
 """
 
 import numpy as np
 
 from rig.estimation import refusals
 from rig.estimation.arrays import Array
-from rig.estimation.reference.accelerometer_model import LEVER, PARAMETERS, Movement, of_arms, of_gravity, of_lever
+from rig.estimation.reference.accelerometer_model import (
+    LEVER,
+    PARAMETERS,
+    Movement,
+    find_flange_acceleration,
+    project_lever_arm,
+    project_reference,
+)
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, F, matrix
 from rig.estimation.reference.stacked import null_vector, to_theta
 
@@ -20,34 +28,36 @@ REMEDY = "Take attitudes turned about at least two axes, or sweep about more axe
 
 
 def linear_start(movement: Movement, norm: float, up: Array) -> Array:
-    """θ (22,) with ‖v_ref‖ = `norm` on the side of `up` (3,).
+    """Return θ (22,) with ‖v_ref‖ = `norm` in the half-space of `up` (3,).
 
-    Raises Fault `rank_deficient`, `ill_conditioned`, `sign_unknown`.
+    Raise Fault `rank_deficient`, `ill_conditioned`, `sign_unknown`.
     """
     theta = _linear(movement, movement.readings(), norm, up)
-    return _linear(movement, movement.readings() - of_arms(0.0, movement) @ matrix(theta).T, norm, up)
+    return _linear(movement, movement.readings() - find_flange_acceleration(0.0, movement) @ matrix(theta).T, norm, up)
 
 
 def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Array:
-    """The linear solution from readings (K, 3) without what the flange's own centripetal acceleration does to them."""
+    """Return the linear solution from readings (K, 3) less the flange's own acceleration."""
     x = np.zeros((*readings.shape, LEVER.stop))
     for axis in range(3):
         x[:, axis, 3 * axis : 3 * axis + 3] = readings
         x[:, axis, BIAS.start + axis] = -movement.constant()
-    x[..., REFERENCE] = -of_gravity(0.0, movement)
-    x[..., LEVER] = -of_lever(0.0, movement)
+    x[..., REFERENCE] = -project_reference(0.0, movement)
+    x[..., LEVER] = -project_lever_arm(0.0, movement)
     swept = len(movement.sweeps.speeds_rad_s) > 0
     x = x.reshape(3 * len(readings), -1)[:, : LEVER.stop if swept else LEVER.start]
     sizes = np.repeat([_rms(x[:, block]) for block in (F, REFERENCE, BIAS, LEVER)], [9, 3, 3, 3])[: x.shape[1]]
     noise = np.sqrt(np.diag(movement.noise()).max() / np.mean(readings**2)) * (np.sqrt(len(readings)) + np.sqrt(3))
-    needed = x.shape[1] - 1
-    told = refusals.condition_of(x / sizes, needed, float(noise))
-    refusals.check_conditioning(told, needed, MAX_CONDITION, "some of F, bias, reference and lever arm", REMEDY)
+    parameters = x.shape[1] - 1
+    conditioning = refusals.condition_of(x / sizes, parameters, float(noise))
+    refusals.check_conditioning(
+        conditioning, parameters, MAX_CONDITION, "some of F, bias, reference and lever arm", REMEDY
+    )
     theta = to_theta(null_vector(x, sizes, norm, up))
     refusals.check_side(theta[REFERENCE], up)
     return np.concatenate([theta, np.zeros(PARAMETERS - len(theta))])
 
 
 def _rms(columns: Array) -> float:
-    """Root mean square of a block of columns, as one of them is on average."""
+    """Return the root mean square of a block of columns, 1 if it is empty."""
     return float(np.sqrt(np.mean(columns**2))) if columns.size else 1.0

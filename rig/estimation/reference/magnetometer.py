@@ -1,10 +1,10 @@
-"""A magnetometer turned in a constant field, with the iron that turns with it: TRIAX, Eq. (7).
+"""A magnetometer turned in a constant field, with the iron fixed to it: TRIAX, Eq. (7).
 
     m_m = F Rᵀ m + b,   F = M C_NO C_SI,   b = M C_NO b_HI + b_O
 
 C_SI and b_HI are the soft and hard iron, C_NO the non-orthogonality, M the scale factors, b_O the sensor's own offset.
-(Below Eq. (7) TRIAX writes S C_NO b_HI; the line above it makes that M.) Only the products F and b can be seen from
-readings: iron and sensor are not told apart, and need not be, because the correction m = F⁻¹ (m_m − b) takes both out.
+(Below Eq. (7) TRIAX writes S C_NO b_HI; the line above it makes that M.) Only the products F and b are identifiable:
+iron and sensor are not separated, and need not be, because the correction m = F⁻¹ (m_m − b) removes both.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
-from rig.estimation.reference.attitude_error import effects, whitening_with
+from rig.estimation.reference.attitude_error import effects, find_whiteners
 from rig.estimation.reference.reference_model import most_likely, predicted, whitened
 from rig.estimation.reference.triaxial import TriaxialSolution
 from rig.estimation.refusals import convergence_required
@@ -21,20 +21,20 @@ from rig.estimation.statistics.coverage import false_alarm_of_each
 
 MODEL = "m_m = F Rᵀ m + b"
 FREE = 14  # F and b, and the field's direction: its size is given
-FALSE_ALARM = 1e-3  # in which a steady, uniform field is refused for one of the two
+FALSE_ALARM = 1e-3  # probability that a steady, uniform field fails one of the two tests
 
 
 def hard_iron(solution: TriaxialSolution) -> Array:
-    """(3,) F⁻¹ b: the field that would read as b."""
+    """Return F⁻¹ b (3,): the field that would read as b."""
     return np.asarray(np.linalg.solve(solution.matrix, solution.bias), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
 class Uniformity:
-    """Whether the field was the same in all attitudes: χ² of what the model leaves, and what noise rarely makes it.
+    """The test of a uniform field: χ² of the residuals in all attitudes and its critical value.
 
-    `attitude_error_rad` is how far off the attitudes were taken to be about each axis: what is left may turn the field
-    by so much, and may not change its size.
+    `attitude_error_rad` is the assumed attitude error about each axis: residuals may include rotations of the field of
+    this size, but no change of its norm.
     """
 
     chi_square: float
@@ -44,7 +44,7 @@ class Uniformity:
 
     @property
     def uniform(self) -> bool:
-        """Whether the field is uniform, as far as residuals show it."""
+        """True if the residuals agree with a uniform field."""
         return self.chi_square <= self.limit
 
 
@@ -55,9 +55,9 @@ def uniformity(
     variances_t2: ArrayLike,
     attitude_error_rad: float,
 ) -> Uniformity:
-    """What the best fit with attitudes off by so much leaves, from the `solution` of these readings.
+    """Return the test by the best fit with that attitude error, from the `solution` of these readings.
 
-    Raises Fault `attitude_untrustworthy` where there is none.
+    `readings_t`, `variances_t2` (N, 3), `attitudes` (N, 3, 3). Raise Fault `attitude_untrustworthy` if there is no fit.
     """
     from scipy.special import chdtri
 
@@ -65,18 +65,20 @@ def uniformity(
     v_bar = np.zeros_like(m)
     start = solution.theta
     with convergence_required():
-        white = whitening_with(v, effects(start, r, v_bar), np.full(len(m), attitude_error_rad))
-        theta, _ = most_likely(start, m, r, v_bar, white, norm_known=True)
-    left = whitened(white, m - predicted(theta, r, v_bar))
-    freedom = left.size - FREE
-    return Uniformity(float(np.sum(left**2)), freedom, float(chdtri(freedom, FALSE_ALARM)), attitude_error_rad)
+        whiteners = find_whiteners(v, effects(start, r, v_bar), np.full(len(m), attitude_error_rad))
+        theta, _ = most_likely(start, m, r, v_bar, whiteners, norm_known=True)
+    whitened_residuals = whitened(whiteners, m - predicted(theta, r, v_bar))
+    freedom = whitened_residuals.size - FREE
+    return Uniformity(
+        float(np.sum(whitened_residuals**2)), freedom, float(chdtri(freedom, FALSE_ALARM)), attitude_error_rad
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class FieldDrift:
-    """The largest change (3,) of the readings in one attitude, as χ² of its three components says, and its σ (3,).
+    """The largest change (3,) of the readings in one attitude, by the χ² of its components, and its std (3,).
 
-    `limit` is what that χ² rarely is by noise, however many changes there were to choose from.
+    `limit` is the critical value of that χ², with a Bonferroni correction for the number of changes.
     """
 
     change_t: Array
@@ -86,12 +88,15 @@ class FieldDrift:
 
     @property
     def steady(self) -> bool:
-        """Whether noise explains it."""
+        """True if noise explains the change."""
         return self.chi_square <= self.limit
 
 
 def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: float) -> FieldDrift:
-    """Drift of each reading (N, 3), N ≥ 2, from the first; attitudes repeat to `repeatability_rad` about each axis."""
+    """Return the drift of readings (N, 3), N ≥ 2, from the first.
+
+    `variances_t2` (N, 3); attitudes repeat with a standard deviation of `repeatability_rad` about each axis.
+    """
     from scipy.special import chdtri
 
     m, v = (np.asarray(a, dtype=np.float64) for a in (means_t, variances_t2))

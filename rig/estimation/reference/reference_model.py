@@ -1,13 +1,13 @@
-"""The forward model of TRIAX, Eqs. (3), (9), (10): what a sensor reads in a known attitude, and the best fit to it.
+"""The forward model of TRIAX, Eqs. (3), (9), (10), a sensor's readings in known attitudes, and its best fit.
 
     v_m = F (s + φ s²) + b,   s = Rᵀ v_ref + v̄
 
-R takes the body frame to the table frame. θ holds F (row by row), v_ref, b, and φ (3,) where second-order terms are
-wanted: 15 or 18 numbers. The least-squares fit weighted by the readings' variances is the maximum of the likelihood;
-Gauss–Newton finds it from the paper's estimate in a few steps. With v̄ = 0, F and v_ref are known only up to a common
-factor, so there ‖v_ref‖ is held.
+R maps the body frame to the table frame. θ holds F (row by row), v_ref, b, and φ (3,) with second-order terms: 15 or 18
+numbers. The least-squares fit weighted by the readings' variances is that of maximum likelihood; Gauss–Newton reaches
+it from the paper's estimate in a few steps. With v̄ = 0, F and v_ref are identifiable only up to a common factor, so
+‖v_ref‖ is fixed.
 
-How well each reading is known comes as W (…, N, 3, 3) with W V Wᵀ = 1, V its covariance: `whitening`.
+The covariance V of readings is given as whiteners W (…, N, 3, 3) with W V Wᵀ = 1: `whitening`.
 
 All functions broadcast over runs: readings (…, N, 3), θ (…, 15 or 18).
 """
@@ -26,38 +26,38 @@ STEP_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class KnownVector:
-    """v̄ (N, 3) in body coordinates, what the table itself adds in each attitude: its rate, for a gyroscope."""
+    """v̄ (N, 3) in body coordinates, the table's own motion in each attitude: its rate, for a gyroscope."""
 
     added: ArrayLike
 
     def v_bar(self, count: int) -> Array:
-        """v̄ (N, 3) for `count` attitudes."""
+        """Return v̄ (N, 3) for `count` attitudes."""
         return np.asarray(self.added, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
 class KnownNorm:
-    """v̄ = 0, so ‖v_ref‖ = `norm` must be known, and a table vector `side` (3,) whose product with v_ref is positive."""
+    """v̄ = 0, with a given ‖v_ref‖ = `norm`, and a table vector `side` (3,) whose product with v_ref is positive."""
 
     norm: float
     side: ArrayLike
 
     def v_bar(self, count: int) -> Array:
-        """v̄ (N, 3) for `count` attitudes: zero."""
+        """Return v̄ (N, 3) for `count` attitudes: zero."""
         return np.zeros((count, 3))
 
 
-Known = KnownVector | KnownNorm
+ReferencePrior = KnownVector | KnownNorm
 
 
 def sensed(theta: Array, attitudes: Array, v_bar: Array) -> Array:
-    """s = Rᵀ v_ref + v̄ (…, N, 3) from attitudes (N, 3, 3) and v̄ (N, 3)."""
+    """Return s = Rᵀ v_ref + v̄ (…, N, 3) from attitudes (N, 3, 3) and v̄ (N, 3)."""
     s: Array = np.einsum("nji,...j->...ni", attitudes, theta[..., REFERENCE]) + v_bar
     return s
 
 
 def predicted(theta: Array, attitudes: Array, v_bar: Array) -> Array:
-    """The readings v_m (…, N, 3) of the model."""
+    """Return the readings v_m (…, N, 3) of the model."""
     s = sensed(theta, attitudes, v_bar)
     if theta.shape[-1] > 15:
         s = s + theta[..., None, SECOND] * s**2
@@ -66,20 +66,20 @@ def predicted(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def matrix(theta: Array) -> Array:
-    """F (…, 3, 3)."""
+    """Return F (…, 3, 3)."""
     return theta[..., F].reshape(*theta.shape[:-1], 3, 3)
 
 
 def jacobian(theta: Array, attitudes: Array, v_bar: Array) -> Array:
-    """(…, N, 3, 15 or 18) derivative of the readings with respect to θ."""
+    """Return the derivative (…, N, 3, 15 or 18) of the readings with respect to θ."""
     s, f = sensed(theta, attitudes, v_bar), matrix(theta)[..., None, :, :]
-    slope, felt = np.ones_like(s), s
+    slope, nonlinear = np.ones_like(s), s
     if theta.shape[-1] > 15:
         second = theta[..., None, SECOND]
-        slope, felt = 1 + 2 * second * s, s + second * s**2
+        slope, nonlinear = 1 + 2 * second * s, s + second * s**2
     rows = np.zeros((*s.shape, theta.shape[-1]))
     for i in range(3):
-        rows[..., i, 3 * i : 3 * i + 3] = felt
+        rows[..., i, 3 * i : 3 * i + 3] = nonlinear
         rows[..., i, 12 + i] = 1.0
     rows[..., REFERENCE] = (f * slope[..., None, :]) @ np.swapaxes(attitudes, -1, -2)
     if theta.shape[-1] > 15:
@@ -88,7 +88,7 @@ def jacobian(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def free_directions(theta: Array, *, norm_known: bool) -> Array:
-    """(…, p, q) columns: the ways θ may move. With the norm known, v_ref moves only across itself (q = p − 1)."""
+    """Return the free directions (…, p, q) of θ; with the norm known, v_ref moves only across itself (q = p − 1)."""
     p = theta.shape[-1]
     free = np.zeros((*theta.shape[:-1], p, p))
     free[...] = np.eye(p)
@@ -96,7 +96,7 @@ def free_directions(theta: Array, *, norm_known: bool) -> Array:
         return free
     reference = theta[..., REFERENCE]
     unit = reference / np.linalg.norm(reference, axis=-1, keepdims=True)
-    # Householder: the reflection that takes v_ref to the first axis; its other columns lie across v_ref.
+    # Householder: the reflection of v_ref to the first axis; its other columns are perpendicular to v_ref.
     sign = np.where(unit[..., :1] < 0, -1.0, 1.0)
     mirror = unit + sign * np.array([1.0, 0.0, 0.0])
     mirror = mirror / np.linalg.norm(mirror, axis=-1, keepdims=True)
@@ -105,31 +105,32 @@ def free_directions(theta: Array, *, norm_known: bool) -> Array:
 
 
 def whitening(variances: Array) -> Array:
-    """W (…, N, 3, 3) of readings whose three errors are independent, with variances (…, N, 3)."""
+    """Return whiteners (…, N, 3, 3) of readings with three independent errors of variances (…, N, 3)."""
     return np.asarray(np.eye(3) / np.sqrt(variances)[..., None], dtype=np.float64)
 
 
-def whitened(white: Array, residuals: Array) -> Array:
-    """W r (…, N, 3) of residuals (…, N, 3): independent, each with the standard deviation 1."""
-    independent: Array = (white @ residuals[..., None])[..., 0]
+def whitened(whiteners: Array, residuals: Array) -> Array:
+    """Return W r (…, N, 3) of residuals (…, N, 3): independent, each with the standard deviation 1."""
+    independent: Array = (whiteners @ residuals[..., None])[..., 0]
     return independent
 
 
-def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, white: Array, *, norm_known: bool) -> Array:
-    """W J (…, 3 N, q), reduced to the free directions: (W J)ᵀ W J is the Fisher information."""
-    return _reduced(theta, attitudes, v_bar, white, free_directions(theta, norm_known=norm_known))
+def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, whiteners: Array, *, norm_known: bool) -> Array:
+    """Return W J (…, 3 N, q) in the free directions: (W J)ᵀ W J is the Fisher information."""
+    return _reduce_jacobian(theta, attitudes, v_bar, whiteners, free_directions(theta, norm_known=norm_known))
 
 
-def _reduced(theta: Array, attitudes: Array, v_bar: Array, white: Array, free: Array) -> Array:
-    rows = white @ jacobian(theta, attitudes, v_bar)
+def _reduce_jacobian(theta: Array, attitudes: Array, v_bar: Array, whiteners: Array, free: Array) -> Array:
+    """Return W J (…, 3 N, q) in the directions `free` (…, p, q)."""
+    rows = whiteners @ jacobian(theta, attitudes, v_bar)
     reduced: Array = rows.reshape(*rows.shape[:-3], -1, rows.shape[-1]) @ free
     return reduced
 
 
-def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, white: Array, *, norm_known: bool) -> Array:
-    """(…, p, p) inverse of the Fisher information: the covariance of the maximum-likelihood estimate to first order."""
+def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, whiteners: Array, *, norm_known: bool) -> Array:
+    """Return the inverse (…, p, p) of the Fisher information: the Cramér–Rao bound of θ."""
     free = free_directions(theta, norm_known=norm_known)
-    reduced = _reduced(theta, attitudes, v_bar, white, free)
+    reduced = _reduce_jacobian(theta, attitudes, v_bar, whiteners, free)
     size = np.linalg.norm(reduced, axis=-2, keepdims=True)
     scaled = reduced / size
     inverse = np.linalg.inv(np.swapaxes(scaled, -1, -2) @ scaled) / (np.swapaxes(size, -1, -2) * size)
@@ -138,17 +139,17 @@ def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, white: Array,
 
 
 def most_likely(
-    start: Array, readings: Array, attitudes: Array, v_bar: Array, white: Array, *, norm_known: bool
+    start: Array, readings: Array, attitudes: Array, v_bar: Array, whiteners: Array, *, norm_known: bool
 ) -> tuple[Array, int]:
-    """θ (…, p) of least weighted squares by Gauss–Newton from `start`, and the steps it took."""
+    """Return θ (…, p) of weighted least squares by Gauss–Newton from `start`, and the number of steps."""
     theta = start.copy()
     norm = np.linalg.norm(theta[..., REFERENCE], axis=-1, keepdims=True)
     steps = 0
     while steps < STEP_LIMIT:
         steps += 1
         free = free_directions(theta, norm_known=norm_known)
-        reduced = _reduced(theta, attitudes, v_bar, white, free)
-        residuals = whitened(white, readings - predicted(theta, attitudes, v_bar))
+        reduced = _reduce_jacobian(theta, attitudes, v_bar, whiteners, free)
+        residuals = whitened(whiteners, readings - predicted(theta, attitudes, v_bar))
         size = np.linalg.norm(reduced, axis=-2)
         scaled = reduced / size[..., None, :]
         across = np.swapaxes(scaled, -1, -2)
@@ -158,8 +159,8 @@ def most_likely(
         if norm_known:
             reference = theta[..., REFERENCE]
             theta[..., REFERENCE] = reference * (norm / np.linalg.norm(reference, axis=-1, keepdims=True))
-        # In standard deviations of a reading; beyond rounding, which small variances make large in this unit.
-        rounding = 1e-13 * np.linalg.norm(whitened(white, readings))
+        # In standard deviations of a reading, plus rounding, which is large in this unit if variances are small.
+        rounding = 1e-13 * np.linalg.norm(whitened(whiteners, readings))
         if np.max(np.linalg.norm(step, axis=-1)) <= STEP_TOLERANCE + rounding:
             break
     return theta, steps

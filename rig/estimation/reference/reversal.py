@@ -1,14 +1,14 @@
-"""A magnetometer's own bias and the field of what carries it, told apart by turning the sensor over on its holder.
+"""Separation of a magnetometer's own bias and the field of its carrier by turning the sensor over on its holder.
 
-In run k the sensor is mounted by the rotation M_k from the holder's axes to its own. Its bias b goes with it, the field
-a of what it is mounted on (the arm's iron, as far as it turns with the flange) stays with the holder:
+In run k the sensor is mounted by the rotation M_k from the holder's axes to its own. Its bias b turns with it, the
+field a of its carrier (the arm's iron, as far as it turns with the flange) is fixed to the holder:
 
     b_k = b + F_k M_k a
 
-where b_k is the bias found as mounted and F_k the matrix found with it, which knows how the sensor really sat. Half a
-turn about one axis: b is half the sum and the field half the difference on the other two axes, and along it they stay
-together. A second one about another axis tells all three. What the arm's other links do at the sensor is the same in
-all runs with the same attitudes, to first order, and goes with a.
+b_k is the bias estimated in run k and F_k the matrix estimated with it, which includes the real mounting. With half a
+revolution about one axis, b is half the sum and the field half the difference on the other two axes; along it their sum
+alone is identifiable. A second one about another axis separates all three. The field of the arm's other links at the
+sensor is the same in all runs with the same attitudes, to first order, and is included in a.
 """
 
 from dataclasses import dataclass
@@ -24,11 +24,10 @@ SAME = 1e-6  # of mountings, which are nominal and exact
 
 @dataclass(frozen=True, slots=True)
 class Reversal:
-    """`bias_t` b (3,) in the sensor's axes, and `arm_field_t` (3,) in them as mounted in the first run; `covariance`
-    (6, 6) of both.
+    """`bias_t` b (3,) in the sensor's axes, `arm_field_t` (3,) in those of the first run, `covariance` (6, 6).
 
-    On an axis that was not turned over, `arm_field_in_bias`, the sum of both stands in the bias and 0 in the field.
-    `chi_square` says whether the runs agree on what they share.
+    If an axis was not turned over, `arm_field_in_bias` is True, the bias contains the sum of both and the field is 0.
+    `chi_square` tests the agreement of the runs.
     """
 
     bias_t: Array
@@ -41,29 +40,29 @@ class Reversal:
 
 
 def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings: Array) -> Reversal:
-    """Sensor and arm told apart by K ≥ 2 runs: biases (K, 3) with covariances (K, 3, 3), F and M (K, 3, 3).
+    """Separate sensor and arm by K ≥ 2 runs: biases (K, 3) with covariances (K, 3, 3), F and M (K, 3, 3).
 
-    Raises Refused `mounting_not_turned` where all mountings are one, Fault `reversal_contradicts` where the runs do not
-    agree on what turning over leaves alone.
+    Raise Refused `mounting_not_turned` if all mountings are equal, Fault `reversal_contradicts` if the runs contradict
+    each other.
     """
     from scipy.special import chdtri
 
-    together = _together(mountings)
-    if together.shape[1] == 3:
+    common = _find_common_directions(mountings)
+    if common.shape[1] == 3:
         raise Refused(
             "mounting_not_turned",
             "the sensor had the same mounting in all runs",
             "Turn it over on its extension, state this in its `mounting`, and run again",
         )
-    # The directions of the holder's in which a is found; it is 0 in the others.
-    told = np.eye(3) - together @ together.T
-    white = np.linalg.inv(np.linalg.cholesky(covariances_t2))
-    design = np.concatenate([np.broadcast_to(np.eye(3), matrices.shape), matrices @ mountings @ told], axis=-1)
-    whitened = (white @ design).reshape(-1, 6)
+    # Projection to the holder's directions in which a is identifiable; it is 0 in the others.
+    projection = np.eye(3) - common @ common.T
+    whiteners = np.linalg.inv(np.linalg.cholesky(covariances_t2))
+    design = np.concatenate([np.broadcast_to(np.eye(3), matrices.shape), matrices @ mountings @ projection], axis=-1)
+    whitened = (whiteners @ design).reshape(-1, 6)
     inverse = np.linalg.pinv(whitened, rcond=1e-6)
-    found = inverse @ (white @ biases_t[..., None]).reshape(-1)
-    left = (white @ (biases_t - design @ found)[..., None]).reshape(-1)
-    chi_square, freedom = float(left @ left), len(left) - (6 - together.shape[1])
+    estimate = inverse @ (whiteners @ biases_t[..., None]).reshape(-1)
+    residuals = (whiteners @ (biases_t - design @ estimate)[..., None]).reshape(-1)
+    chi_square, freedom = float(residuals @ residuals), len(residuals) - (6 - common.shape[1])
     limit = float(chdtri(freedom, FALSE_ALARM))
     if chi_square > limit:
         raise Fault(
@@ -74,13 +73,13 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
         )
     to_axes = np.block([[np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), mountings[0]]])
     covariance = to_axes @ (inverse @ inverse.T) @ to_axes.T
-    mixed = np.abs(mountings[0] @ together).max(axis=1, initial=0.0) > SAME
-    x, y, z = mixed.tolist()
-    return Reversal(found[:3], mountings[0] @ found[3:], covariance, (x, y, z), chi_square, freedom, limit)
+    inseparable = np.abs(mountings[0] @ common).max(axis=1, initial=0.0) > SAME
+    x, y, z = inseparable.tolist()
+    return Reversal(estimate[:3], mountings[0] @ estimate[3:], covariance, (x, y, z), chi_square, freedom, limit)
 
 
-def _together(mountings: Array) -> Array:
-    """(3, n) orthonormal directions of the holder's whose fields look alike in all mountings, and so like a bias."""
+def _find_common_directions(mountings: Array) -> Array:
+    """Return the holder's orthonormal directions (3, n) whose fields are equal in all mountings, as a bias is."""
     differences = (mountings[1:] - mountings[0]).reshape(-1, 3)
     _, sizes, rows = np.linalg.svd(differences)
     alike = np.ones(3, dtype=np.bool_)

@@ -4,9 +4,9 @@ F⁻¹ v_m − Rᵀ v_ref − b* − φ s² = v̄ with b* = F⁻¹ b is linear i
 
     X β = V̄,   X = [D(v_m)  −Rᵀ  −I  −diag(s²)]
 
-v̄ ≠ 0: linear least squares, Eq. (6). v̄ = 0: the last right singular vector, Eq. (5), scaled to the known ‖v_ref‖ and
-turned to the known side. The vector of unit length depends on the units of the columns, which TRIAX does not state;
-here every block is brought to the size of its columns first.
+v̄ ≠ 0: linear least squares, Eq. (6). v̄ = 0: the last right singular vector, Eq. (5), scaled to the given ‖v_ref‖ and
+sign. That vector of unit length depends on the units of the columns, which TRIAX does not state; here every block of
+columns is scaled to unit RMS first.
 
 Everything broadcasts over runs: readings (…, N, 3). θ is that of `reference_model`: F itself and b, not their inverses.
 """
@@ -14,11 +14,20 @@ Everything broadcasts over runs: readings (…, N, 3). θ is that of `reference_
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.reference.reference_model import BIAS, REFERENCE, SECOND, F, Known, KnownNorm, matrix, sensed
+from rig.estimation.reference.reference_model import (
+    BIAS,
+    REFERENCE,
+    SECOND,
+    F,
+    KnownNorm,
+    ReferencePrior,
+    matrix,
+    sensed,
+)
 
 
 def stack(readings: Array, attitudes: Array, squares: Array | None) -> Array:
-    """X (…, 3 N, 15), Eq. (4), or (…, 3 N, 18) with s² (…, N, 3) given."""
+    """Return X (…, 3 N, 15), Eq. (4), or (…, 3 N, 18) with s² (…, N, 3) given."""
     x = np.zeros((*readings.shape, 15 if squares is None else 18))
     for i in range(3):
         x[..., i, 3 * i : 3 * i + 3] = readings
@@ -30,7 +39,7 @@ def stack(readings: Array, attitudes: Array, squares: Array | None) -> Array:
 
 
 def column_sizes(readings: Array, squares: Array | None) -> Array:
-    """(…, 15 or 18) root-mean-square size of each block of columns of X."""
+    """Return the root-mean-square size (…, 15 or 18) of each block of columns of X."""
     sizes = np.ones((*readings.shape[:-2], 15 if squares is None else 18))
     sizes[..., F] = np.sqrt(np.mean(readings**2, axis=(-2, -1)))[..., None]
     sizes[..., REFERENCE] = np.sqrt(1 / 3)
@@ -40,14 +49,14 @@ def column_sizes(readings: Array, squares: Array | None) -> Array:
 
 
 def least_squares(x: Array, sizes: Array, v_bar: Array) -> Array:
-    """β (…, p) of Eq. (6) for v̄ (N, 3)."""
+    """Return β (…, p) of Eq. (6) for v̄ (N, 3)."""
     scaled = x / sizes[..., None, :]
     beta: Array = (np.linalg.pinv(scaled) @ v_bar.reshape(-1)) / sizes
     return beta
 
 
 def null_vector(x: Array, sizes: Array, norm: float, side: Array) -> Array:
-    """β (…, p) of Eq. (5): scaled so that ‖v_ref‖ = `norm`, turned so that v_ref lies on the side of `side` (3,)."""
+    """Return β (…, p) of Eq. (5), scaled to ‖v_ref‖ = `norm`, with v_ref in the half-space of `side` (3,)."""
     _, _, directions = np.linalg.svd(x / sizes[..., None, :], full_matrices=False)
     beta = directions[..., -1, :] / sizes
     reference = beta[..., REFERENCE]
@@ -57,7 +66,7 @@ def null_vector(x: Array, sizes: Array, norm: float, side: Array) -> Array:
 
 
 def to_theta(beta: Array) -> Array:
-    """θ of the forward model from β: F from its inverse, b = F b*."""
+    """Return θ of the forward model from β: F from its inverse, b = F b*."""
     theta = beta.copy()
     f = np.linalg.inv(matrix(beta))
     theta[..., F] = f.reshape(*f.shape[:-2], 9)
@@ -65,52 +74,56 @@ def to_theta(beta: Array) -> Array:
     return theta
 
 
-def published_estimate(readings: Array, attitudes: Array, known: Known, *, second_order: bool) -> tuple[Array, int]:
-    """θ (…, 15 or 18) as TRIAX publishes it, and the number of linear solutions it took.
+def estimate_as_published(
+    readings: Array, attitudes: Array, prior: ReferencePrior, *, second_order: bool
+) -> tuple[Array, int]:
+    """Return θ (…, 15 or 18) as TRIAX publishes it, and the number of linear solutions.
 
-    With second-order terms the linear solution repeats, with s² from the last v_ref, until it stands still.
+    With second-order terms the linear solution is repeated, with s² from the last v_ref, until it converges.
     """
     x = stack(readings, attitudes, None)
-    theta = to_theta(_solve(x, column_sizes(readings, None), known))
+    theta = to_theta(_solve(x, column_sizes(readings, None), prior))
     if not second_order:
         return theta, 1
-    v_bar = known.v_bar(len(attitudes))
+    v_bar = prior.v_bar(len(attitudes))
     solutions = 1
     change = np.inf
     while change > 1e-12 and solutions < 50:
         squares = sensed(theta, attitudes, v_bar) ** 2
         x = stack(readings, attitudes, squares)
         last = theta[..., REFERENCE]
-        theta = to_theta(_solve(x, column_sizes(readings, squares), known))
+        theta = to_theta(_solve(x, column_sizes(readings, squares), prior))
         moved = np.linalg.norm(theta[..., REFERENCE] - last, axis=-1) / np.linalg.norm(last, axis=-1)
         change, solutions = float(np.max(moved)), solutions + 1
     return theta, solutions
 
 
-def _solve(x: Array, sizes: Array, known: Known) -> Array:
-    if isinstance(known, KnownNorm):
-        return null_vector(x, sizes, known.norm, np.asarray(known.side, dtype=np.float64))
-    return least_squares(x, sizes, known.v_bar(x.shape[-2] // 3))
+def _solve(x: Array, sizes: Array, prior: ReferencePrior) -> Array:
+    """Return β (…, p) by Eq. (5) if the norm of v_ref is given, else by Eq. (6)."""
+    if isinstance(prior, KnownNorm):
+        return null_vector(x, sizes, prior.norm, np.asarray(prior.side, dtype=np.float64))
+    return least_squares(x, sizes, prior.v_bar(x.shape[-2] // 3))
 
 
-def published_covariance(theta: Array, readings: Array, attitudes: Array, known: Known, variances: Array) -> Array:
-    """(p, p) covariance of one published θ, to first order in the readings' errors e (variances (N, 3)).
+def published_covariance(
+    theta: Array, readings: Array, attitudes: Array, prior: ReferencePrior, variances: Array
+) -> Array:
+    """Return the covariance (p, p) of one published θ, to first order in the readings' errors e of `variances` (N, 3).
 
-    An error enters equation k as F⁻¹ e_k, because the readings stand in X: δβ = −X⁺ F⁻¹ e, within what the
-    normalisation leaves free. The iteration of the second-order terms adds the change of s² with v_ref. Then F and b
-    follow from β.
+    An error enters equation k as F⁻¹ e_k, because the readings are in X: δβ = −X⁺ F⁻¹ e, projected to the
+    normalisation. The iteration of the second-order terms adds the change of s² with v_ref. F and b follow from β.
     """
     second_order = len(theta) > 15
-    norm_known = isinstance(known, KnownNorm)
-    s = sensed(theta, attitudes, known.v_bar(len(attitudes)))
+    norm_known = isinstance(prior, KnownNorm)
+    s = sensed(theta, attitudes, prior.v_bar(len(attitudes)))
     squares = s**2 if second_order else None
     x, sizes = stack(readings, attitudes, squares), column_sizes(readings, squares)
     f = matrix(theta)
     inverse = np.linalg.inv(f)
     p = len(theta)
-    left, singular, right = np.linalg.svd(x / sizes, full_matrices=False)
-    kept = p - norm_known
-    pseudo = ((right[:kept].T / singular[:kept]) @ left[:, :kept].T) / sizes[:, None]
+    left_vectors, singular, right_vectors = np.linalg.svd(x / sizes, full_matrices=False)
+    rank = p - norm_known
+    pseudo = ((right_vectors[:rank].T / singular[:rank]) @ left_vectors[:, :rank].T) / sizes[:, None]
     project = np.eye(p)
     if norm_known:
         beta = theta.copy()

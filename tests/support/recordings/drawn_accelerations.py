@@ -22,9 +22,9 @@ from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
 from rig.estimation.gyroscope.budget import Budget
-from rig.estimation.reference.accelerometer_model import Movement, felt
+from rig.estimation.reference.accelerometer_model import Movement, find_force
 from rig.estimation.reference.imu import ImuSolution, solve_imu
-from rig.estimation.reference.reading_errors import of_pieces, of_sensor, per_axis
+from rig.estimation.reference.reading_errors import per_axis, project_errors, repeat_by_segment
 from rig.estimation.statistics.bias_process import flicker_covariance
 from rig.estimation.statistics.expected_sizes import OWN_SHARES
 from rig.motion.geometry import NOMINAL, WRIST_1
@@ -126,13 +126,13 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
         return rng.uniform(-half_width, half_width, 3) if evenly else half_width / STANDARD * rng.normal(size=3)
 
     chi, theta = within(odd), truth.theta()
-    warm = of_pieces(own.warmer_k + rng.uniform(-1, 1) * own.unseen_k, movement)
-    bent = of_sensor(theta, movement, np.square) @ within(even)
-    bent += of_sensor(theta, movement, lambda along: along**3) @ chi
+    warm = repeat_by_segment(own.warmer_k + rng.uniform(-1, 1) * own.unseen_k, movement)
+    bent = project_errors(theta, movement, np.square) @ within(even)
+    bent += project_errors(theta, movement, lambda along: along**3) @ chi
     bent += per_axis((warm * movement.constant())[:, None] * np.ones(3)) @ within(bias_k)
     bent += per_axis(_along(session) * warm[:, None]) @ within(1e-6 * sheet.scale_ppm_k)
     flickered = rng.multivariate_normal(np.zeros(len(pieces)), flicker_covariance(own.windows_s), 3)
-    flickering = movement.constant() * [of_pieces(each, movement) for each in flickered]
+    flickering = movement.constant() * [repeat_by_segment(each, movement) for each in flickered]
     bent += own.instability_m_s2 * flickering.T.ravel()
     return session.reading(bent, _parameters(truth, chi) - session.parameters)
 
@@ -184,7 +184,7 @@ def bent(change: Callable[[Array], Array], scale: float = 0.0) -> Damage:
     """By what an axis adds that feels so much; `scale` is the part of it that is seen at 1 g up and down."""
 
     def damage(session: Session, size: float) -> Session:
-        more = of_sensor(
+        more = project_errors(
             session.truth.theta(), session.movement, lambda along: size * change(along / GRAVITY) * GRAVITY
         )
         then = np.zeros(6)
@@ -196,7 +196,7 @@ def bent(change: Callable[[Array], Array], scale: float = 0.0) -> Damage:
 
 def stepped(session: Session, size: float) -> Session:
     """The bias changes half-way; true is its mean."""
-    more = per_axis((of_pieces(session.late, session.movement) * session.movement.constant())[:, None] * ASKEW)
+    more = per_axis((repeat_by_segment(session.late, session.movement) * session.movement.constant())[:, None] * ASKEW)
     return session.reading(size * more @ np.ones(3), np.concatenate([np.zeros(3), size * ASKEW / 2]))
 
 
@@ -204,7 +204,7 @@ def scaled(axes: Array) -> Damage:
     """Scale factors change half-way; true is their mean."""
 
     def damage(session: Session, size: float) -> Session:
-        more = per_axis(_along(session) * of_pieces(session.late, session.movement)[:, None])
+        more = per_axis(_along(session) * repeat_by_segment(session.late, session.movement)[:, None])
         return session.reading(size * more @ axes, np.concatenate([-size * axes / 2, np.zeros(3)]) * session.parameters)
 
     return damage
@@ -226,7 +226,7 @@ def disturbed(session: Session, size: float) -> Session:
 
 def _along(session: Session) -> Array:
     """(K, 3) what each axis feels."""
-    return np.asarray(felt(session.truth.theta(), session.movement) @ session.truth.matrix.T, dtype=np.float64)
+    return np.asarray(find_force(session.truth.theta(), session.movement) @ session.truth.matrix.T, dtype=np.float64)
 
 
 def _parameters(truth: Truth, chi: Array) -> Array:
