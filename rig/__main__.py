@@ -1,4 +1,4 @@
-"""`python -m rig` is the command `rig`, which begins here."""
+"""The entry point of `python -m rig`, which is the command `rig`."""
 
 import os
 import signal
@@ -8,15 +8,15 @@ from typing import Any
 
 
 def main() -> int:
-    """Entry point of `rig`: as `rig.cli.main`, with a Ctrl-C that is one line from the first moment on."""
-    signal.signal(signal.SIGINT, _end)  # until `rig.cli.guarded` has its own
+    """Run `rig` as `rig.cli.main` does; a Ctrl-C gives one line from the first moment on."""
+    signal.signal(signal.SIGINT, _end)  # until `rig.cli.run_guarded` installs its own
     from rig.cli import main as command
 
     return command()
 
 
 def _end(*_: Any) -> None:
-    """End at once: while modules are loaded nothing has begun, and what is raised there is a traceback."""
+    """End at once: while modules are loaded nothing has begun, and an exception would print a traceback."""
     with suppress(OSError):
         os.write(2, b"rig: interrupted\n")
     os._exit(130)

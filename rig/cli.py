@@ -1,4 +1,4 @@
-"""The command line: which commands there are. Each is imported when it is meant, so that help comes at once."""
+"""The command line: its commands, each imported only when it is called, so that help comes at once."""
 
 import argparse
 import gc
@@ -19,20 +19,20 @@ from rig.station.plain_text import for_file, say_on_terminal
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure
 
-# The rig's linear algebra is small: threads only get in its way, most of all on a busy machine. NumPy asks when it is
-# loaded, so this must be said before; whoever has said otherwise is heeded, and so is a program that has NumPy already.
+# The rig's linear algebra is small: threads slow it down, most of all on a busy machine. NumPy reads these variables
+# when it is loaded. Values that the user has set stay, and so does NumPy in a program that has already loaded it.
 if "numpy" not in sys.modules:
     for _library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
-# What is imported lives as long as the process: to look through it for garbage takes a tenth of a short command.
-_COLLECTED_AFTER = 50_000  # objects that hold others
+# Imported modules live as long as the process: to search them for garbage takes a tenth of a short command.
+_GARBAGE_THRESHOLD = 50_000  # container objects
 
 
 class Command(NamedTuple):
-    """A command: its module, in which `add` says what it takes and `run` does it, its help line, and its page in docs.
+    """A command: its module (`add` adds its arguments, `run` carries it out), its help line, and its page in docs.
 
-    `waits_for` is what it says at once if it begins by loading libraries for a second.
+    `waits_for` is the line that it prints at once if it begins by loading libraries for a second.
     """
 
     module: str
@@ -44,18 +44,18 @@ class Command(NamedTuple):
 COMMANDS = {
     "demo": Command(
         "rig.commands.measure.demo",
-        "a calibration in a simulated laboratory, without any hardware",
+        "run a calibration in a simulated laboratory, without any hardware",
         "how-to/start/ten-minutes.md",
         "reading the configuration",
     ),
     "new": Command(
         "rig.commands.devices.new",
-        "a configuration from a few questions, with comments, checked",
+        "write a configuration from a few questions, with comments, checked",
         "how-to/start/own-imu.md",
     ),
     "run": Command(
         "rig.commands.measure.run",
-        "run the procedure the file names",
+        "run the calibration that the file describes",
         "how-to/start/first-calibration.md",
         "reading the configuration",
     ),
@@ -67,13 +67,13 @@ COMMANDS = {
     ),
     "check": Command(
         "rig.commands.measure.check",
-        "connect and look; nothing moves, no program is stopped",
+        "connect and check; nothing moves, no program is stopped",
         "how-to/start/first-calibration.md",
         "reading the configuration",
     ),
     "record": Command(
         "rig.commands.measure.record",
-        "record the sensors alone, while something else turns them; nothing moves",
+        "record only the sensors, while another device turns them; nothing moves",
         "how-to/without-an-arm/known-attitudes.md",
     ),
     "resume": Command(
@@ -84,29 +84,29 @@ COMMANDS = {
     ),
     "station": Command(
         "rig.commands.station.station",
-        "one part after the other: number, checks, run, verdict, label",
+        "calibrate one part after the other: number, checks, run, verdict, label",
         "how-to/at-the-rig/station.md",
         "reading the configuration",
     ),
     "floor": Command(
         "rig.commands.station.floor",
-        "what several rigs that share a history do now, in a browser",
+        "show in a browser the state of several rigs that share a history",
         "how-to/at-the-rig/station.md",
     ),
     "watch": Command(
         "rig.commands.station.watch",
-        "a recorded run in a browser, as it was",
+        "replay a recorded run in a browser",
         "how-to/at-the-rig/operators-page.md",
     ),
     "solve": Command(
         "rig.commands.offline.solve",
-        "recompute the calibration from a recording, or from samples recorded elsewhere",
+        "recompute the calibration from a recording, or from samples of another program",
         "how-to/without-an-arm/data-recorded-elsewhere.md",
         "reading the recording",
     ),
     "allan": Command(
         "rig.commands.offline.allan",
-        "random walk and bias instability, by the Allan deviation of what was recorded at rest",
+        "random walk and bias instability, by the Allan deviation of a recording at rest",
         "how-to/at-the-rig/bias-drift.md",
         "reading the recording",
     ),
@@ -117,76 +117,76 @@ COMMANDS = {
     ),
     "show": Command(
         "rig.commands.documents.show",
-        "what a finished run amounts to: values, budgets, checks",
+        "show the result of a finished run: values, budgets, checks",
         "how-to/finished-runs/read-a-certificate.md",
         "reading the result",
     ),
     "explain": Command(
         "rig.commands.documents.explain",
-        "what a check, an error, a limit or a word means, and what to do",
+        "explain a check, an error, a limit or a word, and say what to do",
         "how-to/start/failed.md",
     ),
     "report": Command(
         "rig.commands.documents.report",
-        "the certificate of a finished run: HTML, PDF, digital certificate",
+        "write the certificate of a finished run: HTML, PDF, digital certificate",
         "how-to/finished-runs/read-a-certificate.md",
         "reading the result",
     ),
     "verify": Command(
         "rig.commands.documents.verify",
-        "who signed a certificate, when, whether it is unchanged, and whether a history knows it",
+        "check who signed a certificate and when, whether it is unchanged, and whether it is in a history",
         "how-to/finished-runs/signed-certificates.md",
         "looking at the signatures",
     ),
     "export": Command(
         "rig.commands.documents.export",
-        "what was calibrated and recorded, in the files of other programs",
+        "write calibrations and readings in the formats of other programs",
         "how-to/finished-runs/export.md",
         "reading the run",
     ),
     "history": Command(
         "rig.commands.history.command",
-        "what the laboratory remembers: calibrations, trends, check standards",
+        "the history of the laboratory: calibrations, trends, check standards",
         "how-to/finished-runs/check-standards.md",
         "opening the history",
     ),
     "study": Command(
         "rig.commands.offline.study",
-        "Monte-Carlo studies of the papers' figures and tables; without a name, list them",
+        "run a Monte-Carlo study of the papers' figures and tables; without a name, list them",
         "how-to/with-code/studies.md",
         "loading the studies",
     ),
     "board": Command(
         "rig.commands.devices.board",
-        "look at the board, read and change its stored calibrations, flash its firmware",
+        "inspect the board, read and change its stored calibrations, flash its firmware",
         "board.md",
     ),
-    "kvh": Command("rig.commands.devices.kvh", "look at a KVH 1775", "how-to/at-the-rig/kvh1775.md"),
+    "kvh": Command("rig.commands.devices.kvh", "inspect a KVH 1775", "how-to/at-the-rig/kvh1775.md"),
     "autopilot": Command(
         "rig.commands.devices.autopilot",
-        "write a calibration into an autopilot's parameters, and bring the old ones back",
+        "write a calibration into an autopilot's parameters, or restore the old ones",
         "how-to/at-the-rig/autopilot.md",
     ),
     "lines": Command(
         "rig.commands.devices.lines",
-        "look at a device that prints lines, and write its section, or a whole file that runs by hand",
+        "inspect a device that prints lines, and write its section or a complete configuration by hand",
         "how-to/at-the-rig/lines.md",
     ),
     "world": Command(
         "rig.commands.laboratory.world",
-        "only the simulated laboratory, in the foreground, for any client",
+        "run only the simulated laboratory, in the foreground, for any client",
         "how-to/with-code/laboratory-ci.md",
     ),
 }
 FIRST_STEPS = """\
-Calibrates inertial sensors on a robot arm, a servomotor or by hand. What one does first:
+Calibrates inertial sensors on a robot arm, a servomotor or by hand. First steps:
 
   rig demo                a calibration in a simulated laboratory; ten seconds
-  rig new my.yaml         a configuration from a few questions
+  rig new my.yaml         write a configuration from a few questions
   rig plan CONFIG         what the arm will do, and how long; connects to nothing
-  rig check CONFIG        what is there and what is missing, before a run on hardware; nothing moves
+  rig check CONFIG        devices present and missing, before a run on hardware; nothing moves
   rig run CONFIG          the calibration
-  rig show latest         what the latest run found
+  rig show latest         the result of the latest run
   rig report latest       its certificate
   rig history             every calibration so far
 
@@ -195,18 +195,18 @@ FAULT, INTERRUPTED = Fault.exit_status, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `rig`; returns the exit status docs/architecture.md promises (0 to 5, or 130)."""
-    gc.set_threshold(_COLLECTED_AFTER)
-    keep_streams_usable()  # help too is read by `head`, and by terminals that know no °
+    """Run `rig` and return the exit status that docs/architecture.md defines (0 to 5, or 130)."""
+    gc.set_threshold(_GARBAGE_THRESHOLD)
+    keep_streams_usable()  # help too is read by `head`, and by terminals without the character °
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["history"]:
-        from rig.commands.history.command import with_usual_command
+        from rig.commands.history.command import insert_usual_command
 
-        words = with_usual_command(words)
+        words = insert_usual_command(words)
     if not words and "_ARGCOMPLETE" not in os.environ:
-        return guarded(_first_steps)
+        return run_guarded(_first_steps)
     meant = _first_word(os.environ["COMP_LINE"].split()[1:] if "_ARGCOMPLETE" in os.environ else words)
-    parser = _parser(meant)
+    parser = _build_parser(meant)
     if "_ARGCOMPLETE" in os.environ:
         import argcomplete
 
@@ -215,7 +215,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not_understood:
         hint = "--set takes one word without blanks, as in --set procedure.speed_deg_s=30; " if "--set" in words else ""
         parser.error(f"{hint}unrecognized arguments: {' '.join(not_understood)}")
-    return guarded(lambda: _begun(meant, options.command, options))
+    return run_guarded(lambda: _carry_out(meant, options.command, options))
 
 
 def _first_word(words: Sequence[str]) -> str | None:
@@ -228,70 +228,74 @@ def _first_steps() -> int:
     return 0
 
 
-def _begun(name: str | None, command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
-    """Carry out a command; there is a sign of life before what it needs is loaded."""
+def _carry_out(name: str | None, command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
+    """Carry out a command; its first line of progress is printed before its modules are loaded."""
     if name is not None and COMMANDS[name].waits_for:
         say_on_terminal(COMMANDS[name].waits_for)
     return command(options)
 
 
-def guarded(command: Callable[[], int]) -> int:
+def run_guarded(command: Callable[[], int]) -> int:
     """Run a command; turn every named error into one message on stderr and its exit status."""
     keep_streams_usable()
     end_by_interrupt()
     try:
         status = command()
         if (lost := output_lost()) is not None:
-            what = f"all is done, but stdout has not taken what was to be printed ({lost.strerror or lost})"
-            raise Unprinted("output_lost", what, "Make room, or print into another place")
+            what = f"the work is done, but stdout has lost the output ({lost.strerror or lost})"
+            raise Unprinted("output_lost", what, "Free some space, or redirect the output to another disk")
         return status
     except RigError as error:
-        return _ended(str(error), error.exit_status)
+        return _print_ending(str(error), error.exit_status)
     except KeyboardInterrupt as interrupt:
-        ignore_endings()  # all is stopped: an impatient second one has nothing left to end
-        return _ended(str(interrupt) or "interrupted", INTERRUPTED)
+        ignore_endings()  # all is stopped: an impatient second Ctrl-C has nothing to end
+        return _print_ending(str(interrupt) or "interrupted", INTERRUPTED)
     except OSError as error:
-        return _ended(str(Fault("system", f"the system refused ({error})", "Correct that, then try again")), FAULT)
-    except SystemExit as ended:  # what a script's own code raised: its status would be taken for a verdict
+        return _print_ending(
+            str(Fault("system", f"the system refused ({error})", "Correct that, then try again")), FAULT
+        )
+    except SystemExit as ended:  # raised by a script's own code: its status would be taken for a verdict
         ended_by = f"a script ended the program (SystemExit: {ended})"
-        return _ended(str(Fault("script_failed", ended_by, "Remove from the script what ends the program")), FAULT)
+        return _print_ending(
+            str(Fault("script_failed", ended_by, "Remove from the script what ends the program")), FAULT
+        )
     except BaseException:
         import traceback
 
-        traceback.print_exc()  # a defect of ours; Python's own status, 1, would mean a verdict
+        traceback.print_exc()  # a defect of rig; Python's own status, 1, would mean a verdict
         return FAULT
 
 
-def _ended(text: str, status: int) -> int:
+def _print_ending(text: str, status: int) -> int:
     print(for_file(f"rig: {printable_lines(text)}", sys.stderr), file=sys.stderr)
     return status
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose complaint is one line that stands before the usage, with what may have been meant."""
+    """A parser whose error is one line before the usage, with the choices that may have been meant."""
 
     def error(self, message: str) -> NoReturn:
-        """Print what is wrong, how the command is used, and where help is; end with status 2."""
+        """Print the error, the usage of the command and the way to help; end with status 2."""
         usage = self.format_usage()
-        self.exit(2, f"{self.prog}: error: {_with_what_was_meant(message)}\n{usage}more: {self.prog} --help\n")
+        self.exit(2, f"{self.prog}: error: {_suggest_choice(message)}\n{usage}more: {self.prog} --help\n")
 
 
-def _with_what_was_meant(message: str) -> str:
+def _suggest_choice(message: str) -> str:
     """Return a message of argparse about a wrong choice as a sentence, with the nearest of the choices."""
     wrong = re.fullmatch(r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)", message)
     if wrong is None:
         return message
     from difflib import get_close_matches
 
-    name, given, choices = wrong.groups()
-    known = [choice.strip(" '") for choice in choices.split(",")]
-    what = f"there is no command {given}" if name == "COMMAND" else f"{name} cannot be {given}"
-    nearest = get_close_matches(given, known, n=2)
-    return f"{what}; " + (f"did you mean {' or '.join(nearest)}?" if nearest else f"there are {', '.join(known)}")
+    name, word, choices = wrong.groups()
+    commands = [choice.strip(" '") for choice in choices.split(",")]
+    what = f"there is no command {word}" if name == "COMMAND" else f"{name} cannot be {word}"
+    nearest = get_close_matches(word, commands, n=2)
+    return f"{what}; " + (f"did you mean {' or '.join(nearest)}?" if nearest else f"there are {', '.join(commands)}")
 
 
-def _parser(meant: str | None) -> argparse.ArgumentParser:
-    """Return a parser of every command by its name, and of the arguments of the one that is meant."""
+def _build_parser(meant: str | None) -> argparse.ArgumentParser:
+    """Return a parser of every command by its name, and of the arguments of the `meant` one."""
     parser = _Parser(prog="rig", description="Calibrate inertial sensors on a robot arm, a servomotor or by hand.")
     parser.add_argument("--version", action="version", version=f"rig {VERSION}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
@@ -305,9 +309,9 @@ def _parser(meant: str | None) -> argparse.ArgumentParser:
 
 
 def run_script(procedure: "AnyProcedure") -> int:
-    """Entry point of a script that is run as `python FILE.py` and defines `procedure`; arguments as of `rig run`.
+    """Run a script that is called as `python FILE.py` and defines `procedure`; its arguments are those of `rig run`.
 
-    It is this procedure that runs, whatever the configuration names.
+    This procedure runs, whatever the configuration names.
     """
     from rig.commands.measure.run import add, run
     from rig.plans.script_file import script_in
@@ -317,4 +321,4 @@ def run_script(procedure: "AnyProcedure") -> int:
     add(parser, script=False)
     options = parser.parse_args()
     options.script = script_in(script, procedure)
-    return guarded(lambda: run(options))
+    return run_guarded(lambda: run(options))

@@ -17,8 +17,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.commands.history.again_work import Task, solved_again
-from rig.commands.history.spread import Cluster, one_by_one, spread
+from rig.commands.history.again_work import Task, solve_task
+from rig.commands.history.spread import Cluster, distribute, solve_one_by_one
 from rig.history.again.answer import Answer
 from rig.history.entered.finished import recording_of
 
@@ -59,9 +59,9 @@ def on_a_cluster(todo: list[Task], workers: int) -> tuple[Took, dict[str, Answer
         Client(local) as client,  # type: ignore[no-untyped-call]
     ):
         for each in todo[: len(KINDS)]:
-            client.run(solved_again, each)
+            client.run(solve_task, each)
         solving_s, here_s, began_s = client.run(time.process_time), time.process_time(), time.perf_counter()
-        answers = {task.key: answer for task, answer in spread(todo, solved_again, Cluster(client))}
+        answers = {task.key: answer for task, answer in distribute(todo, solve_task, Cluster(client))}
         wall_s, here_s = time.perf_counter() - began_s, time.process_time() - here_s
         solved_s = sum(client.run(time.process_time).values()) - sum(solving_s.values())
         return Took(wall_s, solved_s, here_s), answers
@@ -75,7 +75,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         todo = tasks(options.recordings, Path(folder))
         began_s, here_s = time.perf_counter(), time.process_time()
-        alone = {task.key: answer for task, answer in one_by_one(todo, solved_again)}
+        alone = {task.key: answer for task, answer in solve_one_by_one(todo, solve_task)}
         alone_took = f"{time.perf_counter() - began_s:.1f} s, {time.process_time() - here_s:.1f} s of a processor"
         record("solve of a recording, again", len(todo) / (time.process_time() - here_s), "recordings/s")
         print(f"{len(todo)} recordings, one by one in this process: {alone_took}", flush=True)

@@ -1,4 +1,4 @@
-"""Arguments of several commands: the configuration, changes to it, a script in place of the procedure it names."""
+"""Arguments of several commands: the configuration, changes of its values, a script in place of its procedure."""
 
 from argparse import ArgumentParser, ArgumentTypeError, _ActionsContainer
 from collections.abc import Iterator
@@ -9,31 +9,31 @@ from rig.errors import Refused
 
 
 def add_config(parser: ArgumentParser) -> None:
-    """`CONFIG` and `--set`."""
+    """Add the arguments `CONFIG` and `--set`."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="YAML configuration file")
     add_set(parser, "change one value of the file")
 
 
 def add_set(parser: ArgumentParser, text: str, metavar: str = "PATH=VALUE") -> None:
-    """`--set`, any number of times."""
+    """Add the argument `--set`, which may be repeated."""
     parser.add_argument("--set", action="append", default=[], metavar=metavar, dest="overrides", help=text)
 
 
 def add_script(parser: ArgumentParser) -> None:
     """Add the argument `--script`."""
-    parser.add_argument("--script", type=Path, metavar="FILE", help="a procedure of your own, in place of the file's")
+    parser.add_argument("--script", type=Path, metavar="FILE", help="your own procedure, in place of the file's")
 
 
 def add_run(
     parser: _ActionsContainer, name: str, text: str, *, metavar: str = "RUN", nargs: str | None = None, **more: Any
 ) -> None:
-    """Add an argument that is a run; `latest` is the one that this user ran last."""
-    text += "; latest: the one that you ran last"
-    action = parser.add_argument(name, type=_run, metavar=metavar, nargs=nargs, help=text, **more)
-    action.completer = _completed_runs  # type: ignore[attr-defined]  # as argcomplete asks for it
+    """Add an argument that is a run; `latest` is this user's last one."""
+    text += "; latest: your last one"
+    action = parser.add_argument(name, type=_parse_run, metavar=metavar, nargs=nargs, help=text, **more)
+    action.completer = _complete_runs  # type: ignore[attr-defined]  # as argcomplete asks for it
 
 
-def _run(text: str) -> Path:
+def _parse_run(text: str) -> Path:
     from rig.data.latest_run import meant_run
 
     try:
@@ -42,7 +42,7 @@ def _run(text: str) -> Path:
         raise ArgumentTypeError(f"{text}: {error.what}. {error.remedy}") from None
 
 
-def _completed_runs(prefix: str, **_: Any) -> Iterator[str]:
+def _complete_runs(prefix: str, **_: Any) -> Iterator[str]:
     from argcomplete.completers import FilesCompleter
 
     from rig.data.latest_run import LATEST
@@ -53,4 +53,4 @@ def _completed_runs(prefix: str, **_: Any) -> Iterator[str]:
 
 def add_json(parser: _ActionsContainer) -> None:
     """Add the argument `--json`."""
-    parser.add_argument("--json", action="store_true", help="for machines")
+    parser.add_argument("--json", action="store_true", help="print JSON")

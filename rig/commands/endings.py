@@ -1,4 +1,4 @@
-"""Every way to end a command from outside, made to stop the arm first."""
+"""Signals that end a command from outside, all made to stop the arm first."""
 
 import signal
 from collections.abc import Iterator
@@ -12,34 +12,36 @@ _PRINTING_BEHIND = getattr(signal, "SIGTTOU", None)
 
 
 def end_by_interrupt() -> None:
-    """Let every ending signal raise KeyboardInterrupt from now on.
+    """Make every ending signal raise KeyboardInterrupt from now on.
 
-    Left alone, a closed terminal, Ctrl-\\, Ctrl-Z or any other of them would end or suspend this process while the arm
+    By default a closed terminal, Ctrl-\\, Ctrl-Z or another such signal ends or suspends this process while the arm
     goes on moving.
     """
     INTERRUPTS.allow()
     for number in MEANT_SIGNALS:
-        # A script's `&` starts programs that ignore Ctrl-C: an arm must stop by it all the same. That a run is to
-        # outlive its terminal is said by ignoring SIGHUP alone (nohup).
+        # A script's `&` starts programs that ignore Ctrl-C, which must stop an arm all the same. A run that is to
+        # outlive its terminal ignores only SIGHUP (nohup).
         if number != _HANGING_UP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _interrupt)
     for number in OTHER_SIGNALS:
-        if signal.getsignal(number) == signal.SIG_DFL:  # whoever handles or ignores one has a use for it
+        if signal.getsignal(number) == signal.SIG_DFL:  # a signal that is handled or ignored already has a use
             signal.signal(number, _interrupt)
-    # A terminal that lets nobody print in the background (`stty tostop`) would suspend a run by its own progress.
+    # A terminal that blocks output in the background (`stty tostop`) would suspend a run that prints its progress.
     if _PRINTING_BEHIND is not None and signal.getsignal(_PRINTING_BEHIND) == signal.SIG_DFL:
         signal.signal(_PRINTING_BEHIND, signal.SIG_IGN)
 
 
 def ignore_endings() -> None:
-    """Let nothing but a kill end this process from outside any more."""
+    """Ignore from now on every signal that ends a process, except a kill."""
     for number in ENDING_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
 @contextmanager
 def ending_by_interrupt() -> Iterator[None]:
-    """Let every ending signal raise KeyboardInterrupt for the length of the block, and then do what it did before."""
+    """Make every ending signal raise KeyboardInterrupt for the length of the block, and restore its handlers
+    afterwards.
+    """
     changed = ENDING_SIGNALS if _PRINTING_BEHIND is None else (*ENDING_SIGNALS, _PRINTING_BEHIND)
     before = {number: signal.getsignal(number) for number in changed}
     end_by_interrupt()

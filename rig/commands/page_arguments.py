@@ -1,4 +1,4 @@
-"""The operator's page on the command line: whether it is wanted, where, and what it may answer."""
+"""The operator's page on the command line: whether it is wanted, its address, and whether it may answer questions."""
 
 import argparse
 import os
@@ -29,19 +29,21 @@ LONGEST_TOKEN = 1000  # bytes of its file
 
 @dataclass(frozen=True, slots=True)
 class PageWish:
-    """Where the page is wanted (`place` is ADDRESS or ADDRESS:PORT), and whether it may answer for the operator."""
+    """The wish for a page: `host_and_port` (ADDRESS or ADDRESS:PORT), its token, and whether it may answer for the
+    operator.
+    """
 
-    place: str | None = None
+    host_and_port: str | None = None
     token: str | None = None
     may_answer: bool = False
 
     def address(self) -> "PageAddress":
-        """Raises Refused `page_address`."""
-        from rig.page.server.serving import ADDRESS, PageAddress
+        """Return the address. Raise Refused `page_address` for a wrong port."""
+        from rig.page.server.serving import ADDRESS
 
-        host, colon, port = (self.place or ADDRESS).rpartition(":")
+        host, colon, port = (self.host_and_port or ADDRESS).rpartition(":")
         if not colon or (host.count(":") and not host.endswith("]")):  # no port, or an IPv6 address alone
-            host, port = self.place or ADDRESS, ""
+            host, port = self.host_and_port or ADDRESS, ""
         if port and not (port.isascii() and port.isdecimal() and int(port) < 65536):
             raise Refused("page_address", f"{port!r} is no port", "Give --page-address ADDRESS:PORT")
         return PageAddress(host.strip("[]"), int(port) if port else None, self.token)
@@ -49,7 +51,7 @@ class PageWish:
 
 @dataclass(frozen=True, slots=True)
 class OperatorsPage:
-    """What a run needs of its page: who listens, who answers instead of the terminal, and how to wait at the end."""
+    """The page as a run uses it: its listeners, its answer in place of the terminal's, and how to wait at the end."""
 
     listeners: "tuple[Listener, ...]" = ()
     answer: Answer | None = None
@@ -58,74 +60,74 @@ class OperatorsPage:
 
 def add_page(parser: argparse.ArgumentParser) -> None:
     """Add the page's arguments of `rig run` and `rig resume`."""
-    parser.add_argument("--page", action="store_true", help="show the run in a browser as well")
-    parser.add_argument("--confirm-on-page", action="store_true", help="ask the operator there, not on the terminal")
-    add_place(parser)
+    parser.add_argument("--page", action="store_true", help="show the run also in a browser")
+    parser.add_argument("--confirm-on-page", action="store_true", help="ask the operator on the page, not the terminal")
+    add_page_address(parser)
 
 
-def add_place(parser: argparse.ArgumentParser) -> None:
-    """Where the page is, and its token."""
+def add_page_address(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the page's address and token."""
     parser.add_argument(
         "--page-address",
         metavar="ADDRESS[:PORT]",
-        help="where (default: 127.0.0.1:8137); one that others reach needs a token",
+        help="the page's address (default: 127.0.0.1:8137); an address that others can reach needs a token",
     )
     token = parser.add_mutually_exclusive_group()
     token.add_argument(
         "--page-token-file",
         type=Path,
         metavar="FILE",
-        help=f"holds the page's token (default: what {TOKEN_VARIABLE} says, or a new one each time)",
+        help=f"file with the page's token (default: the variable {TOKEN_VARIABLE}, else a new one each time)",
     )
     token.add_argument(
-        "--page-token", metavar="TOKEN", help="the token itself, which whoever lists this computer's processes sees"
+        "--page-token", metavar="TOKEN", help="the token itself; everyone who lists this computer's processes sees it"
     )
 
 
-def token_said(options: argparse.Namespace) -> str | None:
-    """The page's token where one is given: by the command line, a file or the environment.
+def read_page_token(options: argparse.Namespace) -> str | None:
+    """Return the page's token if one is given: by the command line, a file or the environment.
 
-    Raises Refused `page_address` for a file that cannot be read, or that others can.
+    Raise Refused `page_address` for a file that cannot be read, or that others can read.
     """
     path: Path | None = options.page_token_file
     if path is None:
-        given: str | None = options.page_token
-        return given if given is not None else os.environ.get(TOKEN_VARIABLE)
+        token: str | None = options.page_token
+        return token if token is not None else os.environ.get(TOKEN_VARIABLE)
     try:
         if os.name == "posix" and stat.S_IMODE(path.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
-            raise UnfitFile("others than you may read or write it")
+            raise UnfitFile("others than you can read or write it")
         return read_regular_file(path, LONGEST_TOKEN).decode("utf-8", errors="replace").strip()
     except (OSError, UnfitFile) as error:
         raise Refused(
             "page_address",
-            f"the page's token cannot be taken from {path}: {error}",
+            f"the page's token cannot be read from {path}: {error}",
             "Give a file that contains only the token and that only you can read: chmod 600 FILE",
         ) from error
 
 
-def wish(options: argparse.Namespace) -> PageWish | None:
-    """What the arguments ask for, None for no page.
+def read_page_wish(options: argparse.Namespace) -> PageWish | None:
+    """Return the page that the arguments ask for, None for no page.
 
-    Raises Refused `page_address` for a place that will not do, and for what goes with a page alone.
+    Raise Refused `page_address` for an unusable address, and for options that need `--page`.
     """
     if not options.page:
         if options.confirm_on_page or options.page_address or options.page_token or options.page_token_file:
-            raise Refused(
-                "page_address", "this option is for the page, and no page was asked for", "Give --page as well"
-            )
+            raise Refused("page_address", "this option needs a page, and --page is not given", "Give --page as well")
         return None
     from rig.page.server.serving import check
 
-    made = PageWish(options.page_address, token_said(options), options.confirm_on_page)
-    check(made.address())  # before there is a run folder
-    return made
+    wish = PageWish(options.page_address, read_page_token(options), options.confirm_on_page)
+    check(wish.address())  # before there is a run folder
+    return wish
 
 
 @contextmanager
-def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], About]") -> Iterator[OperatorsPage]:
-    """The page of a run in `folder`, for the length of the block; nothing where none is wanted.
+def serve_operators_page(
+    wanted: PageWish | None, folder: Path, about: "Callable[[], About]"
+) -> Iterator[OperatorsPage]:
+    """Serve the page of a run in `folder` for the length of the block; without a wish it does nothing.
 
-    Raises Refused `page_address`.
+    Raise Refused `page_address`.
     """
     if wanted is None:
         yield OperatorsPage()
@@ -142,16 +144,18 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
         lookout = stack.enter_context(looking_out(folder, feed))
         stack.enter_context(control.stoppable())
 
-        def asked(announcement: Sequence[str], to_do: str) -> bool:
-            say(f"The operator is asked on the page, whether to {to_do}.", sys.stderr)
+        def ask_on_page(announcement: Sequence[str], to_do: str) -> bool:
+            say(f"The operator is asked on the page whether to {to_do}.", sys.stderr)
             agreed = control.ask(announcement, to_do)
             return ask_operator(announcement, to_do) if agreed is None else agreed
 
-        yield OperatorsPage((feed, lookout, _Address(url)), asked if wanted.may_answer else None, stay_for_the_operator)
+        yield OperatorsPage(
+            (feed, lookout, _Address(url)), ask_on_page if wanted.may_answer else None, stay_for_the_operator
+        )
 
 
 class _Address:
-    """A listener that says where the page is once it stays: most refusals end a run before, and the page with it."""
+    """A listener that prints the page's address once the page stays: most refusals end a run and its page before."""
 
     def __init__(self, url: str) -> None:
         self._url: str | None = url
@@ -166,13 +170,13 @@ class _Address:
 
 
 def stay_for_the_operator() -> None:
-    """Where somebody sits at the terminal, the page with its verdict stays until Ctrl-C; a script goes on."""
+    """Keep the page with its verdict until Ctrl-C if an operator sits at the terminal; a script goes on."""
     if sys.stdin is not None and sys.stdin.isatty():
         say("The page stays until Ctrl-C.", sys.stderr)
         wait_for_interrupt()
 
 
 def wait_for_interrupt() -> None:
-    """Wait until Ctrl-C, which is how the command is meant to end."""
+    """Wait until Ctrl-C, the normal end of the command."""
     with suppress(KeyboardInterrupt):
         threading.Event().wait()

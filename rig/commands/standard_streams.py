@@ -1,4 +1,4 @@
-"""Standard streams that cannot end a run: whoever reads our words may go away at any time; the work goes on."""
+"""Standard streams that cannot end a run: if the reader of the output goes away, the work goes on."""
 
 import os
 import sys
@@ -7,9 +7,9 @@ from typing import Any, TextIO
 
 
 class _Unbroken:
-    """A text stream whose loss ends nothing: what it refuses is thrown away, and all that follows.
+    """A text stream whose loss ends nothing: output that it refuses is discarded, and all later output.
 
-    `lost` is why it refused, unless whoever read it has gone away: then it has what it wanted.
+    `lost` is the error, unless the reader has gone away: then it has read all that it wanted.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -42,7 +42,7 @@ class _Unbroken:
 
 
 def output_lost() -> OSError | None:
-    """Return why stdout has not taken all that was printed since this was last asked; None if it has."""
+    """Return why stdout has lost output since the last call; None if it has lost none."""
     stream = sys.stdout
     if not isinstance(stream, _Unbroken):
         return None
@@ -51,10 +51,10 @@ def output_lost() -> OSError | None:
     return lost
 
 
-def tell_where_the_result_is(result: Path) -> None:
-    """Say on stderr, if stdout has lost what was printed of a result, that it is whole in that file.
+def say_where_the_result_is(result: Path) -> None:
+    """Print on stderr, if stdout has lost output, that the result is complete in that file.
 
-    So the loss does not change what a run ends with.
+    The exit status of the run thus stays the same.
     """
     from rig.station.plain_text import say
 
@@ -64,10 +64,10 @@ def tell_where_the_result_is(result: Path) -> None:
 
 
 def keep_streams_usable() -> None:
-    """Make stdin, stdout and stderr usable whatever they are: closed, a pipe without a reader, a closed terminal.
+    """Make stdin, stdout and stderr usable in any state: closed, a pipe without a reader, a closed terminal.
 
-    Neither a lost stdout nor a lost stderr ends what goes on. A lost stderr carries only progress. A full disk under
-    stdout loses results: see `output_lost`. A reader that has gone away (`rig plan … | head`) has what it wanted.
+    Neither a lost stdout nor a lost stderr ends the work. A lost stderr carries only progress. A full disk under stdout
+    loses results: see `output_lost`. A reader that has gone away (`rig plan … | head`) has read all that it wanted.
     """
     # A closed descriptor would go to the next file opened, and stray output into that file.
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
@@ -79,5 +79,5 @@ def keep_streams_usable() -> None:
         return
     reconfigure = getattr(sys.stdout, "reconfigure", None)
     if reconfigure is not None:
-        reconfigure(errors="replace")  # a terminal that knows no ° shows a question mark
+        reconfigure(errors="replace")  # a terminal without the character ° shows a question mark
     sys.stdout, sys.stderr = _Unbroken(sys.stdout), _Unbroken(sys.stderr)

@@ -239,7 +239,7 @@ def test_the_command_that_goes_on_shows_the_same_page_and_no_token(tmp_path: Pat
     station.add(parser)
     page = ["--page", "--page-address", "192.0.2.10:8137"]
     begun = ["a b.yaml", "--set", "station.repeats=1", "--series", "parts.csv", *page]
-    said = shlex.split(station.going_on(parser.parse_args([*begun, "--page-token", "secret"]), tmp_path))
+    said = shlex.split(station.resume_command(parser.parse_args([*begun, "--page-token", "secret"]), tmp_path))
     assert said[:2] == ["rig", "station"] and "secret" not in said
     assert parser.parse_args(said[2:]) == parser.parse_args([*begun, "--out", str(tmp_path)])
 

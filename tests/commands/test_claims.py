@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from rig.commands.laboratory.claims import claimed_arm, claimed_board, claimed_sensor
-from rig.commands.laboratory.own_address import own_address
+from rig.commands.laboratory.claims import claim_arm, claim_board, claim_sensor
+from rig.commands.laboratory.own_address import find_own_address
 from rig.config.load import load
 from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.errors import Refused
@@ -50,12 +50,12 @@ def test_a_claim_is_refused_to_others_and_ends_with_its_process() -> None:
     host = fresh_host()
     with arm_held_elsewhere(host) as other:
         with pytest.raises(Refused, match=f"arm_claimed: the arm at {host} .*process {other.pid}: -c "):
-            claimed_arm(host).__enter__()
-        with claimed_arm(fresh_host()), claimed_board(f"socket://{host}:7321"):  # other things are free
+            claim_arm(host).__enter__()
+        with claim_arm(fresh_host()), claim_board(f"socket://{host}:7321"):  # other things are free
             pass
         other.kill()
         other.wait()
-        with claimed_arm(host):
+        with claim_arm(host):
             pass
 
 
@@ -63,27 +63,27 @@ def test_an_arm_and_a_port_are_known_by_every_name_they_have(tmp_path: Path) -> 
     device, link = tmp_path / "ttyACM0", tmp_path / "by-id"
     device.touch()
     link.symlink_to(device)
-    with claimed_arm("localhost"), pytest.raises(Refused, match=r"arm_claimed: the arm at 127\.0\.0\.1 "):
-        claimed_arm("127.0.0.1").__enter__()
-    with claimed_board(str(link)):
+    with claim_arm("localhost"), pytest.raises(Refused, match=r"arm_claimed: the arm at 127\.0\.0\.1 "):
+        claim_arm("127.0.0.1").__enter__()
+    with claim_board(str(link)):
         with pytest.raises(Refused, match=f"board_claimed: the board at {device} "):
-            claimed_board(str(device)).__enter__()
+            claim_board(str(device)).__enter__()
         with pytest.raises(Refused, match=f"sensor_claimed: the sensor kvh at {device} "):
-            claimed_sensor("kvh", str(device)).__enter__()
+            claim_sensor("kvh", str(device)).__enter__()
 
 
 @pytest.mark.slow
 def test_a_second_simulated_laboratory_moves_to_an_address_of_its_own() -> None:
     host = fresh_host()
     here, text = load(DEMO, [f"arm.host={host}", f"board.port=socket://{host}:7321"]).config, DEMO.read_text("utf-8")
-    with own_address(here, text) as first, own_address(here, text) as second:
+    with find_own_address(here, text) as first, find_own_address(here, text) as second:
         assert first == [] and len(second) == 2
         moved = load(DEMO, second).config
         assert moved.board is not None and moved.board.port == f"socket://{moved.arm.host}:7321"
         assert moved.arm.host not in (host, load(DEMO).config.arm.host)
-    with arm_held_elsewhere(host), own_address(here, text) as moved_away:
+    with arm_held_elsewhere(host), find_own_address(here, text) as moved_away:
         assert moved_away != []
-    with own_address(here, text) as again:
+    with find_own_address(here, text) as again:
         assert again == [], "what has ended takes no address"
 
 
@@ -91,7 +91,7 @@ def test_a_second_simulated_laboratory_moves_to_an_address_of_its_own() -> None:
 def test_hardware_is_where_its_configuration_says() -> None:
     host = fresh_host()
     config = load(DEMO, [f"arm.host={host}"]).config
-    with arm_held_elsewhere(host), own_address(config, None) as moved:
+    with arm_held_elsewhere(host), find_own_address(config, None) as moved:
         assert moved == []
 
 

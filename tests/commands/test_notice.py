@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.measure.notice import noticed
+from rig.commands.measure.notice import notify_after
 from rig.errors import Fault, Refused
 
 TELL = 'echo "$RIG_STATUS $RIG_RUN" > told.txt'
@@ -26,12 +26,12 @@ def test_it_is_told_how_the_run_ended(
     monkeypatch.chdir(tmp_path)
     if isinstance(ends, BaseException):
         with pytest.raises(type(ends)):
-            noticed(TELL, Path("run"), lambda: work_that(ends))
+            notify_after(TELL, Path("run"), lambda: work_that(ends))
     else:
-        assert noticed(TELL, Path("run"), lambda: work_that(ends)) == status
+        assert notify_after(TELL, Path("run"), lambda: work_that(ends)) == status
     assert (tmp_path / "told.txt").read_text(encoding="utf-8") == f"{status} {tmp_path / 'run'}\n"
 
 
 def test_a_command_that_fails_changes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert noticed("exit 7", tmp_path, lambda: 0) == 0
+    assert notify_after("exit 7", tmp_path, lambda: 0) == 0
     assert "the command of --notify failed: it ended with status 7" in capsys.readouterr().err

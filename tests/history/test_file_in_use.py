@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import event, text
 
-from rig.commands.history.recall import remembered
+from rig.commands.history.recall import recall_sensors
 from rig.commands.history.remember import remember
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.load import load
@@ -36,7 +36,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def look_at_its_configuration(file: Path) -> None:
-    assert remembered(load(CONFIGS / "ci.yaml").config, frozenset()).silent is None
+    assert recall_sensors(load(CONFIGS / "ci.yaml").config, frozenset()).silent is None
 
 
 def look_in_a_notebook(file: Path) -> None:
@@ -169,14 +169,14 @@ def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered
     with open_history(str(file)) as history:
         history.enter(finished(0))
     config = load(CONFIGS / "ci.yaml").config
-    assert remembered(config, frozenset()).silent is None  # the run begins
+    assert recall_sensors(config, frozenset()).silent is None  # the run begins
     with monkeypatch.context() as forging:
         forging.setattr("support.history.kept_rows.as_of_another_process", lambda: None)
         exchange(file)
     before = {each.name: each.read_bytes() for each in file.parent.iterdir()}
     event, _ = remember(RECORDINGS / "verified", config.history)  # and ends
     assert isinstance(event, NotRemembered) and name in event.why
-    assert name in (remembered(config, frozenset()).silent or "")
+    assert name in (recall_sensors(config, frozenset()).silent or "")
     assert {each.name: each.read_bytes() for each in file.parent.iterdir()} == before
     as_of_another_process()
     event, _ = remember(RECORDINGS / "verified", config.history)

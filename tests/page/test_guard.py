@@ -13,8 +13,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from rig.commands.page_arguments import PageWish, add_page, wish
-from rig.commands.station.watch import last_words
+from rig.commands.page_arguments import PageWish, add_page, read_page_wish
+from rig.commands.station.watch import read_last_words
 from rig.errors import Refused
 from rig.page.about import About
 from rig.page.page_state import PageState
@@ -253,7 +253,7 @@ def test_a_port_that_is_none_is_refused(place: str) -> None:
 def said(*words: str) -> PageWish | None:
     parser = argparse.ArgumentParser()
     add_page(parser)
-    return wish(parser.parse_args(["--page", *words]))
+    return read_page_wish(parser.parse_args(["--page", *words]))
 
 
 def test_a_token_comes_from_a_file_or_the_environment_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -297,4 +297,4 @@ def test_a_log_of_a_foreign_folder_is_read_as_far_as_it_is_one(
     tmp_path: Path, planted: Callable[[Path], None], words: str
 ) -> None:
     planted(tmp_path / "log.txt")
-    assert last_words(tmp_path) == "this run has no result" + words
+    assert read_last_words(tmp_path) == "this run has no result" + words

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from rig.cli import guarded, main
-from rig.commands.configured import configured
+from rig.cli import main, run_guarded
+from rig.commands.configured import load_configured
 from rig.data.own_texts import note_own
 from rig.data.run_folder import ScriptIdentity, script_identity
 from rig.errors import Refused
@@ -49,7 +49,7 @@ def test_what_ends_the_program_inside_a_command_is_no_verdict(
     def command() -> int:
         raise SystemExit(status)
 
-    assert guarded(command) == 3
+    assert run_guarded(command) == 3
     assert capsys.readouterr().err.startswith("rig: script_failed: ")
 
 
@@ -114,4 +114,4 @@ def test_a_section_that_fails_is_refused_by_name(tmp_path: Path) -> None:
     checking = "    def problems(self, config):\n        return [1 / 0]\n\n\ndef plan("
     path = script(tmp_path, OWN.read_text(encoding="utf-8").replace("def plan(", checking, 1))
     with pytest.raises(Refused, match=r"script_failed: the section of own\.py fails \(ZeroDivisionError"):
-        configured(CONFIGS / "demo.yaml", ["procedure={}"], path)
+        load_configured(CONFIGS / "demo.yaml", ["procedure={}"], path)

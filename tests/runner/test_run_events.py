@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.configured import configured
+from rig.commands.configured import load_configured
 from rig.data.recording.events import BoardObserved, BoardSolved, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.motion.state import ArmState, RuntimeState
 from rig.motion.steps import Sweep
@@ -67,7 +67,7 @@ def events(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[RunEvent]]
     folder = tmp_path_factory.mktemp("events")
     listener = Everything()
     with worlds(folder) as start:
-        found = configured(start(QUICK_EXPERIMENT).config_path)
+        found = load_configured(start(QUICK_EXPERIMENT).config_path)
         run = Run(folder, found.loaded, found.script, Stations((Failing(), listener), always_yes))
         assert run.carry_out(found.phase).passed
     dropped = ListenerDropped("Failing", "RuntimeError: no page to show it on")

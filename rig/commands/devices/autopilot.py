@@ -164,16 +164,16 @@ def _kept(options: Namespace) -> Path:
 @contextmanager
 def _connected(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
     """The only autopilot of a configuration, in its simulated laboratory if it has one, and the IMUs it is read by."""
-    from rig.commands.laboratory.claims import claimed_sensor
+    from rig.commands.laboratory.claims import claim_sensor
     from rig.commands.laboratory.laboratory import simulated_laboratory
-    from rig.commands.laboratory.own_address import loaded_here
+    from rig.commands.laboratory.own_address import load_at_own_address
     from rig.errors import raised_as
     from rig.sensors.mavlink.link import AutopilotLink
     from rig.sensors.mavlink.source import mavlink_section
     from rig.sensors.registry import group_by_port
 
     with ExitStack() as stack:
-        loaded = stack.enter_context(loaded_here(options.config, options.overrides))
+        loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))
         sensors = {name: each for name, each in loaded.config.sensors.items() if each.mavlink is not None}
         found = [(port, sections) for port, _, sections in group_by_port(sensors)]
         if len(found) != 1:
@@ -190,7 +190,7 @@ def _connected(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[st
             )
         ((port, sections),) = found
         name, section = next(iter(sections.items()))
-        stack.enter_context(claimed_sensor(name, port))
+        stack.enter_context(claim_sensor(name, port))
         stack.enter_context(raised_as(Refused))
         link = stack.enter_context(closing(AutopilotLink(name, port, mavlink_section(section).baud)))
         link.identify()

@@ -21,9 +21,9 @@ from rig.board.identify import (
     spell_part,
 )
 from rig.board.store import calibration_of, store
-from rig.commands.laboratory.claims import claimed_board
+from rig.commands.laboratory.claims import claim_board
 from rig.commands.laboratory.laboratory import simulated_laboratory
-from rig.commands.laboratory.own_address import loaded_here
+from rig.commands.laboratory.own_address import load_at_own_address
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.quantity import RATE
@@ -119,14 +119,14 @@ def erase(options: Namespace) -> int:
 def _connected(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
     """The board of a configuration, in its simulated laboratory if it has one."""
     with ExitStack() as stack:
-        loaded = stack.enter_context(loaded_here(options.config, options.overrides))
+        loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))
         section = require_board_section(loaded.config)
         if loaded.simulated:
             stack.enter_context(simulated_laboratory(loaded.text))
             kept = loaded.flash_file
             memory = f"is kept in {kept}" if kept else "too, unless world.board.flash_file names a file that keeps it"
             say(f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr)
-        stack.enter_context(claimed_board(section.port))
+        stack.enter_context(claim_board(section.port))
         with refusing():
             board = stack.enter_context(Board(section.port, section.baud, lambda batch: None))
         yield loaded.config, board

@@ -23,9 +23,9 @@ from rig.board.identify import (
     spell_part,
 )
 from rig.board.store import store
-from rig.commands.laboratory.claims import claimed_board
+from rig.commands.laboratory.claims import claim_board
 from rig.commands.laboratory.laboratory import simulated_laboratory
-from rig.commands.laboratory.own_address import loaded_here
+from rig.commands.laboratory.own_address import load_at_own_address
 from rig.commands.laboratory.simulated_operator import SimulatedOperator
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_sections import SensorSection
@@ -58,13 +58,13 @@ def hand(options: Namespace) -> int:
     if options.write:
         refuse_unless_answerable(options.yes)
     with ExitStack() as stack:
-        loaded = stack.enter_context(loaded_here(options.config, options.overrides))
+        loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))
         config = loaded.config
         among = _sensors(config, options.sensor)
         operator = None
         if loaded.simulated:
             operator = SimulatedOperator(stack.enter_context(simulated_laboratory(loaded.text)))
-        stack.enter_context(claimed_board(require_board_section(config).port))
+        stack.enter_context(claim_board(require_board_section(config).port))
         of_board = _fetched(config, among) if options.fetch else _made(config, next(iter(among)), options, operator)
         board, name, found = stack.enter_context(of_board)
         calibration = Calibration(

@@ -35,14 +35,14 @@ def add(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print what is at the port, or every KVH 1775 of the configuration, that is given; 2 if one has a problem."""
-    from rig.commands.laboratory.own_address import loaded_here
+    from rig.commands.laboratory.own_address import load_at_own_address
     from rig.report.terminal.kvh_info import print_kvh_info
 
     target, baud = options.target, options.baud
     with ExitStack() as stack:
         places = {target: (target, baud or 921600)}
         if Path(target).is_file():
-            loaded = stack.enter_context(loaded_here(Path(target), options.overrides))
+            loaded = stack.enter_context(load_at_own_address(Path(target), options.overrides))
             places = {
                 name: (section.serial.port, baud or section.serial.baud)
                 for name, section in loaded.config.sensors.items()
@@ -66,7 +66,7 @@ def _look(name: str, port: str, baud: int) -> "KvhInfo":
     """Raises Refused where nothing can be asked at all."""
     import numpy as np
 
-    from rig.commands.laboratory.claims import claimed_sensor
+    from rig.commands.laboratory.claims import claim_sensor
     from rig.report.terminal.kvh_info import KvhInfo
     from rig.sensors.errors import SensorError
     from rig.sensors.kvh1775.driver import Kvh1775
@@ -75,7 +75,7 @@ def _look(name: str, port: str, baud: int) -> "KvhInfo":
     seen: list[NDArray[Any]] = []
     with (
         raised_as(Refused),
-        claimed_sensor(name, port),
+        claim_sensor(name, port),
         closing(Kvh1775(name, port, baud, lambda messages, *_: seen.append(messages))) as kvh,
     ):
         found = KvhInfo(name, port, baud, kvh.serial_number, dict(kvh.settings))

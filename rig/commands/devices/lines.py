@@ -103,13 +103,13 @@ def section_of(port: str, baud: int | None, name: str, seconds: tuple[float, flo
 
     Raise Refused as `listen`, and `lines_no_pattern` if its lines have nothing in common.
     """
-    from rig.commands.laboratory.claims import claimed_sensor
+    from rig.commands.laboratory.claims import claim_sensor
     from rig.sensors.lines.guessing import guess
     from rig.sensors.lines.listening import listen
     from rig.sensors.lines.shape import NoShape, find_shape
     from rig.sensors.lines.written import section
 
-    with raised_as(Refused), claimed_sensor(name, port):
+    with raised_as(Refused), claim_sensor(name, port):
         baud, lines, still_s = listen(port, baud, _tell, seconds)
     try:
         shape = find_shape(lines)

@@ -1,4 +1,4 @@
-"""`rig explain`: what a check, an error, a limit or a word is, and where to look."""
+"""`rig explain`: the meaning of a check, an error, a limit or a word, and where to read more."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
@@ -13,29 +13,29 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.errors.by_way import Way
 
-WAYS: "dict[Way, str]" = {"hand": "by hand", "file": "with readings from files", "arm": "on an arm or a servomotor"}
+METHODS: "dict[Way, str]" = {"hand": "by hand", "file": "with readings from files", "arm": "on an arm or a servomotor"}
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig explain`."""
+    """Add the arguments of `rig explain`."""
     what = "a check (gyro.scale_changed), an error (wrong_axis), a limit, or a word (E_n, sweep, scale factor)"
     parser.add_argument("name", nargs="+", metavar="NAME", help=what)
 
 
 def run(options: Namespace) -> int:
-    """Print what the name means. Returns 0. Raises Refused `nothing_known`."""
+    """Print the meaning of the name. Return 0. Raise Refused `nothing_known`."""
     name = " ".join(options.name).strip()
-    lines = [*_check(name), *_limit(name), *_error(name), *_word(name)]
+    lines = [*_explain_check(name), *_explain_limit(name), *_explain_error(name), *_explain_word(name)]
     if not lines:
-        alike = get_close_matches(name, _names(), cutoff=0.5)
-        known = f"Did you mean {' or '.join(alike)}?" if alike else "Give a name as it was printed"
-        raise Refused("nothing_known", f"there is no check, error, limit or word called {shorten(name)}", known)
+        alike = get_close_matches(name, _list_names(), cutoff=0.5)
+        remedy = f"Did you mean {' or '.join(alike)}?" if alike else "Give a name as it was printed"
+        raise Refused("nothing_known", f"there is no check, error, limit or word called {shorten(name)}", remedy)
     for line in lines:
         say(line)
     return 0
 
 
-def _check(name: str) -> Iterator[str]:
+def _explain_check(name: str) -> Iterator[str]:
     from rig.report.words.check_words import words_of_name
 
     if (words := words_of_name(name)) is not None:
@@ -44,43 +44,43 @@ def _check(name: str) -> Iterator[str]:
         yield "More: docs/checks.md, docs/method.md"
 
 
-def _limit(name: str) -> Iterator[str]:
+def _explain_limit(name: str) -> Iterator[str]:
     from rig.config.judging.limits import LIMITS, Limits
 
     key = name.removeprefix("limits.")
     if key in LIMITS:
         row = LIMITS[key]
-        of = "a property of the sensor" if row.kind == "conformity" else "how good the measurement is"
+        kind = "a property of the sensor" if row.kind == "conformity" else "how good the measurement is"
         unit = "" if row.unit == "1" else f", in {row.unit}"
-        yield f"limits.{key}: a limit on {of}: {Limits.model_fields[key].description}{unit}."
+        yield f"limits.{key}: a limit on {kind}: {Limits.model_fields[key].description}{unit}."
         yield "More: docs/configuration.md"
 
 
-def _error(name: str) -> Iterator[str]:
+def _explain_error(name: str) -> Iterator[str]:
     from rig.errors.catalogue import catalogue
 
     for entry in catalogue():
         if entry.name == name:
             yield f"{entry.name}: an error. It occurs when {entry.when}."
-            yield from _remedies(name, entry.remedy)
+            yield from _explain_remedies(name, entry.remedy)
             yield "More: docs/errors.md"
 
 
-def _remedies(name: str, usual: str) -> Iterator[str]:
-    """Yield what to do, one line for each way if they differ, that of the latest run first."""
+def _explain_remedies(name: str, usual: str) -> Iterator[str]:
+    """Yield the remedies, one line for each method if they differ, that of the latest run first."""
     from rig.errors.by_way import remedies_by_way
 
     remedies = remedies_by_way(name)
     if not remedies:
         yield f"What to do: {usual.rstrip('.')}."
-    used = _way_in_use()
-    for way in sorted(remedies, key=lambda way: way != used):
-        as_now = ", as in your latest run" if way == used else ""
-        yield f"What to do {WAYS[way]}{as_now}: {remedies[way].rstrip('.')}."
+    used = _find_method_in_use()
+    for method in sorted(remedies, key=lambda method: method != used):
+        as_now = ", as in your latest run" if method == used else ""
+        yield f"What to do {METHODS[method]}{as_now}: {remedies[method].rstrip('.')}."
 
 
-def _way_in_use() -> "Way | None":
-    """Return how the latest run calibrates, by its configuration; None if there is no run or nothing says it."""
+def _find_method_in_use() -> "Way | None":
+    """Return how the latest run calibrates, by its configuration; None without a run or if it does not say so."""
     import yaml
 
     from rig.config.files.regular_file import UnfitFile, read_regular_file
@@ -98,17 +98,17 @@ def _way_in_use() -> "Way | None":
     return "hand" if isinstance(turner, dict) and turner.get("kind") == "hand" else "arm"
 
 
-def _word(name: str) -> Iterator[str]:
+def _explain_word(name: str) -> Iterator[str]:
     from rig.report.words.glossary import find_words
 
-    found = [*find_words(name)]
-    for word in found:
+    words = [*find_words(name)]
+    for word in words:
         yield f"{word.names}: {word.plain_meaning}"
-    if found:
+    if words:
         yield "More: docs/glossary.md"
 
 
-def _names() -> list[str]:
+def _list_names() -> list[str]:
     from rig.config.judging.limits import LIMITS
     from rig.errors.catalogue import catalogue
     from rig.report.words.check_words import check_words

@@ -1,4 +1,4 @@
-"""`rig export`: a run in the files of other programs."""
+"""`rig export`: a run in the formats of other programs."""
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -15,35 +15,37 @@ if TYPE_CHECKING:
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig export`."""
+    """Add the arguments of `rig export`."""
     add_run(parser, "run", "a run folder")
     parser.add_argument(
         "--format",
         choices=FORMATS,
         required=True,
-        help="whose; docs/how-to/finished-runs/export.md says what each holds",
+        help="the format; docs/how-to/finished-runs/export.md describes each",
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to (default: export/FORMAT in the run folder)")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder of the files (default: export/FORMAT in the run folder)"
+    )
     parser.add_argument(
         "--at-temperature",
         nargs=2,
         metavar=("CELSIUS", "DRIFT_RUN"),
-        help="biases as they are at that temperature, by the slopes a run of bias_drift has found",
+        help="give biases at this temperature, by the slopes that a run of bias_drift measured",
     )
 
 
 def run(options: Namespace) -> int:
-    """Write the files as `files` does; returns 0."""
-    files(options)
+    """Write the files as `export_files` does; return 0."""
+    export_files(options)
     return 0
 
 
-def files(options: Namespace) -> list[Path]:
-    """Readings of the first movement with what turned it, or the calibrations of a run that passed, into `--out`.
+def export_files(options: Namespace) -> list[Path]:
+    """Write readings of the first movement with its motion, or the calibrations of a passed run, into `--out`.
 
-    `--at-temperature`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
-    Returns the files. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of
-    readings as `open_run` and `exported`, of calibrations as `read_passed_result`, `at_temperature` and the format do.
+    `--at-temperature`: a temperature in °C, and the run of `bias_drift` with the slopes. Return the files. Raise
+    Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links`; for readings as `open_run` and
+    `exported`; for calibrations as `read_passed_result`, `at_temperature` and the format.
     """
     from rig.plans.recorded import open_run
     from rig.report.exports.recorded import exported
@@ -58,12 +60,12 @@ def files(options: Namespace) -> list[Path]:
             write = writer_of_readings(name)
             say_on_terminal("reading the recordings")
             recordings = exported(open_run(run).movement)
-            _made(folder, own=out is not None)
+            _make_folder(folder, named_by_user=out is not None)
             with replace_together():
                 written = write(recordings, folder)
         else:
-            texts = texts_of_calibrations(name)(_calibrations(run, moved))
-            _made(folder, own=out is not None)
+            texts = texts_of_calibrations(name)(_read_calibrations(run, moved))
+            _make_folder(folder, named_by_user=out is not None)
             written = [folder / file for file in texts]
             with replace_together():
                 for path, text in zip(written, texts.values(), strict=True):
@@ -75,29 +77,30 @@ def files(options: Namespace) -> list[Path]:
     return written
 
 
-def _made(folder: Path, *, own: bool) -> None:
-    """Make the folder, unless a link leads elsewhere, from what lies in it or, if it is not named by the user as their
-    `own`, from itself. Raises Refused and OSError.
+def _make_folder(folder: Path, *, named_by_user: bool) -> None:
+    """Make the folder unless a link leads out of it. Raise Refused and OSError.
+
+    Links among its contents are refused; the folder itself may be one only if the user named it.
     """
     from rig.data.run_folder import refuse_links
 
-    refuse_links(*(() if own else (folder.parent, folder)))
+    refuse_links(*(() if named_by_user else (folder.parent, folder)))
     folder.mkdir(parents=True, exist_ok=True)
     refuse_links(*folder.rglob("*"))
 
 
-def _calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCalibrations":
+def _read_calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCalibrations":
     from rig.data.result_file import read_passed_result, read_result
     from rig.report.exports.calibrations import calibrations
     from rig.report.exports.temperature import at_temperature
 
-    found = calibrations(read_passed_result(run))
+    run_calibrations = calibrations(read_passed_result(run))
     if moved is None:
-        return found
+        return run_calibrations
     temperature, drift = moved
     try:
         temperature_c = float(temperature)
     except ValueError as error:
         remedy = "Give it as in --at-temperature 31.5 DRIFT_RUN"
-        raise Refused("bad_option", f"--at-temperature {temperature} is no temperature", remedy) from error
-    return at_temperature(found, read_result(Path(drift)), temperature_c)
+        raise Refused("bad_option", f"--at-temperature {temperature} is not a temperature", remedy) from error
+    return at_temperature(run_calibrations, read_result(Path(drift)), temperature_c)

@@ -1,4 +1,4 @@
-"""`rig report`: the documents of a finished run once more, in other forms or with the customer's name in them."""
+"""`rig report`: the documents of a finished run again, in other forms or with the customer's name in them."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_run, add_set
-from rig.commands.history.named_history import add_history, named_history
+from rig.commands.history.named_history import add_history, read_history_name
 from rig.config.files.written_file import replace_together, write_new
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
@@ -19,29 +19,29 @@ if TYPE_CHECKING:
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig report`."""
+    """Add the arguments of `rig report`."""
     add_run(parser, "run", "a run folder or its result.json")
     parser.add_argument(
         "--pdf",
         action="store_true",
-        help="PDF/A-3b too, with result.json and the digital certificate attached (extra `pdf`)",
+        help="also write PDF/A-3b, with result.json and the digital certificate attached (extra `pdf`)",
     )
     parser.add_argument(
         "--reversal",
         type=Path,
         metavar="FILE",
-        help="the file that `rig reversal` wrote by --out, of its magnetometers",
+        help="file that `rig reversal --out` wrote for the run's magnetometers",
     )
-    parser.add_argument("--dcc", action="store_true", help="the digital certificate (DCC 3.2.1, XML) too")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to (default: the run folder)")
+    parser.add_argument("--dcc", action="store_true", help="also write the digital certificate (DCC 3.2.1, XML)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the documents (default: the run folder)")
     parser.add_argument(
         "--sign",
         metavar="KEY",
-        help="sign the PDF (made if no form is asked for) and the digital certificate (extra `sign`): a PKCS#12 or PEM "
+        help="sign the PDF (written if no form is chosen) and the digital certificate (extra `sign`): a PKCS#12 or PEM "
         "file, or pkcs11:token=…;object=…?module-path=…; its passphrase or PIN in RIG_SIGNING_PASSPHRASE",
     )
     parser.add_argument(
-        "--time-server", metavar="URL", help="a time stamp (RFC 3161) of this server in the PDF's signature"
+        "--time-server", metavar="URL", help="put a time stamp (RFC 3161) of this server in the PDF's signature"
     )
     parser.add_argument(
         "--long-term",
@@ -53,41 +53,41 @@ def add(parser: ArgumentParser) -> None:
         "the time server, the list (CRL) and the certificate, as PEM; may be repeated",
     )
     add_history(parser)
-    add_set(parser, "say something else on the certificate, for example certificate.customer=Example")
+    add_set(parser, "replace an entry on the certificate, for example certificate.customer=Example")
 
 
 def run(options: Namespace) -> int:
-    """Write the certificate as `documents` does; returns 0, or 2 where a form that was asked for could not be made."""
-    _, left_out = documents(options)
+    """Write the certificate as `write_documents`; return 0, or 2 if a requested form could not be made."""
+    _, left_out = write_documents(options)
     for error in left_out:
         say(f"rig: left out: {error}", sys.stderr)
     return Refused.exit_status if left_out else 0
 
 
-def documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
-    """Certificate of a run folder or its result.json: HTML, and with `--dcc` and `--pdf` in these forms, into `--out`.
+def write_documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
+    """Write the certificate of a run folder or its result.json into `--out`: HTML, with `--dcc` and `--pdf` also these.
 
-    `--sign` is whose key signs these two, `--time-server` who says when. `--reversal` is what `rig reversal` wrote of
-    its magnetometers; `--history` where the certificate is noted, the user's own history by default, and never one that
-    the folder names. Returns the files, and why forms that were asked for could not be made. Raises Refused
-    `report_folder`, `bad_option`, and as `read_result`, `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`
-    and `signatory`.
+    `--sign` is the key that signs these two, `--time-server` the server that dates the signature. `--reversal` is the
+    file that `rig reversal` wrote for its magnetometers; `--history` the history that notes the certificate, the user's
+    own by default, and never one that the folder names. Return the files, and why requested forms could not be made.
+    Raise Refused `report_folder`, `bad_option`, and as `read_result`, `read_reversal`, `refuse_links`,
+    `certificate_of`, `stated_in` and `signatory`.
     """
     if options.sign is None and options.time_server is not None:
-        raise Refused("bad_option", "--time-server is for what is signed", "Give --sign KEY too, or leave it out")
+        raise Refused("bad_option", "--time-server is for signed documents", "Give --sign KEY too, or leave it out")
     if options.long_term and options.time_server is None:
-        what = "--long-term says what was revoked at a time, and no time server says which"
+        what = "--long-term shows revocations at the time of signing, which needs a time server"
         raise Refused("bad_option", what, "Give --sign KEY and --time-server URL too, or leave it out")
     if options.sign is None:
-        return _documents(options, None)
+        return _write_signed(options, None)
     from rig.report.signatures.signatory import signatory
 
     with signatory(options.sign) as by:
-        return _documents(options, by)
+        return _write_signed(options, by)
 
 
-def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], list[Refused]]:
-    from rig.commands.history.remember import journal_end, remember_certificate
+def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path], list[Refused]]:
+    from rig.commands.history.remember import find_journal_end, remember_certificate
     from rig.data.entries.magnetometer import read_reversal
     from rig.data.result_file import read_result
     from rig.data.run_folder import CERTIFICATE, RESULT, refuse_links
@@ -101,13 +101,13 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
     pdf = options.pdf or (by is not None and not options.dcc)  # the page itself cannot carry a signature
     file: Path = options.run / RESULT if options.run.is_dir() else options.run
     result = read_result(file)
-    turned = {} if options.reversal is None else read_reversal(options.reversal).magnetometers
-    certificate = certificate_of(result, stated_in(file.parent, options.overrides), turned)
-    end = None if by is None else journal_end(file.parent, named_history(options.history))
+    reversals = {} if options.reversal is None else read_reversal(options.reversal).magnetometers
+    certificate = certificate_of(result, stated_in(file.parent, options.overrides), reversals)
+    end = None if by is None else find_journal_end(file.parent, read_history_name(options.history))
     reason = reason_of(certificate, end)
     written: dict[str, bytes] = {CERTIFICATE: certificate_page(certificate).encode()}
     left_out: list[Refused] = []
-    digital = _digital(certificate, by, reason, left_out if options.dcc else None) if options.dcc or pdf else {}
+    digital = _make_digital(certificate, by, reason, left_out if options.dcc else None) if options.dcc or pdf else {}
     if options.dcc:
         written |= digital
     folder: Path = options.out or file.parent
@@ -121,7 +121,7 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
                 say_on_terminal("drawing the PDF")
                 try:
                     attached = {RESULT: file.read_bytes(), **digital}
-                    written[PDF] = _pdf(written[CERTIFICATE].decode(), attached, by, reason, options)
+                    written[PDF] = _make_pdf(written[CERTIFICATE].decode(), attached, by, reason, options)
                     write_new(folder / PDF, written[PDF])
                 except Refused as error:
                     left_out.append(error)
@@ -130,20 +130,25 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
     for name in written:
         say(str(folder / name))
     issued = issue_certificate(certificate, written)
-    missed = remember_certificate(file.parent, file.read_text(encoding="utf-8"), issued, named_history(options.history))
-    if missed is not None:
-        say(f"rig: the certificate is in no history: {missed}", sys.stderr)
+    reason_not_noted = remember_certificate(
+        file.parent, file.read_text(encoding="utf-8"), issued, read_history_name(options.history)
+    )
+    if reason_not_noted is not None:
+        say(f"rig: the certificate is in no history: {reason_not_noted}", sys.stderr)
     return [folder / name for name in written], left_out
 
 
-def _digital(
+def _make_digital(
     certificate: "Certificate", by: "Signatory | None", reason: "Reason", left_out: list[Refused] | None
 ) -> dict[str, bytes]:
-    """The digital certificate by its name, signed where somebody signs; what it lacks is `left_out`, or only told."""
+    """Return the digital certificate by its name, signed if there is a signatory, or nothing if it cannot be made.
+
+    The reason is appended to `left_out`, or only printed if that is None.
+    """
     from rig.report.certificate.dcc import DCC, digital_certificate
 
     try:
-        made = digital_certificate(certificate)
+        certificate_xml = digital_certificate(certificate)
     except Refused as error:
         if left_out is None:
             say(f"rig: no digital certificate is attached: {error.what}", sys.stderr)
@@ -151,23 +156,25 @@ def _digital(
             left_out.append(error)
         return {}
     if by is None:
-        return {DCC: made}
+        return {DCC: certificate_xml}
     from rig.report.signatures.signing import sign_as_xades
 
-    return {DCC: sign_as_xades(made, by, reason)}
+    return {DCC: sign_as_xades(certificate_xml, by, reason)}
 
 
-def _pdf(
+def _make_pdf(
     page: str, attached: Mapping[str, bytes], by: "Signatory | None", reason: "Reason", options: Namespace
 ) -> bytes:
-    """Return the page as PDF, signed if there is a signatory. Raise Refused as `pdf_of` and `sign_as_pades`."""
+    """Return the page as PDF, signed if there is a signatory. Raise Refused as `pdf_of`, `read_authorities` and
+    `sign_as_pades`.
+    """
     from rig.report.certificate.pdf import pdf_of
 
-    made = pdf_of(page, attached)
+    document = pdf_of(page, attached)
     if by is None:
-        return made
+        return document
     from rig.report.signatures.long_term import read_authorities
     from rig.report.signatures.signing import sign_as_pades
 
     authorities = read_authorities(options.long_term) if options.long_term else None
-    return sign_as_pades(made, by, reason, options.time_server, authorities)
+    return sign_as_pades(document, by, reason, options.time_server, authorities)

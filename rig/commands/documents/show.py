@@ -1,4 +1,4 @@
-"""`rig show`: what a finished run amounts to, in short or in full."""
+"""`rig show`: the result of a finished run, in short or in full."""
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig show`."""
+    """Add the arguments of `rig show`."""
     add_run(parser, "run", "a run folder or its result.json (default: latest)", nargs="?", default="latest")
     part = parser.add_mutually_exclusive_group()
-    part.add_argument("--budget", action="store_true", help="values, uncertainty budgets, and what stands beside")
-    part.add_argument("--checks", action="store_true", help="every check, sensor by sensor, those that failed first")
+    part.add_argument("--budget", action="store_true", help="values with their uncertainty budgets and remarks")
+    part.add_argument("--checks", action="store_true", help="every check, sensor by sensor, failed ones first")
     part.add_argument("--all", action="store_true", help="both")
-    parser.add_argument("--sensor", metavar="NAME", help="of this sensor alone")
+    parser.add_argument("--sensor", metavar="NAME", help="only this sensor")
 
 
 def run(options: Namespace) -> int:
-    """Print a finished run as it was judged; nothing is solved anew, nothing is written.
+    """Print a finished run as it was judged; nothing is solved again, nothing is written.
 
-    Returns 0, whatever the verdict is. Raises Refused `no_result`, `not_a_result`, `no_such_sensor`.
+    Return 0, whatever the verdict is. Raise Refused `no_result`, `not_a_result`, `no_such_sensor`.
     """
     from rich.console import Console
 
@@ -34,11 +34,11 @@ def run(options: Namespace) -> int:
 
     result, sensor = read_result(options.run), options.sensor
     console = Console(highlight=False)
-    if sensor is not None and sensor not in (names := _sensors(result)):
-        scalars = _scalars(options.run)
+    if sensor is not None and sensor not in (names := _list_sensors(result)):
+        scalars = _describe_scalars(options.run)
         if sensor not in scalars:
-            known = ", ".join([*names, *scalars])
-            raise Refused("no_such_sensor", f"{options.run} has no sensor {sensor}", f"Choose one of: {known}")
+            names_in_run = ", ".join([*names, *scalars])
+            raise Refused("no_such_sensor", f"{options.run} has no sensor {sensor}", f"Choose one of: {names_in_run}")
         say(scalars[sensor])
         return 0
     if options.budget or options.all or (sensor is not None and not options.checks):
@@ -52,26 +52,32 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _sensors(result: "ResultDocument") -> list[str]:
+def _list_sensors(result: "ResultDocument") -> list[str]:
     from rig.report.kinds.registry import kinds
 
-    return [*dict.fromkeys(found.sensor for kind in kinds() for found in kind.find(result))]
+    return [*dict.fromkeys(entry.sensor for kind in kinds() for entry in kind.find(result))]
 
 
-def _scalars(run: Path) -> dict[str, str]:
-    """What the recording has without axes, in words by name: the result has none. Raises Refused as `read_run`."""
+def _describe_scalars(run: Path) -> dict[str, str]:
+    """Return the channels without axes in words by sensor name, from the recording, as the result has none of them.
+
+    Raise Refused as `read_run`.
+    """
     import numpy as np
 
     from rig.data.recording.run_file import read_run
     from rig.data.run_folder import recordings
 
     recorded = [read_run(path) for path in recordings(run, "raw")] if run.is_dir() else []
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for name, sensor in recorded[0].sensors.items() if recorded else ():
         for channel in () if sensor.has_axes else sensor.channels:
-            of = channel.measures
-            values = np.concatenate([channel.values(each.samples[name]) for each in recorded]) / of.reading.size
-            about = f"mean {values.mean():.2f}, {values.min():.2f} to {values.max():.2f} {of.reading.name}, "
-            told = f"{of.name} {about if len(values) else ''}{len(values)} samples"
-            found[name] = f"{found[name]}; {told}" if name in found else f"{name}, {sensor.part}: {told}"
-    return found
+            quantity = channel.measures
+            values = (
+                np.concatenate([channel.values(run_data.samples[name]) for run_data in recorded])
+                / quantity.reading.size
+            )
+            about = f"mean {values.mean():.2f}, {values.min():.2f} to {values.max():.2f} {quantity.reading.name}, "
+            text = f"{quantity.name} {about if len(values) else ''}{len(values)} samples"
+            texts[name] = f"{texts[name]}; {text}" if name in texts else f"{name}, {sensor.part}: {text}"
+    return texts

@@ -1,4 +1,4 @@
-"""`rig verify`: who signed a certificate, when, whether it is unchanged, and whether a history knows it."""
+"""`rig verify`: the signer and time of a certificate, whether it is unchanged, and whether it is in a history."""
 
 import json
 from argparse import ArgumentParser, Namespace
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.commands.config_arguments import add_json
-from rig.commands.history.named_history import named_history
+from rig.commands.history.named_history import read_history_name
 from rig.errors import Refused
 from rig.station.plain_text import say
 
@@ -17,12 +17,16 @@ if TYPE_CHECKING:
 
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
-WRONG, NOBODY_TRUSTED = 1, 4
-BY_NOBODY_TRUSTED = {"not_signed", "signer_unknown", "signer_not_trusted"}  # all is well but who answers for the file
+WRONG, NOT_TRUSTED = 1, 4
+TRUST_PROBLEMS = {
+    "not_signed",
+    "signer_unknown",
+    "signer_not_trusted",
+}  # the file is unchanged, but its signer is not trusted
 STATUSES = (
     "exit status: 0 no file was changed, and signed by whom --trust and --signer say, or attached to one that is, or "
     f"known to the history that --history names; {WRONG} a file was altered, or the history contradicts it; "
-    f"{NOBODY_TRUSTED} nobody who is trusted has signed a file: it is not signed, signed by another, or there is no "
+    f"{NOT_TRUSTED} nobody who is trusted has signed a file: it is not signed, signed by another, or there is no "
     "--trust; 2 it could not be found out"
 )
 
@@ -35,7 +39,7 @@ def add(parser: ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help="a signed certificate.pdf or certificate.xml; beside it what is attached to it, such as result.json",
+        help="a signed certificate.pdf or certificate.xml; with it, files attached to it, such as result.json",
     )
     parser.add_argument(
         "--trust",
@@ -43,22 +47,20 @@ def add(parser: ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="CERTIFICATE",
-        help="that of the laboratory's key, or of who issued it, or of a time server: PEM or DER; may be repeated; the "
-        "key's certificate must be made for signing documents",
+        help="certificate of the laboratory's key, of its issuer, or of a time server: PEM or DER; may be repeated; "
+        "the key's certificate must be issued for signing documents",
     )
     parser.add_argument(
         "--signer",
         metavar="NAME",
         help="the name that the key's certificate must have: its common name, or all of it, as CN=Example,O=Laboratory",
     )
-    parser.add_argument(
-        "--history", metavar="PLACE", help="whether this history knows the files, and still has them so"
-    )
+    parser.add_argument("--history", metavar="PLACE", help="check that the files are in this history, unchanged")
     add_json(parser)
 
 
 @dataclass(frozen=True, slots=True)
-class _Found:
+class VerifiedFile:
     file: Path
     signatures: "tuple[SignatureReport, ...]"
     history: tuple[str, ...]
@@ -67,32 +69,32 @@ class _Found:
 
 
 def run(options: Namespace) -> int:
-    """Look at each file and say what is found; returns 0, or the exit status that `--help` names.
+    """Verify each file and print the findings; return 0, or the exit status that `--help` names.
 
-    Raises Refused `bad_option`, `verify_file`, and as `read_trusted_certificates`, `inspect_file` and `open_history`.
+    Raise Refused `bad_option`, `verify_file`, and as `read_trusted_certificates`, `inspect_file` and `open_history`.
     """
     from rig.report.signatures.inspection import inspect_file, read_trusted_certificates
     from rig.report.signatures.trust import Trust
 
     if options.signer is not None and not options.trust:
-        what = "--signer names whom a trusted authority must have certified, and no --trust says which authority"
+        what = "--signer names the holder of a certificate, and no --trust names the authority that issued it"
         raise Refused("bad_option", what, "Give --trust CERTIFICATE too, or leave it out")
     trust = Trust(read_trusted_certificates(options.trust), options.signer)
-    contents = {file: _content(file) for file in options.files}
+    contents = {file: _read_content(file) for file in options.files}
     looks = {file: inspect_file(file.name, content, trust) for file, content in contents.items()}
-    named = named_history(options.history)
-    known = {} if named is None else _known(named, contents, looks)
-    found = [_found(file, contents[file], looks, known.get(file)) for file in contents]
+    named = read_history_name(options.history)
+    history_answers = {} if named is None else _look_up(named, contents, looks)
+    files = [_judge(file, contents[file], looks, history_answers.get(file)) for file in contents]
     if options.json:
-        print(json.dumps({"schema": SCHEMA, "files": list(map(_entry, found))}, indent=2))
+        print(json.dumps({"schema": SCHEMA, "files": list(map(_entry, files))}, indent=2))
     else:
-        for each in found:
-            _tell(each)
-    problems = {problem.name for document in found for problem in document.problems}
-    return WRONG if problems - BY_NOBODY_TRUSTED else NOBODY_TRUSTED if problems else 0
+        for file in files:
+            _print_file(file)
+    problems = {problem.name for document in files for problem in document.problems}
+    return WRONG if problems - TRUST_PROBLEMS else NOT_TRUSTED if problems else 0
 
 
-def _content(file: Path) -> bytes:
+def _read_content(file: Path) -> bytes:
     from rig.config.files.regular_file import UnfitFile, read_regular_file
 
     try:
@@ -102,22 +104,22 @@ def _content(file: Path) -> bytes:
         raise Refused("verify_file", f"{file} cannot be read: {why}", "Give the files of a certificate") from None
 
 
-def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]") -> dict[Path, Any]:
-    """What the history says of each file."""
-    from rig.commands.history.waiting import answer_of
+def _look_up(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]") -> dict[Path, Any]:
+    """Return the history's entry of each file. Raise Refused `history_unreachable`, and as `open_history`."""
+    from rig.commands.history.waiting import await_answer
     from rig.history.entered_file import find_file_entries
     from rig.history.storage.address import resolve_address
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 
-    where = resolve_address(named)
-    if not is_there(where):  # to look makes none
-        raise Refused("history_unreachable", f"there is no history {where.label}", "Name another with --history")
+    address = resolve_address(named)
+    if not is_there(address):  # opening it would create one
+        raise Refused("history_unreachable", f"there is no history {address.label}", "Name another with --history")
 
-    def asked() -> dict[Path, Any]:
-        with open_history(where) as history:
+    def ask() -> dict[Path, Any]:
+        with open_history(address) as history:
             anchors = {
-                file: next((each.reason.anchor for each in look.signatures if each.reason.anchor), None)
+                file: next((seal.reason.anchor for seal in look.signatures if seal.reason.anchor), None)
                 for file, look in looks.items()
             }
             return {
@@ -125,25 +127,33 @@ def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Fil
                 for file, content in contents.items()
             }
 
-    return answer_of(asked)
+    return await_answer(ask)
 
 
-def _found(file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", known: Any) -> _Found:
-    """A file that has no signature of its own is held by the signed one it is attached to, or by the history."""
+def _judge(file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: Any) -> VerifiedFile:
+    """Judge one file; without a signature of its own it is vouched for by a signed file that holds it, or by the
+    history.
+    """
     look, attached_to = looks[file], None
     problems = look.problems
     if not look.signatures:
-        attached_to, problems = _held(file.name, content, look, looks)
-        if known is not None and not known.problems:
-            problems = tuple(problem for problem in problems if problem.name not in BY_NOBODY_TRUSTED)
-    said = () if known is None else known.said
-    return _Found(file, look.signatures, said, attached_to, (*problems, *(() if known is None else known.problems)))
+        attached_to, problems = _find_signed_holder(file.name, content, look, looks)
+        if history_answer is not None and not history_answer.problems:
+            problems = tuple(problem for problem in problems if problem.name not in TRUST_PROBLEMS)
+    history_words = () if history_answer is None else history_answer.said
+    return VerifiedFile(
+        file,
+        look.signatures,
+        history_words,
+        attached_to,
+        (*problems, *(() if history_answer is None else history_answer.problems)),
+    )
 
 
-def _held(
+def _find_signed_holder(
     name: str, content: bytes, look: "FileInspection", looks: "Mapping[Path, FileInspection]"
 ) -> tuple[str | None, tuple[Refused, ...]]:
-    """The signed file that an unsigned one is attached to, and what is wrong: if it is attached, as with its signer."""
+    """Return the signed file that holds an unsigned one, and its problems: if held, those of the signer."""
     from rig.report.signatures.findings import not_as_signed
 
     holders = {other: signed for other, signed in looks.items() if name in signed.attached}
@@ -157,16 +167,16 @@ def _held(
     return None, look.problems
 
 
-def _tell(documents: _Found) -> None:
-    say(f"{documents.file}: {_state(documents.problems)}")
-    for each in documents.signatures:
-        when = "at a time it does not say" if each.when is None else f"{each.when:%Y-%m-%d %H:%M:%S %Z}"
-        clock = "the signer's own clock" if each.time_server is None else f"the time server {each.time_server}"
-        say(f"  signed by {each.signer}, {when} by {clock}")
-        say(f"  its certificate has SHA-256 {each.certificate_sha256}; {_TRUSTED[each.trusted]}")
-        if each.long_term:
+def _print_file(documents: VerifiedFile) -> None:
+    say(f"{documents.file}: {_describe_state(documents.problems)}")
+    for seal in documents.signatures:
+        when = "at a time it does not say" if seal.when is None else f"{seal.when:%Y-%m-%d %H:%M:%S %Z}"
+        clock = "the signer's own clock" if seal.time_server is None else f"the time server {seal.time_server}"
+        say(f"  signed by {seal.signer}, {when} by {clock}")
+        say(f"  its certificate has SHA-256 {seal.certificate_sha256}; {TRUST_WORDS[seal.trusted]}")
+        if seal.long_term:
             say("  its certificate was not revoked at that time, by the authorities' lists in the file")
-        say(f"  reason: {each.reason.text}")
+        say(f"  reason: {seal.reason.text}")
     if documents.attached_to is not None:
         say(f"  attached to {documents.attached_to}, which is signed")
     for words in documents.history:
@@ -175,37 +185,39 @@ def _tell(documents: _Found) -> None:
         say(f"  {problem}")
 
 
-def _state(problems: Sequence[Refused]) -> str:
+def _describe_state(problems: Sequence[Refused]) -> str:
     if not problems:
-        return "whole"
-    altered = {problem.name for problem in problems} - BY_NOBODY_TRUSTED
-    return "NOT WHOLE, or not to be relied on" if altered else "NOT SIGNED BY ANYBODY WHO IS TRUSTED"
+        return "valid"
+    altered = {problem.name for problem in problems} - TRUST_PROBLEMS
+    return "NOT VALID" if altered else "NOT SIGNED BY A TRUSTED SIGNER"
 
 
-_TRUSTED = {
+TRUST_WORDS = {
     None: "whether that is the laboratory's, compare yourself, or give --trust",
     True: "trusted by --trust",
     False: "not trusted",
 }
 
 
-def _entry(documents: _Found) -> dict[str, Any]:
+def _entry(documents: VerifiedFile) -> dict[str, Any]:
     return {
         "file": str(documents.file),
         "whole": not documents.problems,
         "signatures": [
             {
-                "signer": each.signer,
-                "certificate_sha256": each.certificate_sha256,
-                "when": None if each.when is None else each.when.isoformat(),
-                "time_server": each.time_server,
-                "reason": each.reason.text,
-                "trusted": each.trusted,
-                "long_term": each.long_term,
+                "signer": signature.signer,
+                "certificate_sha256": signature.certificate_sha256,
+                "when": None if signature.when is None else signature.when.isoformat(),
+                "time_server": signature.time_server,
+                "reason": signature.reason.text,
+                "trusted": signature.trusted,
+                "long_term": signature.long_term,
             }
-            for each in documents.signatures
+            for signature in documents.signatures
         ],
         "attached_to": documents.attached_to,
         "history": list(documents.history),
-        "problems": [{"name": each.name, "what": each.what, "remedy": each.remedy} for each in documents.problems],
+        "problems": [
+            {"name": problem.name, "what": problem.what, "remedy": problem.remedy} for problem in documents.problems
+        ],
     }

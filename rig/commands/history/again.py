@@ -1,4 +1,6 @@
-"""`rig history recompute`: all recordings of a history by today's method, and what that changes. Overwrites nothing."""
+"""`rig history recompute`: solve all recordings of a history by today's method, and report what changes. Overwrites
+nothing.
+"""
 
 import sys
 from argparse import Namespace
@@ -8,10 +10,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from rig.commands.history.again_work import Task, solved_again
-from rig.commands.history.questions import opened
-from rig.commands.history.spread import Answered, Cluster, Processes, Solve, one_by_one, spread
-from rig.commands.history.waiting import answer_of
+from rig.commands.history.again_work import Task, solve_task
+from rig.commands.history.questions import open_named_history
+from rig.commands.history.spread import Cluster, Processes, Solve, SolvedTask, distribute, solve_one_by_one
+from rig.commands.history.waiting import await_answer
 from rig.config.files.written_file import write_new
 from rig.data.recording.settings import find_setting
 from rig.data.run_folder import refuse_links
@@ -28,32 +30,32 @@ CHANGED = 1
 MOST_SHOWN = 20  # lines on the terminal; the page has them all
 
 
-def again(options: Namespace, solve: Solve = solved_again) -> int:
-    """Solve again what was chosen, and write the report into `--out`. Returns 1 when anything is to be looked at.
+def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
+    """Solve the chosen recordings again and write the report into `--out`. Return 1 if a result calls for attention.
 
-    Raises Refused `bad_option`, `unknown_setting`, `unknown_estimator`, `not_in_history`, `another_question`,
-    `report_folder`, and as `opened`, `refuse_links` and `client_of`; Fault `cluster_lost`, with a report of what was
-    solved until then.
+    Raise Refused `bad_option`, `unknown_setting`, `unknown_estimator`, `not_in_history`, `another_question`,
+    `report_folder`, and as `open_named_history`, `refuse_links` and `connect_client`; Fault `cluster_lost`, after a
+    report of the recordings solved until then.
     """
     question = _question(options)
     selection = Selection(options.serial_number, options.part, options.since, options.rig)
-    label, stated = answer_of(lambda: _stated(options, selection))
+    label, stated = await_answer(lambda: _load_stated(options, selection))
     out: Path = options.out
     refuse_links(*(out / name for name in (JOURNAL, CSV, PAGE)))
-    with _written(out):
+    with _refuse_unwritable(out):
         out.mkdir(parents=True, exist_ok=True)
     with RecomputeJournal(out, question) as journal:
         answers = dict(journal.solved)
-        left = to_solve(stated, answers)
-        if len(left) < len(stated):
-            say(f"{len(stated) - len(left)} of {len(stated)} are solved in {out / JOURNAL} already", sys.stderr)
+        remaining = to_solve(stated, answers)
+        if len(remaining) < len(stated):
+            say(f"{len(stated) - len(remaining)} of {len(stated)} are already solved in {out / JOURNAL}", sys.stderr)
         tasks = [
-            Task(each.content_sha256, each.recordings, each.places, question.overrides, question.estimator)
-            for each in left
+            Task(result.content_sha256, result.recordings, result.places, question.overrides, question.estimator)
+            for result in remaining
         ]
         lost = _solve_all(tasks, options, solve, journal, answers)
     outcome = compared(stated, answers, options.u_fraction)
-    with _written(out):
+    with _refuse_unwritable(out):
         write_new(out / CSV, again_csv(outcome))
         write_new(out / PAGE, again_page(outcome, question, label))
     _print(outcome, out)
@@ -69,7 +71,7 @@ def _question(options: Namespace) -> RecomputeQuestion:
         raise Refused("bad_option", f"--jobs {options.jobs} is too small", "Give 1 or more")
     if not options.u_fraction > 0:
         raise Refused(
-            "bad_option", f"--u-fraction {options.u_fraction} is no part of U", "Give a number above 0, as 0.1"
+            "bad_option", f"--u-fraction {options.u_fraction} is not a fraction of U", "Give a number above 0, as 0.1"
         )
     for item in options.overrides:
         find_setting(item)
@@ -78,63 +80,63 @@ def _question(options: Namespace) -> RecomputeQuestion:
     return RecomputeQuestion(VERSION, tuple(options.overrides), options.estimator)
 
 
-def _stated(options: Namespace, selection: Selection) -> tuple[str, tuple[StatedResult, ...]]:
-    with opened(options) as history:
-        found = list_stated_results(history, selection)
+def _load_stated(options: Namespace, selection: Selection) -> tuple[str, tuple[StatedResult, ...]]:
+    with open_named_history(options) as history:
+        results = list_stated_results(history, selection)
         label = history.engine.url.render_as_string()
-    if not found:
-        raise Refused("not_in_history", "no calibration in the history fits", "Look with `rig history`")
-    return label, found
+    if not results:
+        raise Refused("not_in_history", "no calibration in the history matches", "List all with `rig history`")
+    return label, results
 
 
 def _solve_all(
     tasks: Sequence[Task], options: Namespace, solve: Solve, journal: RecomputeJournal, answers: dict[str, Answer]
 ) -> Fault | None:
-    """Have all solved and note each answer; the fault with which a cluster went away."""
+    """Solve all tasks and note each answer. Return the fault by which a cluster was lost, else None."""
     try:
-        with _answered(tasks, options, solve) as answered:
-            for task, answer in _bar(answered, len(tasks)):
+        with _solve_by_workers(tasks, options, solve) as answers_by_task:
+            for task, answer in _track_progress(answers_by_task, len(tasks)):
                 answers[task.key] = answer
                 journal.note(task.key, answer)
     except Fault as lost:
         return lost
     except KeyboardInterrupt:
-        raise KeyboardInterrupt("interrupted; what is solved is kept, and the same command goes on") from None
+        raise KeyboardInterrupt("interrupted; the solved results are kept, and the same command goes on") from None
     return None
 
 
 @contextmanager
-def _answered(tasks: Sequence[Task], options: Namespace, solve: Solve) -> Iterator[Iterable[Answered]]:
+def _solve_by_workers(tasks: Sequence[Task], options: Namespace, solve: Solve) -> Iterator[Iterable[SolvedTask]]:
     with ExitStack() as stack:
         if not tasks:
             yield ()
         elif options.dask is not None:
-            from rig.commands.history.cluster import client_of
+            from rig.commands.history.cluster import connect_client
 
-            cluster = Cluster(stack.enter_context(client_of(options.dask)))
+            cluster = Cluster(stack.enter_context(connect_client(options.dask)))
             for worker, threads in cluster.threads().items():
                 if threads > 1:
                     one = "dask worker --nworkers auto --nthreads 1 is faster"
                     say(
-                        f"{worker} has {threads} threads in one process, of which one works at a time: {one}",
+                        f"{worker} has {threads} threads in one process; only one works at a time: {one}",
                         sys.stderr,
                     )
-            yield spread(tasks, solve, cluster)
+            yield distribute(tasks, solve, cluster)
         elif options.jobs > 1:
-            yield spread(tasks, solve, stack.enter_context(Processes(min(options.jobs, len(tasks)))))
+            yield distribute(tasks, solve, stack.enter_context(Processes(min(options.jobs, len(tasks)))))
         else:
-            yield one_by_one(tasks, solve)
+            yield solve_one_by_one(tasks, solve)
 
 
-def _bar(answered: Iterable[Answered], total: int) -> Iterable[Answered]:
+def _track_progress(answers_by_task: Iterable[SolvedTask], total: int) -> Iterable[SolvedTask]:
     from rich.progress import track
 
     console = Console(stderr=True)
-    return track(answered, total=total, description="solving", console=console, disable=not console.is_terminal)
+    return track(answers_by_task, total=total, description="solving", console=console, disable=not console.is_terminal)
 
 
 @contextmanager
-def _written(out: Path) -> Iterator[None]:
+def _refuse_unwritable(out: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -144,9 +146,9 @@ def _written(out: Path) -> Iterator[None]:
 def _print(outcome: RecomputeOutcome, out: Path) -> None:
     if outcome.notable:
         Console(highlight=False).print(notable_table(outcome, MOST_SHOWN))
-    lines = sum(max(1, len(each.stated.calibrations)) for each in outcome.notable)
-    if lines > MOST_SHOWN:
-        say(f"and {lines - MOST_SHOWN} more in {out / PAGE}")
+    count = sum(max(1, len(row.stated.calibrations)) for row in outcome.notable)
+    if count > MOST_SHOWN:
+        say(f"and {count - MOST_SHOWN} more in {out / PAGE}")
     for line in counts(outcome):
         say(line)
     for name in (CSV, PAGE):

@@ -1,4 +1,4 @@
-"""The answer of a history for a run, which waits a few seconds for it and no longer."""
+"""The answer of a history to a run, which waits for it a few seconds only."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from rig.commands.history.waiting import answer_of
+from rig.commands.history.waiting import await_answer
 from rig.errors import RigError
 
 if TYPE_CHECKING:
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 ANSWER_S = 4.0  # docs/how-to/finished-runs/shared-history.md promises five until the verdict
-# What is imported before the time begins, since on a busy computer this alone takes longer: for any question, and to
-# enter a run.
+# Modules imported before the time begins, as on a busy computer the import alone takes longer: for any question, and
+# to enter a run.
 TO_ASK = ("rig.history.store",)
 TO_ENTER = ("rig.history.entered.index", "rig.report.kinds.registry", "rig.history.series", "scipy.special")
 TO_CONNECT = {
@@ -25,21 +25,22 @@ TO_CONNECT = {
 }
 
 
-def history_answer(place: "HistoryAddress", work: Callable[[], T], imported: Sequence[str] = ()) -> T:
-    """Return what `work` gets of the history at `place`, or raise what it raises; TimeoutError after `ANSWER_S`.
+def ask_history(address: "HistoryAddress", work: Callable[[], T], modules: Sequence[str] = ()) -> T:
+    """Return what `work` returns of the history at `address`, or raise what it raises; TimeoutError after `ANSWER_S`.
 
-    That time is the history's alone: what the work needs is imported before, the modules named `imported` too.
+    That time is the history's alone: the modules that the work needs, and those named in `modules`, are imported
+    before.
     """
-    for name in (*TO_ASK, *imported):
+    for name in (*TO_ASK, *modules):
         import_module(name)
-    with suppress(ImportError):  # the extra that it belongs to, the history itself names
-        for name in TO_CONNECT["file" if isinstance(place.where, Path) else "server"]:
+    with suppress(ImportError):  # the history itself then names the missing extra
+        for name in TO_CONNECT["file" if isinstance(address.where, Path) else "server"]:
             import_module(name)
-    return answer_of(work, ANSWER_S)
+    return await_answer(work, ANSWER_S)
 
 
-def why(error: Exception) -> str:
-    """Say why a history was of no use, in a few words."""
+def explain_failure(error: Exception) -> str:
+    """Return in a few words why a history was of no use."""
     if isinstance(error, RigError):
         return f"{error.name}: {error.what}"
     if isinstance(error, TimeoutError):

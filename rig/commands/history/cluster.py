@@ -1,4 +1,4 @@
-"""The cluster of a Dask scheduler that somebody names."""
+"""The client of a Dask scheduler, which distributes the work over a cluster."""
 
 import logging
 from collections.abc import Iterator
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def client_of(address: str) -> Iterator["Client"]:
-    """A client of the scheduler at `address`. Raises Refused `missing_extra`, `no_cluster`."""
+def connect_client(address: str) -> Iterator["Client"]:
+    """Connect to the scheduler at `address` for the block. Raise Refused `missing_extra`, `no_cluster`."""
     from rig.errors.extras import missing_extra
 
     try:
@@ -27,6 +27,6 @@ def client_of(address: str) -> Iterator["Client"]:
             "no_cluster", f"no Dask scheduler answers at {address} ({error})", "Start one with `dask scheduler`"
         ) from error
     for name in ("distributed", "distributed.client", "tornado.application"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what becomes of a cluster is told by name, in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # the fault `cluster_lost` says it in one line
     with client:
         yield client

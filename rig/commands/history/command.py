@@ -1,4 +1,4 @@
-"""`rig history …`: what the laboratory remembers; what its commands take."""
+"""`rig history …`: its commands and their arguments."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -7,91 +7,101 @@ from pathlib import Path
 
 from rig.commands.config_arguments import add_json, add_run, add_set
 from rig.commands.history.named_history import add_history
-from rig.commands.history.waiting import answer_of
+from rig.commands.history.waiting import await_answer
 
 LIST = "list"
-AGAIN = "recompute"
-_COMMANDS = (LIST, "show", "plot", "rigs", "import", "verify", AGAIN, "compare", "void")
+RECOMPUTE = "recompute"
+_COMMANDS = (LIST, "show", "plot", "rigs", "import", "verify", RECOMPUTE, "compare", "void")
 
 
-def with_usual_command(arguments: Sequence[str]) -> list[str]:
-    """`rig history …` without one of its commands is `rig history list …`."""
+def insert_usual_command(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments with `list` inserted where `rig history …` names none of its commands."""
     words = list(arguments)
-    if words[:1] == ["history"] and words[1:2] not in [[each] for each in (*_COMMANDS, "-h", "--help")]:
+    if words[:1] == ["history"] and words[1:2] not in [[command] for command in (*_COMMANDS, "-h", "--help")]:
         words.insert(1, LIST)
     return words
 
 
 def add(history: argparse.ArgumentParser) -> None:
-    """The commands of `rig history`."""
+    """Add the commands of `rig history`."""
     commands = history.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    def added(name: str, text: str) -> argparse.ArgumentParser:
+    def add_command(name: str, text: str) -> argparse.ArgumentParser:
         command: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
         command.set_defaults(of_history=name)
         add_history(command)
         return command
 
-    listed = added(LIST, "calibrations, and of one sensor their trends; the usual one, its name may be left out")
-    listed.add_argument("serial_number", nargs="?", metavar="SERIAL", help="of one sensor")
-    _add_selection(listed)
-    form = listed.add_mutually_exclusive_group()
-    form.add_argument("--json", action="store_true", help="for machines")
-    form.add_argument("--csv", action="store_true", help="for machines and spreadsheets, a line for each parameter")
-    show = added("show", "one calibration with its run")
-    show.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")
-    show.add_argument("--json", action="store_true", help="the result.json of its run, as it was entered")
-    plot = added("plot", "draw a sensor's calibrations over time, drift and charts (extra `study`)")
-    plot.add_argument("serial_number", metavar="SERIAL", help="of this sensor")
-    _add_selection(plot)
-    plot.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
-    rigs = added("rigs", "what check standards and shared sensors say of the rigs themselves")
-    _add_selection(rigs, rig=False)
-    add_json(rigs)
-    imported = added("import", "enter runs that are in no history yet; what is there already stays as it is")
-    add_run(imported, "folders", "run folders, or folders that hold some", metavar="DIR", nargs="+")
-    imported.add_argument(
-        "--solve", action="store_true", help="enter what the recordings give, whatever a result.json says"
+    list_parser = add_command(LIST, "list calibrations, and the trends of one sensor; the default command")
+    list_parser.add_argument("serial_number", nargs="?", metavar="SERIAL", help="only this sensor")
+    _add_selection(list_parser)
+    form = list_parser.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true", help="print JSON")
+    form.add_argument("--csv", action="store_true", help="print CSV, one line per parameter")
+    show_parser = add_command("show", "show one calibration with its run")
+    show_parser.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")
+    show_parser.add_argument("--json", action="store_true", help="the result.json of its run, as it was entered")
+    plot_parser = add_command("plot", "draw a sensor's calibrations over time, drift and charts (extra `study`)")
+    plot_parser.add_argument("serial_number", metavar="SERIAL", help="this sensor")
+    _add_selection(plot_parser)
+    plot_parser.add_argument(
+        "--out", type=Path, default=Path(), metavar="DIR", help="folder of the figures (default: .)"
     )
-    added("verify", "whether rows, results and files are what was entered; exit status 1 when they are not")
-    again = added(AGAIN, "solve every recording by today's method and say what changes; nothing is overwritten")
-    again.add_argument("--serial", dest="serial_number", metavar="SERIAL", help="only of one sensor")
-    _add_selection(again)
-    _add_again(again)
-    compare = added("compare", "two calibrations of one sensor, with E_n")
-    compare.add_argument("first", type=int, metavar="A", help="number of the earlier one, as `rig history` has it")
-    compare.add_argument("second", type=int, metavar="B", help="number of the later one")
-    compare.add_argument(
+    rigs_parser = add_command("rigs", "compare the rigs themselves by check standards and shared sensors")
+    _add_selection(rigs_parser, rig=False)
+    add_json(rigs_parser)
+    import_parser = add_command("import", "enter runs that are not yet in the history; others stay unchanged")
+    add_run(import_parser, "folders", "run folders, or folders that contain some", metavar="DIR", nargs="+")
+    import_parser.add_argument(
+        "--solve",
+        action="store_true",
+        help="enter results recomputed from the recordings, not those of result.json",
+    )
+    add_command("verify", "check that rows, results and files are as they were entered; exit status 1 if not")
+    again_parser = add_command(RECOMPUTE, "solve every recording by today's method and report what changes")
+    again_parser.add_argument("--serial", dest="serial_number", metavar="SERIAL", help="only this sensor")
+    _add_selection(again_parser)
+    _add_recompute(again_parser)
+    compare_parser = add_command("compare", "compare two calibrations of one sensor by E_n")
+    compare_parser.add_argument("first", type=int, metavar="A", help="number of the earlier one in `rig history`")
+    compare_parser.add_argument("second", type=int, metavar="B", help="number of the later one")
+    compare_parser.add_argument(
         "--plot", type=Path, metavar="DIR", help="draw the differences into this folder (extra `study`)"
     )
-    add_json(compare)
-    void = added("void", "say that a calibration does not count, and why; nothing is taken away")
-    void.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")
-    void.add_argument("--reason", required=True, metavar="TEXT", help="why, in a few words")
+    add_json(compare_parser)
+    void_parser = add_command("void", "mark a calibration as void, and say why; nothing is deleted")
+    void_parser.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")
+    void_parser.add_argument("--reason", required=True, metavar="TEXT", help="why, in a few words")
 
 
-def _add_again(again: argparse.ArgumentParser) -> None:
-    """How everything is solved, on how many processes or machines, and where the report goes."""
-    add_set(again, "judge by another threshold or limit than was recorded, as in `rig solve`", metavar="NAME=VALUE")
-    again.add_argument("--estimator", metavar="NAME", help="another than each procedure's own, as in `rig solve`")
-    again.add_argument(
+def _add_recompute(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `rig history recompute`: method, number of processes or machines, folder of the report."""
+    add_set(
+        parser,
+        "judge by another threshold or limit than recorded, as in `rig solve`",
+        metavar="NAME=VALUE",
+    )
+    parser.add_argument("--estimator", metavar="NAME", help="one estimator for all procedures, as in `rig solve`")
+    parser.add_argument(
         "--u-fraction",
         type=float,
         default=0.1,
         metavar="PART",
-        help="a result counts as moved beyond this part of the U that was stated (default: 0.1)",
+        help="report a result as moved beyond this fraction of its stated U (default: 0.1)",
     )
-    again.add_argument(
+    parser.add_argument(
         "--out",
         type=Path,
         default=Path("recomputed"),
         metavar="DIR",
-        help="report and journal; the same command with the same folder goes on (default: recomputed)",
+        help="folder of report and journal; the same command with the same folder goes on (default: recomputed)",
     )
-    spread = again.add_mutually_exclusive_group()
-    spread.add_argument("--jobs", type=int, default=1, metavar="N", help="processes of this computer (default: 1)")
-    spread.add_argument(
-        "--dask", metavar="ADDRESS", help="the workers of this Dask scheduler, as tcp://10.0.0.2:8786 (extra `dask`)"
+    workers = parser.add_mutually_exclusive_group()
+    workers.add_argument("--jobs", type=int, default=1, metavar="N", help="processes on this computer (default: 1)")
+    workers.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="workers of this Dask scheduler, as tcp://10.0.0.2:8786 (extra `dask`)",
     )
 
 
@@ -99,7 +109,7 @@ def _add_selection(parser: argparse.ArgumentParser, *, rig: bool = True) -> None
     parser.add_argument("--part", metavar="PART", help="only sensors of this part")
     parser.add_argument("--since", type=_day, metavar="DATE", help="only from this day on, as 2026-11-20")
     if rig:
-        parser.add_argument("--rig", metavar="RIG", help="only by this rig, its name or its arm's serial number")
+        parser.add_argument("--rig", metavar="RIG", help="only by this rig: its name or its arm's serial number")
 
 
 def _day(text: str) -> date:
@@ -110,21 +120,21 @@ def _day(text: str) -> date:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Carry out the command of `rig history` that is meant; Ctrl-C is heard at once, whatever its database does."""
-    if options.of_history == AGAIN:
-        from rig.commands.history.again import again
+    """Carry out the chosen command. Ctrl-C ends it at once, even while its database does not answer."""
+    if options.of_history == RECOMPUTE:
+        from rig.commands.history.again import recompute_history
 
-        return again(options)
+        return recompute_history(options)
     from rig.commands.history import questions as history
 
     commands: dict[str, Callable[[argparse.Namespace], int]] = {
-        LIST: history.listed,
+        LIST: history.list_calibrations,
         "show": history.show,
         "plot": history.plot,
         "rigs": history.rigs,
-        "import": history.imported,
+        "import": history.import_runs,
         "verify": history.verify,
         "compare": history.compare,
         "void": history.void,
     }
-    return answer_of(lambda: commands[options.of_history](options))
+    return await_answer(lambda: commands[options.of_history](options))

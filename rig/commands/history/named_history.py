@@ -1,11 +1,11 @@
-"""The history that somebody names in a command: itself, or by the configuration that names it."""
+"""The history that a command names: itself, or by a configuration file that names one."""
 
 import argparse
 from pathlib import Path
 
 
 def add_history(parser: argparse._ActionsContainer) -> None:
-    """`--history PLACE`."""
+    """Add the argument `--history`."""
     parser.add_argument(
         "--history",
         metavar="PLACE",
@@ -14,10 +14,10 @@ def add_history(parser: argparse._ActionsContainer) -> None:
     )
 
 
-def named_history(given: str | None) -> str | None:
-    """A file's name or a URL, None where nothing is said. Raises Refused as `load`."""
-    if given is None or not given.endswith((".yaml", ".yml")):
-        return given
+def read_history_name(name_or_file: str | None) -> str | None:
+    """Return the file name or URL of the named history, None if none is named. Raise Refused as `load`."""
+    if name_or_file is None or not name_or_file.endswith((".yaml", ".yml")):
+        return name_or_file
     from rig.config.load import load
 
-    return load(Path(given), sections=None).config.history.url
+    return load(Path(name_or_file), sections=None).config.history.url

@@ -1,4 +1,4 @@
-"""What the commands of `rig history` do."""
+"""The commands of `rig history`, carried out."""
 
 import json
 import sys
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from rig.commands.history.named_history import named_history
+from rig.commands.history.named_history import read_history_name
 from rig.config.files.regular_file import UnfitFile
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
@@ -36,33 +36,35 @@ from rig.station.plain_text import plain, say
 DISAGREE = 1
 
 
-def listed(options: Namespace) -> int:
-    """Print calibrations; of one serial number the trends too. Raises Refused `not_in_history` and as `opened`."""
-    selection = _selection(options)
-    with opened(options) as history:
-        pasts = _selected(history, selection)
-    found = {subject: trends(each) for subject, each in subjects(pasts).items()}
+def list_calibrations(options: Namespace) -> int:
+    """Print calibrations, and the trends of one serial number. Raise Refused `not_in_history`, and as
+    `open_named_history`.
+    """
+    selection = _read_selection(options)
+    with open_named_history(options) as history:
+        pasts = _select_pasts(history, selection)
+    series = {subject: trends(past) for subject, past in subjects(pasts).items()}
     if options.csv:
         for line in history_csv(pasts).rstrip("\n").split("\n"):
             say(line)
     elif options.json:
-        document = history_document(pasts, found if selection.serial_number is not None else None)
+        document = history_document(pasts, series if selection.serial_number is not None else None)
         print(json.dumps(document, indent=2, allow_nan=False))
     elif not pasts:
         say("No calibration is in this history yet; `rig run` enters each one.")
     else:
         console = Console(highlight=False)
         console.print(calibrations_table(pasts))
-        for subject, each in found.items() if selection.serial_number is not None else ():
-            console.print(trends_table(subject, list(each.values())))
-            for line in trend_lines(each):
+        for subject, trends_of in series.items() if selection.serial_number is not None else ():
+            console.print(trends_table(subject, list(trends_of.values())))
+            for line in trend_lines(trends_of):
                 console.print(plain(line))
     return 0
 
 
 def show(options: Namespace) -> int:
-    """Print one calibration, and where its run lies. Raises Refused `not_in_history`."""
-    with opened(options) as history:
+    """Print one calibration, and where its run is stored. Raise Refused `not_in_history`."""
+    with open_named_history(options) as history:
         past = history.calibration(options.number)
         (kept,) = history.kept(past.run_id)
     if options.json:
@@ -74,28 +76,28 @@ def show(options: Namespace) -> int:
     for line in run_lines(past, kept):
         console.print(plain(line))
     for computer, path in kept.places:
-        console.print(plain(f"lies on {computer} in {path}"))
+        console.print(plain(f"stored on {computer} in {path}"))
     for recording in kept.recordings:
         console.print(plain(f"{recording.name}: {recording.size} bytes, SHA-256 {recording.sha256}"))
     return 0
 
 
 def plot(options: Namespace) -> int:
-    """Draw the series of a serial number. Raises Refused `not_in_history`, `missing_extra`, `report_folder`."""
-    with opened(options) as history:
-        pasts = _selected(history, _selection(options))
+    """Draw the series of a serial number. Raise Refused `not_in_history`, `missing_extra`, `report_folder`."""
+    with open_named_history(options) as history:
+        pasts = _select_pasts(history, _read_selection(options))
 
     def draw(folder: Path) -> list[Path]:
         from rig.history.plots import draw_trends
 
-        return draw_trends({subject: trends(each) for subject, each in subjects(pasts).items()}, folder)
+        return draw_trends({subject: trends(past) for subject, past in subjects(pasts).items()}, folder)
 
     for path in _draw(options.out, draw):
         say(str(path))
     return 0
 
 
-def _drawn_changes(title: str, changes: Sequence[Change], folder: Path, name: str) -> list[Path]:
+def _draw_changes(title: str, changes: Sequence[Change], folder: Path, name: str) -> list[Path]:
     from rig.history.plots import draw_changes
 
     return draw_changes(title, changes, folder, name)
@@ -116,60 +118,60 @@ def _draw(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
 
 
 def rigs(options: Namespace) -> int:
-    """Print what check standards and shared sensors say of the rigs. Returns 1 when one is out of control."""
-    with opened(options) as history:
+    """Print how the rigs compare by check standards and shared sensors. Return 1 if one is out of control."""
+    with open_named_history(options) as history:
         pasts = history.calibrations(Selection(part=options.part, since=options.since))
-    states, found = rig_states(pasts), effects(pasts)
+    states, rig_effects = rig_states(pasts), effects(pasts)
     alarmed = any(chart.out_of_control for state in states for chart in state.charts.values() if chart.alarm.size)
     if options.json:
-        print(json.dumps(rigs_document(states, found), indent=2, allow_nan=False))
+        print(json.dumps(rigs_document(states, rig_effects), indent=2, allow_nan=False))
         return DISAGREE if alarmed else 0
     console = Console(highlight=False)
     if any(state.charts for state in states):
         console.print(states_table(states))
     else:
         console.print("no check standard was calibrated often enough on one rig; history.check_standards names them")
-    if found:
-        console.print(effects_table(found))
+    if rig_effects:
+        console.print(effects_table(rig_effects))
     else:
         console.print("no two rigs have calibrated the same sensors often enough to be compared")
     return DISAGREE if alarmed else 0
 
 
-def imported(options: Namespace) -> int:
-    """Enter runs as their recordings give them; tells of each what became of it. Returns 1 when one was refused."""
+def import_runs(options: Namespace) -> int:
+    """Enter runs as their recordings give them, and report the outcome of each. Return 1 if one was refused."""
     from rig.station.words import calibrations_in_words
 
-    new = known = refused = 0
-    with opened(options) as history:
-        for folder in _run_folders(options.folders, unsolved=options.solve):
+    new = existing = refused = 0
+    with open_named_history(options) as history:
+        for folder in _find_run_folders(options.folders, unsolved=options.solve):
             try:
-                run = _finished(folder, history, solve=options.solve)
+                run = _recompute_finished(folder, history, solve=options.solve)
                 entered = history.enter(run)
             except (RigError, UnfitFile, OSError) as error:
                 refused += 1
                 say(f"{folder}: {error}", sys.stderr)
                 continue
-            new, known = new + entered.new, known + (not entered.new)
-            numbers = calibrations_in_words([each.id for each in history.of_run(entered.run_id)])
-            say(f"{folder}: {'entered' if entered.new else 'there already'} as {numbers}")
+            new, existing = new + entered.new, existing + (not entered.new)
+            numbers = calibrations_in_words([past.id for past in history.of_run(entered.run_id)])
+            say(f"{folder}: {'entered' if entered.new else 'already there'} as {numbers}")
             if entered.new and run.certificate is None and (folder / PAGE).exists():
-                said = f"its {PAGE} is not what this version writes of its result, and was not entered"
-                say(f"{folder}: {said}; rig report writes it anew", sys.stderr)
-    say(f"{new} entered, {known} there already, {refused} refused")
+                reason = f"its {PAGE} is not the one this version writes of its result, and was not entered"
+                say(f"{folder}: {reason}; rig report writes it again", sys.stderr)
+    say(f"{new} entered, {existing} already there, {refused} refused")
     return DISAGREE if refused else 0
 
 
 def verify(options: Namespace) -> int:
-    """Hold rows against their journal and results, files against hashes; names what is wrong. Returns 1 then."""
+    """Compare rows with their journal and results, files with their hashes. Print differences; return 1 if any."""
     from rig.history.integrity import STATES, WRONG, examine_history
 
     counts = dict.fromkeys(STATES, 0)
-    with opened(options) as history:
-        for found in examine_history(history):
-            counts[found.state] += 1
-            if found.state != "ok":
-                say(f"{found.state}: {found.what}: {found.why}")
+    with open_named_history(options) as history:
+        for finding in examine_history(history):
+            counts[finding.state] += 1
+            if finding.state != "ok":
+                say(f"{finding.state}: {finding.what}: {finding.why}")
         end = history.head()
     say(f"journal: entry {end.number}, chained to all before by SHA-256 {end.sha256}")
     say(", ".join(f"{count} {state}" for state, count in counts.items()))
@@ -181,73 +183,74 @@ def compare(options: Namespace) -> int:
 
     Raise Refused `not_in_history`, `not_comparable`, and as `plot`.
     """
-    with opened(options) as history:
+    with open_named_history(options) as history:
         first, second = history.calibration(options.first), history.calibration(options.second)
-        before, now = ([*history.of_run(each.run_id), each] for each in (first, second))
+        before, now = ([*history.of_run(past.run_id), past] for past in (first, second))
     if first.subject != second.subject:
         raise Refused(
             "not_comparable",
             f"{first.id} is of {title_of(first.subject)}, {second.id} of {title_of(second.subject)}",
             "Give two calibrations of one sensor at one range",
         )
-    found = changes_between(before, now)[second.subject]
+    changes = changes_between(before, now)[second.subject]
     title = f"{title_of(first.subject)}: {first.id} and {second.id}"
     if options.plot is not None:
         name = f"compare_{first.id}_{second.id}"
-        for path in _draw(options.plot, lambda folder: _drawn_changes(title, found, folder, name)):
+        for path in _draw(options.plot, lambda folder: _draw_changes(title, changes, folder, name)):
             say(str(path), sys.stderr)
     if options.json:
         numbers = {"before": first.id, "now": second.id}
-        document = {**numbers, "parameters": {each.name: change_entry(each) for each in found}}
+        document = {**numbers, "parameters": {change.name: change_entry(change) for change in changes}}
         print(json.dumps(document, indent=2, allow_nan=False))
         return 0
-    Console(highlight=False).print(changes_table(title, found))
-    say(comparison_in_words(found))
+    Console(highlight=False).print(changes_table(title, changes))
+    say(comparison_in_words(changes))
     return 0
 
 
 def void(options: Namespace) -> int:
-    """Say that a calibration does not count. Raises Refused `not_in_history`, `already_voided`."""
-    with opened(options) as history:
+    """Mark a calibration as void. Raise Refused `not_in_history`, `already_voided`."""
+    with open_named_history(options) as history:
         history.void(options.number, options.reason)
-    say(f"calibration {options.number} does not count any more")
+    say(f"calibration {options.number} is void")
     return 0
 
 
-def opened(options: Namespace) -> AbstractContextManager[History]:
-    """The history that is meant. Raises Refused as `open_history`, and as `load` where a configuration names it."""
-    return open_history(own_history_address(named_history(options.history)) or resolve_address(None))
+def open_named_history(options: Namespace) -> AbstractContextManager[History]:
+    """Open the named history. Raise Refused as `open_history`, and as `load` if a configuration names it."""
+    return open_history(own_history_address(read_history_name(options.history)) or resolve_address(None))
 
 
-def _selection(options: Namespace) -> Selection:
+def _read_selection(options: Namespace) -> Selection:
     return Selection(options.serial_number, options.part, options.since, options.rig)
 
 
-def _selected(history: History, selection: Selection) -> list[Past]:
-    """Raises Refused `not_in_history` where one sensor was asked for and there is none."""
+def _select_pasts(history: History, selection: Selection) -> list[Past]:
+    """Return the selected calibrations. Raise Refused `not_in_history` if there is none of the chosen sensor."""
     pasts = history.calibrations(selection)
     if not pasts and selection.serial_number is not None:
         raise Refused(
             "not_in_history",
-            f"no calibration of {selection.serial_number} in the history fits",
-            "Look with `rig history`, or enter runs with `rig history import`",
+            f"no calibration of {selection.serial_number} in the history matches",
+            "List all with `rig history`, or enter runs with `rig history import`",
         )
     return pasts
 
 
-def _run_folders(given: list[Path], *, unsolved: bool) -> Iterator[Path]:
-    """The run folders given, and those within them; what is no run folder comes as it is, for its own error."""
-    for folder in given:
+def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
+    """Yield the run folders among and within `folders`; a folder without any comes as it is, for its own error."""
+    for folder in folders:
         inner = {file.parent for file in folder.rglob(RESULT)}
         if unsolved:
             inner |= {file.parent for file in folder.rglob("*.h5") if recordings(file.parent, "raw")}
         yield from sorted(inner) or [folder]
 
 
-def _finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
-    """The run as its recordings give it, which a result.json alone only claims; what is there already is not solved.
+def _recompute_finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
+    """Return the run as its recordings give it, as result.json alone is only a claim. A run in the history is not
+    solved.
 
-    Raises Refused `no_recording`, `result_not_of_recording`, and as the recordings' solution does.
+    Raise Refused `no_recording`, `result_not_of_recording`, and as the recordings' solution.
     """
     claimed = None if solve and not (folder / RESULT).exists() else read_finished_run(folder)
     if claimed is not None:
@@ -264,8 +267,8 @@ def _finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
     from rig.plans.recorded import judged, open_run
     from rig.report.document import document_of
 
-    given = document_of(judged(open_run(folder)))
-    differing = [] if claimed is None else not_given(claimed.document, given)
+    document = document_of(judged(open_run(folder)))
+    differing = [] if claimed is None else not_given(claimed.document, document)
     if claimed is not None and not differing:
         return claimed
     if not solve:
@@ -276,4 +279,4 @@ def _finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
             "Enter the result of the recordings by `rig history import --solve DIR`; a result of an older "
             "version may differ too",
         )
-    return read_finished_run(folder, given)
+    return read_finished_run(folder, document)

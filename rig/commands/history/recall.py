@@ -1,9 +1,9 @@
-"""The beginning of a run: what the history knows of its sensors' serial numbers."""
+"""The serial numbers of a run's sensors as the history has them, read when the run begins."""
 
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
-from rig.commands.history.answer import history_answer, why
+from rig.commands.history.answer import ask_history, explain_failure
 from rig.config.models import RigConfig
 from rig.data.absent import NO_BOARD
 from rig.runner.mounted import CalibratedBefore, Memory
@@ -13,70 +13,71 @@ if TYPE_CHECKING:
     from rig.history.store import Past, Selection
 
 
-def remembered(config: RigConfig, moved: frozenset[str]) -> Memory:
-    """What is known of the sensors of `config`; a history that does not answer only says nothing.
+def recall_sensors(config: RigConfig, moved: frozenset[str]) -> Memory:
+    """Return earlier calibrations of the sensors of `config`; if the history does not answer, only the reason.
 
-    `moved` are serial numbers of sensors that are stated to be on another board than before.
+    `moved` are serial numbers of sensors that are declared to be on another board than before.
     """
     from rig.history.storage.address import choose_history_address
 
     try:
-        where = choose_history_address(config.history)
-        if where is None:
+        address = choose_history_address(config.history)
+        if address is None:
             return Memory(silent="the history is off", moved=moved)
-        numbers = sorted({each.serial_number for each in config.all_sensors.values()})
-        found = history_answer(where, lambda: _of(where, numbers))
+        numbers = sorted({sensor.serial_number for sensor in config.all_sensors.values()})
+        calibrations = ask_history(address, lambda: _load_of_sensors(address, numbers))
     except Exception as error:  # whatever it is, a run does not depend on the history
-        return Memory(silent=f"the history is silent ({why(error)})", moved=moved)
-    return Memory(found, None, moved)
+        return Memory(silent=f"the history is silent ({explain_failure(error)})", moved=moved)
+    return Memory(calibrations, None, moved)
 
 
-def known_board(
-    config: RigConfig, board: str, parts: Collection[str], own: Collection[str], *, simulated: bool
+def find_other_board(
+    config: RigConfig, board: str, parts: Collection[str], own_serial_numbers: Collection[str], *, simulated: bool
 ) -> str | None:
-    """The serial number, in words, that the history has of one of these `parts` on that board, if it is not of `own`.
+    """Return the serial number, in words, that the history has of one of these `parts` on that board.
 
-    The newest calibration decides. A history that does not answer knows none.
+    None if it is one of `own_serial_numbers`. The newest calibration decides. A history that does not answer gives
+    None.
     """
     from rig.history.storage.address import choose_history_address
 
     try:
-        where = choose_history_address(config.history)
-        found = () if where is None else history_answer(where, lambda: _on(where, board))
-    except Exception:  # whatever it is, a run does not depend on the history, and says that it is silent
+        address = choose_history_address(config.history)
+        calibrations = () if address is None else ask_history(address, lambda: _load_of_board(address, board))
+    except Exception:  # whatever it is, a run does not depend on the history; its own recall reports the failure
         return None
-    same = [each for each in found if each.part in parts and each.simulated == simulated]
-    if not same or same[0].serial_number in own:
+    similar = [before for before in calibrations if before.part in parts and before.simulated == simulated]
+    if not similar or similar[0].serial_number in own_serial_numbers:
         return None
-    return f"{same[0].serial_number}, calibrated {same[0].words}"
+    return f"{similar[0].serial_number}, calibrated {similar[0].words}"
 
 
-def _on(where: "HistoryAddress", board: str) -> tuple[CalibratedBefore, ...]:
+def _load_of_board(address: "HistoryAddress", board: str) -> tuple[CalibratedBefore, ...]:
     from rig.history.store import Selection
 
-    return _found(where, [Selection(board=board)])
+    return _load_calibrations(address, [Selection(board=board)])
 
 
-def _of(where: "HistoryAddress", serial_numbers: list[str]) -> tuple[CalibratedBefore, ...]:
+def _load_of_sensors(address: "HistoryAddress", serial_numbers: list[str]) -> tuple[CalibratedBefore, ...]:
     from rig.history.store import Selection
 
-    return _found(where, [Selection(serial_number=number) for number in serial_numbers])
+    return _load_calibrations(address, [Selection(serial_number=number) for number in serial_numbers])
 
 
-def _found(where: "HistoryAddress", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
-    """What a history has of that, the newest first; a file that is not there has nothing."""
+def _load_calibrations(address: "HistoryAddress", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
+    """Return the valid calibrations of these selections, the newest first; a file that does not exist has none."""
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 
-    if not is_there(where):
+    if not is_there(address):
         return ()
-    with open_history(where) as history:
-        found = [each for selection in wanted for each in history.calibrations(selection)]
-    newest_first = sorted(found, key=lambda each: (each.started_utc, each.id), reverse=True)
-    return tuple(_before(each) for each in newest_first if each.voided is None)
+    with open_history(address) as history:
+        pasts = [past for selection in wanted for past in history.calibrations(selection)]
+    newest_first = sorted(pasts, key=lambda past: (past.started_utc, past.id), reverse=True)
+    return tuple(_describe(past) for past in newest_first if past.voided is None)
 
 
-def _before(past: "Past") -> CalibratedBefore:
+def _describe(past: "Past") -> CalibratedBefore:
     return CalibratedBefore(
         part=past.part,
         serial_number=past.serial_number,

@@ -1,4 +1,4 @@
-"""Waiting for something that may never answer, such as a database that has frozen."""
+"""Waiting for an answer that may never come, such as that of a frozen database."""
 
 from collections.abc import Callable
 from threading import Thread
@@ -7,13 +7,14 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-def answer_of(work: Callable[[], T], within_s: float | None = None) -> T:
-    """What `work` returns, or raises, from a thread of its own. Raises TimeoutError when it takes longer.
+def await_answer(work: Callable[[], T], within_s: float | None = None) -> T:
+    """Return what `work` returns, or raise what it raises, from a thread of its own. Raise TimeoutError if it takes
+    longer.
 
-    So Ctrl-C is heard at once, whatever the thread waits for. One that is late is left behind, and ends with the
-    process: a library that waits for its server cannot be told to stop.
+    Ctrl-C thus takes effect at once, whatever the thread waits for. A late thread is abandoned and ends with the
+    process, as a library that waits for its server cannot be interrupted.
     """
-    from concurrent.futures import Future  # not at once: `rig --help` has no use for it
+    from concurrent.futures import Future  # here, as `rig --help` does not need it
 
     answer: Future[T] = Future()
 

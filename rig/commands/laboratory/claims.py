@@ -1,10 +1,10 @@
-"""One rig at a time for an arm, a board, an instrument: a command claims what it works with, for as long as it does.
+"""Claims: a command reserves the arm, board or instrument that it works with, so that only one rig at a time uses it.
 
-A claim is a socket that listens under a name of the kernel's own, which no file stands for (unix(7), abstract sockets).
-It ends with the process that holds it, however that ends, so nothing stale is left behind; every user of the computer
-sees it; and the kernel tells whose it is. Other systems than Linux have no such names: nothing is claimed there.
+A claim is a socket that listens under an abstract name of the kernel (unix(7)), for which there is no file. It ends
+with the process that holds it, however that ends, so no stale claim remains. Every user of the computer sees it, and
+the kernel names the holder. Only Linux has such names: other systems claim nothing.
 
-What is held from another computer the arm itself tells: `program_running`, `registers_in_use`.
+A claim from another computer is reported by the arm itself: `program_running`, `registers_in_use`.
 """
 
 import os
@@ -27,47 +27,47 @@ CREDENTIALS = struct.Struct("3i")  # of the far end: process, user, group (unix(
 
 
 @contextmanager
-def claimed(config: RigConfig) -> Iterator[None]:
-    """All that a run works with. Raises Refused as `claimed_arm`, `claimed_board` and `claimed_sensor` do."""
+def claim_devices(config: RigConfig) -> Iterator[None]:
+    """Claim all devices of a run for the block. Raise Refused as `claim_arm`, `claim_board` and `claim_sensor`."""
     with ExitStack() as stack:
         if config.turner.address:
-            stack.enter_context(claimed_arm(config.turner.address))
+            stack.enter_context(claim_arm(config.turner.address))
         if config.board is not None:
-            stack.enter_context(claimed_board(config.board.port))
-        ports = {each.own_port[1]: name for name, each in config.sensors.items() if each.own_port is not None}
+            stack.enter_context(claim_board(config.board.port))
+        ports = {sensor.own_port[1]: name for name, sensor in config.sensors.items() if sensor.own_port is not None}
         for port, name in ports.items():
-            stack.enter_context(claimed_sensor(name, port))
+            stack.enter_context(claim_sensor(name, port))
         yield
 
 
-def claimed_arm(host: str) -> AbstractContextManager[None]:
-    """The arm, or what turns at a serial port, by whatever name it is called.
+def claim_arm(host: str) -> AbstractContextManager[None]:
+    """Claim the arm, or the turner at a serial port, whichever of its names is used.
 
-    Raises Refused `arm_claimed`, `only_on_linux`.
+    Raise Refused `arm_claimed`, `only_on_linux`.
     """
     refuse_unless_linux("what moves an arm or a servomotor")
     if "/" in host:
-        return _claimed("arm_claimed", f"port {_place(host)}", f"the turner at {host}")
-    return _claimed("arm_claimed", f"arm {_address(host)}", f"the arm at {host}")
+        return _claim("arm_claimed", f"port {_canonical_port(host)}", f"the turner at {host}")
+    return _claim("arm_claimed", f"arm {_resolve_host(host)}", f"the arm at {host}")
 
 
-def claimed_laboratory(host: str) -> AbstractContextManager[None]:
-    """The address of a simulated laboratory, from before its world is there. Raises Refused `arm_claimed`."""
-    return _claimed("arm_claimed", f"laboratory {_address(host)}", f"the simulated laboratory at {host}")
+def claim_laboratory(host: str) -> AbstractContextManager[None]:
+    """Claim the address of a simulated laboratory, before its world starts. Raise Refused `arm_claimed`."""
+    return _claim("arm_claimed", f"laboratory {_resolve_host(host)}", f"the simulated laboratory at {host}")
 
 
-def claimed_board(port: str) -> AbstractContextManager[None]:
-    """A claim on the board at `port`. Raises Refused `board_claimed`."""
-    return _claimed("board_claimed", f"port {_place(port)}", f"the board at {port}")
+def claim_board(port: str) -> AbstractContextManager[None]:
+    """Claim the board at `port`. Raise Refused `board_claimed`."""
+    return _claim("board_claimed", f"port {_canonical_port(port)}", f"the board at {port}")
 
 
-def claimed_sensor(name: str, port: str) -> AbstractContextManager[None]:
-    """A sensor with a port of its own. Raises Refused `sensor_claimed`."""
-    return _claimed("sensor_claimed", f"port {_place(port)}", f"the sensor {name} at {port}")
+def claim_sensor(name: str, port: str) -> AbstractContextManager[None]:
+    """Claim a sensor with a port of its own. Raise Refused `sensor_claimed`."""
+    return _claim("sensor_claimed", f"port {_canonical_port(port)}", f"the sensor {name} at {port}")
 
 
 @contextmanager
-def _claimed(name: str, device: str, told: str) -> Iterator[None]:
+def _claim(name: str, device: str, description: str) -> Iterator[None]:
     if sys.platform != "linux":
         yield
         return
@@ -80,14 +80,14 @@ def _claimed(name: str, device: str, told: str) -> Iterator[None]:
         except OSError as error:
             raise Refused(
                 name,
-                f"{told} is in use by another rig on this computer, {_holder(address)}",
+                f"{description} is in use by another rig on this computer, {_describe_holder(address)}",
                 "Let it finish, or end it with Ctrl-C where it runs",
             ) from error
         yield
 
 
-def _holder(address: str) -> str:
-    """The process that has it, and how it was called where that may be read."""
+def _describe_holder(address: str) -> str:
+    """Return the process that holds the claim, and its command line if that may be read."""
     process = 0
     try:
         with socket.socket(socket.AF_UNIX) as question:
@@ -97,21 +97,21 @@ def _holder(address: str) -> str:
                 question.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size)
             )
         program, *arguments = Path(f"/proc/{process}/cmdline").read_text("utf-8", "replace").split("\0")[1:-1]
-    except (OSError, ValueError):  # it has ended meanwhile, or is another user's
+    except (OSError, ValueError):  # it has ended meanwhile, or belongs to another user
         return f"process {process}" if process else "whose process cannot be seen"
     return f"process {process}: {shorten(shlex.join([Path(program).name, *arguments]))}"
 
 
-def _place(port: str) -> str:
-    """A port by the one name it has, whatever links to it: its device, or its address."""
+def _canonical_port(port: str) -> str:
+    """Return the one name of a port, whatever links to it: its device, or its address."""
     parts = urlsplit(port)
     if parts.scheme == "socket" and parts.hostname is not None:
-        return f"{_address(parts.hostname)}:{parts.port}"
+        return f"{_resolve_host(parts.hostname)}:{parts.port}"
     return os.path.realpath(port)
 
 
-def _address(host: str) -> str:
+def _resolve_host(host: str) -> str:
     try:
         return socket.gethostbyname(host)
-    except (OSError, UnicodeError):  # nobody's name; connecting says so
+    except (OSError, UnicodeError):  # an unknown name; the connection reports it
         return host

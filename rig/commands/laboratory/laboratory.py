@@ -1,4 +1,4 @@
-"""Starts the simulated laboratory a configuration asks for, in a process of its own, and stops it afterwards."""
+"""The start of the simulated laboratory of a configuration, in a process of its own, and its end."""
 
 import json
 import socket
@@ -18,18 +18,17 @@ MOUNT_TIMEOUT_S = 30.0
 
 @contextmanager
 def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator[str]:
-    """Run the world of a configuration, given as its text, for the `with` block; the address of its control channel.
+    """Run the world of a configuration text for the length of the block; yield the address of its control channel.
 
-    Should steps of it come late, it writes to the file `late` what held them; to stderr where it is None.
+    If its steps come late, it writes the causes to the file `late`, or to stderr if that is None.
 
-    The world ends when its standard input closes, so it cannot outlive this process, however this process ends.
-    Raises Refused: `only_on_linux`, what the world refused, or `world_not_ready` when it ends without a word of its
-    own.
+    The world ends when its standard input closes, so it cannot outlive this process, however this process ends. Raise
+    Refused: `only_on_linux`, the world's own refusal, or `world_not_ready` if it ends without one.
     """
     refuse_unless_linux("the simulated laboratory")
     command = [sys.executable, "-P", "-m", "rig.world", "--until-eof", *([] if late is None else ["--late", str(late)])]
     with (
-        written(config_text) as path,
+        write_temporary(config_text) as path,
         # A session of its own: Ctrl-C in the terminal must stop the arm first, not the laboratory under it.
         subprocess.Popen(
             [*command, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
@@ -55,20 +54,20 @@ def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator
                 process.kill()
 
 
-def hands_of(control: str) -> Callable[[int], None]:
-    """What mounts the item for a stage, from 0: the simulated operator, who knows nothing but the stage's number.
+def make_mounter(control: str) -> Callable[[int], None]:
+    """Return the function that mounts the item for a stage, counted from 0: the simulated operator does it.
 
-    `control` is the laboratory's control channel. Raises OSError where it is gone.
+    `control` is the laboratory's control channel. The function raises OSError if the laboratory is gone.
     """
-    return lambda stage: _told(control, {"do": "mount", "stage": stage})
+    return lambda stage: _send_request(control, {"do": "mount", "stage": stage})
 
 
-def part_fitter(control: str) -> Callable[[str], None]:
-    """What lays the part of a serial number in: the simulated operator. `control` and raises as `hands_of`."""
-    return lambda part: _told(control, {"do": "fit", "part": part})
+def make_fitter(control: str) -> Callable[[str], None]:
+    """Return the function that fits the part of a serial number: the simulated operator does it. As `make_mounter`."""
+    return lambda part: _send_request(control, {"do": "fit", "part": part})
 
 
-def _told(control: str, request: Mapping[str, str | int]) -> None:
+def _send_request(control: str, request: Mapping[str, str | int]) -> None:
     host, _, port = control.rpartition(":")
     with socket.create_connection((host, int(port)), MOUNT_TIMEOUT_S) as channel:
         channel.sendall(json.dumps(request).encode() + b"\n")
@@ -76,8 +75,8 @@ def _told(control: str, request: Mapping[str, str | int]) -> None:
 
 
 @contextmanager
-def written(config_text: str) -> Iterator[Path]:
-    """The configuration as a file that is there for the length of the `with` block."""
+def write_temporary(config_text: str) -> Iterator[Path]:
+    """Write the configuration to a file that exists for the length of the block."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "config.yaml"
         path.write_text(config_text, encoding="utf-8")

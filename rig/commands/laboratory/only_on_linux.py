@@ -1,4 +1,4 @@
-"""Refuses by name what needs Linux: an arm, a servomotor, the simulated laboratory."""
+"""The refusal of what needs Linux: an arm, a servomotor, the simulated laboratory."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The simulated operator's ears: what the one at the rig is told by hand goes to the laboratory."""
+"""The simulated operator, to whom the instructions of a run by hand are passed on."""
 
 import json
 import socket
@@ -9,22 +9,22 @@ from rig.station.events import RunEvent
 
 
 class SimulatedOperator:
-    """A listener of a run: hands on to the laboratory's operator what the one at the rig is told to do by hand.
+    """A listener of a run that passes instructions by hand on to the laboratory's operator.
 
-    The line of text and the drawing are made of the same: what to do, and with which side up. Nothing else is told.
+    The operator gets only what the line of text and the drawing show: the motion, and the side that points up.
     """
 
     def __init__(self, control: str) -> None:
-        """`control` is the laboratory's control channel."""
+        """Connect to the laboratory's control channel `control` for each instruction."""
         host, _, port = control.rpartition(":")
         self._address = host, int(port)
 
     def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does. Raises OSError where the laboratory is gone."""
+        """Take an event, as a Listener does. Raise OSError if the laboratory is gone."""
         if isinstance(event, HandAsked):
-            asked = event.instruction
-            told = {"do": "instruct", "say": asked.say, "face": asked.face, "turns": asked.turns}
-            told["again"] = event.again is not None
+            instruction = event.instruction
+            request = {"do": "instruct", "say": instruction.say, "face": instruction.face, "turns": instruction.turns}
+            request["again"] = event.again is not None
             with socket.create_connection(self._address, MOUNT_TIMEOUT_S) as channel:
-                channel.sendall(json.dumps(told).encode() + b"\n")
+                channel.sendall(json.dumps(request).encode() + b"\n")
                 channel.makefile("rb").readline()

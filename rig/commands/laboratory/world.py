@@ -5,22 +5,22 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from rig.commands.config_arguments import add_config
-from rig.commands.laboratory.laboratory import written
+from rig.commands.laboratory.laboratory import write_temporary
 from rig.commands.laboratory.only_on_linux import refuse_unless_linux
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig world`."""
+    """Add the arguments of `rig world`."""
     add_config(parser)
 
 
 def run(options: Namespace) -> int:
-    """Run only the world of a configuration, until Ctrl-C; returns its exit status.
+    """Run only the world of a configuration, until Ctrl-C; return its exit status.
 
-    Raises Refused `only_on_linux`, and as `load`.
+    Raise Refused `only_on_linux`, and as `load`.
     """
     refuse_unless_linux("the simulated laboratory")
     from rig.config.load import load
 
-    with written(load(options.config, options.overrides, sections=None).text) as config_path:
+    with write_temporary(load(options.config, options.overrides, sections=None).text) as config_path:
         return subprocess.call([sys.executable, "-P", "-m", "rig.world", str(config_path)])

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.configured import Configured
-from rig.commands.history.recall import remembered
-from rig.commands.history.remember import remember, since_lines
-from rig.commands.laboratory.claims import claimed
-from rig.commands.laboratory.laboratory import hands_of, simulated_laboratory
+from rig.commands.history.recall import recall_sensors
+from rig.commands.history.remember import describe_changes, remember
+from rig.commands.laboratory.claims import claim_devices
+from rig.commands.laboratory.laboratory import make_mounter, simulated_laboratory
 from rig.commands.laboratory.simulated_operator import SimulatedOperator
-from rig.commands.page_arguments import PageWish, operators_page
-from rig.commands.standard_streams import tell_where_the_result_is
+from rig.commands.page_arguments import PageWish, serve_operators_page
+from rig.commands.standard_streams import say_where_the_result_is
 from rig.data.run_folder import CONFIG, LOG, RESULT, WORLD_LATE
 from rig.report.document import document_of
 from rig.report.terminal.table import print_kept
@@ -36,36 +36,36 @@ def carry_out(
     as_json: bool,
     page: PageWish | None,
 ) -> int:
-    """Run, or go on with, the phases in a run folder; on a `page` too if wanted. Returns 0 passed, 1 verdict failed.
+    """Run the phases in a run folder, or continue them; on a `page` too if wanted. Return 0 if passed, 1 if failed.
 
-    `moved` are serial numbers of sensors that are stated to be on another board than before.
+    `moved` are serial numbers of sensors that are declared to be on another board than before.
     """
-    with operators_page(page, folder, lambda: _about(folder, configured, page)) as shown:
-        # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
+    with serve_operators_page(page, folder, lambda: _about(folder, configured, page)) as page_of_run:
+        # In a laboratory that this process simulates no person can be hurt, so no operator is asked.
         on_terminal = always_yes if assume_yes or configured.loaded.simulated else ask_operator
-        answer = shown.answer if shown.answer is not None and not assume_yes else on_terminal
-        with log(folder / LOG) as logged, view() as seen, ExitStack() as held:
-            station = Stations((logged, seen, *shown.listeners), answer, attended=answer is not always_yes)
-            memory = remembered(configured.loaded.config, moved)
-            this = Run(folder, configured.loaded, configured.script, station, memory)
-            with this.reported():
-                held.enter_context(claimed(configured.loaded.config))
+        answer = page_of_run.answer if page_of_run.answer is not None and not assume_yes else on_terminal
+        with log(folder / LOG) as logged, view() as terminal, ExitStack() as stack:
+            station = Stations((logged, terminal, *page_of_run.listeners), answer, attended=answer is not always_yes)
+            memory = recall_sensors(configured.loaded.config, moved)
+            run = Run(folder, configured.loaded, configured.script, station, memory)
+            with run.reported():
+                stack.enter_context(claim_devices(configured.loaded.config))
                 if configured.loaded.simulated:
-                    control = held.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
-                    station.mount = hands_of(control)
+                    control = stack.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
+                    station.mount = make_mounter(control)
                     station.listeners = (*station.listeners, SimulatedOperator(control))
-            outcome = this.carry_out(configured.phase)
+            outcome = run.carry_out(configured.phase)
             try:
-                entered, beside = remember(folder, configured.loaded.config.history)
+                entered, comparisons = remember(folder, configured.loaded.config.history)
             except KeyboardInterrupt:
                 station.event(NotRemembered(folder, "interrupted"))
                 raise
             if entered is not None:
                 station.event(entered)
             station.event(RunFolderWritten(folder))
-        print_kept(folder, document_of(outcome), since_lines(beside), as_json=as_json)
-        tell_where_the_result_is(folder / RESULT)
-        shown.stay()
+        print_kept(folder, document_of(outcome), describe_changes(comparisons), as_json=as_json)
+        say_where_the_result_is(folder / RESULT)
+        page_of_run.stay()
     return 0 if outcome.passed else 1
 
 
@@ -79,15 +79,15 @@ def _about(folder: Path, configured: Configured, page: PageWish | None) -> "Abou
         folder=str(folder),
         procedure=config.procedure.name,
         may_answer=page is not None and page.may_answer,
-        parts={name: f"{each.part} {each.serial_number}" for name, each in config.all_sensors.items()},
+        parts={name: f"{sensor.part} {sensor.serial_number}" for name, sensor in config.all_sensors.items()},
         simulated=configured.loaded.simulated,
-        storing=_storing(folder, configured),
+        storing=_storing_command(folder, configured),
         arm=built(kind_of(config.turner).describe_configured(config.turner).kinematics),
     )
 
 
-def _storing(folder: Path, configured: Configured) -> str | None:
-    """The command that stores the run's calibration on the board; a simulated one forgets it with the command's end."""
+def _storing_command(folder: Path, configured: Configured) -> str | None:
+    """Return the command that stores the run's calibration on the board; None if simulated, as that board then ends."""
     if configured.loaded.simulated or not configured.loaded.config.parts_on_board:
         return None
     return f"rig board calibration write {shlex.quote(str(folder / CONFIG))} {shlex.quote(str(folder))}"

@@ -1,4 +1,4 @@
-"""`rig check`: connect and look. Receives only, so nothing moves and no program on the arm is stopped."""
+"""`rig check`: connect and check. Receives only, so nothing moves and no program on the arm is stopped."""
 
 import json
 import sys
@@ -19,30 +19,30 @@ Tell = Callable[[str], None]
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig check`."""
+    """Add the arguments of `rig check`."""
     add_config(parser)
     add_script(parser)
     add_json(parser)
 
 
 def run(options: Namespace) -> int:
-    """Look at the board and the arm; print what is there and what is missing. 0 when a run could start, else 2.
+    """Check the board and the arm; print the devices present and missing. Return 0 if a run could start, else 2.
 
-    With `--json` all of it at the end, of schema "rig.check/1".
+    With `--json` print all at the end, in the schema "rig.check/1".
     """
-    seen: list[str] = []
-    tell: Tell = seen.append if options.json else say
-    from rig.commands.configured import configured_here
+    lines: list[str] = []
+    tell: Tell = lines.append if options.json else say
+    from rig.commands.configured import open_configured
 
     with ExitStack() as stack:
-        found = stack.enter_context(configured_here(options.config, options.overrides, options.script))
-        if found.loaded.simulated:
-            stack.enter_context(simulated_laboratory(found.loaded.text))
-        looks = [_look_at_board, _look_at_instruments, _look_at_turner]
-        missing = [problem for look_at in looks for problem in _named(look_at, found, tell)]
+        configured = stack.enter_context(open_configured(options.config, options.overrides, options.script))
+        if configured.loaded.simulated:
+            stack.enter_context(simulated_laboratory(configured.loaded.text))
+        checks = [_check_board, _check_instruments, _check_turner]
+        missing = [problem for check in checks for problem in _catch_problem(check, configured, tell)]
     if options.json:
         problems = [problem._asdict() for problem in missing]
-        document = {"schema": "rig.check/1", "ready": not missing, "seen": seen, "missing": problems}
+        document = {"schema": "rig.check/1", "ready": not missing, "seen": lines, "missing": problems}
         print(json.dumps(document, indent=2))
         return 2 if missing else 0
     for problem in missing:
@@ -51,17 +51,17 @@ def run(options: Namespace) -> int:
     return 2 if missing else 0
 
 
-def _named(
-    look_at: "Callable[[Configured, Tell], list[Problem]]", configured: "Configured", tell: Tell
+def _catch_problem(
+    check: "Callable[[Configured, Tell], list[Problem]]", configured: "Configured", tell: Tell
 ) -> list[Problem]:
-    """The problems found, including the one that ended the looking."""
+    """Return the problems of one check, including the one that ended it."""
     try:
-        return look_at(configured, tell)
+        return check(configured, tell)
     except RigError as error:
         return [error.problem]
 
 
-def _look_at_board(configured: "Configured", tell: Tell) -> list[Problem]:
+def _check_board(configured: "Configured", tell: Tell) -> list[Problem]:
     from firmware_host.client import Board
     from rig.board.identify import (
         find_sensor,
@@ -70,14 +70,14 @@ def _look_at_board(configured: "Configured", tell: Tell) -> list[Problem]:
         refusing,
         require_board_section,
     )
-    from rig.commands.laboratory.claims import claimed_board
+    from rig.commands.laboratory.claims import claim_board
 
     config = configured.loaded.config
     missing: list[Problem] = []
     if not config.parts_on_board:
         return missing
     section = require_board_section(config)
-    with refusing(), claimed_board(section.port), Board(section.port, section.baud, lambda batch: None) as board:
+    with refusing(), claim_board(section.port), Board(section.port, section.baud, lambda batch: None) as board:
         identity = board.identity
         tell(f"board at {section.port}: {identity.unique_id}, firmware {identity.firmware}")
         try:
@@ -96,9 +96,9 @@ def _look_at_board(configured: "Configured", tell: Tell) -> list[Problem]:
     return missing
 
 
-def _look_at_instruments(configured: "Configured", tell: Tell) -> list[Problem]:
-    """The sensors with a port of their own; nothing in their memories is changed."""
-    from rig.commands.laboratory.claims import claimed_sensor
+def _check_instruments(configured: "Configured", tell: Tell) -> list[Problem]:
+    """Return the problems of the sensors with a port of their own; nothing in their memories is changed."""
+    from rig.commands.laboratory.claims import claim_sensor
     from rig.sensors.errors import SensorError
     from rig.sensors.registry import group_by_port
 
@@ -106,18 +106,18 @@ def _look_at_instruments(configured: "Configured", tell: Tell) -> list[Problem]:
     for port, kind, sections in group_by_port(configured.loaded.config.sensors):
         name = ", ".join(sections)
         try:
-            with claimed_sensor(name, port):
-                for seen in kind.look(sections):
-                    if isinstance(seen, str):
-                        tell(f"sensor {name}: {seen}")
+            with claim_sensor(name, port):
+                for finding in kind.look(sections):
+                    if isinstance(finding, str):
+                        tell(f"sensor {name}: {finding}")
                     else:
-                        missing.append(seen.problem)
+                        missing.append(finding.problem)
         except (Refused, SensorError) as error:
             missing.append(error.problem)
     return missing
 
 
-def _look_at_turner(configured: "Configured", tell: Tell) -> list[Problem]:
+def _check_turner(configured: "Configured", tell: Tell) -> list[Problem]:
     from rig.motion.doubts import doubts
     from rig.turners.registry import kind_of
 
@@ -129,17 +129,20 @@ def _look_at_turner(configured: "Configured", tell: Tell) -> list[Problem]:
     plan = configured.phase.plan(report.state.q_rad)
     for doubt in doubts(plan):
         tell(f"note: {doubt}")
-    return [*_claims_of_others(section.address), *kind.problems([plan], section, report)]
+    return [*_find_other_claims(section.address), *kind.problems([plan], section, report)]
 
 
-def _claims_of_others(host: str) -> list[Problem]:
-    """A problem if another rig has the arm; looking at it disturbs nobody, so it is claimed for no longer than this."""
-    from rig.commands.laboratory.claims import claimed_arm
+def _find_other_claims(host: str) -> list[Problem]:
+    """Return a problem if another rig has claimed the arm.
+
+    The claim lasts no longer than this call, as to check the arm disturbs no other rig.
+    """
+    from rig.commands.laboratory.claims import claim_arm
 
     if not host:
         return []
     try:
-        with claimed_arm(host):
+        with claim_arm(host):
             return []
     except Refused as refused:
         return [refused.problem]

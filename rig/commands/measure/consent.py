@@ -1,4 +1,4 @@
-"""A run folder may have come from anywhere: to the addresses it names one connects if they are the user's own."""
+"""Consent to the addresses of a run folder that may have come from anywhere: rig connects only to the user's own."""
 
 import hashlib
 import os
@@ -17,21 +17,21 @@ CONFIG_MAX_BYTES = 10_000_000
 
 
 def refuse_foreign_addresses(folder: Path, loaded: Loaded, agreed: Sequence[str] = ()) -> None:
-    """Where the folder's configuration is none that this user has run here, every address has to be in `agreed`.
+    """Refuse addresses not in `agreed`, unless this user has run the folder's configuration on this computer.
 
-    Raises Refused `foreign_folder`.
+    Raise Refused `foreign_folder`.
     """
     if is_own(_sha256(folder / CONFIG)):
         return
-    addresses = [(what, where) for what, where in _addresses(loaded) if where not in agreed]
+    addresses = [(what, where) for what, where in _list_addresses(loaded) if where not in agreed]
     if not addresses:
         return
-    named = " ".join(f"--connect {shlex.quote(where)}" for _, where in addresses)
+    options = " ".join(f"--connect {shlex.quote(where)}" for _, where in addresses)
     raise Refused(
         "foreign_folder",
         f"the {CONFIG} in {folder} was never run by you on this computer; it would connect to "
         + ", ".join(f"{what} {where}" for what, where in addresses),
-        f"If all of this is yours, state it: {resuming(folder)} {named}",
+        f"If all of this is yours, state it: {resuming(folder)} {options}",
     )
 
 
@@ -42,9 +42,10 @@ def _sha256(file: Path) -> str:
         return ""
 
 
-def _addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
-    """What a run would connect to. A simulated laboratory is on this computer, and answers there itself; it may keep
-    its board's flash in a file.
+def _list_addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
+    """Yield what a run would connect to, and its address.
+
+    A simulated laboratory is on this computer and answers there itself, but may keep its board's flash in a file.
     """
     config = loaded.config
     if loaded.flash_file is not None:

@@ -19,7 +19,7 @@ def add(parser: ArgumentParser) -> None:
         "--files",
         type=Path,
         metavar="DIR",
-        help="run nothing; copy the configurations and examples that come with the program into this folder",
+        help="only copy the supplied configurations and examples into this folder",
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: a new one in runs)")
     add_json(parser)
@@ -45,11 +45,11 @@ def _copy(folder: Path) -> int:
     """Copy each supplied file that the folder does not have yet under its path; no file is replaced."""
     import shutil
 
-    copied = kept = 0
+    copied = existing = 0
     try:
         for source, target in _pairs(folder):
             if target.exists() or target.is_symlink():
-                kept += 1
+                existing += 1
                 continue
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
@@ -57,13 +57,13 @@ def _copy(folder: Path) -> int:
     except OSError as error:
         what = f"{folder} cannot be written: {error.strerror or error}"
         raise Refused("files_not_copied", what, "Name another folder with --files") from error
-    say(f"{copied} files copied into {folder}, {kept} were there already and stay as they are")
+    say(f"{copied} files copied into {folder}, {existing} existing ones kept")
     say(f"next: rig plan {folder / DEMO}")
     return 0
 
 
 def _pairs(folder: Path) -> list[tuple[Path, Path]]:
-    """Return every supplied file with its place in the folder."""
+    """Return every supplied file with its path in the folder."""
     pairs = []
     for name in NAMES:
         source = supplied(name)

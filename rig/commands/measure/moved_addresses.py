@@ -1,4 +1,4 @@
-"""What may change of a run that is gone on with: where its devices answer, and nothing else."""
+"""Changes allowed in a resumed run: the addresses of its devices, and nothing else."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from rig.errors.quoting import quote
 
 
 def address_keys(loaded: Loaded) -> list[str]:
-    """The keys of a configuration that say an address: of what turns, of the board, of sensors with their own port."""
+    """Return the keys of a configuration with an address: of the turner, the board, sensors with their own port."""
     import yaml
 
     turner = "turner" if "turner" in yaml.safe_load(loaded.text) else "arm"
@@ -17,14 +17,14 @@ def address_keys(loaded: Loaded) -> list[str]:
 
 
 def refuse_other_changes(loaded: Loaded, overrides: Sequence[str]) -> list[str]:
-    """The addresses that `overrides` of a configuration name. Raises Refused `no_address` where one names more."""
+    """Return the addresses that `overrides` give. Raise Refused `no_address` for any other key."""
     keys = address_keys(loaded)
     for override in overrides:
         key = override.partition("=")[0]
         if key not in keys:
             raise Refused(
                 "no_address",
-                f"--set {quote(key)} is no address of the run, and nothing else of it may change",
+                f"--set {quote(key)} is not an address of the run, and nothing else may change",
                 f"Give a new address to {', '.join(keys) or 'nothing: it has none'}, or start a new run with `rig run`",
             )
     return [override.partition("=")[2] for override in overrides]

@@ -1,4 +1,4 @@
-"""A command of the user's that is run when a run has ended: a message, a mail, a lamp, after hours of measuring."""
+"""A user's command at the end of a run: a message, a mail or a lamp after hours of measurement."""
 
 import os
 import subprocess
@@ -19,15 +19,15 @@ def add_notice(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--notify",
         metavar="COMMAND",
-        help="run this command in a shell when the run has ended, however it ended; RIG_RUN is its folder, RIG_STATUS "
+        help="run this command in a shell after the run, however it ended; RIG_RUN is its folder, RIG_STATUS "
         "the exit status: 0 passed, 1 failed, 2 refused, 3 fault, 130 interrupted",
     )
 
 
-def noticed(command: str | None, folder: Path, work: Callable[[], int]) -> int:
-    """Do the work of a run in a folder and return its exit status; then, whatever became of it, run the command.
+def notify_after(command: str | None, folder: Path, work: Callable[[], int]) -> int:
+    """Carry out a run in `folder` and return its exit status; then run the command, even after an error.
 
-    A command that fails or hangs is told and changes nothing.
+    If the command fails or hangs, that is printed and changes nothing.
     """
     if command is None:
         return work()
@@ -48,7 +48,7 @@ def noticed(command: str | None, folder: Path, work: Callable[[], int]) -> int:
 def _notify(command: str, folder: Path, status: int) -> None:
     environment = {**os.environ, "RIG_RUN": str(folder.resolve()), "RIG_STATUS": str(status)}
     try:
-        # Its words are no result: they go where the progress of the run went.
+        # Its output is not a result, so it goes to stderr like the run's progress.
         done = subprocess.run(command, shell=True, env=environment, timeout=PATIENCE_S, check=False, stdout=2)
         why = f"it ended with status {done.returncode}" if done.returncode else None
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:

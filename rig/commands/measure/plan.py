@@ -5,7 +5,7 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
-from rig.commands.measure.wanted import add_wanted, print_shortest_run
+from rig.commands.measure.wanted import add_target, print_shortest_run
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
@@ -14,21 +14,21 @@ if TYPE_CHECKING:
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig plan`."""
+    """Add the arguments of `rig plan`."""
     add_config(parser)
     add_script(parser)
     form = parser.add_mutually_exclusive_group()
     add_json(form)
     form.add_argument(
-        "--table", action="store_true", help="the sweeps as CSV, a profile for each axis: time, angle, rate"
+        "--table", action="store_true", help="print the sweeps as CSV, a profile for each axis: time, angle, rate"
     )
-    add_wanted(parser)
+    add_target(parser)
 
 
 def run(options: Namespace) -> int:
-    """Print the plan as `planned` has it, or the shortest one for what is wanted.
+    """Print the plan of `make_plan`, or the shortest one for a target uncertainty.
 
-    Returns 0, or 1 where no plan has that. Raises Refused as `planned` and `print_shortest_run`.
+    Return 0, or 1 if no plan reaches the target. Raise Refused as `make_plan` and `print_shortest_run`.
     """
     if options.target_uncertainty or options.max_duration_s is not None or options.write is not None:
         return print_shortest_run(options)
@@ -36,46 +36,46 @@ def run(options: Namespace) -> int:
     from rig.report.terminal.plan_profile import profile_csv
     from rig.report.terminal.plan_table import print_plan
 
-    found = planned(options)
-    if isinstance(found.config.procedure, ByHandSection):
-        _print_by_hand(found.config.procedure, as_json=options.json)
+    dry_run = make_plan(options)
+    if isinstance(dry_run.config.procedure, ByHandSection):
+        _print_by_hand(dry_run.config.procedure, as_json=options.json)
         return 0
     if options.table:
-        for line in profile_csv(found.plan):
+        for line in profile_csv(dry_run.plan):
             say(line)
     else:
-        print_plan(found, as_json=options.json)
+        print_plan(dry_run, as_json=options.json)
     return 0
 
 
 def _print_by_hand(section: "ByHandSection", *, as_json: bool) -> None:
-    """What an operator is asked for, in the order in which it is when nothing comes between."""
+    """Print the instructions to the operator, in their order if nothing interrupts."""
     from rig.plans.by_hand import WantedMoves, simulate_session
 
-    asked = list(simulate_session(WantedMoves(section.flips, section.turns)))
+    instructions = list(simulate_session(WantedMoves(section.flips, section.turns)))
     if as_json:
-        moves = [{"say": each.say, "face": each.face, "turns": each.turns} for each in asked]
+        moves = [{"say": step.say, "face": step.face, "turns": step.turns} for step in instructions]
         say(json.dumps({"schema": "rig.by_hand_plan/1", "moves": moves}))
         return
-    for number, each in enumerate(asked, 1):
-        say(f"{number:2d}  {each.words}")
-    say(f"{len(asked)} moves, {section.rest_s:g} s of rest between them; any order does")
+    for number, step in enumerate(instructions, 1):
+        say(f"{number:2d}  {step.words}")
+    say(f"{len(instructions)} moves, {section.rest_s:g} s of rest between them; any order does")
 
 
-def planned(options: Namespace) -> "DryRun":
-    """The plan from the home pose.
+def make_plan(options: Namespace) -> "DryRun":
+    """Plan the motion from the home pose.
 
-    Raises `Refused` when a motion breaks a limit, and when the attitudes do not tell enough.
+    Raise `Refused` if a motion breaks a limit, and if the attitudes do not determine the parameters.
     """
-    from rig.commands.configured import configured
+    from rig.commands.configured import load_configured
     from rig.errors import refuse
     from rig.report.terminal.plan_table import DryRun
     from rig.turners.registry import kind_of
 
-    found = configured(options.config, options.overrides, options.script)
-    steps = found.phase.plan()
-    config = found.loaded.config
+    configured = load_configured(options.config, options.overrides, options.script)
+    steps = configured.phase.plan()
+    config = configured.loaded.config
     kind = kind_of(config.turner)
     refuse(kind.problems([steps], config.turner, None))
     model = kind.describe_configured(config.turner).model
-    return DryRun(model, steps, config, repeated=found.phase.follows is not None)
+    return DryRun(model, steps, config, repeated=configured.phase.follows is not None)

@@ -1,4 +1,4 @@
-"""`rig record`: the readings of the sensors alone, while something else turns them. No arm is connected to."""
+"""`rig record`: record only the sensors, while another device turns them. No arm is connected."""
 
 import shlex
 import sys
@@ -12,41 +12,41 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 NO_CRYSTAL = (
-    "The board's clock does not follow its crystal: these times may be a per cent off. Another clock can correct them "
+    "The board's clock does not follow its crystal: these times may be 1 % wrong. Another clock can correct them "
     "(rig solve --attitudes FILE --estimate-clock-offset); rig solve --turns cannot use them"
 )
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig record`."""
+    """Add the arguments of `rig record`."""
     add_config(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where each sensor gets a CSV file")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder with a CSV file for each sensor")
     parser.add_argument(
-        "--duration-s", type=float, required=True, metavar="S", help="how long, by the sensors' own clocks"
+        "--duration-s", type=float, required=True, metavar="S", help="duration by the sensors' own clocks"
     )
 
 
 def run(options: Namespace) -> int:
-    """Record into CSV files in `--out` and print what each holds; returns 0.
+    """Record into CSV files in `--out` and print the content of each; return 0.
 
-    Raises Refused `bad_option`, as `load_sensors`, and as `record_readings` does; Fault as that.
+    Raise Refused `bad_option`, as `load_sensors`, and as `record_readings`; Fault as that.
     """
     if not 0 < options.duration_s < float("inf"):
         raise Refused("bad_option", f"--duration-s is {options.duration_s:g}", "Give a time above 0, in seconds")
-    from rig.commands.laboratory.own_address import own_address
+    from rig.commands.laboratory.own_address import find_own_address
     from rig.config.load import load_sensors
     from rig.runner.readings import record_readings
 
     config, simulated = load_sensors(options.config, options.overrides)
     with ExitStack() as stack:
-        if simulated is not None and (moved := stack.enter_context(own_address(config, simulated))):
+        if simulated is not None and (moved := stack.enter_context(find_own_address(config, simulated))):
             config, simulated = load_sensors(options.config, [*options.overrides, *moved])
         if simulated is not None:
             stack.enter_context(simulated_laboratory(simulated))
-        recorded = record_readings(config, options.out, options.duration_s)
-    for path, each in recorded.items():
-        say(f"{path}: {each.seen.samples} samples, {each.seen.lost} lost")
-    if any(each.follows_crystal is False for each in recorded.values()):
+        recordings = record_readings(config, options.out, options.duration_s)
+    for path, recording in recordings.items():
+        say(f"{path}: {recording.seen.samples} samples, {recording.seen.lost} lost")
+    if any(recording.follows_crystal is False for recording in recordings.values()):
         say(NO_CRYSTAL, file=sys.stderr)
-    say(f"If they lay still: rig allan {shlex.quote(str(options.out))}", file=sys.stderr)
+    say(f"If they were at rest: rig allan {shlex.quote(str(options.out))}", file=sys.stderr)
     return 0

@@ -4,37 +4,37 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from rig.commands.config_arguments import add_run, add_set
-from rig.commands.measure.notice import noticed
+from rig.commands.measure.notice import notify_after
 from rig.commands.measure.run import add_outcome
-from rig.commands.page_arguments import wish
+from rig.commands.page_arguments import read_page_wish
 from rig.errors import Refused
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig resume`."""
+    """Add the arguments of `rig resume`."""
     add_run(parser, "run_folder", "an interrupted run", metavar="RUN_DIR")
-    parser.add_argument("--script", type=Path, metavar="FILE", help="the script it was begun with, of another's folder")
+    parser.add_argument("--script", type=Path, metavar="FILE", help="its script, if the folder is another user's")
     parser.add_argument(
         "--connect",
         action="append",
         default=[],
         metavar="ADDRESS",
-        help="an address in a folder that is not of a run of yours, to which it may connect; for each of them",
+        help="permit this address in another user's run folder; may be repeated",
     )
-    add_set(parser, "a board, a sensor or the arm answers elsewhere now: board.port=/dev/ttyACM1", "KEY=ADDRESS")
+    add_set(parser, "give a new address of a board, a sensor or the arm: board.port=/dev/ttyACM1", "KEY=ADDRESS")
     add_outcome(parser)
 
 
 def run(options: Namespace) -> int:
-    """Go on with an interrupted run by the script it was begun with: sweeps it has finished count, the others are done.
+    """Continue an interrupted run by the script it was begun with: finished sweeps count, the others are done.
 
-    A sweep that the verdict named as disturbed is repeated. Of a folder that is somebody else's `--script` names the
-    script, which is executed, and `--connect` the addresses that may be connected to; `--set` names new addresses of
-    devices. Returns as `rig run` does. Raises Refused `no_run`, `already_finished`, and as `refuse_links`,
-    `read_result`, `refuse_other_changes`, `refuse_foreign_addresses`, `script_identity` and `kept_script`.
+    A sweep that the verdict named as disturbed is repeated. For another user's folder `--script` names the script,
+    which is executed, and `--connect` the addresses that may be used; `--set` gives new addresses of devices. Return as
+    `rig run`. Raise Refused `no_run`, `already_finished`, and as `refuse_links`, `read_result`, `refuse_other_changes`,
+    `refuse_foreign_addresses`, `script_identity` and `kept_script`.
     """
-    page = wish(options)
-    from rig.commands.configured import configured_here
+    page = read_page_wish(options)
+    from rig.commands.configured import open_configured
     from rig.commands.measure.carry_out import carry_out
     from rig.commands.measure.consent import refuse_foreign_addresses
     from rig.commands.measure.moved_addresses import refuse_other_changes
@@ -57,16 +57,16 @@ def run(options: Namespace) -> int:
             "Start a new run with `rig run`",
         )
     refuse_links(*folder.iterdir())
-    begun = load(folder / CONFIG, sections=None, turners=sections())
-    named_now = refuse_other_changes(begun, options.overrides)
-    now = load(folder / CONFIG, options.overrides, sections=None, turners=sections())
-    refuse_foreign_addresses(folder, now, [*options.connect, *named_now])
-    named = None if options.script is None else load_script(options.script)
-    script, moved = kept_script(folder, script_identity(folder), named), frozenset(options.other_board)
+    loaded = load(folder / CONFIG, sections=None, turners=sections())
+    new_addresses = refuse_other_changes(loaded, options.overrides)
+    reloaded = load(folder / CONFIG, options.overrides, sections=None, turners=sections())
+    refuse_foreign_addresses(folder, reloaded, [*options.connect, *new_addresses])
+    script_given = None if options.script is None else load_script(options.script)
+    script, moved = kept_script(folder, script_identity(folder), script_given), frozenset(options.other_board)
     note_run(folder)
-    with configured_here(folder / CONFIG, options.overrides, script=script) as found:
+    with open_configured(folder / CONFIG, options.overrides, script=script) as configured:
 
         def work() -> int:
-            return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
+            return carry_out(folder, configured, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
 
-        return noticed(options.notify, folder, work)
+        return notify_after(options.notify, folder, work)

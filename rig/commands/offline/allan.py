@@ -1,4 +1,4 @@
-"""`rig allan`: random walk and bias instability of what was recorded at rest."""
+"""`rig allan`: random walk and bias instability from a recording at rest."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -17,7 +17,7 @@ CSV = (".csv", ".csv.gz")
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig allan`."""
+    """Add the arguments of `rig allan`."""
     what = "a run folder, its run.h5, a log of a sensor at rest as CSV, or what `rig record` wrote"
     add_run(parser, "run", what, metavar="RECORDING")
     parser.add_argument("--plot", type=Path, metavar="DIR", help="draw the curves into this folder")
@@ -27,24 +27,24 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print the Allan deviations of a run folder, a run file or a log as CSV; draw them into the folder `--plot`.
 
-    Returns 0. Raises Refused `report_folder`, `missing_extra`, `not_at_rest`, and as `read_samples` does of a log, of a
-    run `no_raw_readings`, and as `open_run` and `at_rest` do.
+    Return 0. Raise Refused `report_folder`, `missing_extra`, `not_at_rest`; for a log as `read_samples`; for a run
+    `no_raw_readings`, and as `open_run` and `at_rest`.
     """
     from rig.report.figures.allan import print_at_rest
 
-    with raised_as(Refused):  # nothing runs here
-        logs = _logs(options.run)
-        found = _of_logs(logs) if logs else _of_run(options.run)
-    print_at_rest(found, as_json=options.json)
+    with raised_as(Refused):  # no arm moves: wrong data is a refusal
+        logs = _find_logs(options.run)
+        sensors = _analyse_logs(logs) if logs else _analyse_run(options.run)
+    print_at_rest(sensors, as_json=options.json)
     if options.plot is not None:
-        _draw(found, options.plot)
+        _draw(sensors, options.plot)
     return 0
 
 
-def _logs(path: Path) -> list[Path]:
-    """A log, or those in a folder that `rig record` wrote; none of a run."""
+def _find_logs(path: Path) -> list[Path]:
+    """Return the log, or the logs in a folder that `rig record` wrote; none for a run."""
     if path.is_dir() and not any(path.glob("*.h5")):
-        return sorted(each for each in path.iterdir() if _is_log(each))
+        return sorted(file for file in path.iterdir() if _is_log(file))
     return [path] if _is_log(path) else []
 
 
@@ -52,14 +52,14 @@ def _is_log(path: Path) -> bool:
     return path.name.lower().endswith(CSV)
 
 
-def _of_logs(paths: Sequence[Path]) -> "dict[str, SensorAtRest]":
+def _analyse_logs(paths: Sequence[Path]) -> "dict[str, SensorAtRest]":
     from rig.analysis.at_rest import log_at_rest
     from rig.observation.external.csv_samples import read_samples
 
     return {path.stem: log_at_rest(read_samples(path)) for path in paths}
 
 
-def _of_run(path: Path) -> "dict[str, SensorAtRest]":
+def _analyse_run(path: Path) -> "dict[str, SensorAtRest]":
     from rig.analysis.at_rest import at_rest, log_at_rest
     from rig.observation.external.csv_samples import samples_in
     from rig.plans.recorded import open_run

@@ -8,17 +8,16 @@ from rig.errors import Refused
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig reversal`."""
+    """Add the arguments of `rig reversal`."""
     add_run(parser, "runs", "run folders, or their run.h5: two or three", nargs="+")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the JSON to this file too")
     add_json(parser)
 
 
 def run(options: Namespace) -> int:
-    """Print what the runs say together, and write it to `--out`; nothing else is changed. Returns 0.
+    """Print the biases that the runs give together, and write them to `--out`; nothing else is changed. Return 0.
 
-    Raises Refused `report_folder`, and Refused and Fault as `open_run`, `turner_of`, `judged` and
-    `reversals` do.
+    Raise Refused `report_folder`, and Refused and Fault as `open_run`, `turner_of`, `judged` and `reversals`.
     """
     from rig.analysis.reversal import reversals
     from rig.config.files.written_file import write_new
@@ -26,10 +25,10 @@ def run(options: Namespace) -> int:
     from rig.plans.recorded import judged, open_run
     from rig.report.terminal.reversal import print_reversal, reversal_document
 
-    opened = [(str(each), open_run(each)) for each in options.runs]
+    opened = [(str(path), open_run(path)) for path in options.runs]
     for _, run in opened:
         turner_of(run.movement[0])
-    document = reversal_document(reversals([(each, judged(run)) for each, run in opened]))
+    document = reversal_document(reversals([(name, judged(run)) for name, run in opened]))
     print_reversal(document, as_json=options.json)
     if options.out is not None:
         try:

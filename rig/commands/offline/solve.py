@@ -1,4 +1,4 @@
-"""`rig solve`: a recording once more, or samples recorded elsewhere, with their sweeps or attitudes."""
+"""`rig solve`: recompute a recording, or solve samples of other programs with their sweeps or attitudes."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -11,25 +11,32 @@ from rig.station.plain_text import say, say_on_terminal
 
 
 def add(solve: ArgumentParser) -> None:
-    """The arguments of `rig solve`."""
+    """Add the arguments of `rig solve`."""
     add_run(solve, "run", "a run folder or its run.h5; with --sweeps, --attitudes or --turns, samples as CSV")
-    elsewhere = solve.add_mutually_exclusive_group()
-    elsewhere.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples recorded elsewhere")
-    elsewhere.add_argument("--attitudes", type=Path, metavar="CSV", help="the attitudes, for samples recorded in them")
-    elsewhere.add_argument(
-        "--turns", action="store_true", help="samples of a sensor that a hand turned on a table: they tell the motion"
+    motion = solve.add_mutually_exclusive_group()
+    motion.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples of another program")
+    motion.add_argument(
+        "--attitudes", type=Path, metavar="CSV", help="the attitudes in which the samples were recorded"
+    )
+    motion.add_argument(
+        "--turns",
+        action="store_true",
+        help="samples of a sensor turned by hand on a table, whose motion the samples give",
     )
     solve.add_argument(
         "--estimator",
         metavar="NAME",
-        help="vector (default), newton, levenberg_marquardt, or algorithm_1, as published; with --sweeps increments "
-        "too (default for turns from rest to rest); with --attitudes increments (gyroscope), attitude_weighted, "
-        "maximum_likelihood, or as_published; none other with --turns",
+        help="vector (default), newton, levenberg_marquardt, or algorithm_1 (as published); with --sweeps also "
+        "increments (default for turns from rest to rest); with --attitudes increments (gyroscope), "
+        "attitude_weighted, maximum_likelihood, or as_published; with --turns there is no choice",
     )
-    judge = "judge by another threshold or limit than was recorded, for example observation.max_lost_fraction=0.01"
+    judge = "judge by another threshold or limit than recorded, for example observation.max_lost_fraction=0.01"
     add_set(solve, judge, metavar="NAME=VALUE")
     solve.add_argument(
-        "--script", type=Path, metavar="FILE", help="the script it was recorded by, where that is another's; executed"
+        "--script",
+        type=Path,
+        metavar="FILE",
+        help="the script that recorded it, if it is another user's; it is executed",
     )
     shown = solve.add_mutually_exclusive_group()
     add_json(shown)
@@ -40,24 +47,24 @@ def add(solve: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Solve a recording, or samples with sweeps or attitudes, and print the result.
 
-    Of a recording nothing is written. Raises Refused `bad_option`, `unknown_setting`, and as each of them.
+    For a recording nothing is written. Raise Refused `bad_option`, `unknown_setting`, and as each of them.
     """
     if options.sweeps is None and options.attitudes is None and not options.turns:
         if options.out is not None:
             raise Refused("bad_option", "--out is for samples with their motion", "Use rig report RUN --out DIR")
         if options.columns is not None:
-            raise Refused("bad_option", "--columns is for samples as CSV", "Give --attitudes or --sweeps beside them")
-        return _recording(options)
+            raise Refused("bad_option", "--columns is for samples as CSV", "Give --attitudes or --sweeps too")
+        return _solve_recording(options)
     if options.overrides:
         raise Refused("unknown_setting", "samples as CSV have no settings", "Leave out --set")
     return solve_elsewhere.run(options)
 
 
-def _recording(options: Namespace) -> int:
-    """Recompute the result of a run folder or a run file. Returns as `rig run` does.
+def _solve_recording(options: Namespace) -> int:
+    """Recompute the result of a run folder or a run file. Return as `rig run` does.
 
-    `--set` changes what it is judged by, see `RunSettings.with_overrides`. `--script` is the one it was recorded by,
-    where that is another's.
+    `--set` changes the settings it is judged by, see `RunSettings.with_overrides`. `--script` is the script that
+    recorded it, if that is another user's.
     """
     from rig.data.recording.run_reading import reading_ahead
 
@@ -69,8 +76,8 @@ def _recording(options: Namespace) -> int:
         run = open_run(options.run, options.script, begun=begun).judged_by(options.overrides)
     say_on_terminal("solving")
     outcome = judged(run, options.estimator)
-    if (said := left_out(run)) is not None:
-        say(said, sys.stderr)
+    if (omission := left_out(run)) is not None:
+        say(omission, sys.stderr)
     folder = options.run if options.run.is_dir() else options.run.parent
     print_outcome(document_of(outcome), as_json=options.json, whole=options.all, folder=folder)
     return 0 if outcome.passed else 1

@@ -1,4 +1,4 @@
-"""`rig study`: lists the studies, or runs one with a progress bar and writes what it found."""
+"""`rig study`: list the studies, or run one with a progress bar and write its findings."""
 
 import sys
 import time
@@ -16,42 +16,46 @@ if TYPE_CHECKING:
     from rig.study.catalogue import StudyEntry
     from rig.study.report import StudyFinding
 
-WORTH_TELLING_S = 5.0
+SHOWN_FROM_S = 5.0
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig study`."""
-    parser.add_argument("name", nargs="?", metavar="NAME", help="one of those that `rig study` lists")
-    parser.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="default: 1")
-    parser.add_argument("--runs", type=int, metavar="N", help="per parameter set (default: as many as the paper)")
+    """Add the arguments of `rig study`."""
+    parser.add_argument("name", nargs="?", metavar="NAME", help="a study, as listed by `rig study`")
+    parser.add_argument(
+        "--out", type=Path, default=Path("studies"), metavar="DIR", help="folder of the results (default: studies)"
+    )
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the random numbers (default: 1)")
+    parser.add_argument("--runs", type=int, metavar="N", help="runs per parameter set (default: as in the paper)")
     parser.add_argument("--jobs", type=int, metavar="N", help="processes; the results do not depend on it")
     parser.add_argument("--dask", metavar="ADDRESS", help="compute on the cluster of this Dask scheduler")
-    parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the table (default: csv)")
+    parser.add_argument(
+        "--format", choices=("csv", "parquet"), default="csv", help="format of the table (default: csv)"
+    )
 
 
 def run(options: Namespace) -> int:
-    """List the studies, or run the one that is named. Returns 0."""
-    return _listed() if options.name is None else _run(options)
+    """List the studies, or run the named one. Return 0."""
+    return _list_studies() if options.name is None else _run_study(options)
 
 
-def _listed() -> int:
+def _list_studies() -> int:
     """Print the names of the studies, what each shows, and how long it takes."""
     from rich.console import Console
     from rich.table import Table
 
     from rig.study.catalogue import STUDIES
 
-    listed = Table(box=None, show_header=False)
+    table = Table(box=None, show_header=False)
     for name, entry in STUDIES.items():
-        listed.add_row(name, entry.summary, _about(entry))
+        table.add_row(name, entry.summary, _describe_duration(entry))
     console = Console()
-    console.print(listed)
-    console.print("on one core; --jobs N has N of them work, --runs N takes fewer runs than the paper")
+    console.print(table)
+    console.print("durations on one core; --jobs N uses N cores, --runs N takes fewer runs than the paper")
     return 0
 
 
-def _run(options: Namespace) -> int:
+def _run_study(options: Namespace) -> int:
     """Run one study, print its findings and write its files into `--out`.
 
     Raises Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and as `refuse_links`.
@@ -74,14 +78,16 @@ def _run(options: Namespace) -> int:
         raise missing_extra(error, "study") from error
     if options.format == "parquet":
         try:
-            import pyarrow  # noqa: F401  # now, not when all is computed
+            import pyarrow  # noqa: F401  # now, not after all is computed
         except ImportError as error:
             raise missing_extra(error, "parquet") from error
     refuse_links(*options.out.glob("*"))
-    if options.runs is None and options.dask is None and (about := _about(entry, options.jobs or 1)):
+    if options.runs is None and options.dask is None and (about := _describe_duration(entry, options.jobs or 1)):
         say(f"study {options.name}: {about}", file=sys.stderr)
-    with _cluster(options.dask) if options.dask else nullcontext():
-        report = entry.run(Settings(options.seed, options.runs, options.jobs, partial(_bar, options.jobs or 1)))
+    with _compute_on_cluster(options.dask) if options.dask else nullcontext():
+        report = entry.run(
+            Settings(options.seed, options.runs, options.jobs, partial(_report_progress, options.jobs or 1))
+        )
     paths = write(report, options.out, options.name, options.format)
     _print_findings(options.name, report.findings)
     for path in paths:
@@ -89,34 +95,34 @@ def _run(options: Namespace) -> int:
     return 0
 
 
-def _about(entry: "StudyEntry", jobs: int = 1) -> str:
-    """How long a study takes, in words; nothing where that is not known."""
+def _describe_duration(entry: "StudyEntry", jobs: int = 1) -> str:
+    """Return in words how long a study takes; empty if that is not known."""
     duration_s = entry.duration_s(jobs)
     return "" if duration_s is None else f"about {duration_words(max(duration_s, 1.0))}"
 
 
 @contextmanager
-def _cluster(address: str) -> Iterator[None]:
-    """Everything joblib does inside goes to the Dask scheduler at `address`."""
+def _compute_on_cluster(address: str) -> Iterator[None]:
+    """Make joblib compute on the Dask scheduler at `address` for the length of the block."""
     from joblib import parallel_config
 
-    from rig.commands.history.cluster import client_of
+    from rig.commands.history.cluster import connect_client
 
-    with client_of(address) as client, parallel_config(backend="dask", client=client):
+    with connect_client(address) as client, parallel_config(backend="dask", client=client):
         yield
 
 
-def _bar(jobs: int, results: Iterable[Any], total: int) -> Iterable[Any]:
-    """How long it takes is told by the first piece; a terminal has a bar besides."""
+def _report_progress(jobs: int, results: Iterable[Any], total: int) -> Iterable[Any]:
+    """Yield the results; print the expected duration after the first, and show a bar on a terminal."""
     from rich.console import Console
     from rich.progress import track
 
     console, began_s = Console(stderr=True), time.monotonic()
-    shown = track(results, total=total, description="study", console=console, disable=not console.is_terminal)
-    for number, result in enumerate(shown):
-        left_s = (time.monotonic() - began_s) * (total - 1) / jobs
-        if number == 0 and left_s > WORTH_TELLING_S:
-            console.print(f"{total} pieces, about {duration_words(left_s)} to go")
+    progress = track(results, total=total, description="study", console=console, disable=not console.is_terminal)
+    for number, result in enumerate(progress):
+        remaining_s = (time.monotonic() - began_s) * (total - 1) / jobs
+        if number == 0 and remaining_s > SHOWN_FROM_S:
+            console.print(f"{total} parts, about {duration_words(remaining_s)} to go")
         yield result
 
 
@@ -124,16 +130,16 @@ def _print_findings(name: str, findings: "tuple[StudyFinding, ...]") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    shown = Table(title=f"study {name}", title_justify="left")
+    table = Table(title=f"study {name}", title_justify="left")
     for heading in ("quantity", "ours", "published", "unit", "ours/published"):
-        shown.add_column(heading, justify="left" if heading in ("quantity", "unit") else "right")
+        table.add_column(heading, justify="left" if heading in ("quantity", "unit") else "right")
     for finding in findings:
         ratio = finding.ratio
-        shown.add_row(
+        table.add_row(
             finding.quantity,
             f"{finding.value:.4g}",
             "" if finding.published is None else f"{finding.published:.4g}",
             finding.unit,
             "" if ratio is None else f"{ratio:.3f}",
         )
-    Console().print(shown)
+    Console().print(table)

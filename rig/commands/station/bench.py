@@ -1,7 +1,7 @@
-"""The bench of a station: what stays between two parts, and a part's run on it.
+"""The bench of a station: devices and configuration that stay for all parts, and the run of one part.
 
-The claims, the simulated laboratory, the configuration and its script stay. What turns is connected anew, since a run
-ends with it stopped for good, but ahead: while the part is changed.
+The claims, the simulated laboratory, the configuration and its script stay. The turner is connected again for each
+part, as a run ends with it stopped for good, but ahead of time: while the part is changed.
 """
 
 import json
@@ -16,11 +16,11 @@ from pathlib import Path
 from rig.analysis.outcome import Outcome
 from rig.batch.batch import BatchPart, Chip, PartEnded
 from rig.batch.parts_in_turn import Desk, now_utc
-from rig.commands.configured import Configured, changed
-from rig.commands.history.recall import known_board, remembered
+from rig.commands.configured import Configured, change_configured
+from rig.commands.history.recall import find_other_board, recall_sensors
 from rig.commands.history.remember import remember
-from rig.commands.laboratory.claims import claimed
-from rig.commands.laboratory.laboratory import hands_of, part_fitter, simulated_laboratory
+from rig.commands.laboratory.claims import claim_devices
+from rig.commands.laboratory.laboratory import make_fitter, make_mounter, simulated_laboratory
 from rig.commands.page_arguments import Answer
 from rig.config.models import RigConfig
 from rig.data.own_texts import note_own
@@ -39,9 +39,11 @@ from rig.turners.registry import kind_of
 
 
 @dataclass(slots=True)
-class Heard:
-    """A listener of one run: what board it met, whether anything was recorded, and whether its end says that refused
-    sweeps can be repeated."""
+class PartListener:
+    """A listener of one run.
+
+    It keeps the board that was met, whether anything was recorded, and whether refused sweeps can be repeated.
+    """
 
     chip: Chip | None = None
     recorded: bool = False
@@ -51,7 +53,7 @@ class Heard:
         """Take an event, as a Listener does."""
         match event:
             case BoardConnected(_, identity):
-                self.chip = Chip(identity.unique_id, tuple(each.who_am_i for each in identity.sensors if each.present))
+                self.chip = Chip(identity.unique_id, tuple(part.who_am_i for part in identity.sensors if part.present))
             case SamplingStarted():
                 self.recorded = True
             case Advice(repeats=repeats):
@@ -59,10 +61,10 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True)
-class Station:
-    """What holds for all parts: whether somebody sits there, who and for which work order, and who listens.
+class BatchSettings:
+    """The settings of all parts: whether an operator attends, their name, the work order, and the listeners.
 
-    `going_on` is the command that goes on with the batch.
+    `going_on` is the command that continues the batch.
     """
 
     attended: bool
@@ -74,97 +76,101 @@ class Station:
 
 @dataclass(frozen=True, slots=True)
 class RigBench:
-    """A bench with the rig of a configuration. `control` is its simulated laboratory's, None for a real one.
+    """A bench with the rig of a configuration.
 
-    `ahead` connects what turns.
+    `control` is the address of its simulated laboratory, None for a real one. `ahead` connects the turner.
     """
 
     configured: Configured
     control: str | None
-    station: Station
+    station: BatchSettings
     ahead: Ahead
 
     @property
     def simulated(self) -> bool:
-        """Whether the laboratory is."""
+        """Whether the laboratory is simulated."""
         return self.configured.loaded.simulated
 
     def today(self, serial: str) -> str | None:
-        """The newest calibration of today that passed."""
-        memory = remembered(self._of(serial).loaded.config, frozenset())
+        """Return in words the newest calibration of today that passed, else None."""
+        memory = recall_sensors(self._configure(serial).loaded.config, frozenset())
         day = datetime.now(UTC).date().isoformat()
         parts = {self.configured.loaded.config.sensors[name].part for name in self._named}
-        found = (
-            each
-            for each in memory.calibrations
-            if each.serial_number == serial and each.part in parts and each.simulated == self.simulated
+        calibrations = (
+            past
+            for past in memory.calibrations
+            if past.serial_number == serial and past.part in parts and past.simulated == self.simulated
         )
-        return next((each.words for each in found if (each.day, each.verdict) == (day, "pass")), None)
+        return next((past.words for past in calibrations if (past.day, past.verdict) == (day, "pass")), None)
 
     def known_as(self, chip: Chip, serial: str) -> str | None:
-        """The newest other number that the history has of this board."""
-        config = self._of(serial).loaded.config
-        own = {each.serial_number for each in config.all_sensors.values()}
+        """Return the newest other serial number that the history has of this board, else None."""
+        config = self._configure(serial).loaded.config
+        own_numbers = {sensor.serial_number for sensor in config.all_sensors.values()}
         parts = {config.sensors[name].part for name in self._named}
-        return known_board(config, chip.board, parts, own, simulated=self.simulated)
+        return find_other_board(config, chip.board, parts, own_numbers, simulated=self.simulated)
 
     def fit(self, serial: str) -> None:
-        """The simulated operator lays the part in."""
+        """Make the simulated operator fit the part, if there is one."""
         if self.control is not None:
-            part_fitter(self.control)(serial)
+            make_fitter(self.control)(serial)
 
     def run(self, part: BatchPart, folder: Path, desk: Desk) -> PartEnded:
-        """Run the part in `folder`, or go on there; refused sweeps are repeated at once. Raises Refused, Fault."""
-        of_part = self._of(part.serial)
-        if (folder / RESULT).exists() and (ended := _finished(folder, of_part)) is not None:
+        """Run the part in `folder`, or continue there; refused sweeps are repeated at once. Raise Refused, Fault."""
+        configured = self._configure(part.serial)
+        if (folder / RESULT).exists() and (ended := _read_ended(folder, configured)) is not None:
             return ended
-        new = _prepared(folder, of_part)
-        heard, began_s, asked = Heard(), time.monotonic(), False
+        new = _prepare_folder(folder, configured)
+        listener, began_s, was_asked = PartListener(), time.monotonic(), False
 
         def answer(announcement: Sequence[str], to_do: str) -> bool:
-            nonlocal began_s, asked
-            chip, asked = None if asked else heard.chip, True  # whose it is, is asked once
+            nonlocal began_s, was_asked
+            chip, was_asked = None if was_asked else listener.chip, True  # the part's number is confirmed only once
             agreed = desk.agrees(announcement, to_do, chip)
             began_s = time.monotonic()
             return agreed
 
         try:
-            outcome, repeated = self._outcome(folder, of_part, heard, answer)
+            outcome, repeated = self._run_repeatedly(folder, configured, listener, answer)
         except (Refused, Fault) as error:
-            if isinstance(error, Refused) and new and not heard.recorded:
+            if isinstance(error, Refused) and new and not listener.recorded:
                 discard(folder)
             self.ahead.begin()
             raise
         self.ahead.begin()
-        why = "" if outcome.passed else ", ".join(each.name for each in outcome.checks if not each.passed)
+        why = "" if outcome.passed else ", ".join(check.name for check in outcome.checks if not check.passed)
         return PartEnded(
             "pass" if outcome.passed else "fail",
             now_utc(),
             why,
-            _certificate(folder, of_part),
+            _certificate_number(folder, configured),
             repeated,
-            heard.chip,
+            listener.chip,
             time.monotonic() - began_s,
         )
 
-    def _outcome(self, folder: Path, of_part: Configured, heard: Heard, answer: Answer) -> tuple[Outcome, int]:
-        """What came of the part, and how often refused sweeps were repeated."""
-        config = of_part.loaded.config
-        with log(folder / LOG) as logged, view() as seen:
-            station = Stations((logged, seen, heard, *self.station.listeners), answer, attended=self.station.attended)
-            station.mount = None if self.control is None else hands_of(self.control)
-            memory = remembered(config, frozenset())
+    def _run_repeatedly(
+        self, folder: Path, configured: Configured, listener: PartListener, answer: Answer
+    ) -> tuple[Outcome, int]:
+        """Return the part's outcome, and how often refused sweeps were repeated."""
+        config = configured.loaded.config
+        with log(folder / LOG) as logged, view() as terminal:
+            station = Stations(
+                (logged, terminal, listener, *self.station.listeners), answer, attended=self.station.attended
+            )
+            station.mount = None if self.control is None else make_mounter(self.control)
+            memory = recall_sensors(config, frozenset())
             going_on, connected = self.station.going_on, self.ahead.connected
-            this = Run(folder, of_part.loaded, of_part.script, station, memory, connected, going_on)
-            phase = of_part.phase
+            run = Run(folder, configured.loaded, configured.script, station, memory, connected, going_on)
+            phase = configured.phase
             for repeated in range(config.station.repeats + 1):
-                left, heard.repeats = config.station.repeats - repeated, False
+                repeats_left, listener.repeats = config.station.repeats - repeated, False
                 try:
-                    outcome = this.carry_out(phase)
-                    if outcome.passed or not left or not this.refused_sweeps(phase):
+                    outcome = run.carry_out(phase)
+                    if outcome.passed or not repeats_left or not run.refused_sweeps(phase):
                         break
                 except Fault:
-                    if not (left and heard.repeats):
+                    if not (repeats_left and listener.repeats):
                         raise
                 phase = replace(phase, agreed=True)
             entered, _ = remember(folder, config.history)
@@ -175,40 +181,40 @@ class RigBench:
 
     @property
     def _named(self) -> tuple[str, ...]:
-        """The sensors that have the part's number."""
+        """The sensors that have the part's serial number."""
         config = self.configured.loaded.config
         return config.station.sensors or tuple(config.to_calibrate)
 
-    def _of(self, serial: str) -> Configured:
-        """The configuration of one part."""
+    def _configure(self, serial: str) -> Configured:
+        """Return the configuration of one part."""
         values = {f"sensors.{name}.serial_number": serial for name in self._named}
         values |= {"history.operator": self.station.operator} if self.station.operator else {}
         values |= {"history.note": f"work order {self.station.work_order}"} if self.station.work_order else {}
-        return changed(self.configured, [f"{key}={json.dumps(value)}" for key, value in values.items()])
+        return change_configured(self.configured, [f"{key}={json.dumps(value)}" for key, value in values.items()])
 
 
 @contextmanager
-def bench(configured: Configured, folder: Path, station: Station) -> Iterator[RigBench]:
-    """The bench for the length of the `with` block; `folder` is the batch's.
+def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> Iterator[RigBench]:
+    """Open the bench for the length of the block; `folder` is the batch's.
 
-    Raises Refused as `claimed`, and `station_sensors` where the configuration has no such sensors.
+    Raise Refused as `claim_devices`, and `station_sensors` if the configuration has no such sensors.
     """
     config = configured.loaded.config
     refuse_other_sensors(config)
-    with ExitStack() as held:
-        held.enter_context(claimed(config))
+    with ExitStack() as stack:
+        stack.enter_context(claim_devices(config))
         control = None
         if configured.loaded.simulated:
-            control = held.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
+            control = stack.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
         connect = partial(kind_of(config.turner).connect, config.turner)
         ahead = Ahead(connect, folder / ARM_LOG)
-        held.callback(ahead.close)
+        stack.callback(ahead.close)
         ahead.begin()
         yield RigBench(configured, control, station, ahead)
 
 
 def refuse_other_sensors(config: RigConfig) -> None:
-    """Raise Refused `station_sensors` where `station.sensors` names one that is not calibrated."""
+    """Raise Refused `station_sensors` if `station.sensors` names a sensor that is not calibrated."""
     others = [name for name in config.station.sensors if name not in config.to_calibrate]
     if others:
         raise Refused(
@@ -218,28 +224,28 @@ def refuse_other_sensors(config: RigConfig) -> None:
         )
 
 
-def _finished(folder: Path, of_part: Configured) -> PartEnded | None:
-    """What came of a run that had its result when the station was killed; None where sweeps are left to repeat."""
-    found = read_result(folder)
-    failed = [check for check in found.checks if not check.passed]
+def _read_ended(folder: Path, configured: Configured) -> PartEnded | None:
+    """Return the result that a run had when the station was killed; None if sweeps remain to be repeated."""
+    result = read_result(folder)
+    failed = [check for check in result.checks if not check.passed]
     if any(check.means.sweep is not None for check in failed):
         return None
-    remember(folder, of_part.loaded.config.history)
-    why, chip = ", ".join(check.name for check in failed), Chip(found.provenance.board_unique_id)
-    return PartEnded(found.verdict, now_utc(), why, _certificate(folder, of_part), chip=chip)
+    remember(folder, configured.loaded.config.history)
+    why, chip = ", ".join(check.name for check in failed), Chip(result.provenance.board_unique_id)
+    return PartEnded(result.verdict, now_utc(), why, _certificate_number(folder, configured), chip=chip)
 
 
-def _prepared(folder: Path, of_part: Configured) -> bool:
-    """A run folder for the part, unless one was begun there; whether it is new."""
+def _prepare_folder(folder: Path, configured: Configured) -> bool:
+    """Prepare a run folder for the part unless a run was begun there. Return whether it is new."""
     if (folder / CONFIG).exists():
         return False
-    if folder.exists():  # a kill came between its first file and its last
+    if folder.exists():  # the process was killed while it wrote the first files
         discard(folder)
-    new_folder(folder, of_part.loaded, of_part.script.text, of_part.script.identity)
-    note_own(of_part.loaded.text, of_part.script.text)
+    new_folder(folder, configured.loaded, configured.script.text, configured.script.identity)
+    note_own(configured.loaded.text, configured.script.text)
     return True
 
 
-def _certificate(folder: Path, of_part: Configured) -> str:
-    """The number of the certificate in a run folder."""
-    return certificate_of(read_result(folder), of_configuration(of_part.loaded)).number
+def _certificate_number(folder: Path, configured: Configured) -> str:
+    """Return the number of the certificate in a run folder."""
+    return certificate_of(read_result(folder), of_configuration(configured.loaded)).number

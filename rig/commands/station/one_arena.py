@@ -1,7 +1,7 @@
-"""Memory of a command that stays for a morning: threads come and go with every part, and glibc gives each an arena.
+"""The memory of a command that runs for hours: every part starts threads, and glibc gives each thread an arena.
 
-What one thread has used and let go then lies idle where the next does not look, some megabytes more with every part
-(mallopt(3), M_ARENA_MAX). With one arena it is used again.
+Memory that one thread has freed stays unused in its arena, some megabytes more with every part (mallopt(3),
+M_ARENA_MAX). With one arena it is used again.
 """
 
 import ctypes
@@ -11,7 +11,7 @@ M_ARENA_MAX = -8  # malloc.h
 
 
 def keep_to_one_arena() -> None:
-    """Let all threads of this process share the memory that they let go; nothing where the C library is another."""
+    """Make all threads of this process share freed memory; do nothing on another C library than glibc."""
     if sys.platform == "linux":
         mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
         if mallopt is not None:

@@ -1,4 +1,4 @@
-"""`rig watch`: a run that is recorded, replayed on the operator's page."""
+"""`rig watch`: a recorded run, replayed on the operator's page."""
 
 import math
 import sys
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_run
-from rig.commands.page_arguments import PageWish, add_place, token_said, wait_for_interrupt
+from rig.commands.page_arguments import PageWish, add_page_address, read_page_token, wait_for_interrupt
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused, raised_as
 from rig.station.plain_text import say
@@ -27,10 +27,10 @@ LARGEST_LOG = 50_000_000  # bytes
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig watch`, which has a page in any case."""
+    """Add the arguments of `rig watch`, which always has a page."""
     add_run(parser, "run_folder", "a run folder", metavar="RUN_DIR")
-    parser.add_argument("--speed", type=_speed, default=1.0, metavar="N", help="times as fast as it was (default: 1)")
-    add_place(parser)
+    parser.add_argument("--speed", type=_speed, default=1.0, metavar="N", help="replay N times as fast (default: 1)")
+    add_page_address(parser)
 
 
 def _speed(text: str) -> float:
@@ -41,10 +41,10 @@ def _speed(text: str) -> float:
 
 
 def run(options: Namespace) -> int:
-    """Replay every recording in a run folder, `--speed` times as fast as it was; the page stays until Ctrl-C.
+    """Replay every recording in a run folder, `--speed` times as fast; the page stays until Ctrl-C.
 
-    Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run`, `turner_of`, `check_arms_times` and
-    `read_result` do.
+    Return 0. Raise Refused `no_run`, `page_address`, and as `read_run`, `turner_of`, `check_arms_times` and
+    `read_result`.
     """
     from rig.data.recording.run_file import read_run
     from rig.data.result_file import read_result
@@ -57,11 +57,11 @@ def run(options: Namespace) -> int:
     from rig.page.server.serving import serving
 
     folder: Path = options.run_folder
-    wanted = PageWish(options.page_address, token_said(options))
+    wanted = PageWish(options.page_address, read_page_token(options))
     runs = [read_run(path) for readings in ("raw", "calibrated") for path in recordings(folder, readings)]
     if not runs:
         raise Refused("no_run", f"{folder} holds no recording", "Give the folder of a run")
-    with raised_as(Refused):  # nothing runs here
+    with raised_as(Refused):  # no arm moves: wrong data is a refusal
         for run in runs:
             turner_of(run)
             check_arms_times(run.states)
@@ -72,9 +72,9 @@ def run(options: Namespace) -> int:
         try:
             for run in runs:
                 _replay(moments(run), feed, options.speed)
-            for event in _ending(folder, result):
+            for event in _read_ending(folder, result):
                 feed.event(event)
-            say("All is replayed. The page stays until Ctrl-C.", sys.stderr)
+            say("The replay is finished. The page stays until Ctrl-C.", sys.stderr)
             wait_for_interrupt()
         except KeyboardInterrupt:
             pass
@@ -89,7 +89,7 @@ def _about(folder: Path, runs: "list[RunData]") -> "About":
 
     parts: dict[str, str] = {}
     for run in runs:
-        parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.sensors.items()}
+        parts |= {name: f"{sensor.part} {sensor.serial_number}" for name, sensor in run.sensors.items()}
     made_with = runs[0].provenance
     simulated = calls_itself_simulated(made_with.arm_software)
     turner = turner_of(runs[0])
@@ -112,7 +112,7 @@ def _replay(recorded: "Iterator[Moment]", feed: "Feed", speed: float) -> None:
             feed.event(moment.event)
 
 
-def _ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent]":
+def _read_ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent]":
     from rig.data.run_folder import CERTIFICATE, RESULT
     from rig.page.replay import ended
     from rig.station.events import DocumentWritten, Interrupted
@@ -120,14 +120,14 @@ def _ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent
     if (folder / CERTIFICATE).is_file():
         yield DocumentWritten(folder / CERTIFICATE)
     if result is None:
-        yield Interrupted(last_words(folder))
+        yield Interrupted(read_last_words(folder))
         return
     yield DocumentWritten(folder / RESULT)
     yield from ended(result)
 
 
-def last_words(folder: Path) -> str:
-    """How the log of a run without a result ends."""
+def read_last_words(folder: Path) -> str:
+    """Return how the log of a run without a result ends."""
     from rig.data.run_folder import LOG
 
     try:
@@ -135,5 +135,5 @@ def last_words(folder: Path) -> str:
     except (OSError, UnfitFile):
         log = b""
     lines = log.decode("utf-8", errors="replace").splitlines()
-    said = [line.partition(" INFO ")[2] for line in lines if " INFO " in line]
-    return "; ".join(["this run has no result", *said[-LOG_TAIL:][-1:]])
+    messages = [line.partition(" INFO ")[2] for line in lines if " INFO " in line]
+    return "; ".join(["this run has no result", *messages[-LOG_TAIL:][-1:]])

@@ -173,7 +173,7 @@ def test_whose_readings_nobody_said_are_in_no_history(tmp_path: Path, capsys: py
     history = tmp_path / "history.sqlite"
     assert main(sweeps("--out", str(tmp_path / "run"), "--history", str(history))) == 0
     said = capsys.readouterr()
-    assert "entered in no history" in said.err and not history.exists()
+    assert "not entered in a history" in said.err and not history.exists()
     assert said.out.startswith("gyroscope imu ") and "not stated" not in said.out
     assert main(sweeps("--out", str(tmp_path / "run"))) == 2
     assert "rig: run_folder: " in capsys.readouterr().err

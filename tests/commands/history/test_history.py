@@ -55,9 +55,9 @@ def test_runs_are_imported_once_and_what_is_none_is_named(place: str, capsys: py
         shutil.copytree(RECORDINGS / name, runs / name)
     assert main(["history", "import", str(runs), str(bad)]) == 1
     printed = capsys.readouterr()
-    assert printed.out.splitlines()[-1] == "2 entered, 0 there already, 1 refused"
+    assert printed.out.splitlines()[-1] == "2 entered, 0 already there, 1 refused"
     assert f"{bad}: not_a_result" in printed.err
-    assert "0 entered, 2 there already, 0 refused" in told(capsys, "import", runs)
+    assert "0 entered, 2 already there, 0 refused" in told(capsys, "import", runs)
     assert "LSM9DS1-CI" in told(capsys) and "ADIS16465-001" in told(capsys, "list")
 
 
@@ -118,7 +118,7 @@ def test_trends_are_told_for_people_and_for_machines(year: str, capsys: pytest.C
 
 @pytest.mark.slow
 def test_a_calibration_is_shown_and_compared(year: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "lies on bench in /runs/0" in told(capsys, "show", "1")
+    assert "stored on bench in /runs/0" in told(capsys, "show", "1")
     assert json.loads(told(capsys, "show", "1", "--json"))["schema"] == "rig.result/1"
     found = json.loads(told(capsys, "compare", "1", "12", "--json"))["parameters"]
     assert found["kx"]["normalised_error"] > 1 > found["bx"]["normalised_error"]
@@ -238,5 +238,5 @@ def test_a_run_enters_itself_and_is_held_against_the_last(place: str, capsys: py
     log = (folder / "run" / "log.txt").read_text(encoding="utf-8")
     assert f"entered in {place} as calibration 2 (rig history show 2)" in log
     assert "changed by" not in done.stderr, "which is said once"
-    assert "0 entered, 1 there already" in told(capsys, "import", folder / "run")
+    assert "0 entered, 1 already there" in told(capsys, "import", folder / "run")
     assert "0 changed, 0 missing" in told(capsys, "verify")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rig.commands.history import command as history_command
-from rig.commands.history.again import again
+from rig.commands.history.again import recompute_history
 from rig.commands.history.again_work import Task
 from rig.data.result_file import ResultDocument
 from rig.history.again.answer import Answer, RecomputedResult
@@ -121,15 +121,15 @@ def test_a_scheduler_that_is_killed_is_named_and_a_second_call_goes_on(history: 
     journal = Path("recomputed/recomputed.jsonl")
     with killable_cluster(tmp_path) as (scheduler, address):
         command = [sys.executable, "-m", "rig", "history", "recompute", "--dask", address]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as again:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
 
             def two_are_done() -> bool:
                 return journal.exists() and journal.read_text(encoding="utf-8").count("\n") >= 2
 
-            wait_for(two_are_done, "two calibrations", meanwhile=alive(again))
+            wait_for(two_are_done, "two calibrations", meanwhile=alive(process))
             scheduler.kill()
-            said, errors = again.communicate()
-    assert again.returncode == 3 and "cluster_lost" in errors and "Traceback" not in errors
+            said, errors = process.communicate()
+    assert process.returncode == 3 and "cluster_lost" in errors and "Traceback" not in errors
     assert "5 results: " in said and "not reached" in said
     solved = journal.read_text(encoding="utf-8").count("\n") - 1
     assert 1 <= solved < 5
@@ -186,7 +186,7 @@ def test_an_interrupted_one_is_gone_on_with(history: History) -> None:
     history_command.add(parser)
     options = parser.parse_args(["recompute"])
     with pytest.raises(KeyboardInterrupt, match="goes on"):
-        again(options, solve)
-    assert again(options, solve) == 0
+        recompute_history(options, solve)
+    assert recompute_history(options, solve) == 0
     asked.remove("interrupted")
     assert sorted(asked) == sorted(runs) and len(rows()) == 40

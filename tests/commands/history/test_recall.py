@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.history.recall import remembered
+from rig.commands.history.recall import recall_sensors
 from rig.config.load import load
 from rig.history.store import open_history
 from support.history.past_runs import finished
@@ -23,7 +23,7 @@ def test_the_calibrations_of_the_configured_serial_numbers_are_known_the_newest_
         for day, serial_number in ((0, "G-1"), (1, "G-2"), (2, "G-1"), (3, "G-1")):
             history.enter(finished(day, serial_number=serial_number, passed=day != 2))
         history.void(4, "another sensor was mounted")
-    known = remembered(load(CI, ["sensors.gyro.serial_number=G-1"], None).config, frozenset({"G-1"}))
+    known = recall_sensors(load(CI, ["sensors.gyro.serial_number=G-1"], None).config, frozenset({"G-1"}))
     assert [(each.number, each.day, each.verdict) for each in known.calibrations] == [
         (3, "2025-01-08", "pass"),
         (1, "2025-01-06", "pass"),
@@ -33,7 +33,7 @@ def test_the_calibrations_of_the_configured_serial_numbers_are_known_the_newest_
 
 
 def test_a_history_that_is_not_there_yet_is_an_empty_one_and_is_not_made(place: str) -> None:
-    known = remembered(load(CI, sections=None).config, frozenset())
+    known = recall_sensors(load(CI, sections=None).config, frozenset())
     assert known.calibrations == () and known.silent is None and not Path(place).exists()
 
 
@@ -41,5 +41,5 @@ def test_a_run_does_not_depend_on_what_the_history_says(tmp_path: Path, monkeypa
     (tmp_path / "history.sqlite").write_text("no database", encoding="utf-8")
     for said, words in ((str(tmp_path / "history.sqlite"), "the history is silent"), ("off", "the history is off")):
         monkeypatch.setenv("RIG_HISTORY", said)
-        known = remembered(load(CI, sections=None).config, frozenset())
+        known = recall_sensors(load(CI, sections=None).config, frozenset())
         assert known.calibrations == () and known.silent is not None and known.silent.startswith(words)

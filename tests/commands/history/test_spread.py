@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.history.cluster import client_of
-from rig.commands.history.spread import Cluster, Processes, one_by_one, spread
+from rig.commands.history.cluster import connect_client
+from rig.commands.history.spread import Cluster, Processes, distribute, solve_one_by_one
 from rig.data.run_folder import RESULT
 from rig.errors import Fault
 from rig.history.again.answer import RecomputedResult, Unsolved
@@ -21,7 +21,7 @@ TASKS = [task(name) for name in NAMES]
 def test_a_process_that_dies_costs_its_recording_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")  # as the command line says it
     with Processes(2) as hands:
-        answers = {task.key: answer for task, answer in spread(TASKS, deadly, hands)}
+        answers = {task.key: answer for task, answer in distribute(TASKS, deadly, hands)}
     assert isinstance(lost := answers.pop(DEADLY), Unsolved) and lost.state == "lost"
     assert sorted(answers) == sorted(set(NAMES) - {DEADLY})
     assert all(isinstance(each, RecomputedResult) and each.verdict == key for key, each in answers.items())
@@ -31,7 +31,7 @@ def test_a_process_that_dies_costs_its_recording_and_no_other(monkeypatch: pytes
 
 
 def test_a_defect_at_one_recording_costs_no_other_here() -> None:
-    answers = {task.key: answer for task, answer in one_by_one(TASKS, failing)}
+    answers = {task.key: answer for task, answer in solve_one_by_one(TASKS, failing)}
     assert answers.pop(DEADLY) == Unsolved("failed", "ZeroDivisionError: a defect")
     assert all(isinstance(each, RecomputedResult) for each in answers.values()) and len(answers) == len(NAMES) - 1
 
@@ -39,11 +39,11 @@ def test_a_defect_at_one_recording_costs_no_other_here() -> None:
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_workers_of_a_cluster_work_in_processes_of_their_own_and_one_that_dies_costs_no_other(tmp_path: Path) -> None:
-    with local_cluster(n_workers=2, processes=True) as cluster, client_of(cluster.scheduler_address) as client:
+    with local_cluster(n_workers=2, processes=True) as cluster, connect_client(cluster.scheduler_address) as client:
         tasks = [*(task(name) for name in NAMES if name != DEADLY), task(f"{WAITING} 1", tmp_path)]
         killed = False
         answers = {}
-        for each, answer in spread(tasks, waiting, Cluster(client)):
+        for each, answer in distribute(tasks, waiting, Cluster(client)):
             answers[each.key] = answer
             if not killed:
                 pids = client.run(os.getpid)
@@ -61,7 +61,7 @@ def test_a_cluster_without_workers_is_waited_for_and_then_named(monkeypatch: pyt
     monkeypatch.setattr("rig.commands.history.spread.WITHOUT_WORKERS_S", 0.5)
     with (
         local_cluster(n_workers=0, processes=False) as cluster,
-        client_of(cluster.scheduler_address) as client,
+        connect_client(cluster.scheduler_address) as client,
         pytest.raises(Fault, match="no worker for"),
     ):
-        list(spread(TASKS, told, Cluster(client)))
+        list(distribute(TASKS, told, Cluster(client)))

@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 from rich.text import Text
 
-from rig.cli import guarded
+from rig.cli import run_guarded
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import resuming
 from rig.errors import Fault, Problem, refuse
@@ -96,7 +96,7 @@ def test_how_a_run_ends_is_kept_as_a_picture(
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     PICTURES.mkdir(parents=True, exist_ok=True)
-    assert guarded(ends(sensors, how)) == STATUS[how]
+    assert run_guarded(ends(sensors, how)) == STATUS[how]
     out, err = capsys.readouterr()
     said = (out + err).rstrip("\n")
     rows = keep(said, width, f"{sensors}-{how}-{width}")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.configured import configured
+from rig.commands.configured import load_configured
 from rig.motion.steps import Rest
 from rig.plans.verbs import Verbs
 from rig.runner.phases import Run
@@ -48,7 +48,7 @@ def test_a_run_goes_on_when_a_listener_raises_while_the_arm_moves(world: World, 
         "limits": {"scale_std": 1, "bias_std_rad_s": 1},
         "world": {"time_scale": 12},
     }
-    found = configured(world(fast).config_path)
+    found = load_configured(world(fast).config_path)
     stock = found.phase.procedure.script
 
     def script(rig: Verbs) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rig.commands.configured import configured
+from rig.commands.configured import load_configured
 from rig.data.recording.events import RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.recording.provenance import provenance_of
 from rig.data.recording.recorded_turner import RecordedTurner
@@ -31,7 +31,7 @@ BIAS_RAD_S = np.array([0.01, -0.02, 0.005])
 def write(folder: Path) -> None:
     """The run folder, as far as it is recorded."""
     (folder / CONFIG).write_text(TEXT, encoding="utf-8")
-    found = configured(folder / CONFIG)
+    found = load_configured(folder / CONFIG)
     config, plan = found.loaded.config, found.phase.plan()
     kind = kind_of(config.turner)
     report = kind.look(config.turner)

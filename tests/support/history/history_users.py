@@ -41,7 +41,7 @@ def run_folder(folder: Path, serial_number: str, second: int) -> Path:
 def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
     """Enter parts."""
     from rig.batch.status import Now
-    from rig.commands.history.recall import remembered
+    from rig.commands.history.recall import recall_sensors
     from rig.commands.history.remember import remember
     from rig.config.load import load
     from rig.floor.heartbeat import heartbeat
@@ -63,7 +63,7 @@ def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
                 over.wait()
             serial_number = f"{rig}-{number}"
             heart.hear(replace(now, state="running", part=serial_number))
-            silent = remembered(config, frozenset()).silent
+            silent = recall_sensors(config, frozenset()).silent
             time.sleep(drawn.uniform(0, pause_s))
             event, _ = remember(run_folder(folder / serial_number, serial_number, seed * 100 + number), config.history)
             if isinstance(event, Remembered):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from firmware_host.answers import BoardObservation
 from rig.analysis.check import Check, fitness
-from rig.commands.configured import configured
+from rig.commands.configured import load_configured
 from rig.data.meaning import Meaning
 from rig.data.recording.events import BoardNotObserved, BoardObserved
 from rig.motion.state import ArmState, Joints, RobotMode, RuntimeState, SafetyMode
@@ -63,7 +63,7 @@ ABOUT = About(
 
 def planned() -> Plan:
     """The movement of demo.yaml."""
-    return configured(DEMO).phase.plan()
+    return load_configured(DEMO).phase.plan()
 
 
 def state(time_s: float, q_rad: Joints, qd_rad_s: Joints) -> ArmState:

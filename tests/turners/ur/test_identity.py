@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.commands.configured import configured
+from rig.commands.configured import load_configured
 from rig.config.models import ArmSection
 from rig.config.ranges import ModelName
 from rig.errors import Problem, Refused
@@ -201,7 +201,7 @@ def test_another_arms_clearance_is_by_its_own_lengths() -> None:
 
 
 def test_nothing_else_is_said_of_an_arm_that_is_not_meant() -> None:
-    plan = configured(Path("configs/demo.yaml")).phase.plan()
+    plan = load_configured(Path("configs/demo.yaml")).phase.plan()
     told = replace(report(plan.start_q_rad), called="an arm")
     assert names(ARM, told) == ["arm_not_identified"]
     assert [p.name for p in preflight_problems([plan], ARM, told)] == ["arm_not_identified"]
