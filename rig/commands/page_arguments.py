@@ -39,7 +39,7 @@ class PageWish:
 
     def address(self) -> "PageAddress":
         """Return the address. Raise Refused `page_address` for a wrong port."""
-        from rig.page.server.serving import ADDRESS
+        from rig.page.server.serving import ADDRESS, PageAddress
 
         host, colon, port = (self.host_and_port or ADDRESS).rpartition(":")
         if not colon or (host.count(":") and not host.endswith("]")):  # no port, or an IPv6 address alone

@@ -271,7 +271,7 @@ def test_a_tokens_file_that_others_read_or_that_is_missing_is_refused(tmp_path: 
     if mode is not None:
         file.write_text(TOKEN, encoding="utf-8")
         file.chmod(mode)
-    with pytest.raises(Refused, match="page_address: the page's token cannot be taken") as refused:
+    with pytest.raises(Refused, match="page_address: the page's token cannot be read") as refused:
         said("--page-token-file", str(file))
     assert TOKEN not in str(refused.value)
 
