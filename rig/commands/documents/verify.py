@@ -140,7 +140,7 @@ def _judge(file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", h
         attached_to, problems = _find_signed_holder(file.name, content, look, looks)
         if history_answer is not None and not history_answer.problems:
             problems = tuple(problem for problem in problems if problem.name not in TRUST_PROBLEMS)
-    history_words = () if history_answer is None else history_answer.said
+    history_words = () if history_answer is None else history_answer.entries
     return VerifiedFile(
         file,
         look.signatures,
