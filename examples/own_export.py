@@ -13,11 +13,11 @@ import rig
 from rig.report.exports.calibrations import ExportedCalibrations, calibrations
 
 
-def toml_files(found: ExportedCalibrations) -> Mapping[str, str]:
+def toml_files(solved: ExportedCalibrations) -> Mapping[str, str]:
     """Return the texts by name of the file; a file says its convention, and what it cannot hold."""
     lines = ["# corrected = matrix @ (reading - offset), SI units. Lost: uncertainties, second order, g-sensitivity."]
-    for sensor in found.sensors:
-        lines += ["", f'["{sensor.name}"]', *(f"# {line}" for line in found.origin(sensor))]
+    for sensor in solved.sensors:
+        lines += ["", f'["{sensor.name}"]', *(f"# {line}" for line in solved.origin(sensor))]
         lines += [f"matrix = {sensor.matrix.tolist()}", f"offset = {sensor.offset.tolist()}"]
     return {"calibration.toml": "\n".join(lines) + "\n"}
 

@@ -5,7 +5,7 @@
 Before you start: as for procedures/six_observation.py. It takes hours, ten as it is set.
 
 What happens: the arm goes through its attitudes again and again and stands still in each, for minutes. All repeats but
-the last calibrate the accelerometers, every one tells the biases. After a power cut `rig resume` goes on with the dwell
+the last calibrate the accelerometers, and each gives the biases. After a power cut `rig resume` goes on with the dwell
 that was interrupted. Ctrl-C stops the arm at any moment and keeps what was measured.
 """
 
@@ -25,12 +25,12 @@ from rig.procedure import (
 
 
 def bias_drift(rig: Verbs) -> None:
-    """The steps of the static attitudes, `repeats` times."""
+    """Carry out the steps of the static attitudes, `repeats` times."""
     static_attitudes(rig)
 
 
-def by_repeat(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
-    """The calibration of the accelerometers, and every sensor's bias by repeat."""
+def analyse(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
+    """Return the calibration of the accelerometers, and every sensor's bias by repeat."""
     return estimate_bias_drift(runs, estimator)
 
 
@@ -39,7 +39,7 @@ PROCEDURE = Procedure(
     section=BiasDriftSection,
     plan=plan_static_attitudes,
     script=bias_drift,
-    analyse=by_repeat,
+    analyse=analyse,
 )
 
 if __name__ == "__main__":

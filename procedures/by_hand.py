@@ -26,19 +26,19 @@ from rig.procedure import (
 
 
 def by_hand(rig: Verbs) -> None:
-    """Everything is in the operator's hand."""
+    """Let the operator make every move."""
     rig.preflight()
     rig.start_sampling()
     rig.turn_by_hand()
 
 
-def judged(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
-    """Scale, bias and right angles of every gyroscope from its rests and moves."""
+def analyse(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
+    """Return scale, bias and non-orthogonality of every gyroscope, from its rests and moves."""
     return calibrate_by_hand(runs)
 
 
 PROCEDURE = Procedure(
-    name="by_hand", section=ByHandSection, plan=plan_by_hand, script=by_hand, analyse=judged, turner=HandSection
+    name="by_hand", section=ByHandSection, plan=plan_by_hand, script=by_hand, analyse=analyse, turner=HandSection
 )
 
 if __name__ == "__main__":

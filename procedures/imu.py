@@ -1,4 +1,4 @@
-"""Calibrate gyroscopes and the accelerometers beside them in one run: sweeps as in SIX, attitudes as in TRIAX.
+"""Calibrate gyroscopes and the accelerometers in one run: sweeps as in SIX, attitudes as in TRIAX.
 
     python procedures/imu.py configs/imu.yaml
 
@@ -12,7 +12,7 @@ from rig.procedure import Dwell, ImuSection, Procedure, Rest, Sweep, Transfer, V
 
 
 def imu(rig: Verbs) -> None:
-    """The steps, in the order the plan has them (`rig plan CONFIG` prints it, and what the attitudes will tell)."""
+    """Carry out the plan's steps in their order (`rig plan CONFIG` prints them and what the attitudes determine)."""
     # Refuses unless limits, clearances, payload, modes and the speed slider are right; then asks.
     rig.preflight()
     # From here on every sample and every arm state is in run.h5.
@@ -31,7 +31,7 @@ def imu(rig: Verbs) -> None:
             case Dwell():
                 # Let the sensors settle, then stand still: the accelerometers' part.
                 rig.dwell(step)
-    # The gyroscopes' calibration by the board, to be held against the computer's.
+    # The gyroscopes' calibration by the board, for comparison with the computer's.
     rig.solve_on_board()
 
 

@@ -28,7 +28,7 @@ from rig.procedure import (
 
 
 def servo_six_observation(rig: Verbs) -> None:
-    """The steps of one mounting, in the order the plan has them (`rig plan CONFIG` prints it)."""
+    """Carry out the plan's steps for one mounting in their order (`rig plan CONFIG` prints them)."""
     # Refuses unless the servo is the one that is meant, set up, cool and alone on its line; asks before anything moves.
     rig.preflight()
     # From here on every sample and every state of the shaft is in run.h5.
@@ -44,7 +44,7 @@ def servo_six_observation(rig: Verbs) -> None:
             case Rest():
                 # Stand still: what the gyroscopes read now is their bias.
                 rig.rest(step)
-    # The board's own calibration, to be held against the computer's, after the last mounting.
+    # After the last mounting: the board's own calibration, for comparison with the computer's.
     rig.solve_on_board()
 
 
@@ -54,7 +54,7 @@ PROCEDURE = Procedure(
     plan=plan_servo_six_observation,
     script=servo_six_observation,
     turner=ServoSection,
-    # The speed of a turn is known, its axis in the board only as well as it was screwed on.
+    # The speed of a turn is exact; its axis in the board is only as exact as the mounting.
     estimator="newton",
 )
 

@@ -24,18 +24,18 @@ from rig.procedure import (
 
 
 def six_observation(rig: Verbs) -> None:
-    """The steps, in the order the plan has them (`rig plan CONFIG` prints it)."""
+    """Carry out the plan's steps in their order (`rig plan CONFIG` prints them)."""
     # Refuses unless limits, payload, modes and the speed slider are right; asks before anything moves.
     rig.preflight()
     # From here on every sample and every arm state is in run.h5.
     rig.start_sampling()
     movement(rig)
-    # The board's own calibration, to be held against the computer's.
+    # The board's own calibration, for comparison with the computer's.
     rig.solve_on_board()
 
 
 def movement(rig: Verbs) -> None:
-    """Home, then every sweep with the rest after it."""
+    """Move home, then make every sweep with the rest after it."""
     for step in rig.plan.steps:
         match step:
             case Transfer():

@@ -22,7 +22,7 @@ from rig.procedure import (
 
 
 def static_attitudes(rig: Verbs) -> None:
-    """The steps, in the order the plan has them (`rig plan CONFIG` prints it, and what the attitudes will tell)."""
+    """Carry out the plan's steps in their order (`rig plan CONFIG` prints them and what the attitudes determine)."""
     # Refuses unless limits, clearances, payload, modes and the speed slider are right; then asks.
     rig.preflight()
     # From here on every sample and every arm state is in run.h5.

@@ -1,4 +1,4 @@
-"""Calibrate gyroscopes, and accelerometers beside them, over temperature.
+"""Calibrate gyroscopes and accelerometers over temperature.
 
     python procedures/thermal.py configs/thermal.yaml
 
@@ -7,7 +7,7 @@ A5, a heat gun, an ice pack, a chamber around the arm's wrist (docs/how-to/at-th
 
 What happens: the arm makes its sweeps (and goes to its attitudes), goes home, and waits until the sensors' own
 thermometers have moved on by half a gap. Then it does the same again, up through the range and down again, until no gap
-is left. Whoever warms by hand is told what is wanted next. The run ends by itself where the sensors become too hot, or
+is left. Without a heater the operator is asked for the next temperature. The run ends if the sensors become too hot or
 change too fast. Ctrl-C stops the arm at any moment, the heater goes off, and what was measured is kept.
 """
 
@@ -15,7 +15,7 @@ from rig.procedure import Dwell, Procedure, Rest, Sweep, ThermalSection, Transfe
 
 
 def thermal(rig: Verbs) -> None:
-    """Set after set, as the plan has them (`rig plan CONFIG` prints it), until the range is covered."""
+    """Carry out set after set of the plan (`rig plan CONFIG` prints it), until the range is covered."""
     # Refuses unless limits, clearances, payload, modes, the speed slider and the heater are right; then asks.
     rig.preflight()
     # From here on every sample and every arm state is in run.h5.
@@ -23,7 +23,7 @@ def thermal(rig: Verbs) -> None:
     for step in rig.plan.steps:
         match step:
             case Rest(for_temperature=True):
-                # At home: until the sensors are as warm as is wanted next.
+                # At home: until the sensors have the next temperature.
                 if not rig.wait_for_next_temperature(step):
                     break
             case Transfer():
@@ -38,9 +38,9 @@ def thermal(rig: Verbs) -> None:
             case Dwell():
                 # Let the sensors settle, then stand still: the accelerometers' part.
                 rig.dwell(step)
-    # The heater goes off; ends the run by name where a part of the range is missing.
+    # The heater goes off; the run ends with a fault if a part of the range is missing.
     rig.end_temperature_range()
-    # The board's own arithmetic, over all temperatures alike, to be held against the computer's.
+    # The board's own calibration, of all temperatures together, for comparison with the computer's.
     rig.solve_on_board()
 
 

@@ -3,7 +3,7 @@
     python procedures/verify.py configs/lsm9ds1_adis16465.yaml
 
 Before you start: as for procedures/six_observation.py. The board has a calibration stored for each gyroscope
-(`rig board calibration read CONFIG` shows it), and a reference gyroscope that is known sits beside them.
+(`rig board calibration read CONFIG` shows it), and a reference gyroscope with known errors sits beside them.
 
 What happens: the board corrects its readings by what it has stored and streams rates; the arm repeats the six sweeps;
 the rates are compared with the reference's. `rig run` does this by itself after a calibration when the configuration
@@ -27,7 +27,7 @@ from rig.procedure import (
 
 
 def verify(rig: Verbs) -> None:
-    """The steps of the calibration, without solving anything."""
+    """Carry out the movement of the calibration, without solving anything."""
     # Refuses unless limits, payload, modes and the speed slider are right; asks before anything moves.
     rig.preflight()
     # The gyroscopes send corrected rates, the reference its raw readings.
@@ -35,8 +35,8 @@ def verify(rig: Verbs) -> None:
     movement(rig)
 
 
-def comparison(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
-    """The newest movement against the reference; with the calibration it followed, if there was one."""
+def analyse(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
+    """Compare the newest movement with the reference; add the calibration before it, if there is one."""
     newest = runs[-1:]
     return verify_stored_calibrations(newest) if before is None else verify_calibration(before, newest)
 
@@ -46,7 +46,7 @@ PROCEDURE = Procedure(
     section=VerifySection,
     plan=plan_six_observation,
     script=verify,
-    analyse=comparison,
+    analyse=analyse,
     readings="calibrated",
 )
 

@@ -1,7 +1,6 @@
-"""The shortest run of a configuration: which procedures are tried, and the shortest of them. Pure.
+"""The search for the shortest run of a configuration that reaches a target uncertainty. Pure.
 
-What the file asks for beside the uncertainty stays: order, directions, stages, several speeds, six axes, and the
-attitudes where magnetometers need theirs.
+The file's order, directions, stages, several speeds and six axes stay, and the attitudes if magnetometers need them.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -42,32 +41,33 @@ from rig.plans.by_hand import WantedMoves as Asked
 from rig.plans.by_hand import simulate_session
 from rig.plans.phase import turner_for
 from rig.plans.registry import installed
-from rig.plans.shortest_motions import Motion, of_arm, of_attitudes, of_imu, of_servo
+from rig.plans.shortest_motions import Motion, vary_arm, vary_attitudes, vary_imu, vary_servo
 from rig.turners.registry import kind_of
 
 SectionT = TypeVar("SectionT", bound=Section)
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
-MOST = 100  # sweeps of one plan
+MOST = 100  # sweeps or dwells of one plan
 RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
-# Of the endless run a plan of two repeats is looked at: in one alone, noise weighs too much beside what repeats have
-# alike. Other rests, and more repeats, make U of it smaller yet, but not by more than this.
+# The endless run is predicted from a plan of two repeats: in one alone, noise weighs too much beside the errors that
+# repeats share. Other rests and more repeats reduce its U further, but by no more than this factor.
 TWICE, HOPELESS = 2, 2.0
-ANEW = NOISE, WANDERING, FLICKER, STATES  # the lines that repeats lessen, of accelerometers too
+ANEW = NOISE, WANDERING, FLICKER, STATES  # the budget lines that repeats reduce, also for accelerometers
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # of the last, fine search
 
 
 class Tried(Protocol):
-    """The runs of a procedure that are tried: which there are, and what each is predicted to reach.
+    """The runs of a procedure among which the search chooses, with the prediction of each.
 
-    `predict` is None of what cannot be run; the lines of its budgets that come `anew` each time are gone from those of
-    a run that is repeated without end. `ending` are the keys that let a run end before, when what is wanted is reached.
+    - `predict`: the budgets, None of a run that is not possible.
+    - `anew`: the budget lines whose error is new in each repeat; a run repeated without end has none of them.
+    - `ending`: the keys that end a run before its last repeat, when the target is reached.
     """
 
     @property
     def anew(self) -> Collection[str]: ...
     def candidates(self) -> Sequence[Candidate]: ...
-    def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
+    def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
     def finer(self, best: Candidate) -> Sequence[Candidate]: ...
     def duration_s(self, procedure: ProcedureSection) -> float: ...
     def predict(self, candidate: Candidate) -> Budgets | None: ...
@@ -75,47 +75,47 @@ class Tried(Protocol):
 
 
 def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
-    """The shortest run of this configuration that is predicted to reach what is wanted.
+    """Return the shortest run of this configuration whose predicted uncertainty meets the target.
 
-    Raises Refused `not_foretold` where its procedure is none whose uncertainty is predicted, or not of what is wanted.
+    Raise Refused `not_foretold` if the procedure's uncertainty, or that of the target's quantity, is not predicted.
     """
-    what = tried(config)
+    what = find_search(config)
     _refuse_others(wanted, config)
     candidates = what.candidates()
     floors = [
-        (each.family, once.without(what.anew))
-        for each in what.made_endless(candidates)
-        if (once := what.predict(each)) is not None
+        (candidate.family, once.without(what.anew))
+        for candidate in what.select_endless(candidates)
+        if (once := what.predict(candidate)) is not None
     ]
     able = {family for family, floor in floors if wanted.ratio_to_target(floor.reached) <= HOPELESS}
-    least = min(floors, key=lambda each: wanted.ratio_to_target(each[1].reached))[0]
-    hopeful = [each for each in candidates if each.family in able] or _longest(candidates, least, wanted.at_most_s)
-    found = find_shortest(hopeful, what.predict, wanted)
-    evaluated = [*(floor for _, floor in floors), *found.evaluated]
-    unreachable = not any(wanted.is_met_by(each.reached) for each in evaluated)
-    if found.best is None and unreachable and able and wanted.at_most_s < inf:
+    least = min(floors, key=lambda floor: wanted.ratio_to_target(floor[1].reached))[0]
+    hopeful = [run for run in candidates if run.family in able] or _longest(candidates, least, wanted.at_most_s)
+    coarse = find_shortest(hopeful, what.predict, wanted)
+    evaluated = [*(floor for _, floor in floors), *coarse.evaluated]
+    unreachable = not any(wanted.is_met_by(budgets.reached) for budgets in evaluated)
+    if coarse.best is None and unreachable and able and wanted.at_most_s < inf:
         unreachable = find_shortest(hopeful, what.predict, replace(wanted, at_most_s=inf)).best is None
-    fine = find_shortest(what.finer(found.best.candidate), what.predict, wanted) if found.best else Searched()
-    best = fine.best or found.best
-    best = best and _ending(best, what.ending(best.candidate.procedure, wanted))
-    shown = best or found.nearest
+    fine = find_shortest(what.finer(coarse.best.candidate), what.predict, wanted) if coarse.best else Searched()
+    best = fine.best or coarse.best
+    best = best and _add_target(best, what.ending(best.candidate.procedure, wanted))
+    shown = best or coarse.nearest
     before = Candidate(config.procedure, (), (), what.duration_s(config.procedure))
-    own = what.predict(before)
+    configured = what.predict(before)
     return Shortest(
         wanted,
-        None if own is None else Planned(before, own),
+        None if configured is None else Planned(before, configured),
         best,
-        found.nearest,
+        coarse.nearest,
         evaluated,
         unreachable,
-        len(found.evaluated) + len(fine.evaluated),
+        len(coarse.evaluated) + len(fine.evaluated),
         len(candidates),
         None if shown is None else _directions(plan_of(config, shown.candidate.procedure)),
     )
 
 
-def tried(config: RigConfig) -> Tried:
-    """What may be tried of a configuration. Raises Refused `not_foretold`."""
+def find_search(config: RigConfig) -> Tried:
+    """Return the search among the runs of a configuration. Raise Refused `not_foretold`."""
     procedure = config.procedure
     if not config.to_calibrate:
         raise _not_foretold("nothing is to be calibrated")
@@ -134,54 +134,54 @@ def _not_foretold(what: str) -> Refused:
 
 
 def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
-    """Raise Refused `not_foretold` where something is wanted of a kind of sensor that is not calibrated."""
+    """Raise Refused `not_foretold` if the target is for a kind of sensor that is not calibrated."""
     kinds = {"gyroscope": not isinstance(config.procedure, StaticAttitudesSection)}
     kinds["accelerometer"] = config.procedure.accelerometer_order > 0 and any(
-        each.acceleration is not None for each in config.to_calibrate.values()
+        sensor.acceleration is not None for sensor in config.to_calibrate.values()
     )
     for (kind, calibrated), sizes in zip(kinds.items(), (SIZES[:2], SIZES[2:]), strict=True):
-        if not calibrated and any(getattr(wanted, each) < inf for each in sizes):
+        if not calibrated and any(getattr(wanted, size) < inf for size in sizes):
             raise _not_foretold(f"the procedure calibrates no {kind} whose uncertainty could be wanted")
 
 
 def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
-    """The motions of a procedure; none by hand. Raises Refused `other_turner`."""
-    known = installed()[procedure.name]
-    return known.plan(turner_for(known, config), procedure)
+    """Return the motions of a procedure; none by hand. Raise Refused `other_turner`."""
+    script = installed()[procedure.name]
+    return script.plan(turner_for(script, config), procedure)
 
 
-def _changed(section: SectionT, **keys: object) -> SectionT:
-    """The section with other values of these keys. Raises ValidationError where no file may say them."""
+def _change(section: SectionT, **keys: object) -> SectionT:
+    """Return the section with other values of these keys. Raise ValidationError if the file may not have them."""
     return type(section).model_validate({**dict(section), **keys})
 
 
-def _ending(planned: Planned, keys: Mapping[str, float]) -> Planned:
-    """The run that also ends before, by these keys of its procedure."""
+def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:
+    """Return the run with these keys of its procedure, which end it when the target is reached."""
     procedure = planned.candidate.procedure
-    with suppress(ValidationError):  # so loose a wish that no file may say it
-        procedure = _changed(procedure, **keys)
+    with suppress(ValidationError):  # the target is larger than a file may have
+        procedure = _change(procedure, **keys)
     return replace(planned, candidate=replace(planned.candidate, procedure=procedure))
 
 
 def _directions(plan: Plan) -> Array | None:
-    """(N, 3) the axes of the sweeps in the item's frame; None without sweeps."""
+    """Return the axes (N, 3) of the sweeps in the item's frame; None without sweeps."""
     mounts = {index: stage.mount for stage in plan.stages for index in stage.indices}
     axes = [np.array(mounts.get(sweep.index, np.eye(3))) @ sweep.axis_flange for sweep in plan.sweeps]
     return np.array(axes) if axes else None
 
 
 def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_most_s: float) -> list[Candidate]:
-    """The longest of a family, alone."""
-    own = [each for each in candidates if each.family == family and each.duration_s <= at_most_s]
-    return sorted(own, key=lambda each: each.duration_s)[-1:]
+    """Return a list with the longest candidate of a family."""
+    same = [candidate for candidate in candidates if candidate.family == family and candidate.duration_s <= at_most_s]
+    return sorted(same, key=lambda candidate: candidate.duration_s)[-1:]
 
 
 @dataclass(frozen=True, slots=True)
 class _Swept:
-    """Sweeps or attitudes of a turner with joints; `motions` are what may be told of them but repeats and waits.
+    """Runs of a turner with joints, with sweeps or attitudes.
 
-    Of each its family, how far it turns, and the keys of the procedure. `waits` are the keys that say how long is
-    stood still: after a sweep, in an attitude.
+    - `motions`: each motion's family, its angle, and its keys of the procedure.
+    - `waits`: the keys of the times at standstill, after a sweep or in an attitude.
     """
 
     motions: Callable[[RigConfig], Iterator[Motion]]
@@ -190,53 +190,53 @@ class _Swept:
     anew: Collection[str] = ANEW
 
     def candidates(self) -> Sequence[Candidate]:
-        found = []
+        candidates = []
         least_s = dict.fromkeys(self.waits, RESTS_S[0])
         for family, turned, keys in self.motions(self.config):
-            once, twice = (_changed(self.config.procedure, **keys, **least_s, repeats=repeats) for repeats in (1, 2))
+            once, twice = (_change(self.config.procedure, **keys, **least_s, repeats=repeats) for repeats in (1, 2))
             plan = plan_of(self.config, once)
             if kind_of(self.config.turner).problems([plan], self.config.turner, None):
                 continue
             counts, again_s = self._counts(plan), plan_of(self.config, twice).duration_s - plan.duration_s
-            some = [each for each in REPEATS if each * len(plan.sweeps or plan.dwells) <= MOST or each == 1]
+            some = [number for number in REPEATS if number * len(plan.sweeps or plan.dwells) <= MOST or number == 1]
             if any(twice.problems(self.config)):
                 some = [1]
             for repeats, *values_s in product(some, *[RESTS_S] * len(self.waits)):
                 waits_s = dict(zip(self.waits, values_s, strict=True))
                 lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * _longer_s(counts, least_s, waits_s)
-                rests_s, dwells_s = (  # of which longer dwells tell more
-                    tuple(wait_s for key, wait_s in waits_s.items() if key == of) for of in ("rest_s", "dwell_s")
+                rests_s, dwells_s = (  # longer dwells determine more
+                    tuple(wait_s for key, wait_s in waits_s.items() if key == name) for name in ("rest_s", "dwell_s")
                 )
                 procedure = once.model_copy(update={**waits_s, "repeats": repeats})  # too many to validate each
-                found.append(Candidate(procedure, family, (turned, repeats, *dwells_s), lasting_s, rests_s))
-        return found
+                candidates.append(Candidate(procedure, family, (turned, repeats, *dwells_s), lasting_s, rests_s))
+        return candidates
 
-    def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """The candidate of each family that turns and dwells most, made twice at most, with short rests and long."""
-        found = {
-            (each.family, each.rests_s): each
-            for each in sorted(candidates, key=lambda each: each.sizes)
-            if set(each.rests_s) <= {RESTS_S[0], RESTS_S[-1]} and each.sizes[1] <= TWICE
+    def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Return those of each family with the largest angle and dwell, at most two repeats, short rests and long."""
+        selected = {
+            (candidate.family, candidate.rests_s): candidate
+            for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)
+            if set(candidate.rests_s) <= {RESTS_S[0], RESTS_S[-1]} and candidate.sizes[1] <= TWICE
         }
-        return list(found.values())
+        return list(selected.values())
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:
-        """The candidates that stand still a little shorter, down to the next of the coarse ones.
+        """Return the candidates with slightly shorter waits, down to the next coarse value.
 
-        By so little that those which stand still longer are taken to tell more.
+        The steps are so small that longer waits are taken to give a smaller uncertainty.
         """
         waits_s = {key: float(getattr(best.procedure, key)) for key in self.waits}
-        counts, found = self._counts(plan_of(self.config, best.procedure)), []  # of all repeats
+        counts, candidates = self._counts(plan_of(self.config, best.procedure)), []  # of all repeats
         for values_s in product(*map(_down_from, waits_s.values())):
             shorter_s = dict(zip(waits_s, values_s, strict=True))
             procedure = best.procedure.model_copy(update=shorter_s)  # too many to validate each
             lasting_s = best.duration_s + _longer_s(counts, waits_s, shorter_s)
-            found.append(Candidate(procedure, best.family, (*best.sizes, *values_s), lasting_s))
-        return found
+            candidates.append(Candidate(procedure, best.family, (*best.sizes, *values_s), lasting_s))
+        return candidates
 
     def _counts(self, plan: Plan) -> Mapping[str, int]:
-        """How many waits of each key a plan has."""
-        # By their names: a field test is a Rest as well, and how long it lasts is another key.
+        """Return the number of waits of each key in a plan."""
+        # By their names: a field test is a Rest as well, but its duration has another key.
         rests = sum(step.name.startswith("rest") for step in plan.steps)
         return {key: {"rest_s": rests, "dwell_s": len(plan.dwells)}[key] for key in self.waits}
 
@@ -244,16 +244,16 @@ class _Swept:
         return plan_of(self.config, procedure).duration_s
 
     def predict(self, candidate: Candidate) -> Budgets | None:
-        config = _changed(self.config, procedure=candidate.procedure)
-        plan, made = plan_of(config, candidate.procedure), kind_of(config.turner).describe_configured(config.turner)
+        config = _change(self.config, procedure=candidate.procedure)
+        plan, turner = plan_of(config, candidate.procedure), kind_of(config.turner).describe_configured(config.turner)
         try:
-            rates = predict_budgets(config, plan, made) if plan.sweeps else {}
-            return Budgets(rates, predict_accelerometer_budgets(config, plan, made.kinematics))
-        except (Fault, np.linalg.LinAlgError):  # so few sweeps and rests, or such attitudes, tell nothing
+            rates = predict_budgets(config, plan, turner) if plan.sweeps else {}
+            return Budgets(rates, predict_accelerometer_budgets(config, plan, turner.kinematics))
+        except (Fault, np.linalg.LinAlgError):  # these sweeps, rests or attitudes do not determine it
             return None
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
-        """The wish, after an earlier repeat."""
+        """Return the target's keys, if the run has several repeats."""
         if not isinstance(procedure, SixObservationSection) or procedure.repeats == 1 or procedure.stages:
             return {}
         sizes = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias_rad_s}
@@ -261,35 +261,35 @@ class _Swept:
 
 
 def _longer_s(counts: Mapping[str, int], waits_s: Mapping[str, float], others_s: Mapping[str, float]) -> float:
-    """How much longer so many waits take when they are the others."""
+    """Return the extra duration, s, of waits of the lengths `others_s` instead of `waits_s`."""
     return sum(count * (others_s[key] - waits_s[key]) for key, count in counts.items())
 
 
 def _down_from(wait_s: float) -> list[float]:
-    """The waits of so long and of less, down to the next of the coarse ones."""
-    below = max((each for each in RESTS_S if each < wait_s), default=wait_s - REST_STEP_S)
+    """Return waits from `wait_s` down to the next coarse value, s."""
+    below = max((rest_s for rest_s in RESTS_S if rest_s < wait_s), default=wait_s - REST_STEP_S)
     return np.arange(wait_s, below + REST_STEP_S / 2, -REST_STEP_S).round(3).tolist()
 
 
 @dataclass(frozen=True, slots=True)
 class _ByHand:
-    """A session by hand of so many flips and turns."""
+    """Sessions by hand with different numbers of flips and turns."""
 
     config: RigConfig
-    anew: Collection[str] = tuple(LINES)  # all that readings tell
+    anew: Collection[str] = tuple(LINES)  # all that the readings determine
 
     def candidates(self) -> Sequence[Candidate]:
-        return [self._candidate(*each) for each in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
+        return [self._candidate(*numbers) for numbers in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
 
-    def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """The candidate of most flips and least rests: without noise, more adds nothing."""
-        return [max(candidates, key=lambda each: (each.sizes[0], -each.sizes[1], -each.sizes[2]))]
+    def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Return the candidate of most flips and least rests: without noise, more adds nothing."""
+        return [max(candidates, key=lambda candidate: (candidate.sizes[0], -candidate.sizes[1], -candidate.sizes[2]))]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:
-        """The candidates with a few flips less, down to the next of the coarse numbers."""
+        """Return the candidates with fewer flips, down to the next coarse number."""
         flips, turns, rest_s = best.sizes
-        below = max((each for each in FLIPS if each < flips), default=int(flips))
-        return [self._candidate(each, int(turns), rest_s) for each in range(below + 1, int(flips))]
+        below = max((number for number in FLIPS if number < flips), default=int(flips))
+        return [self._candidate(number, int(turns), rest_s) for number in range(below + 1, int(flips))]
 
     def duration_s(self, procedure: ProcedureSection) -> float:
         _, moves, rest_s = _session(procedure)
@@ -302,26 +302,26 @@ class _ByHand:
             return None
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
-        """The wish, before the list is done: beside what no session shows of hands."""
-        own = wanted.scale**2 - (2 * REAL_HANDS) ** 2
-        return {"target_scale_u": round(own**0.5, 7)} if 0 < own < inf else {}
+        """Return the target's key for a session, less the part of U that no session shows."""
+        remaining = wanted.scale**2 - (2 * REAL_HANDS) ** 2
+        return {"target_scale_u": round(remaining**0.5, 7)} if 0 < remaining < inf else {}
 
     def _candidate(self, flips: int, turns: int, rest_s: float) -> Candidate:
-        procedure = _changed(self.config.procedure, flips=flips, turns=turns, rest_s=rest_s)
+        procedure = _change(self.config.procedure, flips=flips, turns=turns, rest_s=rest_s)
         return Candidate(procedure, (), (flips, turns, rest_s), self.duration_s(procedure))
 
 
 def _session(procedure: ProcedureSection) -> tuple[ByHandSection, Sequence[Instruction], float]:
-    """The section of a session by hand, what is asked for in it, and how long the item rests between."""
+    """Return the section of a session by hand, its instructions, and the rest between two of them, s."""
     assert isinstance(procedure, ByHandSection)
     return procedure, list(simulate_session(Asked(procedure.flips, procedure.turns))), procedure.rest_s
 
 
-# What is tried of a procedure, by its name.
+# The search among the runs of a procedure, by its name.
 TRIED: Mapping[str, Callable[[RigConfig], Tried]] = {
-    "six_observation": partial(_Swept, of_arm, ("rest_s",)),
-    "servo_six_observation": partial(_Swept, of_servo, ("rest_s",)),
-    "static_attitudes": partial(_Swept, of_attitudes, ("dwell_s",)),
-    "imu": partial(_Swept, of_imu, ("rest_s", "dwell_s")),
+    "six_observation": partial(_Swept, vary_arm, ("rest_s",)),
+    "servo_six_observation": partial(_Swept, vary_servo, ("rest_s",)),
+    "static_attitudes": partial(_Swept, vary_attitudes, ("dwell_s",)),
+    "imu": partial(_Swept, vary_imu, ("rest_s", "dwell_s")),
     "by_hand": _ByHand,
 }

@@ -9,16 +9,16 @@ from rig.config.procedures.procedure_sections import LONGEST_SWEEP_S, AttitudesS
 from rig.config.procedures.servo_procedure import SPEED_TO_RANGE
 
 SPEEDS_DEG_S = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0)
-ARCS_DEG = (90.0, 180.0, 270.0)  # where it is known how well the encoders tell them
+ARCS_DEG = (90.0, 180.0, 270.0)  # if the encoders' uncertainty is stated
 TURNS_DEG = (360.0, 720.0, 1080.0)
-BEYOND_DEG = (45.0, 90.0, 180.0)  # of a servo's turn
+BEYOND_DEG = (45.0, 90.0, 180.0)  # overtravel of a servo
 
-# Its family, how far it turns, and the keys of the procedure that say so.
+# Its family, its angle in degrees, and its keys of the procedure.
 Motion = tuple[tuple[object, ...], float, Mapping[str, object]]
 
 
-def of_arm(config: RigConfig) -> Iterator[Motion]:
-    """Sweeps about three axes or six, at one speed or at two, over turns or arcs; the several speeds of a file stay."""
+def vary_arm(config: RigConfig) -> Iterator[Motion]:
+    """Yield sweeps about three axes or six, at one speed or two, over turns or arcs; a file's several speeds stay."""
     procedure = config.procedure
     assert isinstance(procedure, SixSweepsSection)
     axes = (3, 6) if procedure.axes == 3 and not procedure.mountings else (procedure.axes,)
@@ -36,8 +36,8 @@ def of_arm(config: RigConfig) -> Iterator[Motion]:
             yield (count, *keys.values(), closed), arc_deg, {**keys, "axes": count, "arc_deg": arc_deg}
 
 
-def of_attitudes(config: RigConfig) -> Iterator[Motion]:
-    """The attitudes of the file and the sets that have a name; for magnetometers the file's alone."""
+def vary_attitudes(config: RigConfig) -> Iterator[Motion]:
+    """Yield the file's attitudes and the sets that have a name; with magnetometers only the file's."""
     procedure = config.procedure
     assert isinstance(procedure, AttitudesSection)
     sets = [procedure.attitudes, *(() if config.magnetometers else SETS.values())]
@@ -45,15 +45,15 @@ def of_attitudes(config: RigConfig) -> Iterator[Motion]:
         yield (attitudes,), 0.0, {"attitudes": attitudes}
 
 
-def of_imu(config: RigConfig) -> Iterator[Motion]:
-    """Sweeps and attitudes: whole turns at one speed, once round, for an accelerometer's wave is that of one."""
-    turns = [each for each in of_arm(config) if each[1] == TURNS_DEG[0] and not each[2].get("speeds_deg_s")]
-    for (family, turned, keys), (attitudes, _, stood) in product(turns, of_attitudes(config)):
+def vary_imu(config: RigConfig) -> Iterator[Motion]:
+    """Yield sweeps and attitudes, with sweeps of one turn at one speed, as an accelerometer's wave has that period."""
+    turns = [motion for motion in vary_arm(config) if motion[1] == TURNS_DEG[0] and not motion[2].get("speeds_deg_s")]
+    for (family, turned, keys), (attitudes, _, stood) in product(turns, vary_attitudes(config)):
         yield (*family, *attitudes), turned, {**keys, **stood}
 
 
-def of_servo(config: RigConfig) -> Iterator[Motion]:
-    """Turns of a servo at one speed, and how far beyond."""
+def vary_servo(config: RigConfig) -> Iterator[Motion]:
+    """Yield turns of a servo at different speeds and overtravels."""
     for speed_deg_s, overtravel_deg in product(_speeds_deg_s(config), BEYOND_DEG):
         yield (speed_deg_s,), overtravel_deg, {"speed_deg_s": speed_deg_s, "overtravel_deg": overtravel_deg}
 

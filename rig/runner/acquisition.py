@@ -1,4 +1,4 @@
-"""Passes what arrives on to the recording and counts it, for who looks on and to see that samples flow."""
+"""The samples and states that arrive: passed on to the recording, counted, and kept for the next computations."""
 
 import threading
 from collections import defaultdict, deque
@@ -19,17 +19,18 @@ from rig.runner.settling import Settling
 from rig.station.events import SensorSamples
 
 KEPT_PARTS = 3
-REACHES_BACK_S = 300.0  # before a sweep, of what its clock is found by: more tells no more, and takes longer
+REACHES_BACK_S = 300.0  # of data before a sweep, from which its clock is determined: more takes longer and adds nothing
 WHOLE_S = 5.0  # of a dwell, in which every state of the arm is recorded
-STANDING_S = 0.25  # between those recorded after: an arm that stands needs no more, and hours of it would fill the disk
+STANDING_S = 0.25  # between two states recorded after that: hours of a standing arm would fill the disk
 
 
 @dataclass(slots=True)
 class SensorCount:
-    """What one sensor has delivered so far. `lost` counts the gaps in its sequence numbers.
+    """The number of samples that one sensor has delivered so far.
 
-    `latest` are the mean readings of the newest samples, by quantity, and `read_s` is when these were read, by the
-    clock that stamps them.
+    - `lost`: the gaps in its sequence numbers.
+    - `latest`: the mean readings of the newest samples, by quantity.
+    - `read_s`: when these were read, by the clock that stamps them.
     """
 
     name: str
@@ -41,7 +42,7 @@ class SensorCount:
     _next_sequence: int = 0
 
     def add(self, samples: NDArray[Any]) -> None:
-        """Count samples (n,); their means become the `latest` readings."""
+        """Count samples (n,), whose means become the `latest` readings."""
         sequence = samples["sequence"]
         last = int(sequence[-1])
         self.lost += last + 1 - self._next_sequence - len(sequence)
@@ -51,14 +52,14 @@ class SensorCount:
         self.read_s = 1e-6 * float(samples["board_time_us"].mean())
 
     @property
-    def seen(self) -> SensorSamples:
-        """What the page and the terminal are told of the sensor's samples."""
+    def summary(self) -> SensorSamples:
+        """The counts as an event for the page and the terminal."""
         return SensorSamples(self.name, self.samples, self.lost, self.latest)
 
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """What came between two calls of `keep`."""
+    """The data that arrived between two calls of `keep`."""
 
     batches: defaultdict[str, list[np.ndarray]]
     states: list[State]
@@ -66,13 +67,13 @@ class _Part:
 
 @dataclass(slots=True)
 class _Thinning:
-    """Which states of a dwell are recorded, by their times."""
+    """The selection of a dwell's states for the recording, by their times."""
 
     began_s: float | None = None
     last_s: float = 0.0
 
     def keeps(self, time_s: float) -> bool:
-        """Asked of each state once, in their order."""
+        """Return whether to record the state at `time_s`. To be called once for each state, in their order."""
         if self.began_s is None:
             self.began_s = time_s
         if time_s - self.began_s > WHOLE_S and time_s - self.last_s < STANDING_S:
@@ -83,10 +84,10 @@ class _Thinning:
 
 @dataclass(slots=True)
 class Acquisition:
-    """What comes from the sources' and the arm's reader threads, read by the script's. `counts` by the sensor's name.
+    """The data from the reader threads of the sources and the arm, read by the script's thread.
 
-    What comes before there is a `recorder` is not kept. From the first `keep` on, all that came since the last
-    `KEPT_PARTS` of them is also held in memory.
+    `counts` is by sensor name. Data that arrive before there is a `recorder` are not recorded. From the first `keep`
+    on, the data since the last `KEPT_PARTS` calls of it are also held in memory.
     """
 
     counts: dict[str, SensorCount] = field(default_factory=dict)
@@ -98,13 +99,13 @@ class Acquisition:
     _heard: "SimpleQueue[tuple[str, NDArray[Any]]] | None" = None
 
     def expect(self, name: str, sensor: RecordedSensor) -> None:
-        """Count the samples of a sensor, before its stream begins; only rates tell whether the arm settled."""
+        """Count the samples of a sensor, before its stream begins. If it measures rates, watch whether it settles."""
         self.counts[name] = SensorCount(name, sensor)
         if sensor.measures(RATE):
             self.settling.expect(name, sensor)
 
     def on_samples(self, sensor: str, samples: NDArray[Any]) -> None:
-        """Take samples (n,) of a sensor known in `counts`."""
+        """Take samples (n,) of a sensor that `counts` contains."""
         with self._lock:
             self.counts[sensor].add(samples)
             if self._kept:
@@ -125,10 +126,10 @@ class Acquisition:
             self.recorder.add_state(state)
 
     @contextmanager
-    def standing(self) -> Iterator[None]:
-        """The arm stands still for the length of the `with` block: after a while only a few of its states are recorded.
+    def thin_states(self) -> Iterator[None]:
+        """Record few of the arm's states inside the `with` block, after its first seconds, as the arm stands still.
 
-        Whoever watches the arm sees all of them all the same.
+        The page and the watch over the arm still get all of them.
         """
         self._thinning = _Thinning()
         try:
@@ -137,20 +138,20 @@ class Acquisition:
             self._thinning = None
 
     def hear(self) -> "SimpleQueue[tuple[str, NDArray[Any]]]":
-        """A queue into which goes, from now on, all that comes: the sensor's name and samples (n,)."""
+        """Return a queue into which all samples go from now on, as pairs of the sensor's name and samples (n,)."""
         self._heard = SimpleQueue()
         return self._heard
 
     def keep(self) -> None:
-        """Hold what comes from now on, as a part of its own; the oldest part goes when there are too many."""
+        """Begin a new part in memory for the data that arrive from now on; drop the oldest if there are too many."""
         with self._lock:
             self._kept.append(_Part(defaultdict(list), []))
 
-    def kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
-        """Samples (n,) of one sensor and arm states that are held, and how many of these are new.
+    def collect_kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
+        """Return the kept samples (n,) of one sensor, the kept arm states, and the number of new states among these.
 
-        New are those since the latest `keep`; what is older reaches back `REACHES_BACK_S` from there, however long
-        somebody or something was waited for.
+        New are those since the latest `keep`. The older ones reach back by `REACHES_BACK_S` from there at most, however
+        long the run has waited.
         """
         with self._lock:
             batches = [batch for part in self._kept for batch in part.batches[sensor]]
@@ -164,24 +165,24 @@ class Acquisition:
         recent = samples["board_time_us"] + np.uint64(span_us) >= samples["board_time_us"][-1]
         return samples[recent], [state for state in states if state.time_s >= from_s], new
 
-    def newest(self, sensor: str) -> np.ndarray:
-        """Samples (n,) of one sensor that came since the latest `keep`."""
+    def collect_newest(self, sensor: str) -> np.ndarray:
+        """Return the samples (n,) of one sensor that arrived since the latest `keep`."""
         with self._lock:
             batches = list(self._kept[-1].batches[sensor]) if self._kept else []
         return np.concatenate(batches or [np.empty(0, self.counts[sensor].sensor.sample_dtype)])
 
     def samples(self) -> tuple[SensorSamples, ...]:
-        """What every sensor has delivered so far."""
+        """Return the counts of every sensor so far."""
         with self._lock:
-            return tuple(count.seen for count in self.counts.values())
+            return tuple(count.summary for count in self.counts.values())
 
-    def newest_of(self, quantity: Scalar) -> dict[str, tuple[float, float]]:
-        """The newest reading of each sensor that has such a one, and before it when it was read, s."""
+    def find_newest_readings(self, quantity: Scalar) -> dict[str, tuple[float, float]]:
+        """Return when each sensor that measures `quantity` was last read, s, and the reading, by name."""
         with self._lock:
-            heard = {name: (each.read_s, each.latest.get(quantity.name)) for name, each in self.counts.items()}
+            heard = {name: (count.read_s, count.latest.get(quantity.name)) for name, count in self.counts.items()}
         return {name: (read_s, value[0]) for name, (read_s, value) in heard.items() if value is not None}
 
-    def silent(self) -> list[str]:
-        """The sensors that have delivered nothing yet."""
+    def find_silent(self) -> list[str]:
+        """Return the names of the sensors that have delivered nothing yet."""
         with self._lock:
             return [count.name for count in self.counts.values() if count.samples == 0]

@@ -1,6 +1,6 @@
-"""A turner that is connected before the run that will use it, while somebody mounts the part. Nothing moves by that.
+"""A turner that is connected before the run that uses it, while the operator mounts the part. Nothing moves.
 
-A run ends with its turner stopped for good, so every run needs one of its own; to connect it takes seconds.
+A run ends with its turner stopped for good, so each run needs its own connection, which takes seconds.
 """
 
 import threading
@@ -17,9 +17,9 @@ Connecting = Callable[[OnState, Path], AbstractContextManager[Turner]]
 
 
 class Ahead:
-    """Connects by `connect`, into the file `log`, when told to `begin`; the next run gets what was connected.
+    """A connection by `connect`, logged into `log`, that is made before the run; the next run takes it over.
 
-    Where that has failed, or has gone meanwhile, the run connects by itself and says what is wrong.
+    If it has failed or was lost meanwhile, the run connects by itself and reports the error.
     """
 
     def __init__(self, connect: Connecting, log: Path) -> None:
@@ -27,20 +27,20 @@ class Ahead:
         self._next: _Connection | None = None
 
     def begin(self) -> None:
-        """Connect the next one, in a thread; nothing where one is connected already."""
+        """Connect the next turner in a thread, unless one is connected already."""
         if self._next is None:
             self._next = _Connection(self._connect, self._log)
 
     @contextmanager
-    def connected(self, on_state: OnState, log: Path) -> Iterator[Turner]:
-        """The turner of a run, as its kind connects it; every state from now on goes to `on_state`."""
-        taken, self._next = self._next, None
+    def connect_turner(self, on_state: OnState, log: Path) -> Iterator[Turner]:
+        """Provide the turner of a run, as its kind connects it; every state from now on goes to `on_state`."""
+        connection, self._next = self._next, None
         with ExitStack() as stack:
-            turner = None if taken is None else taken.handed_over(stack, on_state)
+            turner = None if connection is None else connection.hand_over(stack, on_state)
             yield turner or stack.enter_context(self._connect(on_state, log))
 
     def close(self) -> None:
-        """Let one go that no run has used."""
+        """Close a connection that no run has used."""
         if self._next is not None:
             self._next.close()
             self._next = None
@@ -65,14 +65,14 @@ class _Connection:
     def _pass_on(self, state: State) -> None:
         self._on_state(state)
 
-    def handed_over(self, stack: ExitStack, on_state: OnState) -> Turner | None:
-        """The turner, if it is there and well; `stack` leaves it then."""
+    def hand_over(self, stack: ExitStack, on_state: OnState) -> Turner | None:
+        """Return the turner if it is connected and without fault, else None; `stack` closes it then."""
         self._thread.join()
         if self._turner is None:
             return None
         try:
             self._turner.check()
-            well = self._turner.missed_states == 0  # it would be told of the run
+            well = self._turner.missed_states == 0  # else the run would report states that were missed before it began
         except RigError:
             well = False
         if not well:
@@ -84,15 +84,15 @@ class _Connection:
         return self._turner
 
     def _let_go(self) -> None:
-        """Forget the run: this refers to itself by its turner, and all that the run has read would stay with it."""
+        """Drop the references to the run, which would keep all of its readings in memory."""
         self._on_state, self._turner = _forget, None
 
     def close(self) -> None:
-        """Let it go."""
+        """Close the connection."""
         self._thread.join()
         if self._turner is not None:
             self._context.__exit__(None, None, None)
 
 
 def _forget(state: State) -> None:
-    """Nobody wants a state yet."""
+    """Drop a state that arrives before a run has begun."""

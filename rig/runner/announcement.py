@@ -1,4 +1,4 @@
-"""What an operator must know before agreeing to a movement. Pure."""
+"""The questions to the operator before a movement. Pure."""
 
 from collections.abc import Iterable
 from math import degrees
@@ -16,9 +16,9 @@ NOBODY = "Nobody and nothing may be within its reach."
 
 
 def mounting(plan: Plan, number: int, words: Wording) -> Prompt:
-    """The question before a stage of a plan, with its `number` from 0: whether the item is mounted for it.
+    """Return the question whether the item is mounted for the stage `number` (from 0) of a plan.
 
-    `words` speak of what turns it.
+    `words` name the turner.
     """
     stages, stage = plan.stages, plan.stages[number]
     far = _farthest(plan)
@@ -38,15 +38,19 @@ def mounting(plan: Plan, number: int, words: Wording) -> Prompt:
 def announcement(
     plan: Plan, report: Report, words: Wording, repeated: Plan | None, mounted: Iterable[str], *, early: bool = False
 ) -> Prompt:
-    """The question before the first motion, which depends on where the turner stands; `words` speak of it.
+    """Return the question before the first motion, which depends on the pose that the turner reports.
 
-    `repeated` is the movement that follows without another question if the calibration passes; `mounted` says, in
-    lines, which sensors are turned, `early` that the movement may end before its last repeat.
+    - `words`: the names of the turner.
+    - `repeated`: the movement that follows without another question if the calibration passes.
+    - `mounted`: lines that name the sensors that are turned.
+    - `early`: whether the movement may end before its last repeat.
     """
     at_most = " at most, until the uncertainty is what is wanted" if early else ""
-    way = find_travel_to_home(plan, report.state.q_rad)
+    home_rad = find_travel_to_home(plan, report.state.q_rad)
     turns = ", ".join(
-        f"{name} {degrees(angle):+.0f}°" for name, angle in zip(report.joints, way, strict=True) if abs(angle) > 0.01
+        f"{name} {degrees(angle):+.0f}°"
+        for name, angle in zip(report.joints, home_rad, strict=True)
+        if abs(angle) > 0.01
     )
     lines = [
         *mounted,
@@ -73,11 +77,11 @@ def announcement(
 
 
 def _joint_names(plan: Plan) -> list[str]:
-    """The names of the joints that sweeps turn, each in its place; of the others, which turn little, their numbers."""
+    """Return a name for each joint: its own if a sweep turns it, else its number."""
     names = {sweep.joint: sweep.joint_name for sweep in plan.sweeps}
     return [names.get(joint, f"joint {joint + 1}") for joint in range(len(plan.home_q_rad))]
 
 
 def _farthest(plan: Plan) -> str:
-    """How far the sweeps of a plan turn, the farthest of them, in words."""
+    """Return the largest angle of the plan's sweeps in words."""
     return turn_words(max(sweep.angle_rad for sweep in plan.sweeps))

@@ -1,4 +1,4 @@
-"""Connects the sources of samples and the turner, starts the recording, hands all of it to a script as one `Rig`."""
+"""Connects the sources of samples and the turner, starts the recording, and gives a script all of it as one `Rig`."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -29,12 +29,12 @@ from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
 from rig.runner.ahead import Connecting
-from rig.runner.board.host_correction import HostCorrected, correcting
+from rig.runner.board.host_correction import HostCorrected, correct_rates
 from rig.runner.board.onboard import BoardCalibration
-from rig.runner.board.sensors import BoardSource, board_source
+from rig.runner.board.sensors import BoardSource, open_board_source
 from rig.runner.by_hand.session import HandSession
 from rig.runner.ending_early import EndingEarly
-from rig.runner.mounted import Memory, mounted
+from rig.runner.mounted import Memory, find_mounted
 from rig.runner.procedure import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
 from rig.runner.warming import Warming
@@ -49,10 +49,11 @@ from rig.turners.turner import Turner
 
 @dataclass(frozen=True, slots=True)
 class Connector:
-    """Opens one phase of a run: what is to be done, by which configuration and script, recorded where, told to whom.
+    """The connections of one phase of a run.
 
-    `found` are the calibrations of the phase before, by sensor name; `memory` is what is known of earlier runs. The
-    turner is connected by `connecting` where that is given.
+    - `results`: the calibrations of the phase before, by sensor name.
+    - `memory`: the sensors' earlier calibrations.
+    - `connecting`: how to connect the turner; None: as its kind does.
     """
 
     phase: Phase
@@ -62,21 +63,22 @@ class Connector:
     path: Path
     station: Station
     resumed: Resumption
-    found: Mapping[str, SensorSolution] = field(default_factory=dict)
+    results: Mapping[str, SensorSolution] = field(default_factory=dict)
     memory: Memory = field(default_factory=Memory)
     connecting: Connecting | None = None
 
-    def _left_out(self, whole_plan: Plan) -> frozenset[int]:
-        """The sweeps of the plan that are not made now: those that are done, and those of other stages."""
-        others = (each.indices for place, each in enumerate(whole_plan.stages) if place != self.settings.stage)
+    def _find_omitted(self, whole_plan: Plan) -> frozenset[int]:
+        """Return the indices of the sweeps and dwells that are omitted now: finished, or of other stages."""
+        others = (stage.indices for index, stage in enumerate(whole_plan.stages) if index != self.settings.stage)
         return self.resumed.done.union(*others)
 
     @contextmanager
     def open(self) -> Iterator[Rig]:
-        """Everything connected and recording, nothing moved yet; on the way out the turner stops, the file is closed.
+        """Connect everything and start recording; on the way out stop the turner and close the file. Nothing has moved
+        yet.
 
-        Raises `Refused` by name when the turner, the board or a sensor is not what the configuration says, or not what
-        was recorded earlier, or has no calibration to correct by.
+        Raise `Refused` by name if the turner, the board or a sensor differs from the configuration or from the
+        recording so far, or has no calibration to correct by.
         """
         whole_plan = self.phase.plan()
         if self.resumed.earlier and not self.phase.agreed:  # a stage that follows resumes nothing
@@ -89,32 +91,36 @@ class Connector:
             for name, sensor in described.items():
                 acquisition.expect(name, sensor)
             kind = kind_of(self.loaded.config.turner)
-            turner, report, made = self._connect_turner(kind, stack, acquisition)
-            recorded = RecordedTurner.build(kind.name, made, report.joints, kind.fields)
-            made_with = self._provenance(kind, board, report, made)
+            turner, report, identity = self._connect_turner(kind, stack, acquisition)
+            recorded = RecordedTurner.build(kind.name, identity, report.joints, kind.fields)
+            made_with = self._build_provenance(kind, board, report, identity)
             recording = self._record(stack, made_with, recorded, described)
             acquisition.recorder = recording.recorder
             simulated = self.loaded.simulated or calls_itself_simulated(report.software)
             on_board = None if board is None else board.board.identity.unique_id
-            carried = mounted(described, on_board, self.memory, simulated=simulated)
-            plan = self.phase.plan(report.state.q_rad, self._left_out(whole_plan))
+            carried = find_mounted(described, on_board, self.memory, simulated=simulated)
+            plan = self.phase.plan(report.state.q_rad, self._find_omitted(whole_plan))
             yield Rig(
                 devices=Devices(turner, report, kind, self.loaded.config.turner, sources, acquisition, carried),
                 plan=plan,
                 whole_plan=whole_plan,
                 recording=recording,
-                along=None if board is None else self._calibrating_along(board, acquisition, recording, recorded),
+                onboard=None
+                if board is None
+                else self._build_board_calibration(board, acquisition, recording, recorded),
                 phase=self.phase,
-                hand=self._by_hand(acquisition, recording, made_with, described),
+                hand=self._build_hand_session(acquisition, recording, made_with, described),
                 stage=self.settings.stage,
-                last=not any(each.indices - self.resumed.done for each in whole_plan.stages[self.settings.stage + 1 :]),
+                last=not any(
+                    stage.indices - self.resumed.done for stage in whole_plan.stages[self.settings.stage + 1 :]
+                ),
                 up=self.loaded.config.site.up,
-                early=self._ending_early(plan, len(whole_plan.sweeps)),
-                warming=self._warming(board, acquisition, recording, whole_plan),
+                early=self._build_early_end(plan, len(whole_plan.sweeps)),
+                warming=self._build_warming(board, acquisition, recording, whole_plan),
             )
 
-    def _ending_early(self, plan: Plan, sweeps: int) -> EndingEarly | None:
-        """What ends the run before its last repeat; None where nothing is wanted, or readings are compared."""
+    def _build_early_end(self, plan: Plan, sweeps: int) -> EndingEarly | None:
+        """Return the condition to end before the last repeat; None without a target, or if readings are compared."""
         section, procedure = self.loaded.config.procedure, self.phase.procedure
         if procedure.reads_corrected or not isinstance(section, SixObservationSection):
             return None
@@ -125,35 +131,35 @@ class Connector:
     def _connect_board(self, stack: ExitStack, acquisition: Acquisition) -> BoardSource:
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
         with refusing():
-            source = stack.enter_context(board_source(config, acquisition.on_samples, calibrated=calibrated))
+            source = stack.enter_context(open_board_source(config, acquisition.on_samples, calibrated=calibrated))
         self.station.event(BoardConnected(require_board_section(config).port, source.board.identity))
         return source
 
     def _connect_others(self, stack: ExitStack, acquisition: Acquisition) -> Iterator[SampleSource]:
-        """The sensors with a port of their own; to verify them, their calibrations correct their readings here."""
+        """Connect the sensors with a port of their own; to verify them, correct their readings on this computer."""
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
         for port, kind, sections in group_by_port(config.sensors):
             on_samples: OnSamples = acquisition.on_samples
             calibrations = {
-                name: self._calibration(name) for name in sections if calibrated and name in config.to_calibrate
+                name: self._find_calibration(name) for name in sections if calibrated and name in config.to_calibrate
             }
             for name, calibration in calibrations.items():
-                on_samples = correcting(name, kind.describe(name, sections[name]), calibration, on_samples)
+                on_samples = correct_rates(name, kind.describe(name, sections[name]), calibration, on_samples)
             with refusing():
                 source = stack.enter_context(kind.connect(sections, on_samples))
             for name, section in sections.items():
                 self.station.event(SensorConnected(name, section.part, section.serial_number, port, source.corrected))
             yield HostCorrected(source, calibrations) if calibrations else source
 
-    def _calibration(self, name: str) -> Calibration:
-        """Raises Refused `nothing_to_correct_by`."""
-        if name not in self.found:
+    def _find_calibration(self, name: str) -> Calibration:
+        """Return the sensor's calibration from the phase before. Raise Refused `nothing_to_correct_by`."""
+        if name not in self.results:
             raise Refused(
                 "nothing_to_correct_by",
                 f"sensors.{name}: no board stores its calibration, and this run has found none",
                 "Verify it in the run that calibrates it: procedure.name six_observation with verify: true",
             )
-        return calibration_of(self.found[name])
+        return calibration_of(self.results[name])
 
     def _connect_turner(
         self, kind: AnyTurner, stack: ExitStack, acquisition: Acquisition
@@ -170,11 +176,11 @@ class Connector:
         return turner, report, kind.describe_connected(section, report)
 
     def _last_seen(self, turner: Turner) -> None:
-        """Tell how the turner was left: whoever looks on has last seen it move."""
+        """Report the turner's last state, as the page has last shown it moving."""
         self.station.event(ArmSeen(turner.latest, turner.missed_states))
 
-    def _provenance(
-        self, kind: AnyTurner, board: BoardSource | None, report: Report, made: TurnerIdentity
+    def _build_provenance(
+        self, kind: AnyTurner, board: BoardSource | None, report: Report, identity: TurnerIdentity
     ) -> Provenance:
         with refusing():
             crystal = None if board is None else follows_crystal(board.board)
@@ -182,7 +188,7 @@ class Connector:
             self.loaded,
             None if board is None else board.board.identity,
             report,
-            made,
+            identity,
             stored={} if board is None else board.stored,
             script=self.script.identity,
             script_installed=self.script.is_installed,
@@ -209,14 +215,14 @@ class Connector:
             )
         return Recording(stack.enter_context(recorder), described, self.station, turner.geometry)
 
-    def _by_hand(
+    def _build_hand_session(
         self,
         acquisition: Acquisition,
         recording: Recording,
         made_with: Provenance,
         described: Mapping[str, RecordedSensor],
     ) -> HandSession | None:
-        """The session in which a hand turns the item; None where none does. Raises Refused `clock_unknown`."""
+        """Return the session in which an operator turns the item, or None. Raise Refused `clock_unknown`."""
         if self.settings.by_hand is None:
             return None
         name = self.settings.to_calibrate[0]
@@ -227,41 +233,41 @@ class Connector:
             settings=self.settings.by_hand,
             name=name,
             sensor=described[name],
-            told=collect_inputs(self.settings, made_with, described[name]),
+            conditions=collect_inputs(self.settings, made_with, described[name]),
             earlier=self.resumed.earlier,
         )
 
-    def _warming(
+    def _build_warming(
         self, board: BoardSource | None, acquisition: Acquisition, recording: Recording, whole_plan: Plan
     ) -> Warming | None:
-        """What watches the temperature; None where the procedure does not change it."""
+        """Return the supervision of the temperature; None if the procedure does not change it."""
         section = self.loaded.config.procedure
         if not isinstance(section, ThermalSection):
             return None
-        events = [each.event for run in self.resumed.earlier for each in run.events]
-        measured = [each for each in events if isinstance(each, SetMeasured)]
+        events = [event.event for run in self.resumed.earlier for event in run.events]
+        measured = [event for event in events if isinstance(event, SetMeasured)]
         return Warming(
             section=section,
             acquisition=acquisition,
             note=recording.note,
             names=tuple(self.loaded.config.to_calibrate),
             heater=board.board if board is not None and section.heater_power > 0 else None,
-            set_s=(whole_plan.duration_s - sum(each.duration_s for each in whole_plan.waits)) / section.repeats,
+            set_s=(whole_plan.duration_s - sum(wait.duration_s for wait in whole_plan.waits)) / section.repeats,
             course=TemperatureCourse(
                 section.from_c,
                 section.to_c,
                 section.max_step_k,
                 section.both_directions,
-                sets=[each for each in measured if self.resumed.done.issuperset(range(each.first, each.end))],
+                sets=[done for done in measured if self.resumed.done.issuperset(range(done.first, done.end))],
             ),
         )
 
-    def _calibrating_along(
+    def _build_board_calibration(
         self, source: BoardSource, acquisition: Acquisition, recording: Recording, turner: RecordedTurner
     ) -> BoardCalibration | None:
-        """The board's own calibration from raw readings; it is given back what it observed before an interruption.
+        """Return the board's own calibration from raw readings, with its observations before an interruption restored.
 
-        None where the readings are no raw ones, or no sensor on it is to be calibrated.
+        None if the readings are not raw, or no sensor on the board is to be calibrated.
         """
         to_calibrate = {
             name: (sensor.index, sensor.described)
@@ -270,7 +276,7 @@ class Connector:
         }
         if self.settings.by_hand is not None or not (self.phase.procedure.calibrates_along and to_calibrate):
             return None
-        along = BoardCalibration(
+        onboard = BoardCalibration(
             source.board,
             acquisition,
             recording.note,
@@ -279,5 +285,5 @@ class Connector:
             turner,
         )
         with refusing():
-            along.recall(self.resumed.earlier, self.resumed.done)
-        return along
+            onboard.recall(self.resumed.earlier, self.resumed.done)
+        return onboard

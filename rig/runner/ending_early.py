@@ -1,7 +1,7 @@
-"""A run that ends before its last repeat, once its uncertainty is what is wanted.
+"""The end of a run before its last repeat, as soon as the target uncertainty is reached.
 
-The arm only makes motions that pre-flight has judged: after the end, the one of the plan that leads from where it
-stands to home. Where the plan has none, the run goes on to the next repeat.
+The arm only makes motions that pre-flight has judged: after the end, the plan's motion that leads home from the present
+pose. If the plan has none, the run goes on to the next repeat.
 """
 
 import time
@@ -19,17 +19,20 @@ from rig.motion.state import Joints
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, Sweep, Transfer
 from rig.station.events import UncertaintySoFar
 
-WRITTEN_S = 0.6  # by then the recorder has written all that it was given
-# Of what is wanted: the whole recording says a little more of clocks and noise than it does before the way home.
+WRITTEN_S = 0.6  # by then the recorder has written everything
+# Of the target: the complete recording determines clocks and noise slightly better than the one so far.
 ENOUGH = 0.99
 
 
 @dataclass(slots=True)
 class EndingEarly:
-    """The end of a run of `repeats` with so many `sweeps` in all, of which the `plan` is what was left to do.
+    """The condition on which a run ends early. It moves nothing.
 
-    It is recorded at `path`, `earlier` are the recordings before. If these are whole repeats, the run may be at its
-    end before anything moves. Nothing here moves anything.
+    - `wanted`: the target uncertainty.
+    - `plan`: the motions that remain of the run.
+    - `sweeps`, `repeats`: the numbers of these in the complete run.
+    - `path`: the file of this recording.
+    - `earlier`: the recordings before; if these are complete repeats, the run may end before anything moves.
     """
 
     wanted: TargetUncertainty
@@ -40,41 +43,45 @@ class EndingEarly:
     earlier: Sequence[RunData]
     estimator: str
     ended: bool = False
-    _motions: int = 0  # asked for so far
+    _motions: int = 0  # that the script has begun
     _due: bool = False
     _recorded: bool = False  # whether this recording has sweeps
     _repeats_left: int = 0
-    _home: int | None = None  # the place in the plan of the motion that is still made after the end
+    _home: int | None = None  # index in the plan of the motion that is still made after the end
 
     def __post_init__(self) -> None:
-        left = [sweep.index for sweep in self.plan.sweeps]
-        whole = bool(left) and left[0] % self._each == 0 and left == [*range(left[0], self.sweeps)]
+        remaining = [sweep.index for sweep in self.plan.sweeps]
+        whole = (
+            bool(remaining)
+            and remaining[0] % self._per_repeat == 0
+            and remaining == [*range(remaining[0], self.sweeps)]
+        )
         if self.earlier and whole:
-            self._stands_at(self.plan.start_q_rad, len(left))
+            self._stands_at(self.plan.start_q_rad, len(remaining))
 
-    def swept(self, sweep: Sweep) -> None:
-        """Note a sweep that was made."""
+    def note_sweep(self, sweep: Sweep) -> None:
+        """Note that a sweep was made."""
         self._recorded = True
-        left = [each.index for each in self.plan.motions[self._motions :] if isinstance(each, Sweep)]
+        remaining = [motion.index for motion in self.plan.motions[self._motions :] if isinstance(motion, Sweep)]
         self._due = False
-        if left and left[0] // self._each > sweep.index // self._each:
-            self._stands_at(sweep.end_q_rad, len(left))
+        if remaining and remaining[0] // self._per_repeat > sweep.index // self._per_repeat:
+            self._stands_at(sweep.end_q_rad, len(remaining))
 
     def due(self) -> bool:
-        """Whether a repeat was completed that nobody has looked at."""
+        """Return whether a repeat was completed and its uncertainty not assessed yet."""
         return self._due and not self.ended
 
     @contextmanager
-    def looking(self) -> Iterator["Future[ReachedUncertainty | None]"]:
-        """The uncertainty so far, as it will be found meanwhile."""
+    def look_in_background(self) -> Iterator["Future[ReachedUncertainty | None]"]:
+        """Compute the uncertainty so far in a thread; yields its future."""
         pool = ThreadPoolExecutor(max_workers=1)
         try:
             yield pool.submit(self._look)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
-    def found(self, looked: "Future[ReachedUncertainty | None]") -> UncertaintySoFar | None:
-        """What was found, which may end the run; what takes too long ends nothing."""
+    def conclude(self, looked: "Future[ReachedUncertainty | None]") -> UncertaintySoFar | None:
+        """Return the uncertainty if it was computed in time; note the end of the run if it meets the target."""
         self._due = False
         reached = looked.result() if looked.done() else None
         if reached is None:
@@ -82,10 +89,10 @@ class EndingEarly:
         self.ended = self.wanted.ratio_to_target(reached) <= ENOUGH
         return UncertaintySoFar(reached.scale, reached.bias_rad_s, self._repeats_left, self.ended)
 
-    def passes_over(self, motion: Motion) -> bool:
-        """Whether the next motion of the plan is not made: after the end, all but the way home."""
-        place, self._motions = self._motions, self._motions + 1
-        return self.ended and place != self._home
+    def skips(self, motion: Motion) -> bool:
+        """Return whether to skip the next motion of the plan: after the end, all but the way home."""
+        index, self._motions = self._motions, self._motions + 1
+        return self.ended and index != self._home
 
     def _look(self) -> ReachedUncertainty | None:
         time.sleep(WRITTEN_S)
@@ -95,25 +102,25 @@ class EndingEarly:
             return None
 
     @property
-    def _each(self) -> int:
-        """The sweeps of one repeat."""
+    def _per_repeat(self) -> int:
+        """The number of sweeps in one repeat."""
         return self.sweeps // self.repeats
 
-    def _stands_at(self, here: Joints, sweeps_left: int) -> None:
-        """Look whether it is enough, if the rest of the plan knows the way home from here."""
-        self._repeats_left = -(-sweeps_left // self._each)
+    def _stands_at(self, pose: Joints, sweeps_left: int) -> None:
+        """Note that an assessment is due if the remaining plan has a motion home from this pose."""
+        self._repeats_left = -(-sweeps_left // self._per_repeat)
         self._home = next(
             (
-                place
-                for place, each in enumerate(self.plan.motions)
-                if place >= self._motions
-                and isinstance(each, Transfer)
-                and _same(each.start_q_rad, here)
-                and _same(each.target_q_rad, self.plan.home_q_rad)
+                index
+                for index, motion in enumerate(self.plan.motions)
+                if index >= self._motions
+                and isinstance(motion, Transfer)
+                and _same(motion.start_q_rad, pose)
+                and _same(motion.target_q_rad, self.plan.home_q_rad)
             ),
             None,
         )
-        self._due = self._home is not None or _same(here, self.plan.home_q_rad)
+        self._due = self._home is not None or _same(pose, self.plan.home_q_rad)
 
 
 def _same(one: Joints, other: Joints) -> bool:

@@ -11,11 +11,11 @@ TIMEOUT_S = 2.0
 
 @dataclass(slots=True)
 class FirstSamples:
-    """A wait that is counted in looks, `look_s` apart, and by the clock of what turns the sensors, if there is one.
+    """A wait that is counted in looks, `look_s` apart, and by the turner's clock if there is one.
 
-    Elapsed time would not do: whoever looks may have been held up, and the thread that reads the samples with it. The
-    limit is stretched by the crowding of this computer, because the far end may run on it. The other clock may be a
-    simulated one, which stands still while its world is held up.
+    Elapsed time would not do: the thread that looks may have been held up, and the one that reads samples with it. The
+    limit grows with the load of this computer, as the simulated laboratory may run on it. The turner's clock may be a
+    simulated one, which stands still while its simulation is held up.
     """
 
     look_s: float
@@ -23,9 +23,9 @@ class FirstSamples:
     _clock_began_s: float | None = None
 
     def wait_on(self, silent: Collection[str], clock_s: float | None = None) -> None:
-        """Count one more look at which the sensors `silent` have sent nothing. Raises Fault `no_samples`.
+        """Count one more look, at which the sensors `silent` have sent nothing. Raise Fault `no_samples`.
 
-        `clock_s` is what the other clock shows now.
+        `clock_s` is the reading of the turner's clock.
         """
         if self._clock_began_s is None:
             self._clock_began_s = clock_s

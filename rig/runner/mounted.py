@@ -1,4 +1,4 @@
-"""What is mounted, beside what is remembered of its serial numbers: told, and asked, before anything moves."""
+"""The mounted sensors beside the earlier calibrations of their serial numbers, confirmed before anything moves."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from rig.station.station import Station
 
 @dataclass(frozen=True, slots=True)
 class CalibratedBefore:
-    """A calibration that a history remembers and that counts: its `number` there, its day, its verdict.
+    """A calibration in the history that counts: its `number` there, its day, its verdict.
 
-    `board_unique_id` is None where the sensor was on no board.
+    `board_unique_id` is None if the sensor was on no board.
     """
 
     part: str
@@ -26,16 +26,16 @@ class CalibratedBefore:
 
     @property
     def words(self) -> str:
-        """When it was and what came of it."""
+        """Its day and its verdict."""
         return f"{self.day}, {self.verdict.upper()} (calibration {self.number})"
 
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """What is remembered of the sensors' serial numbers, the newest first.
+    """The earlier calibrations of the sensors' serial numbers, the newest first.
 
-    `silent` is why nothing is known of them, None where the history answered; `moved` are serial numbers of sensors
-    that sit on another board than before, as whoever runs the rig has stated.
+    `silent` is why none can be read, None if the history answered. `moved` are the serial numbers of sensors that the
+    operator has declared to be on another board than before.
     """
 
     calibrations: Sequence[CalibratedBefore] = ()
@@ -45,9 +45,9 @@ class Memory:
 
 @dataclass(frozen=True, slots=True)
 class MountedSensor:
-    """A sensor of this run: its name, what it is, the board it is on (None: a port of its own).
+    """A sensor of this run: its name, its part, the board it is on (None: a port of its own).
 
-    `last` is the last calibration of its serial number, `elsewhere` the last one on a board where that was another.
+    `last` is the last calibration of its serial number, `elsewhere` the last one on a board if that was another.
     """
 
     name: str
@@ -60,73 +60,77 @@ class MountedSensor:
 
 @dataclass(frozen=True, slots=True)
 class Mounted:
-    """The sensors that are turned, and what is remembered of them."""
+    """The sensors that are turned, and their earlier calibrations."""
 
     sensors: tuple[MountedSensor, ...]
     memory: Memory
 
     @property
     def doubtful(self) -> tuple[MountedSensor, ...]:
-        """The sensors whose serial number is known with another board, unless that is stated to be right."""
-        found = (each for each in self.sensors if each.elsewhere is not None)
-        return tuple(each for each in found if each.serial_number not in self.memory.moved)
+        """The sensors last calibrated on another board, unless the operator has declared that to be right."""
+        moved = self.memory.moved
+        return tuple(sensor for sensor in self.sensors if sensor.elsewhere and sensor.serial_number not in moved)
 
     def lines(self) -> Iterator[str]:
-        """Which sensors they are, on which board, and what is remembered of each."""
-        for board in dict.fromkeys(each.board for each in self.sensors if each.board is not None):
+        """Return a line for each board and sensor, with the sensor's last calibration."""
+        for board in dict.fromkeys(sensor.board for sensor in self.sensors if sensor.board is not None):
             yield f"The board is {board}."
-        for each in self.sensors:
-            before = "not calibrated before" if each.last is None else f"last calibrated {each.last.words}"
-            known = f", {before}" if self.memory.silent is None else ""
-            if each.elsewhere is not None:
-                known += f", on another board ({each.elsewhere.board_unique_id})"
-            yield f"{each.name}: {each.part} {each.serial_number}{known}."
+        for sensor in self.sensors:
+            before = "not calibrated before" if sensor.last is None else f"last calibrated {sensor.last.words}"
+            past = f", {before}" if self.memory.silent is None else ""
+            if sensor.elsewhere is not None:
+                past += f", on another board ({sensor.elsewhere.board_unique_id})"
+            yield f"{sensor.name}: {sensor.part} {sensor.serial_number}{past}."
         if self.memory.silent is not None:
             yield f"What was calibrated before is not known: {self.memory.silent}."
 
 
-def mounted(sensors: Mapping[str, RecordedSensor], board: str | None, memory: Memory, *, simulated: bool) -> Mounted:
-    """The sensors of a run that can be calibrated, by name, on the board of that identifier.
+def find_mounted(
+    sensors: Mapping[str, RecordedSensor], board: str | None, memory: Memory, *, simulated: bool
+) -> Mounted:
+    """Return the sensors of a run that can be calibrated, on the board with the identifier `board`.
 
-    What is simulated and what is not are two.
+    `sensors` is by name. A simulated sensor is never the same as a real one.
     """
-    found = []
+    turned = []
     for name, sensor in sensors.items():
         if not sensor.has_axes:
             continue
-        of = sensor.part, sensor.serial_number, simulated
-        same = [each for each in memory.calibrations if (each.part, each.serial_number, each.simulated) == of]
-        here = board if sensor.on_board else None
-        elsewhere = next((each for each in same if each.board_unique_id is not None), None)
-        if here is None or elsewhere is None or elsewhere.board_unique_id == here:
+        identity = sensor.part, sensor.serial_number, simulated
+        same = [past for past in memory.calibrations if (past.part, past.serial_number, past.simulated) == identity]
+        on_board = board if sensor.on_board else None
+        elsewhere = next((past for past in same if past.board_unique_id is not None), None)
+        if on_board is None or elsewhere is None or elsewhere.board_unique_id == on_board:
             elsewhere = None
-        found.append(MountedSensor(name, sensor.part, sensor.serial_number, here, next(iter(same), None), elsewhere))
-    return Mounted(tuple(found), memory)
+        turned.append(
+            MountedSensor(name, sensor.part, sensor.serial_number, on_board, next(iter(same), None), elsewhere)
+        )
+    return Mounted(tuple(turned), memory)
 
 
 def ask_of_other_boards(mounted: Mounted, station: Station) -> None:
-    """Have the operator say of each doubtful sensor that it is the one of before. Raises Refused `other_board`."""
+    """Ask the operator to confirm the serial number of each doubtful sensor. Raise Refused `other_board`."""
     doubtful = mounted.doubtful
     if not doubtful:
         return
-    said = [_elsewhere(each, each.elsewhere) for each in doubtful if each.elsewhere is not None]
-    numbers = ", ".join(each.serial_number for each in doubtful)
+    statements = [_elsewhere(sensor, sensor.elsewhere) for sensor in doubtful if sensor.elsewhere is not None]
+    numbers = ", ".join(sensor.serial_number for sensor in doubtful)
     another = (
         "If this is another sensor, its serial number in the configuration is wrong, and this calibration would be "
         "taken for one of the other sensor."
     )
     question = Prompt(
-        (*said, another),
+        (*statements, another),
         f"go on with {numbers} on another board",
         to_tick=f"I have looked: the serial number is {numbers}, on another board than before",
         for_a_person=True,
     )
     if not station.ask(question):
-        wrong = ", ".join(f"sensors.{each.name}.serial_number" for each in doubtful)
-        stated = " ".join(f"--other-board {each.serial_number}" for each in doubtful)
+        wrong = ", ".join(f"sensors.{sensor.name}.serial_number" for sensor in doubtful)
+        stated = " ".join(f"--other-board {sensor.serial_number}" for sensor in doubtful)
         raise Refused(
             "other_board",
-            "; ".join(each.rstrip(".") for each in said),
+            "; ".join(statement.rstrip(".") for statement in statements),
             f"Correct {wrong}; or, where a sensor was moved to this board, state that: {stated}",
         )
 

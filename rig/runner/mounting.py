@@ -1,7 +1,7 @@
-"""Whether the item sits as a stage says: looked at by its own sensors, before a sweep turns it. Pure.
+"""Tests of the item's mounting against its stage by the item's own sensors, before a sweep turns it. Pure.
 
-A hand that is still at it, a board the wrong way round, an instruction that was not followed: each is found while
-nothing has moved, or by a turn that is too small to pull at a cable.
+A hand still at the item, a board mounted the wrong way round, an instruction not followed: each is detected at rest, or
+by a turn too small to pull at a cable.
 """
 
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session import nearest_face
 from rig.motion.steps import Stage
 
-REST_S = 1.0  # of readings that show whether it is at rest
+REST_S = 1.0  # of readings to test whether the item is at rest
 PARTS = 5
-STEADY_RAD_S = 0.02  # what a hand at the item exceeds, and nothing that stands; on top of the noise
+STEADY_RAD_S = 0.02  # beyond the noise: a hand at the item causes more, a standing turner less
 NOISES = 6
-ASKEW_RAD = np.radians(20)  # as far as a sensor may sit off its mounting and the item off the stage's
-SHARES = 0.5, 2.0  # of the turn, that a sensor with a scale error reads
+ASKEW_RAD = np.radians(20)  # the largest error of the mounting of sensor and item together
+FRACTIONS = 0.5, 2.0  # of the angle, that a sensor with a scale error reads
 
 
 @dataclass(frozen=True, slots=True)
-class Felt:
-    """What one sensor, by its `name`, read in some time: samples (n,), raw."""
+class GyroscopeReadings:
+    """The raw samples (n,) of one sensor with its `name`."""
 
     name: str
     sensor: RecordedSensor
@@ -45,63 +45,67 @@ class Felt:
         return np.array(self.sensor.mounting)
 
 
-def refuse_unsteady(felt: Felt, turner: str) -> None:
-    """Raise Refused `item_not_at_rest` where a gyroscope's readings change more than noise does.
+def refuse_unsteady(readings: GyroscopeReadings, turner: str) -> None:
+    """Raise Refused `item_not_at_rest` if a gyroscope's readings change by more than their noise.
 
-    `turner` is what an operator calls what turns the item.
+    `turner` is the operator's name of the turner.
     """
-    rates = felt.rates_rad_s
+    rates = readings.rates_rad_s
     means = np.array([part.mean(axis=0) for part in np.array_split(rates, PARTS)])
     noise = np.diff(rates, axis=0).std(axis=0) / np.sqrt(2 * len(rates) / PARTS)
     moved = np.ptp(means, axis=0)
     if np.any(moved > STEADY_RAD_S + NOISES * noise):
         raise Refused(
             "item_not_at_rest",
-            f"{felt.name} reads rates that change by {degrees(moved.max()):.1f} °/s while the {turner} stands still",
+            f"{readings.name} reads rates changing by {degrees(moved.max()):.1f} °/s while the {turner} stands still",
             "Take your hands off the item and its cable, wait until nothing swings, then continue",
         )
 
 
-def refuse_hanging_otherwise(felt: Felt, stage: Stage, up_flange: Array) -> None:
-    """Raise Refused `mounted_otherwise` where an accelerometer does not feel what is up (3,), in the flange's frame.
+def refuse_hanging_otherwise(readings: GyroscopeReadings, stage: Stage, up_flange: Array) -> None:
+    """Raise Refused `mounted_otherwise` if an accelerometer contradicts the vertical (3,) in the flange's frame.
 
-    Of a sensor that measures no acceleration nothing is said.
+    A sensor without accelerations is not tested.
     """
-    if not felt.sensor.measures(ACCELERATION):
+    if not readings.sensor.measures(ACCELERATION):
         return
-    force = felt.sensor.channel(ACCELERATION).values(felt.samples).mean(axis=0)
+    force = readings.sensor.channel(ACCELERATION).values(readings.samples).mean(axis=0)
     stated = np.array(stage.mount) @ up_flange
-    found = felt.mounting.T @ force
-    if _apart(found, stated) > ASKEW_RAD:
+    measured = readings.mounting.T @ force
+    if _apart(measured, stated) > ASKEW_RAD:
         raise Refused(
             "mounted_otherwise",
-            f"by the accelerometer of {felt.name} the item's {nearest_face(found)} axis points up, "
+            f"by the accelerometer of {readings.name} the item's {nearest_face(measured)} axis points up, "
             f"by the stage's mounting its {nearest_face(stated)} axis",
             remedy(stage),
         )
 
 
-def refuse_turning_otherwise(felt: Felt, resting_rad_s: Array, stage: Stage, turn_flange_rad: Array, what: str) -> None:
-    """Raise Fault `mounted_otherwise` where a small turn (3,), in the flange's frame, is felt otherwise.
+def refuse_turning_otherwise(
+    readings: GyroscopeReadings, resting_rad_s: Array, stage: Stage, turn_flange_rad: Array, what: str
+) -> None:
+    """Raise Fault `mounted_otherwise` if a gyroscope contradicts a small rotation (3,), rad, in the flange's frame.
 
-    `resting_rad_s` (3,) is what the gyroscope reads at rest; its readings begin before the turn and end after it.
+    `resting_rad_s` (3,) is its reading at rest; its readings begin before the rotation and end after it.
     """
-    turned = (felt.rates_rad_s - resting_rad_s).sum(axis=0) / felt.sensor.rate_hz
+    turned = (readings.rates_rad_s - resting_rad_s).sum(axis=0) / readings.sensor.rate_hz
     stated = np.array(stage.mount) @ turn_flange_rad
-    found = felt.mounting.T @ turned
-    share = float(np.linalg.norm(found) / np.linalg.norm(stated))
-    said = f"in the {what} {felt.name} is turned about the item's {nearest_face(stated)} axis by the stage's mounting"
-    if not SHARES[0] < share < SHARES[1]:
-        how = f"but reads {degrees(np.linalg.norm(found)):.1f}° of {degrees(np.linalg.norm(stated)):.1f}°"
-    elif _apart(found, stated) > ASKEW_RAD:
-        how = f"but reads a turn about its {nearest_face(found)} axis"
+    measured = readings.mounting.T @ turned
+    fraction = float(np.linalg.norm(measured) / np.linalg.norm(stated))
+    subject = (
+        f"in the {what} {readings.name} is turned about the item's {nearest_face(stated)} axis by the stage's mounting"
+    )
+    if not FRACTIONS[0] < fraction < FRACTIONS[1]:
+        how = f"but reads {degrees(np.linalg.norm(measured)):.1f}° of {degrees(np.linalg.norm(stated)):.1f}°"
+    elif _apart(measured, stated) > ASKEW_RAD:
+        how = f"but reads a turn about its {nearest_face(measured)} axis"
     else:
         return
-    raise Fault("mounted_otherwise", f"{said}, {how}", remedy(stage))
+    raise Fault("mounted_otherwise", f"{subject}, {how}", remedy(stage))
 
 
 def remedy(stage: Stage) -> str:
-    """What to do about an item that is mounted otherwise than its stage says."""
+    """Return what the operator can do if the item's mounting differs from its stage."""
     return f'Mount the item as the stage says ("{stage.instruction}"), or correct its mount in procedure.stages'
 
 

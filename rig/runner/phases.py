@@ -1,7 +1,7 @@
-"""One run in its folder: record a phase, judge it; if it passed, store and go on to the phase that follows.
+"""One run in its folder: records a phase and judges it; if it passed, stores the results and goes on to the next phase.
 
-Each phase is recorded into files of its own. Nothing ends a phase without its reason in the run's log and, where data
-were kept, the command to go on with.
+Each phase has recordings of its own. Whatever ends a phase, the run's log has the reason and, if data were kept, the
+command to go on with.
 """
 
 import traceback
@@ -52,10 +52,12 @@ from rig.turners.registry import kind_of
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run; the laboratory, if it is a simulated one, is there already. `script` is that of its first phase.
+    """A run; its laboratory, if simulated, runs already.
 
-    `memory` is what is known of its sensors from before; the turner is connected by `connecting` where that is given.
-    `again` is the command that goes on with it, where that is not `rig resume`.
+    - `script`: the script of the first phase.
+    - `memory`: the sensors' earlier calibrations.
+    - `connecting`: how to connect the turner; None: as its kind does.
+    - `again`: the command that goes on with the run, if it is not `rig resume`.
     """
 
     folder: Path
@@ -67,58 +69,60 @@ class Run:
     again: str = ""
 
     def carry_out(self, phase: Phase) -> Outcome:
-        """Carry out `phase` and what follows it; writes the outcome into the folder and returns it."""
-        outcome = self._judged(phase, self._recorded(phase, self._resumed(phase), moved=False), None)
+        """Carry out `phase` and the phases that follow it; write the outcome into the folder and return it."""
+        outcome = self._judge(phase, self._record_phase(phase, self._resume(phase), moved=False), None)
         while (follows := phase.follows) is not None:
             phase = follows
             runs: tuple[RunData, ...] = ()
             if outcome.passed:
                 self._store(outcome)
-                runs = self._recorded(phase, Resumption(), moved=True, results=outcome.results)
+                runs = self._record_phase(phase, Resumption(), moved=True, results=outcome.results)
             else:
                 self.station.event(PhaseSkipped(phase.procedure.name))
-            outcome = self._judged(phase, runs, outcome)
-        return self._written(outcome)
+            outcome = self._judge(phase, runs, outcome)
+        return self._write(outcome)
 
-    def refused_sweeps(self, phase: Phase) -> bool:
-        """Whether sweeps or dwells of a phase that was carried out do not count: to carry it out again repeats them."""
+    def has_refused_sweeps(self, phase: Phase) -> bool:
+        """Return whether a phase has sweeps or dwells that do not count, which another run of it repeats."""
         if phase.procedure.reads_corrected:
             return False
         plan = phase.plan()
         planned = {sweep.index for sweep in plan.sweeps} | {dwell.index for dwell in plan.dwells}
-        return bool(planned - self._resumed(phase).done)
+        return bool(planned - self._resume(phase).done)
 
-    def _resumed(self, phase: Phase) -> Resumption:
-        """What counts of the phase's recordings before. Corrected readings are compared as one movement: none do."""
+    def _resume(self, phase: Phase) -> Resumption:
+        """Return the steps of earlier recordings that count: none of corrected readings, which are compared as one
+        movement.
+        """
         if phase.procedure.reads_corrected:
             return Resumption()
-        with self.reported(self._mended, moved=False):
+        with self.report_end(self._advice, moved=False):
             earlier = [read_run(file) for file in recordings(self.folder, phase.procedure.readings)]
             return resumption(earlier, self._settings(phase), self.script)
 
-    def _recorded(
+    def _record_phase(
         self, phase: Phase, resumed: Resumption, *, moved: bool, results: Mapping[str, SensorResult] | None = None
     ) -> tuple[RunData, ...]:
-        """Carry out the phase's script, with the `results` of the calibration before; all recordings of the phase.
+        """Carry out the phase's script, by `results` of the calibration before; return all recordings of the phase.
 
-        The item is mounted anew before each stage with nothing connected: what is in the way may be unplugged.
+        Before each stage the item is mounted with nothing connected, as cables that are in the way may be unplugged.
         """
         readings = phase.procedure.readings
-        with self.reported(self._mended, moved=moved):
+        with self.report_end(self._advice, moved=moved):
             plan = phase.plan()
         stages = plan.stages
-        left = [number for number, each in enumerate(stages) if each.indices - resumed.done]
-        for number in left or [max(len(stages) - 1, 0)]:
+        open_stages = [number for number, stage in enumerate(stages) if stage.indices - resumed.done]
+        for number in open_stages or [max(len(stages) - 1, 0)]:
             if stages:
-                with self.reported(self._mended, moved=moved):
-                    self._mounted(plan, number)
-            path = self._record(phase, number, resumed, moved=moved, results=results)
+                with self.report_end(self._advice, moved=moved):
+                    self._confirm_mounting(plan, number)
+            path = self._record_stage(phase, number, resumed, moved=moved, results=results)
             if stages:
-                with self.reported(self._repeating, moved=True):
+                with self.report_end(self._advice_to_repeat, moved=True):
                     earlier = [read_run(file) for file in recordings(self.folder, readings)]
                 resumed = Resumption(earlier, resumed.done | stages[number].indices)
                 phase, moved = replace(phase, agreed=True), True
-        with self.reported(self._repeating, moved=True):
+        with self.report_end(self._advice_to_repeat, moved=True):
             files = recordings(self.folder, readings)
             if path not in files:
                 raise Fault(
@@ -127,12 +131,12 @@ class Run:
                     "Start a new run, and leave its folder in its place until the run has ended",
                 )
             if phase.procedure.reads_corrected:
-                files = files[-1:]  # one whole movement; what was interrupted before it does not count
+                files = files[-1:]  # a complete movement; interrupted ones before it do not count
             for file in files[:-1]:
-                make_plain(file)  # if the run was killed, only readers that know about it could open its file
+                make_plain(file)  # else only readers that expect a killed run's file could open it
             return tuple(read_run(file) for file in files)
 
-    def _record(
+    def _record_stage(
         self,
         phase: Phase,
         stage: int,
@@ -141,21 +145,21 @@ class Run:
         moved: bool,
         results: Mapping[str, SensorResult] | None,
     ) -> Path:
-        """Carry out the phase's script for one stage, which is the whole of it where there are none; the recording."""
+        """Carry out the phase's script for one stage, or a plan without stages; return the recording's path."""
         path = next_recording(self.folder, phase.procedure.readings)
-        own = phase.procedure is self.script.procedure
-        script = self.script if own else installed_script(phase.procedure.name)
+        is_own = phase.procedure is self.script.procedure
+        script = self.script if is_own else installed_script(phase.procedure.name)
         settings = replace(self._settings(phase), stage=stage)
-        told = self.station, resumed, results or {}, self.memory, self.connecting
-        connector = Connector(phase, self.loaded, settings, script, path, *told)
-        with self.reported(self._mended, moved=moved), connector.open() as rig:
+        context = self.station, resumed, results or {}, self.memory, self.connecting
+        connector = Connector(phase, self.loaded, settings, script, path, *context)
+        with self.report_end(self._advice, moved=moved), connector.open() as rig:
             self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))
             phase.procedure.script(rig)
-            self.station.event(rig.recorded())
+            self.station.event(rig.summarize())
         return path
 
-    def _mounted(self, plan: Plan, number: int) -> None:
-        """Let the operator mount the item for a stage. Raises Refused `not_mounted`."""
+    def _confirm_mounting(self, plan: Plan, number: int) -> None:
+        """Ask the operator to mount the item for a stage. Raise Refused `not_mounted`."""
         if not self.station.ask(mounting(plan, number, kind_of(self.loaded.config.turner).words)):
             raise Refused(
                 "not_mounted",
@@ -165,29 +169,29 @@ class Run:
             )
 
     def _settings(self, phase: Phase) -> RunSettings:
-        """What the phase is judged by, recorded beside it."""
+        """Return the settings that the recording keeps, and by which the phase is judged."""
         then = phase.follows is not None
         settings = settings_of(self.loaded.config, phase.plan())
         return replace(settings, procedure=phase.procedure.name, then_verify=then)
 
-    def _judged(self, phase: Phase, runs: tuple[RunData, ...], before: Outcome | None) -> Outcome:
-        with self.reported(self._repeating, moved=True):
+    def _judge(self, phase: Phase, runs: tuple[RunData, ...], before: Outcome | None) -> Outcome:
+        with self.report_end(self._advice_to_repeat, moved=True):
             outcome = phase.procedure.analyse(runs, before, phase.procedure.estimator)
             if runs and phase.procedure.calibrates_along:
                 check_observed(runs[-1], self.loaded.config.to_calibrate)
         if before is None:
-            for event in observations_of(outcome):
+            for event in list_observations(outcome):
                 self.station.event(event)
         return outcome
 
     def _store(self, outcome: Outcome) -> None:
-        with self.reported(self._mended, moved=True):
+        with self.report_end(self._advice, moved=True):
             for name, stored in store_calibrations(self.loaded.config, outcome.results):
                 sensor = self.loaded.config.sensors[name]
                 self.station.event(CalibrationStored(name, sensor.part, sensor.serial_number, stored.sequence))
 
-    def _written(self, outcome: Outcome) -> Outcome:
-        with self.reported(self._repeating, moved=True):
+    def _write(self, outcome: Outcome) -> Outcome:
+        with self.report_end(self._advice_to_repeat, moved=True):
             for event in write_outcome(self.folder, outcome):
                 self.station.event(event)
         for check in outcome.checks:
@@ -196,22 +200,22 @@ class Run:
         return outcome
 
     @property
-    def _mended(self) -> Advice:
-        return Advice(self.folder, self._going_on, repeats=False)
+    def _advice(self) -> Advice:
+        return Advice(self.folder, self._next_command, repeats=False)
 
     @property
-    def _repeating(self) -> Advice:
-        return Advice(self.folder, self._going_on, repeats=True)
+    def _advice_to_repeat(self) -> Advice:
+        return Advice(self.folder, self._next_command, repeats=True)
 
     @property
-    def _going_on(self) -> str:
+    def _next_command(self) -> str:
         return self.again or resuming(self.folder)
 
     @contextmanager
-    def reported(self, advice: Advice | None = None, *, moved: bool = False) -> Iterator[None]:
-        """What ends a run early goes into its log too; a fault is followed by `advice`, an interruption by its own.
+    def report_end(self, advice: Advice | None = None, *, moved: bool = False) -> Iterator[None]:
+        """Report whatever ends a run early into its log too, followed by `advice` after a fault.
 
-        A refusal says that nothing has moved: after a phase of the run (`moved`) it is a fault.
+        A refusal means that nothing has moved; after a motion of the run (`moved`) it becomes a fault.
         """
         try:
             yield
@@ -219,59 +223,59 @@ class Run:
             if isinstance(error, Refused) and not moved:
                 self.station.event(Failed(error))
                 raise
-            fault = Fault(error.name, _with_notes(error.what, error), error.remedy)
+            fault = Fault(error.name, _add_notes(error.what, error), error.remedy)
             fault.__cause__ = error
-            self._ended(Failed(fault), advice)
+            self._report(Failed(fault), advice)
             raise fault from error
         except OSError as error:
-            remedy = f"Correct that, then go on with: {self._going_on}"
+            remedy = f"Correct that, then go on with: {self._next_command}"
             fault = Fault("system", f"{self.folder} cannot be used ({error})", remedy)
-            self._ended(Failed(fault))
+            self._report(Failed(fault))
             raise fault from error
         except SystemExit as ended:
-            what = _with_notes(f"the script {self.script.name} ended the program (SystemExit: {ended})", ended)
+            what = _add_notes(f"the script {self.script.name} ended the program (SystemExit: {ended})", ended)
             fault = Fault("script_failed", what, ENDING)
             fault.__cause__ = ended
-            self._ended(Failed(fault), advice)
+            self._report(Failed(fault), advice)
             raise fault from ended
         except KeyboardInterrupt as interrupt:
-            stopped = _with_notes(str(interrupt) or "interrupted", interrupt)
-            text = f"{stopped}; the data are kept in {self.folder}. Go on with: {self._going_on}"
-            self._ended(Interrupted(text))
+            stopped = _add_notes(str(interrupt) or "interrupted", interrupt)
+            text = f"{stopped}; the data are kept in {self.folder}. Go on with: {self._next_command}"
+            self._report(Interrupted(text))
             raise KeyboardInterrupt(text) from None
         except Exception:
-            self._ended(Crashed(traceback.format_exc()))
+            self._report(Crashed(traceback.format_exc()))
             raise
 
-    def _ended(self, event: RunEvent, advice: Advice | None = None) -> None:
+    def _report(self, event: RunEvent, advice: Advice | None = None) -> None:
         self.station.event(event)
         if advice is not None and self.folder.exists():
             self.station.event(advice)
 
 
-def _with_notes(what: str, error: BaseException) -> str:
-    """What happened, and what the arm added on its way out about its stop."""
+def _add_notes(what: str, error: BaseException) -> str:
+    """Return the message `what` with the notes of the error, such as the arm's about its stop."""
     return "; ".join([what, *dict.fromkeys(_notes(error))])
 
 
 def _notes(error: BaseException | None) -> Iterator[str]:
-    """The notes of what ended the run, and of what it interrupted: a second Ctrl-C comes while the first is handled."""
+    """Yield the notes of an error and of those it interrupted: a second Ctrl-C arrives while the first is handled."""
     while error is not None:
         yield from getattr(error, "__notes__", ())
         error = None if error.__suppress_context__ else error.__context__
 
 
-def observations_of(outcome: Outcome) -> Iterator[ObservationMade | AttitudeRead]:
-    """What a calibration rests on, and the attitudes that were held out of it, for whoever looks on."""
+def list_observations(outcome: Outcome) -> Iterator[ObservationMade | AttitudeRead]:
+    """Yield a calibration's observations and attitudes, held-out ones too, as events for the page."""
     for name, result in outcome.results.items():
         for observation in result.observations:
             yield ObservationMade(name, observation)
-    for name, found in outcome.accelerometers.items():
-        for dwell in (*found.dwells, *(found.held_out.dwells if found.held_out else ())):
-            yield _read(name, ACCELERATION, dwell, found.gravity_m_s2)
+    for name, accelerometer in outcome.accelerometers.items():
+        for dwell in (*accelerometer.dwells, *(accelerometer.held_out.dwells if accelerometer.held_out else ())):
+            yield _read(name, ACCELERATION, dwell, accelerometer.gravity_m_s2)
     for name, solved in outcome.magnetometers.results.items():
-        for each in solved.dwells:
-            yield _read(name, FIELD, each, solved.field_t)
+        for reading in solved.dwells:
+            yield _read(name, FIELD, reading, solved.field_t)
 
 
 def _read(name: str, quantity: Quantity, dwell: DwellReading | StaticReading, expected: float) -> AttitudeRead:

@@ -1,7 +1,7 @@
 """Carries out the verbs of a script (`rig.plans.verbs`).
 
-Every verb is supervised: while the arm moves or rests the board and the recording are watched, and whatever ends a verb
-early (an error, Ctrl-C, a lost link) stops the arm first and is reported then.
+Every verb is supervised: while the arm moves or rests, the board and the recording are watched. Whatever ends a verb
+early (an error, Ctrl-C, a lost link) first stops the arm and is then reported.
 """
 
 import time
@@ -42,7 +42,7 @@ from rig.runner.first_samples import FirstSamples
 from rig.runner.mounted import Mounted, ask_of_other_boards
 from rig.runner.mounting import (
     REST_S,
-    Felt,
+    GyroscopeReadings,
     refuse_hanging_otherwise,
     refuse_turning_otherwise,
     refuse_unsteady,
@@ -65,19 +65,21 @@ from rig.turners.kind import AnyTurner
 from rig.turners.turner import Turner
 
 FIRST_SAMPLES_LOOK_S = 0.005  # between two looks whether every sensor has sent something
-LOOK_S = 60.0  # to solve what is recorded so far
+LOOK_S = 60.0  # the longest time to solve the recording so far
 SETTLING_LOOK_S = 0.05  # between two questions whether the sensors have settled
-AT_REST_TIMEOUT_S = 10.0  # for the readings that tell how they scatter before anything has moved
-TRIAL_REST_S = 0.3  # of readings after a trial of the mounting, by which it has ended for the sensors too
-SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
+AT_REST_TIMEOUT_S = 10.0  # for the readings whose scatter at rest is measured
+TRIAL_REST_S = 0.3  # of readings after a trial of the mounting: the sensors lag behind it
+SAME_POSE_RAD = radians(1)  # within this the operator's agreement still holds
 
 
 @dataclass(frozen=True, slots=True)
 class Devices:
-    """What is connected.
+    """The connected devices.
 
-    `turner` turns the sensors; `report` is how it stood, `kind` what it is, `section` how it is configured; `sources`
-    are where samples come from, those of the sensors that are `mounted`.
+    - `turner`: turns the sensors; `kind`: its kind; `section`: its configuration; `report`: its state when it was
+      connected.
+    - `sources`: deliver the samples.
+    - `mounted`: the sensors with their earlier calibrations.
     """
 
     turner: Turner
@@ -91,10 +93,7 @@ class Devices:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Where everything goes, and what of: `sensors` by name, and how what turns them is built.
-
-    What happens is told at the `station` as well.
-    """
+    """The recording, with its `sensors` by name and the turner's geometry; its events go to the `station` as well."""
 
     recorder: RunRecorder
     sensors: Mapping[str, RecordedSensor]
@@ -102,7 +101,7 @@ class Recording:
     geometry: DenavitHartenberg
 
     def note(self, event: Event) -> None:
-        """Record what happens, and tell it."""
+        """Record an event and report it."""
         self.recorder.add(event)
         self.station.event(event)
 
@@ -121,17 +120,20 @@ class Recording:
 class Rig:
     """The verbs of one phase.
 
-    `whole_plan` is the same as `plan`, or more when an interrupted run goes on or the item is mounted in stages: this
-    one has the number `stage`, from 0, and is the `last` or not; `along` is there when the board calibrates along,
-    `hand` where an operator's turns the item, `warming` where its temperature is to change, and `up` is that direction
-    in the frame of the arm's base. Where there is an `early` end, all that follows it is passed over but a way home.
+    - `plan`: the motions of this recording; `whole_plan`: also those done before an interruption or in other stages.
+    - `stage`: the number of this stage, from 0; `last`: whether no stage follows.
+    - `onboard`: the calibration by the board itself, if it makes one.
+    - `hand`: the session, if an operator turns the item.
+    - `up`: the vertical in the frame of the arm's base.
+    - `early`: the condition to end early, if there is one; then all motions but one home are skipped.
+    - `warming`: the supervision of the temperature, if the procedure changes it.
     """
 
     devices: Devices
     plan: Plan
     whole_plan: Plan
     recording: Recording
-    along: BoardCalibration | None
+    onboard: BoardCalibration | None
     phase: Phase
     hand: HandSession | None = None
     stage: int = 0
@@ -139,18 +141,18 @@ class Rig:
     up: Vector3 = (0.0, 0.0, 1.0)
     early: EndingEarly | None = None
     warming: Warming | None = None
-    _made: set[int] = field(default_factory=set)  # sweeps and dwells since the latest wait for a temperature
+    _done: set[int] = field(default_factory=set)  # sweeps and dwells since the latest wait for a temperature
     _resting_rad_s: dict[str, Array] = field(default_factory=dict)  # of each gyroscope, before anything moved
-    _motions: Iterator[Motion] | None = None  # the plan's, those to come; None before pre-flight
-    _number: int = 0  # of the step that goes on, or the last one
-    _done_s: float = 0.0  # planned duration of the steps behind us
+    _motions: Iterator[Motion] | None = None  # those of the plan that remain; None before pre-flight
+    _number: int = 0  # of the present step, or the last one
+    _done_s: float = 0.0  # planned duration of the finished steps
     _step_started_s: float = 0.0  # controller time
 
     def preflight(self) -> None:
-        """Check all that must be right before the arm moves, ask the operator, and take control of the arm.
+        """Check every condition of a movement, ask the operator, and take control of the arm.
 
-        A movement that was agreed to before begins without asking, unless the arm no longer stands where it was left.
-        Raises `Refused` naming every problem found; nothing has moved then.
+        A movement that was agreed to before begins without a question, unless the arm has moved since. Raise `Refused`
+        with every problem; nothing has moved then.
         """
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
         refuse(kind.problems([self.whole_plan, self.plan], section, report))
@@ -171,13 +173,13 @@ class Rig:
         devices, station = self.devices, self.recording.station
         ask_of_other_boards(devices.mounted, station)
         repeated = self.whole_plan if self.phase.follows else None
-        told = self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines()
-        said = announcement(*told, early=self.early is not None)
-        if not station.ask(said):
+        situation = self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines()
+        question = announcement(*situation, early=self.early is not None)
+        if not station.ask(question):
             raise Refused("not_confirmed", "nobody agreed to the movement", NOT_AGREED)
 
     def _refuse_moved(self) -> None:
-        """Refuse an arm that somebody moved while the operator thought: it would take another way than announced."""
+        """Raise Refused `arm_moved` if the arm was moved since the announcement, as it would then take another path."""
         moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.turner.latest.q_rad)), default=0.0)
         if moved_rad > SAME_POSE_RAD:
             raise Refused(
@@ -188,60 +190,60 @@ class Rig:
             )
 
     def start_sampling(self) -> None:
-        """Let every source stream; from here on every sample is recorded. Raises `Fault` for a silent sensor."""
+        """Start every source; from here on every sample is recorded. Raise `Fault` for a silent sensor."""
         sources, turner = self.devices.sources, self.devices.turner
-        if self.along is not None:
-            self.along.begin()
+        if self.onboard is not None:
+            self.onboard.begin()
         for source in sources:
             source.start()
         first_samples = FirstSamples(FIRST_SAMPLES_LOOK_S)
-        while silent := self.devices.acquisition.silent():
+        while silent := self.devices.acquisition.find_silent():
             self._check()
             turner.check()
             first_samples.wait_on(silent, turner.latest.time_s)
             time.sleep(FIRST_SAMPLES_LOOK_S)
         if self.whole_plan.dwells:
-            self._wait(self.devices.acquisition.settling.learned, AT_REST_TIMEOUT_S, self._check)
+            self._wait(self.devices.acquisition.settling.learn_rest, AT_REST_TIMEOUT_S, self._check)
         if self.whole_plan.stages:
             self._look_at_the_mounting(self.whole_plan.stages[self.stage])
         self.recording.station.event(SamplingStarted())
 
     def _look_at_the_mounting(self, stage: Stage) -> None:
-        """Refuse an item that is not at rest, or that hangs otherwise than the stage says."""
+        """Raise Refused if the item is not at rest, or if its orientation contradicts the stage."""
         self.devices.acquisition.keep()
         state = self.devices.turner.latest
         up = flange_attitude(np.array(state.q_rad), self.recording.geometry) @ np.array(self.up)
-        for felt in self._felt(REST_S, self._check):
-            refuse_unsteady(felt, self.devices.kind.words.short)
-            refuse_hanging_otherwise(felt, stage, up)
-            self._resting_rad_s[felt.name] = felt.rates_rad_s.mean(axis=0)
+        for readings in self._collect_readings(REST_S, self._check):
+            refuse_unsteady(readings, self.devices.kind.words.short)
+            refuse_hanging_otherwise(readings, stage, up)
+            self._resting_rad_s[readings.name] = readings.rates_rad_s.mean(axis=0)
 
-    def _felt(self, lasting_s: float, watch: Callable[[], None]) -> list[Felt]:
-        """What all gyroscopes have read since the latest `keep`, once that is so long by the clock of each."""
+    def _collect_readings(self, lasting_s: float, watch: Callable[[], None]) -> list[GyroscopeReadings]:
+        """Return the gyroscopes' readings since the latest `keep`, once they last `lasting_s` by each clock."""
         acquisition = self.devices.acquisition
-        sensors = {name: each for name, each in self.recording.sensors.items() if each.measures(RATE)}
+        sensors = {name: sensor for name, sensor in self.recording.sensors.items() if sensor.measures(RATE)}
 
         def long_enough() -> bool:
-            return all(_span_s(acquisition.newest(name)) >= lasting_s for name in sensors)
+            return all(_span_s(acquisition.collect_newest(name)) >= lasting_s for name in sensors)
 
         if not self._wait(long_enough, lasting_s + AT_REST_TIMEOUT_S, watch):
             raise Fault(
                 "no_samples", f"in {lasting_s:g} s too few samples arrived", "Check the cables, then run `rig check`"
             )
-        return [Felt(name, sensor, acquisition.newest(name)) for name, sensor in sensors.items()]
+        return [GyroscopeReadings(name, sensor, acquisition.collect_newest(name)) for name, sensor in sensors.items()]
 
     def _try_the_mounting(self, trial: Transfer, took_s: float) -> None:
-        """End the run where the sensors do not feel a trial's turn as the stage says."""
+        """Raise Fault if the gyroscopes' readings in a trial contradict the stage's mounting."""
         turned = np.array(travel(trial.start_q_rad, trial.target_q_rad))
         axes = flange_axes(np.array(trial.start_q_rad), self.recording.geometry)
-        for felt in self._felt(took_s + TRIAL_REST_S, lambda: self._watch(trial)):
-            stage, resting_rad_s = self.whole_plan.stages[self.stage], self._resting_rad_s[felt.name]
-            refuse_turning_otherwise(felt, resting_rad_s, stage, axes @ turned, trial.name)
+        for readings in self._collect_readings(took_s + TRIAL_REST_S, lambda: self._watch(trial)):
+            stage, resting_rad_s = self.whole_plan.stages[self.stage], self._resting_rad_s[readings.name]
+            refuse_turning_otherwise(readings, resting_rad_s, stage, axes @ turned, trial.name)
 
     def move(self, transfer: Transfer) -> None:
-        """Bring the arm to where the next sweep starts, or home. Raises `unplanned_motion`."""
+        """Move the arm to the start of the next sweep, or home. Raise `unplanned_motion`."""
         self._refuse_unplanned(transfer)
-        if self._passed_over(transfer):
+        if self._skips(transfer):
             return
         if transfer.tries:
             self.devices.acquisition.keep()
@@ -252,26 +254,25 @@ class Rig:
                 self._try_the_mounting(transfer, self.devices.turner.latest.time_s - began_s)
 
     def sweep(self, sweep: Sweep) -> None:
-        """Turn one wrist through a whole revolution, or an arc, at constant speed and note when it began and ended.
+        """Turn one joint through a revolution, or an arc, at constant speed, and record when it began and ended.
 
-        Afterwards, while the arm stands still, the board averages it as well when it calibrates along.
-        Raises `unplanned_motion`.
+        Afterwards, while the arm stands still, a board that calibrates by itself averages it. Raise `unplanned_motion`.
         """
         self._refuse_unplanned(sweep)
-        if self._passed_over(sweep):
+        if self._skips(sweep):
             return
-        if self.along is not None:
-            self.along.keep(sweep)
+        if self.onboard is not None:
+            self.onboard.keep(sweep)
         with self._step(sweep, then=lambda: self._observe(sweep)):
             self.recording.note(SweepStarted(sweep))
             self.devices.turner.move(sweep, lambda: self._watch(sweep))
             self.recording.note(SweepFinished(sweep))
         if self.early is not None:
-            self.early.swept(sweep)
-        self._made.add(sweep.index)
+            self.early.note_sweep(sweep)
+        self._done.add(sweep.index)
 
     def _refuse_unplanned(self, motion: Motion) -> None:
-        """Pre-flight has judged the plan's motions, one from the end of the other: nobody has looked at other ways."""
+        """Raise `unplanned_motion` unless the motion is the plan's next: pre-flight has judged no other."""
         what = f"the script orders {motion.name}"
         remedy = "Let the script make the motions of `plan.steps`, each once, in their order, after `preflight()`"
         if self._motions is None:
@@ -281,37 +282,37 @@ class Rig:
             planned = "no motion is left" if due is None else f"{due.name} comes next"
             raise Fault("unplanned_motion", f"{what}, but in the plan that passed pre-flight {planned}", remedy)
 
-    def _passed_over(self, motion: Motion) -> bool:
-        """Whether a motion is not made, because what is wanted is reached; looks whether it is, after a repeat."""
+    def _skips(self, motion: Motion) -> bool:
+        """Return whether to skip a motion as the target is reached; assess that after each repeat."""
         if self.early is None:
             return False
         if self.early.due():
             turner = self.devices.turner
             host_s, turner_s = time.monotonic(), turner.latest.time_s
-            with self.early.looking() as looked:
+            with self.early.look_in_background() as looked:
                 # By both clocks: this computer may be busy, and the controller's clock may be simulated.
                 while not looked.done() and min(time.monotonic() - host_s, turner.latest.time_s - turner_s) < LOOK_S:
                     turner.rest(SETTLING_LOOK_S, self._check)
-                said = self.early.found(looked)
-            if said is not None:
-                self.recording.station.event(said)
-        return self.early.passes_over(motion)
+                reached = self.early.conclude(looked)
+            if reached is not None:
+                self.recording.station.event(reached)
+        return self.early.skips(motion)
 
     def _observe(self, sweep: Sweep) -> None:
-        """Let the board average the sweep. What it is told takes seconds to find; a heater is spoken to meanwhile."""
-        if self.along is None:
+        """Let the board average the sweep. To find its window takes seconds; a heater gets commands meanwhile."""
+        if self.onboard is None:
             return
         if self.warming is None:
-            found = self.along.revolutions(sweep)
+            revolutions = self.onboard.revolutions(sweep)
         else:
-            with self.along.looking(sweep) as looked:
+            with self.onboard.look_in_background(sweep) as looked:
                 while not looked.done():
                     self.devices.turner.rest(SETTLING_LOOK_S, self._check)
-            found = looked.result()
-        self.along.observe(sweep, found)
+            revolutions = looked.result()
+        self.onboard.observe(sweep, revolutions)
 
     def rest(self, rest: Rest) -> None:
-        """Stand still: the readings here show the bias and the noise."""
+        """Stand still, in order to measure bias and noise."""
         if self.early is not None and self.early.ended:
             return
         with self._step(rest):
@@ -320,20 +321,22 @@ class Rig:
             self.recording.note(RestFinished())
 
     def dwell(self, dwell: Dwell) -> None:
-        """Stand still in an attitude until the sensors have settled, then measure. Raises Fault `not_settled`."""
+        """Stand still in an attitude until the sensors have settled, then measure. Raise Fault `not_settled`."""
         with self._step(dwell):
             settling = self.devices.acquisition.settling
             settling.begin()
-            if not self._wait(lambda: not settling.unsettled(), dwell.settle_s, lambda: self._watch(dwell)):
-                raise _not_settled(dwell, settling.unsettled())
+            if not self._wait(lambda: not settling.find_unsettled(), dwell.settle_s, lambda: self._watch(dwell)):
+                raise _not_settled(dwell, settling.find_unsettled())
             self.recording.note(DwellStarted(dwell))
-            with self.devices.acquisition.standing():
+            with self.devices.acquisition.thin_states():
                 self.devices.turner.rest(dwell.duration_s, lambda: self._watch(dwell))
             self.recording.note(DwellFinished(dwell))
-        self._made.add(dwell.index)
+        self._done.add(dwell.index)
 
     def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None]) -> bool:
-        """Stand still until something is so; False when it was not within so much of the controller's time."""
+        """Stand still until `until` returns True; return False if it did not within `at_most_s` of the controller's
+        time.
+        """
         turner = self.devices.turner
         began_s = turner.latest.time_s
         while not until():
@@ -343,19 +346,19 @@ class Rig:
         return True
 
     def wait_for_next_temperature(self, rest: Rest) -> bool:
-        """Stand still until the sensors are as warm as the next set wants them; False where the range is covered.
+        """Stand still until the sensors have the next set's temperature; return False if the range is covered.
 
-        Raises Refused `other_turner` where the procedure has no temperatures, Fault `range_not_reached`.
+        Raise Refused `other_procedure` if the procedure has no temperatures, Fault `range_not_reached`.
         """
         warming = self._temperatures()
         self._end_set()
-        missing = warming.wanted()
+        missing = warming.find_missing()
         if missing is None:
             return False
         with self._step(rest):
             warming.begin_waiting()
             at_most_s = 60 * warming.section.timeout_min
-            with self.devices.acquisition.standing():
+            with self.devices.acquisition.thin_states():
                 due = self._wait(lambda: warming.is_due, at_most_s, lambda: self._watch(rest))
             if not due:
                 raise range_not_reached(
@@ -365,11 +368,11 @@ class Rig:
         return True
 
     def end_temperature_range(self) -> None:
-        """Switch the heater off. Raises Fault `range_not_reached` where no set has covered a part of the range."""
+        """Switch the heater off. Raise Fault `range_not_reached` if a part of the range is not covered."""
         warming = self._temperatures()
         self._end_set()
         warming.stop_heating()
-        missing = warming.wanted()
+        missing = warming.find_missing()
         if missing is not None:
             raise range_not_reached(missing, f"{warming.section.repeats} sets are made (procedure.repeats)")
 
@@ -383,13 +386,13 @@ class Rig:
         return self.warming
 
     def _end_set(self) -> None:
-        """Count what was made since the latest wait."""
-        if self.warming is not None and self._made:
-            self.warming.end_set(min(self._made), max(self._made) + 1)
-        self._made.clear()
+        """End the set of the sweeps and dwells since the latest wait."""
+        if self.warming is not None and self._done:
+            self.warming.end_set(min(self._done), max(self._done) + 1)
+        self._done.clear()
 
     def turn_by_hand(self) -> None:
-        """Let the operator lay the item down and turn it. Raises Refused `other_turner` where an arm is configured."""
+        """Let the operator lay the item down and turn it. Raise Refused `other_turner` if an arm is configured."""
         if self.hand is None:
             raise Refused(
                 "other_turner",
@@ -399,42 +402,42 @@ class Rig:
         self.hand.carry_out(self._check_along)
 
     def _check_along(self) -> None:
-        """Raise what has become of the board, and tell how many samples came."""
+        """Check the sources and the recording, and report the number of samples."""
         self._check()
         self.recording.station.event(SamplesTaken(self.devices.acquisition.samples()))
 
     def solve_on_board(self) -> None:
-        """Let the board compute its own calibration from what it has averaged; it stands beside the host's.
+        """Let the board compute its own calibration from its averages, for comparison with the host's.
 
-        From the sweeps of all stages, after the last one: it knows speeds alone, whatever the item turns about.
+        Only after the last stage, from the sweeps of all: it uses speeds alone, whatever axis of the item is turned.
         """
-        if self.along is not None and self.last:
-            self.along.solve()
+        if self.onboard is not None and self.last:
+            self.onboard.solve()
 
     def readings(self) -> dict[str, str]:
-        """What every sensor streams, "raw" or "calibrated", by its name."""
+        """Return each sensor's stream, "raw" or "calibrated", by name."""
         return {name: sensor.mode for name, sensor in self.recording.sensors.items()}
 
-    def recorded(self) -> PhaseRecorded:
-        """What was recorded and what was missed."""
+    def summarize(self) -> PhaseRecorded:
+        """Return the numbers of recorded and missed samples and states."""
         return PhaseRecorded(self.devices.acquisition.samples(), self.devices.turner.missed_states)
 
     @contextmanager
     def _step(self, step: Step, then: Callable[[], None] = lambda: None) -> Iterator[None]:
-        """One step from its first event to its last; what happens `then` belongs to it, but not to its time."""
+        """Report the start and the end of a step; `then` is part of the step, but not of its time."""
         self._number += 1
-        place = self._number, len(self.plan.steps), step
+        position = self._number, len(self.plan.steps), step
         turner = self.devices.turner
         self._step_started_s = turner.latest.time_s
-        self.recording.station.event(StepStarted(*place))
+        self.recording.station.event(StepStarted(*position))
         yield
         took_s = turner.latest.time_s - self._step_started_s
         then()
         self._done_s += step.duration_s
-        self.recording.station.event(StepFinished(*place, took_s))
+        self.recording.station.event(StepFinished(*position, took_s))
 
     def _check(self) -> None:
-        """Raise what has become of the sources or the recording."""
+        """Raise the error of a source, the recording or the temperature, if there is one."""
         for source in self.devices.sources:
             source.check(self.devices.turner.latest.time_s)
         self.recording.check()
@@ -442,11 +445,11 @@ class Rig:
             self.warming.check(self.devices.turner.latest.time_s)
 
     def _watch(self, step: Step) -> None:
-        """Look, many times a second while the arm is busy, after board and recording, tell the operator."""
+        """Check the sources and the recording, and report progress; called many times a second during a step."""
         self._check()
         state = self.devices.turner.latest
         within_s = min(state.time_s - self._step_started_s, step.duration_s)
-        # A script may make steps of its own, one that takes no time too.
+        # A script may make steps of its own, even of zero duration.
         fraction = within_s / step.duration_s if step.duration_s > 0 else 1.0
         self.recording.station.event(SamplesTaken(self.devices.acquisition.samples()))
         self.recording.station.event(ArmSeen(state, self.devices.turner.missed_states))
@@ -464,7 +467,7 @@ class Rig:
 
 
 def _span_s(samples: np.ndarray) -> float:
-    """How long samples (n,) last by the clock that stamped them."""
+    """Return the time between the first and the last of samples (n,), s, by the clock that stamped them."""
     return float(np.ptp(samples["board_time_us"])) * 1e-6 if len(samples) else 0.0
 
 

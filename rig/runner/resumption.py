@@ -1,4 +1,4 @@
-"""What an interrupted run has done already, and that the rest of it is the rest of the same run."""
+"""The finished part of an interrupted run, and the check that the rest belongs to the same run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ REMEDY = "Undo the change in config.yaml, or start a new run with `rig run`"
 
 @dataclass(frozen=True, slots=True)
 class Resumption:
-    """The recordings so far, oldest first, and the sweeps and dwells in them that count; none in a new run."""
+    """The recordings so far, oldest first, and the indices of their valid sweeps and dwells; none in a new run."""
 
     earlier: Sequence[RunData] = ()
     done: frozenset[int] = frozenset()
 
     def refuse_other_instruments(self, provenance: Provenance, sensors: Mapping[str, RecordedSensor]) -> None:
-        """Readings of two boards, or at two settings, are not one calibration.
+        """Raise Refused `another_board`, `another_arm`, `another_sensor` if the devices differ.
 
-        Raises Refused `another_board`, `another_arm`, `another_sensor`.
+        Readings of two boards, or at two settings, are not one calibration.
         """
         for run in self.earlier:
             begun = run.provenance
@@ -49,10 +49,10 @@ class Resumption:
 
 
 def resumption(earlier: Sequence[RunData], settings: RunSettings, script: ScriptFile) -> Resumption:
-    """What counts of the recordings of an interrupted run: sound dwells, sound sweeps that the board has averaged too.
+    """Return the valid steps of an interrupted run: dwells, and sweeps that the board has averaged too.
 
-    A sweep that contradicts the others is to be repeated. Both are counted by their place in the procedure,
-    so the rest of a run must be the rest of the same one. Raises Refused `another_script`, `another_procedure`.
+    A sweep that contradicts the others does not count. Steps are identified by their index in the procedure, so script
+    and movement must be the same. Raise Refused `another_script`, `another_procedure`.
     """
     for run in earlier:
         if run.provenance.script_sha256 != script.sha256:
@@ -67,8 +67,8 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
                 "config.yaml in the run folder describes another procedure or home pose than the recording there",
                 REMEDY,
             )
-    swept = (
+    sound = (
         sound_sweeps(run, settings.observation) & find_averaged_sweeps(run, settings.to_calibrate) for run in earlier
     )
     dwelt = (sound_dwells(run, settings.observation) for run in earlier)
-    return Resumption(earlier, frozenset[int]().union(*swept, *dwelt) - disturbed_sweeps(earlier))
+    return Resumption(earlier, frozenset[int]().union(*sound, *dwelt) - disturbed_sweeps(earlier))

@@ -1,6 +1,6 @@
-"""When the sensors have settled after a motion: their readings scatter hardly more than they did before anything moved.
+"""The test whether the sensors have settled after a motion: their readings scatter hardly more than at the start.
 
-The arm's controller says that it stands still while what it carries still swings, so the sensors are asked.
+The arm's controller reports standstill while the carried parts still oscillate, so the sensors decide.
 """
 
 import threading
@@ -15,13 +15,14 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 
-SPAN_S = 0.5  # of readings that are looked at, all of them after the motion
-SPANS_AT_REST = (
-    6  # what the arm vibrates with where it stands comes and goes: the largest of these is what rest is like
-)
-QUIET = 1.2  # times the scatter at rest; the scatter of a hundred samples on three axes is known to 4 %
-STEADY, NOT_FALLING = 2.0, 0.85  # an arm vibrates differently in each attitude: what stays as it is no swing either
-LEAST_COUNTS = 0.5  # of scatter: rounding is no swing
+SPAN_S = 0.5  # of readings in one scatter, all after the motion
+SPANS_AT_REST = 6  # the vibration of a standing arm comes and goes: the largest of these counts as rest
+QUIET = 1.2  # times the scatter at rest; that of a hundred samples on three axes has a standard uncertainty of 4 %
+STEADY, NOT_FALLING = (
+    2.0,
+    0.85,
+)  # an arm vibrates differently in each attitude: a constant scatter is no decaying oscillation
+LEAST_COUNTS = 0.5  # of scatter: less is rounding
 
 
 @dataclass(slots=True)
@@ -35,9 +36,10 @@ class _Watched:
     at_rest_counts: list[float] = field(default_factory=list)
 
     def scatter_counts(self, before: int = 0) -> float | None:
-        """RMS over the axes of the standard deviation of the newest readings, or of those so many spans `before`.
+        """Return the RMS over the axes of the standard deviation of the newest span, or of the one `before` spans
+        earlier.
 
-        None while there are too few.
+        None if there are too few readings.
         """
         if len(self.recent) < (before + 1) * self.enough:
             return None
@@ -46,7 +48,7 @@ class _Watched:
         return float(np.sqrt(np.var(span, axis=0).mean()))
 
     def over_rest(self) -> float | None:
-        """The newest scatter over that at rest, None with too few readings."""
+        """Return the ratio of the newest scatter to that at rest; None if there are too few readings."""
         scatter = self.scatter_counts()
         if scatter is None or not self.at_rest_counts:
             return None
@@ -54,7 +56,7 @@ class _Watched:
 
     @property
     def settled(self) -> bool:
-        """Whether it scatters as at rest, or not much more and without becoming quieter."""
+        """Whether it scatters as at rest, or slightly more without decreasing."""
         ratio, scatter, earlier = self.over_rest(), self.scatter_counts(), self.scatter_counts(before=1)
         if ratio is None or scatter is None:
             return False
@@ -64,16 +66,16 @@ class _Watched:
 
 @dataclass(slots=True)
 class Settling:
-    """What tells whether sensors have settled: fed by the sources' reader threads, asked by the script's."""
+    """The test of all sensors, fed by the threads of the sources, read by the script's."""
 
     _watched: dict[str, _Watched] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def expect(self, name: str, sensor: RecordedSensor) -> None:
-        """Watch a sensor: its accelerations where it sends them, else its rates."""
+        """Watch a sensor: its accelerations if it sends them, else its rates."""
         enough = max(2, round(SPAN_S * sensor.rate_hz))
-        of = sensor.channel(ACCELERATION if sensor.measures(ACCELERATION) else RATE).column
-        self._watched[name] = _Watched(name, of, enough, deque(maxlen=2 * enough))
+        column = sensor.channel(ACCELERATION if sensor.measures(ACCELERATION) else RATE).column
+        self._watched[name] = _Watched(name, column, enough, deque(maxlen=2 * enough))
 
     def add(self, sensor: str, samples: NDArray[Any]) -> None:
         """Take the newest readings (n,) of a sensor that is watched."""
@@ -83,13 +85,13 @@ class Settling:
                 watched.recent.extend(samples[watched.column].astype(np.float64))
 
     def begin(self) -> None:
-        """The arm stands from now on: what was read before does not count."""
+        """Drop the readings so far, as the arm stands still from now on."""
         with self._lock:
             for watched in self._watched.values():
                 watched.recent.clear()
 
-    def learned(self) -> bool:
-        """Take what is read now for how it is at rest; False while there is too little of it."""
+    def learn_rest(self) -> bool:
+        """Add the present scatter to those at rest; return False while there are too few."""
         with self._lock:
             for watched in self._watched.values():
                 scatter = watched.scatter_counts()
@@ -98,7 +100,7 @@ class Settling:
                     watched.recent.clear()
             return all(len(watched.at_rest_counts) >= SPANS_AT_REST for watched in self._watched.values())
 
-    def unsettled(self) -> dict[str, float | None]:
-        """The sensors that have not settled: name → scatter over that at rest, None with too few readings."""
+    def find_unsettled(self) -> dict[str, float | None]:
+        """Return the sensors that have not settled: name → scatter over that at rest, None with too few readings."""
         with self._lock:
-            return {each.name: each.over_rest() for each in self._watched.values() if not each.settled}
+            return {watched.name: watched.over_rest() for watched in self._watched.values() if not watched.settled}

@@ -1,7 +1,7 @@
-"""Watches how warm the sensors are by their own thermometers, and has the board's heater follow a ramp.
+"""The supervision of the sensors' temperatures by their own thermometers, and the ramp of the board's heater.
 
-Looked at many times a second, whatever the arm does: what is too hot or changes too fast ends the run, which stops the
-arm first. The board's heater hears from here again and again; when nobody speaks to it any more, it goes off.
+Checked many times a second, whatever the arm does: a sensor that is too hot or changes too fast ends the run, which
+stops the arm first. The board's heater switches itself off unless the commands from here keep arriving.
 """
 
 from collections import deque
@@ -21,21 +21,22 @@ from rig.errors import Fault, ProblemError, Refused
 from rig.plans.motions.temperature_course import Ramp, TemperatureCourse
 from rig.runner.acquisition import Acquisition
 
-LOOK_S = 0.25  # between two looks, and two words to the heater
+LOOK_S = 0.25  # between two checks, and two commands to the heater
 RATE_SPAN_S = 30.0  # over which the rate of change is judged: a thermometer's counts are coarse
 RATE_LEAST_S = 0.8 * RATE_SPAN_S
-RAMP_SHARE = 0.6  # of the rate that is allowed: the parts do not follow evenly
-SET_SHARE = 0.6  # of a gap, that a set may take
-BEYOND_K = 1.0  # the ends of the range, so that a set's mean comes there
+RAMP_SHARE = 0.6  # of the largest allowed rate: the parts do not follow evenly
+SET_SHARE = 0.6  # of a gap, within which a set must end
+BEYOND_K = 1.0  # beyond the ends of the range, so that a set's mean reaches them
 KEEPS_AWAY_K = 2.0  # from the heater's own limit
 
 
 @dataclass(slots=True)
 class Warming:
-    """What a calibration over temperature watches and does beside its motions.
+    """The supervision of a calibration over temperature.
 
-    `names` are the sensors whose thermometers count. `heater` is the board that has it; None where the operator changes
-    the temperature. `set_s` is how long a set takes, as planned or longer.
+    - `names`: the sensors whose thermometers count.
+    - `heater`: the board that has it; None if the operator changes the temperature.
+    - `set_s`: the duration of a set, the planned one or the longest so far.
     """
 
     section: ThermalSection
@@ -45,17 +46,14 @@ class Warming:
     heater: Board | None
     set_s: float
     course: TemperatureCourse
-    _seen: dict[str, deque[tuple[float, float]]] = field(default_factory=dict)
-    _of_set: list[dict[str, float]] | None = None  # temperatures, since a set began
-    _began_s: float = 0.0  # the set
+    _history: dict[str, deque[tuple[float, float]]] = field(default_factory=dict)
+    _of_set: list[dict[str, float]] | None = None  # temperatures since the set began
+    _began_s: float = 0.0  # when the set began
     _ramp: Ramp | None = None
     _looked_s: float = -np.inf
 
     def prepare(self) -> None:
-        """Refuse a sensor without a thermometer and a board without a heater, before anything has moved.
-
-        Raises Refused `no_thermometer`, `no_heater`.
-        """
+        """Raise Refused `no_thermometer`, `no_heater` for such a sensor or board, before anything has moved."""
         for name in self.names:
             sensor = self.acquisition.counts[name].sensor
             if sensor.temperature_stated or not sensor.measures(TEMPERATURE):
@@ -82,14 +80,14 @@ class Warming:
 
     @property
     def _rate_k_s(self) -> float:
-        """How fast a ramp may be: within the limit, and so that a set is made within a part of a gap."""
+        """The rate of a ramp: below the limit, and so slow that a set ends within a part of a gap."""
         allowed_k_s = RAMP_SHARE * self.section.max_rate_k_per_min / 60
         return min(allowed_k_s, SET_SHARE * self.section.max_step_k / max(self.set_s, 1.0))
 
     def check(self, time_s: float) -> None:
-        """Look at the thermometers at that time of the controller's, and speak to the heater.
+        """Check the thermometers at the controller's time `time_s`, and command the heater.
 
-        Raises Fault `overheated`, `too_fast`.
+        Raise Fault `overheated`, `too_fast`.
         """
         if time_s - self._looked_s < LOOK_S:
             return
@@ -100,23 +98,23 @@ class Warming:
         if self._of_set is not None:
             self._of_set.append(now_c)
         self._refuse_hot(now_c)
-        for name, (read_s, temperature_c) in self.acquisition.newest_of(TEMPERATURE).items():
+        for name, (read_s, temperature_c) in self.acquisition.find_newest_readings(TEMPERATURE).items():
             if name in now_c:
                 self._refuse_fast(name, read_s, temperature_c)
         self._heat(time_s, now_c)
 
     def now_c(self) -> dict[str, float]:
-        """What the thermometers of the sensors read now, by name; empty before all have sent something."""
-        latest = {each.sensor: each.latest.get(TEMPERATURE.name) for each in self.acquisition.samples()}
-        found = {name: value[0] for name in self.names if (value := latest.get(name)) is not None}
-        return found if len(found) == len(self.names) else {}
+        """Return the sensors' temperatures by name; empty until all have sent one."""
+        latest = {sample.sensor: sample.latest.get(TEMPERATURE.name) for sample in self.acquisition.samples()}
+        readings_c = {name: value[0] for name in self.names if (value := latest.get(name)) is not None}
+        return readings_c if len(readings_c) == len(self.names) else {}
 
-    def wanted(self) -> str | None:
-        """What is still missing of the range; None where it is covered."""
+    def find_missing(self) -> str | None:
+        """Return the part of the range that is not covered yet, in words; None if there is none."""
         return self.course.missing()
 
     def begin_waiting(self) -> None:
-        """Say what is waited for: the operator sees to it, or the heater does."""
+        """Report the temperature that is waited for; the operator or the heater changes it."""
         now_c = self.now_c()
         nearest = self._nearest(now_c)
         if self.course.warming is None:
@@ -132,13 +130,13 @@ class Warming:
         return self.course.is_due(self.now_c())
 
     def begin_set(self) -> None:
-        """What is read from now on is the temperature of the set that follows."""
+        """Begin to average the temperatures of the set that follows."""
         self._of_set, self._began_s = [], self._looked_s
 
     def end_set(self, first: int, end: int) -> None:
-        """The sweeps and dwells from `first` up to `end` are made."""
+        """End the set of the sweeps and dwells from index `first` up to `end`."""
         if self._of_set:
-            means = {name: float(np.mean([each[name] for each in self._of_set])) for name in self.names}
+            means = {name: float(np.mean([now_c[name] for now_c in self._of_set])) for name in self.names}
             measured = SetMeasured(first, end, bool(self.course.warming), means)
             self.note(measured)
             self.course.add_set(measured)
@@ -148,13 +146,13 @@ class Warming:
             self._ramp.rate_k_s = self._rate_k_s
 
     def stop_heating(self) -> None:
-        """The heater off, and nothing more said to it."""
+        """Switch the heater off and send it no more commands."""
         self._ramp = None
         if self.heater is not None:
             self.heater.keep_heating(0.0)
 
     def _nearest(self, now_c: Mapping[str, float]) -> float:
-        """The temperature of the sensor that is last on the way."""
+        """Return the temperature of the sensor that lags most in the direction of the course."""
         return max(now_c.values()) if self.course.warming is False else min(now_c.values())
 
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:
@@ -169,16 +167,16 @@ class Warming:
             )
 
     def _refuse_fast(self, name: str, read_s: float, temperature_c: float) -> None:
-        """Raise `too_fast` by when the board read it: a busy computer hears of it at another time."""
-        seen = self._seen.setdefault(name, deque())
-        if seen and read_s <= seen[-1][0]:
+        """Raise `too_fast` by the board's time of each reading, as a busy computer receives it late."""
+        history = self._history.setdefault(name, deque())
+        if history and read_s <= history[-1][0]:
             return
-        seen.append((read_s, temperature_c))
-        while seen[-1][0] - seen[0][0] > RATE_SPAN_S:
-            seen.popleft()
-        if seen[-1][0] - seen[0][0] < RATE_LEAST_S:
+        history.append((read_s, temperature_c))
+        while history[-1][0] - history[0][0] > RATE_SPAN_S:
+            history.popleft()
+        if history[-1][0] - history[0][0] < RATE_LEAST_S:
             return
-        times_s, temperatures_c = np.array(seen).T
+        times_s, temperatures_c = np.array(history).T
         k_per_min = 60 * float(np.polynomial.polynomial.polyfit(times_s - times_s[0], temperatures_c, 1)[1])
         if abs(k_per_min) > self.section.max_rate_k_per_min:
             raise Fault(
@@ -190,7 +188,7 @@ class Warming:
             )
 
     def _heat(self, time_s: float, now_c: Mapping[str, float]) -> None:
-        """One word to the heater."""
+        """Send the heater one command."""
         if self._ramp is None or self.heater is None or self.course.warming is None:
             return
         ends_c = self.section.from_c - BEYOND_K, self.section.to_c + BEYOND_K
@@ -199,7 +197,7 @@ class Warming:
 
 
 def range_not_reached(missing: str, why: str) -> Fault:
-    """The range is not covered, and the run goes no further."""
+    """Return the fault that the range is not covered and the run ends."""
     return Fault(
         "range_not_reached",
         f"{missing}; {why}",

@@ -248,7 +248,7 @@ def test_an_interrupted_part_is_gone_on_with_by_the_stations_own_command(tmp_pat
     going_on = "rig station a.yaml --out batch"
     nowhere = cast(Loaded, None), cast(ScriptFile, None), Stations((), always_yes)
     run = Run(tmp_path, *nowhere, again=going_on)
-    with pytest.raises(KeyboardInterrupt, match=f"Go on with: {going_on}$"), run.reported():
+    with pytest.raises(KeyboardInterrupt, match=f"Go on with: {going_on}$"), run.report_end():
         raise KeyboardInterrupt
 
 

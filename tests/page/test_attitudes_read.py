@@ -15,7 +15,7 @@ from rig.data.result_file import ResultDocument, read_result
 from rig.page.about import About
 from rig.page.page_state import PageState
 from rig.page.rows import look_of
-from rig.runner.phases import observations_of
+from rig.runner.phases import list_observations
 from support.paths import ROOT
 
 RECORDED = ROOT / "tests" / "fixtures" / "recordings" / "magnetometer"
@@ -57,7 +57,7 @@ def test_what_was_so_far_is_what_the_result_rests_on(run: RunData) -> None:
     shown = PageState(About("", ""))
     shown.look(look_of(so_far([run])))
     as_they_came = shown.sections["observations"]
-    for event in observations_of(calibrate([run])):
+    for event in list_observations(calibrate([run])):
         shown.take(event)
     assert shown.sections["observations"] == as_they_came and any(row["unit"] == "µT" for row in as_they_came)
 

@@ -25,7 +25,7 @@ from rig.observation.by_hand.handled import segment_session
 from rig.plans.by_hand import WantedMoves as Asked
 from rig.plans.by_hand import simulate_session
 from rig.plans.registry import installed, sections
-from rig.plans.shortest import plan_of, shortest_run, tried
+from rig.plans.shortest import find_search, plan_of, shortest_run
 from rig.plans.shortest_motions import ARCS_DEG
 from rig.turners import registry as turners
 from rig.world.hand.habits import Action, FlipAction, TurnAction
@@ -153,7 +153,7 @@ def off(rng: np.random.Generator, angle_deg: float) -> tuple[float, ...]:
 
 def predicted_of(of: Run) -> ReachedUncertainty:
     config = config_of(of)
-    budgets = tried(config).predict(Candidate(config.procedure, (), (), 0.0))
+    budgets = find_search(config).predict(Candidate(config.procedure, (), (), 0.0))
     assert budgets is not None
     return budgets.reached
 
@@ -193,7 +193,7 @@ def demo() -> RigConfig:
 @pytest.mark.timeout(3000)
 def test_no_plan_of_the_grid_is_shorter(thorough: bool) -> None:
     """Every plan is predicted; whatever is wanted of them, the search finds the shortest that has it."""
-    what = tried(demo())
+    what = find_search(demo())
     grid = [each for each in what.candidates() if thorough or coarse(each)]
     assert len(grid) >= 30
     known = {id(each): what.predict(each) for each in grid}
@@ -275,10 +275,10 @@ def budgets_of(tells: Tells) -> Callable[[Candidate], Budgets]:
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_several_speeds_are_tried_and_keep_what_the_file_says_of_them() -> None:
-    speeds = {each.procedure.speeds_deg_s for each in tried(demo()).candidates()}  # type: ignore[attr-defined]
+    speeds = {each.procedure.speeds_deg_s for each in find_search(demo()).candidates()}  # type: ignore[attr-defined]
     assert None in speeds and (15.0, 150.0) in speeds
     said = load(CONFIGS / "demo.yaml", ["procedure.speeds_deg_s=[20, 50]"], sections(installed()), turners.sections())
-    speeds = {each.procedure.speeds_deg_s for each in tried(said.config).candidates()}  # type: ignore[attr-defined]
+    speeds = {each.procedure.speeds_deg_s for each in find_search(said.config).candidates()}  # type: ignore[attr-defined]
     assert speeds == {(20.0, 50.0)}
 
 
@@ -326,9 +326,9 @@ def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches(part: st
 @pytest.mark.slow
 def test_arcs_are_tried_where_the_encoders_are_known() -> None:
     known = load(CONFIGS / "demo.yaml", ["uncertainty.angle_std_deg=0.01"], sections(installed()), turners.sections())
-    arcs = {each.sizes[0] for each in tried(known.config).candidates()}
+    arcs = {each.sizes[0] for each in find_search(known.config).candidates()}
     assert arcs >= set(ARCS_DEG)
-    assert not {each.sizes[0] for each in tried(demo()).candidates()} & set(ARCS_DEG)
+    assert not {each.sizes[0] for each in find_search(demo()).candidates()} & set(ARCS_DEG)
 
 
 def test_a_candidate_lasts_as_long_as_its_plan() -> None:
@@ -337,7 +337,7 @@ def test_a_candidate_lasts_as_long_as_its_plan() -> None:
     said += ["procedure.order=[wrist_3, wrist_1, wrist_2]", "procedure.directions=[cw, ccw]"]
     config = load(CONFIGS / "imu.yaml", said, sections(installed()), turners.sections()).config
     whole = Candidate(config.procedure, (), (), plan_of(config, config.procedure).duration_s)
-    for each in tried(config).finer(whole)[::40]:
+    for each in find_search(config).finer(whole)[::40]:
         assert each.duration_s == pytest.approx(plan_of(config, each.procedure).duration_s)
 
 

@@ -38,7 +38,7 @@ def test_what_a_run_has_read_is_let_go_with_it(tmp_path: Path) -> None:
         for _ in range(3):
             ahead.begin()
             acquisition = Acquisition()
-            with ahead.connected(acquisition.on_state, tmp_path / "arm.log"):
+            with ahead.connect_turner(acquisition.on_state, tmp_path / "arm.log"):
                 pass
             assert acquisition.states == 1, "the run hears the turner to its end"
             left = ref(acquisition)

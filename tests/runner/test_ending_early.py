@@ -48,12 +48,12 @@ def made_of(plan: Plan, enough: int) -> list[Motion]:
             looked += 1
             so_far = Future[ReachedUncertainty | None]()
             so_far.set_result(ReachedUncertainty(0.5 if looked >= enough else 2.0, 0.0))
-            said = early.found(so_far)
+            said = early.conclude(so_far)
             assert said is not None and said.as_wanted == (looked >= enough)
-        if not early.passes_over(motion):
+        if not early.skips(motion):
             made.append(motion)
             if isinstance(motion, Sweep):
-                early.swept(motion)
+                early.note_sweep(motion)
     return made
 
 
@@ -78,8 +78,8 @@ def test_resumed_after_whole_repeats_that_are_enough_it_only_goes_home(
     if whole:
         so_far = Future[ReachedUncertainty | None]()
         so_far.set_result(ReachedUncertainty(0.5, 0.0))
-        assert early.found(so_far) == UncertaintySoFar(0.5, 0.0, 3, as_wanted=True)
-        made = [motion.name for motion in plan.motions if not early.passes_over(motion)]
+        assert early.conclude(so_far) == UncertaintySoFar(0.5, 0.0, 3, as_wanted=True)
+        made = [motion.name for motion in plan.motions if not early.skips(motion)]
         assert made == ["approach home"] * (away_rad > 0)
 
 

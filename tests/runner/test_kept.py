@@ -32,7 +32,7 @@ def test_hours_of_waiting_before_a_sweep_are_not_looked_through_for_its_clock() 
     taken(acquisition, 10.0, 3000.0)
     acquisition.keep()
     taken(acquisition, 3000.0, 3010.0)
-    samples, states, new = acquisition.kept("gyro")
+    samples, states, new = acquisition.collect_kept("gyro")
     assert new == 100 and abs(states[-new].time_s - 3000) < 1e-6
     assert abs(states[0].time_s - (3000 - REACHES_BACK_S)) < 0.11
     assert abs(samples["board_time_us"][0] * 1e-6 - 60 - states[0].time_s) < 0.11
@@ -42,10 +42,10 @@ def test_hours_of_waiting_before_a_sweep_are_not_looked_through_for_its_clock() 
 def test_what_came_shortly_before_is_all_kept() -> None:
     acquisition = Acquisition()
     acquisition.expect("gyro", SENSOR)
-    assert len(acquisition.kept("gyro")[0]) == 0
+    assert len(acquisition.collect_kept("gyro")[0]) == 0
     acquisition.keep()
     taken(acquisition, 5.0, 20.0)
     acquisition.keep()
     taken(acquisition, 20.0, 30.0)
-    samples, states, new = acquisition.kept("gyro")
+    samples, states, new = acquisition.collect_kept("gyro")
     assert (len(samples), len(states), new) == (250, 250, 100)

@@ -47,7 +47,7 @@ def hand(options: Namespace) -> int:
     """Let the board calibrate, or fetch what it keeps; print it, and how far double precision differs.
 
     Raises Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and as
-    `calibrated_by_board` and `kept_by_board`; Fault as the first of them.
+    `calibrate_by_board` and `read_kept_solution`; Fault as the first of them.
     """
     if options.moves not in MOVES or not 0 < options.scale_std < 1:
         raise Refused(
@@ -110,7 +110,7 @@ def _made(
     config: RigConfig, name: str, options: Namespace, operator: SimulatedOperator | None
 ) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
     """A session that the board makes now, and the operator with it."""
-    from rig.runner.by_hand.on_board import calibrated_by_board
+    from rig.runner.by_hand.on_board import calibrate_by_board
 
     def tell(event: OfTheHand) -> None:
         if (line := by_hand_line(event)) is not None:
@@ -118,21 +118,21 @@ def _made(
         if operator is not None:
             operator.event(event)
 
-    with calibrated_by_board(config, name, options.moves, options.scale_std, tell) as (board, found):
+    with calibrate_by_board(config, name, options.moves, options.scale_std, tell) as (board, found):
         yield board, name, found
 
 
 @contextmanager
 def _fetched(config: RigConfig, among: dict[str, SensorSection]) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
     """What the board keeps of its last session, of one of the sensors that may be meant."""
-    from rig.runner.by_hand.on_board import kept_by_board
+    from rig.runner.by_hand.on_board import read_kept_solution
 
     section = require_board_section(config)
     with ExitStack() as held:
         with refusing():
             board = held.enter_context(Board(section.port, section.baud, lambda batch: None))
             refuse_other_firmware(board.identity)
-            found = kept_by_board(board)
+            found = read_kept_solution(board)
         part = spell_part(board.identity.sensors[found.index].part)
         name = next((name for name, sensor in among.items() if sensor.part == part), None)
         if name is None:

@@ -48,7 +48,7 @@ def carry_out(
             station = Stations((logged, terminal, *page_of_run.listeners), answer, attended=answer is not always_yes)
             memory = recall_sensors(configured.loaded.config, moved)
             run = Run(folder, configured.loaded, configured.script, station, memory)
-            with run.reported():
+            with run.report_end():
                 stack.enter_context(claim_devices(configured.loaded.config))
                 if configured.loaded.simulated:
                     control = stack.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))

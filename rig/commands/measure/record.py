@@ -45,7 +45,7 @@ def run(options: Namespace) -> int:
             stack.enter_context(simulated_laboratory(simulated))
         recordings = record_readings(config, options.out, options.duration_s)
     for path, recording in recordings.items():
-        say(f"{path}: {recording.seen.samples} samples, {recording.seen.lost} lost")
+        say(f"{path}: {recording.summary.samples} samples, {recording.summary.lost} lost")
     if any(recording.follows_crystal is False for recording in recordings.values()):
         say(NO_CRYSTAL, file=sys.stderr)
     say(f"If they were at rest: rig allan {shlex.quote(str(options.out))}", file=sys.stderr)

@@ -160,14 +160,14 @@ class RigBench:
             )
             station.mount = None if self.control is None else make_mounter(self.control)
             memory = recall_sensors(config, frozenset())
-            going_on, connected = self.station.going_on, self.ahead.connected
+            going_on, connected = self.station.going_on, self.ahead.connect_turner
             run = Run(folder, configured.loaded, configured.script, station, memory, connected, going_on)
             phase = configured.phase
             for repeated in range(config.station.repeats + 1):
                 repeats_left, listener.repeats = config.station.repeats - repeated, False
                 try:
                     outcome = run.carry_out(phase)
-                    if outcome.passed or not repeats_left or not run.refused_sweeps(phase):
+                    if outcome.passed or not repeats_left or not run.has_refused_sweeps(phase):
                         break
                 except Fault:
                     if not (repeats_left and listener.repeats):

@@ -1,6 +1,6 @@
-"""What the board does for its sensors, for one without a board: its readings corrected before they are recorded.
+"""The correction of readings on this computer, before they are recorded, for a sensor without a board.
 
-So a KVH 1775 is verified by the same movement and the same comparison, though it cannot keep a calibration itself.
+So a KVH 1775 is verified by the same movement and comparison, though it cannot store a calibration itself.
 """
 
 from collections.abc import Mapping
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from firmware_host.client import Calibration
 from rig.data.quantity import RATE
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.runner.board.sensors import corrected
+from rig.runner.board.sensors import describe_corrected
 from rig.sensors.source import OnSamples, SampleSource
 
 
 @dataclass(frozen=True, slots=True)
 class HostCorrected:
-    """A source of sensors whose samples pass by `correcting` on their way, by their names."""
+    """A source whose samples pass through `correct_rates`; `calibrations` is by sensor name."""
 
     source: SampleSource
     calibrations: Mapping[str, Calibration]
@@ -28,7 +28,7 @@ class HostCorrected:
     def sensors(self) -> dict[str, RecordedSensor]:
         """Sensors as of `SampleSource`: rates in the same counts, corrected, no accelerations; fields as they come."""
         return {
-            name: corrected(sensor, self.calibrations[name], sensor.channel(RATE).unit_per_count)
+            name: describe_corrected(sensor, self.calibrations[name], sensor.channel(RATE).unit_per_count)
             if name in self.calibrations
             else sensor
             for name, sensor in self.source.sensors.items()
@@ -43,10 +43,10 @@ class HostCorrected:
         self.source.check(clock_s)
 
 
-def correcting(name: str, raw: RecordedSensor, calibration: Calibration, on_samples: OnSamples) -> OnSamples:
-    """Hands on M (m + b) for every reading m of the rates of the sensor `name`, and another's as they are."""
+def correct_rates(name: str, raw: RecordedSensor, calibration: Calibration, on_samples: OnSamples) -> OnSamples:
+    """Return a receiver that hands on M (m + b) for each rate m of the sensor `name`, and other samples unchanged."""
     per_count = raw.channel(RATE).unit_per_count
-    described = corrected(raw, calibration, per_count)
+    described = describe_corrected(raw, calibration, per_count)
     matrix, bias = np.array(calibration.matrix), np.array(calibration.bias_rad_s) / per_count
     rate, dtype = described.channel(RATE).column, described.sample_dtype
 

@@ -1,9 +1,8 @@
-"""The board calibrates by itself, as in SIX: it keeps the readings of a sweep, averages the revolution and solves.
+"""The board's own calibration, as in SIX: it keeps the readings of a sweep, averages the revolution and solves.
 
-What only the host knows is when the revolution was and how fast: that needs the arm's joints and both clocks. So after
-each sweep the host names two board times and the measured speed, and at the end asks for the solution. All the board
-answers goes into the recording, where `rig.analysis.gyroscope.onboard_check` holds it against the host's own
-arithmetic.
+Only the host can determine when the revolution was and how fast, from the arm's joints and both clocks. After each
+sweep it sends two board times and the measured speed, and at the end asks for the solution. All answers are recorded;
+`rig.analysis.gyroscope.onboard_check` compares them with the host's own results.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -28,7 +27,7 @@ from rig.motion.steps import Sweep
 from rig.observation.onboard_window import find_board_averages, revolution_on_the_board
 from rig.runner.acquisition import Acquisition
 
-# From asking the board to keep its readings to the arm's first motion, and how late that may be on a busy machine.
+# From the request to keep readings to the arm's first motion, at most, on a busy computer.
 KEEP_LONGER_S = 4.0
 
 Revolution = tuple[int, int, float]  # two board times, µs, and the speed between them, rad/s
@@ -36,9 +35,9 @@ Revolution = tuple[int, int, float]  # two board times, µs, and the speed betwe
 
 @dataclass(slots=True)
 class BoardCalibration:
-    """Takes the board through a calibration of `sensors` (name → its index on the board and its description).
+    """A calibration of `sensors` (name → its index on the board and its description) by the board.
 
-    What the board answers is given to `note`, for the recording and for who listens.
+    `note` records and reports the board's answers.
     """
 
     board: Board
@@ -50,29 +49,29 @@ class BoardCalibration:
     _observed: dict[str, int] = field(default_factory=dict)
 
     def recall(self, earlier: Sequence[RunData], done: Collection[int]) -> None:
-        """Give the board back what it observed of the sweeps `done` before the run was interrupted."""
+        """Send the board its observations of the sweeps `done` before the run was interrupted."""
         for name, (index, _) in self.sensors.items():
-            for sweep, seen in find_board_averages(earlier, name, done).items():
-                self.board.recall(index, self._count(name), seen.observation.mean_rad_s, seen.speed_rad_s)
+            for sweep, observed in find_board_averages(earlier, name, done).items():
+                self.board.recall(index, self._count(name), observed.observation.mean_rad_s, observed.speed_rad_s)
                 self._observed[name] += 1
                 self.note(BoardRecalled(name, sweep))
 
     def begin(self) -> None:
-        """Make the host keep what it sees, from before the first sample, for the clock of the first sweep."""
+        """Make the host keep data from before the first sample on, for the time base of the first sweep."""
         self.acquisition.keep()
 
     def keep(self, sweep: Sweep) -> None:
-        """Make board and host keep what they see, from just before a sweep."""
+        """Make board and host keep their readings, from just before a sweep."""
         self.acquisition.keep()
         self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEP_LONGER_S)
 
     def revolutions(self, sweep: Sweep) -> Attempts[str, Revolution]:
-        """Return when the revolution was for each sensor, just after it; that may take seconds."""
+        """Return each sensor's window of the revolution, just after it; that may take seconds."""
         return attempt_each({name: partial(self._revolution, name, sweep) for name in self.sensors})
 
     @contextmanager
-    def looking(self, sweep: Sweep) -> Iterator["Future[Attempts[str, Revolution]]"]:
-        """The revolutions, as they will be found meanwhile."""
+    def look_in_background(self, sweep: Sweep) -> Iterator["Future[Attempts[str, Revolution]]"]:
+        """Compute the windows of the revolution in a thread; yields their future."""
         pool = ThreadPoolExecutor(max_workers=1)
         try:
             yield pool.submit(self.revolutions, sweep)
@@ -80,35 +79,35 @@ class BoardCalibration:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def observe(self, sweep: Sweep, revolutions: Attempts[str, Revolution]) -> None:
-        """Make the board average the revolutions. One that is not fit for it is noted and left out."""
+        """Make the board average the revolutions. Note one that it cannot use, and leave it out."""
         for name, fault in revolutions.faults.items():
             self.note(BoardNotObserved(name, sweep.index, str(fault)))
         for name, revolution in revolutions.results.items():
             try:
-                found, speed_rad_s = self._observe(name, revolution)
+                observation, speed_rad_s = self._observe(name, revolution)
             except (Fault, BoardError) as error:
                 if error.name in ("board_link_lost", "board_error"):
                     raise
                 self.note(BoardNotObserved(name, sweep.index, str(error)))
                 continue
             self._observed[name] += 1
-            self.note(BoardObserved(name, sweep.index, speed_rad_s, found))
+            self.note(BoardObserved(name, sweep.index, speed_rad_s, observation))
 
     def solve(self) -> None:
-        """Note the board's solution by either method, after the last sweep."""
+        """Note the board's solution by each method, after the last sweep."""
         for name, (index, _) in self.sensors.items():
             for method in METHODS:
                 self.note(BoardSolved(name, self.board.solve(index, method)))
 
     def _observe(self, name: str, revolution: Revolution) -> tuple[BoardObservation, float]:
-        """The board's observation and the speed it was told, rad/s."""
+        """Return the board's observation and the speed sent to it, rad/s."""
         start_us, end_us, speed_rad_s = revolution
         index, _ = self.sensors[name]
         return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s
 
     def _revolution(self, name: str, sweep: Sweep) -> Revolution:
         _, sensor = self.sensors[name]
-        samples, states, new = self.acquisition.kept(name)
+        samples, states, new = self.acquisition.collect_kept(name)
         turned = np.array([state.to_record() for state in states], self.turner.dtype)
         return revolution_on_the_board(
             samples,

@@ -1,4 +1,4 @@
-"""The board as a source of samples: its configured sensors set up, and described for the recording."""
+"""The board as a source of samples: sets up its configured sensors and describes them for the recording."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -20,9 +20,9 @@ from rig.sensors.source import OnSamples
 
 @dataclass(frozen=True, slots=True)
 class BoardSensor:
-    """A sensor that is set up: its index on the board, and what a reader of its samples must know.
+    """A sensor that is set up: its index on the board and its description.
 
-    `stored` is the calibration its readings are corrected by, None where they come raw.
+    `stored` is the calibration that corrects its readings, None if they are raw.
     """
 
     index: int
@@ -32,7 +32,7 @@ class BoardSensor:
 
 @dataclass(frozen=True, slots=True)
 class BoardSource:
-    """The board with its sensors set up, by name. What it streams is handed on by the sensors' names."""
+    """The board with its sensors set up, by name; it passes samples on by these names."""
 
     board: Board
     set_up: Mapping[str, BoardSensor]
@@ -57,18 +57,18 @@ class BoardSource:
 
 
 @contextmanager
-def board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
-    """The board for the length of the `with` block.
+def open_board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
+    """Connect the board and set its sensors up for the `with` block.
 
-    Raises BoardError as `Board`, Refused as `require_board_section`, `refuse_other_firmware` and `set_up_sensors`.
+    Raise BoardError as `Board`, Refused as `require_board_section`, `refuse_other_firmware` and `set_up_sensors`.
     """
     section = require_board_section(config)
     names: dict[int, str] = {}
 
-    def on_batch(batch: SampleBatch) -> None:
+    def pass_on(batch: SampleBatch) -> None:
         on_samples(names[batch.sensor], batch.samples)
 
-    with Board(section.port, section.baud, on_batch) as board:
+    with Board(section.port, section.baud, pass_on) as board:
         refuse_other_firmware(board.identity)
         set_up = set_up_sensors(board, config, calibrated=calibrated)
         names.update({sensor.index: name for name, sensor in set_up.items()})
@@ -76,27 +76,29 @@ def board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bo
 
 
 def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
-    """Every configured sensor on the board by its name; those to calibrate stream corrected readings when `calibrated`.
+    """Set up every configured sensor on the board; those to calibrate stream corrected readings if `calibrated`.
 
-    Raises Refused as `find_sensor` and `read_stored_calibration`.
+    Return them by name. Raise Refused as `find_sensor` and `read_stored_calibration`.
     """
     gyroscopes = {
-        name: _corrected(board, name, section)
+        name: _set_up_corrected(board, name, section)
         if calibrated and name in config.to_calibrate
-        else _raw(board, name, section)
+        else _set_up_raw(board, name, section)
         for name, section in config.on_board.items()
     }
-    return gyroscopes | {name: _magnetometer(board, name, each) for name, each in config.magnetometers.items()}
+    return gyroscopes | {
+        name: _set_up_magnetometer(board, name, section) for name, section in config.magnetometers.items()
+    }
 
 
-def _magnetometer(board: Board, name: str, section: MagnetometerSection) -> BoardSensor:
+def _set_up_magnetometer(board: Board, name: str, section: MagnetometerSection) -> BoardSensor:
     info = find_sensor(board.identity, name, section)
     setup = board.configure_magnetometer(info.index, section.rate_hz, section.range_gauss)
     field = triad_channel(FIELD, setup.sensitivity_t, FULL_SCALE_COUNTS, setup.range_t)
     return BoardSensor(info.index, build_sensor(section, field, rate_hz=setup.rate_hz))
 
 
-def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
+def _set_up_raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
     info = find_sensor(board.identity, name, section)
     range_g = 0.0 if section.acceleration is None else section.acceleration.range_g
     setup = board.configure(info.index, section.rate_hz, section.range_deg_s, range_g)
@@ -109,26 +111,28 @@ def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
     return BoardSensor(info.index, build_sensor(section, *channels, rate_hz=setup.rate_hz))
 
 
-def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
-    raw = _raw(board, name, section)
+def _set_up_corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
+    raw = _set_up_raw(board, name, section)
     stored = read_stored_calibration(board, name, section)
-    return BoardSensor(raw.index, corrected(raw.described, stored.calibration, CALIBRATED_RAD_S), stored)
+    return BoardSensor(raw.index, describe_corrected(raw.described, stored.calibration, CALIBRATED_RAD_S), stored)
 
 
-def corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_s: float) -> RecordedSensor:
-    """The sensor when its rates come corrected, in counts of that size and without accelerations."""
+def describe_corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_s: float) -> RecordedSensor:
+    """Return the description of a sensor with corrected rates, in `sensitivity_rad_s`, and no accelerations."""
     raw = sensor.channel(RATE)
     assert raw.full_scale_counts is not None, "every driver states it"
     limit_rad_s = raw.full_scale_counts * raw.unit_per_count
-    bias_rad_s, share = np.abs(calibration.bias_rad_s), np.ones(3)
-    if calibration.polynomials is not None:  # wherever in their range it is
+    bias_rad_s, fraction = np.abs(calibration.bias_rad_s), np.ones(3)
+    if calibration.polynomials is not None:  # anywhere in the temperature range
         changed, moved_rad_s = calibration.polynomials.most()
-        share, bias_rad_s = 1 - changed, bias_rad_s + moved_rad_s
-    # What a saturated reading becomes, at least: the other axes may read anything beside it.
-    on_axis, beside = np.diag(np.diag(calibration.matrix)), np.abs(calibration.matrix)
-    np.fill_diagonal(beside, 0.0)
+        fraction, bias_rad_s = 1 - changed, bias_rad_s + moved_rad_s
+    # The least corrected rate of a saturated reading, whatever the other axes read.
+    on_axis, off_axis = np.diag(np.diag(calibration.matrix)), np.abs(calibration.matrix)
+    np.fill_diagonal(off_axis, 0.0)
     lowest_rad_s = float(
-        np.min(on_axis @ (share * (limit_rad_s - bias_rad_s)) - beside @ ((2 - share) * (limit_rad_s + bias_rad_s)))
+        np.min(
+            on_axis @ (fraction * (limit_rad_s - bias_rad_s)) - off_axis @ ((2 - fraction) * (limit_rad_s + bias_rad_s))
+        )
     )
     full_scale = int(lowest_rad_s / sensitivity_rad_s)
     rate = replace(raw, unit_per_count=sensitivity_rad_s, full_scale_counts=full_scale)

@@ -1,7 +1,6 @@
-"""The board calibrates a gyroscope by hand by itself: the host says what to do, looks on, and checks the answer.
+"""A gyroscope's calibration by hand that the board makes itself: the host instructs, follows, and checks the answer.
 
-The board alone finds rests and moves and solves; it would do so without anybody. What is told to the operator follows
-from what it says of each move.
+The board detects rests and moves and solves without the host, whose instructions follow from the board's reports.
 """
 
 import time
@@ -27,11 +26,11 @@ from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove
 from rig.observation.by_hand.runs import MICROSECOND_S, rotate_face
 from rig.plans.by_hand import ROUND, WantedMoves, next_instruction, still_open
-from rig.runner.board.sensors import BoardSource, board_source
-from rig.runner.by_hand.session import drained
+from rig.runner.board.sensors import BoardSource, open_board_source
+from rig.runner.by_hand.session import drain
 
 LOOK_S = 0.05
-AGAIN = {  # what the board calls it: the error's name, what, what to do
+AGAIN = {  # the board's term: the error's name, what, what to do
     "clipped": ("clipping", "it was turned faster than the sensor's range", "Turn more slowly"),
     "lost": ("lost_in_move", "readings are missing", "Make the move again"),
     "no_face": ("not_flat", "it lies on none of its six sides", "Lay it down on a side, and let go"),
@@ -45,7 +44,7 @@ AGAIN = {  # what the board calls it: the error's name, what, what to do
 
 @dataclass(frozen=True, slots=True)
 class CalibratedByBoard:
-    """What the board found of a sensor of that index, and the same in double precision, None without its readings."""
+    """The board's solution for the sensor `index`, and its agreement with double precision, None without readings."""
 
     index: int
     solved: BoardHandSolution
@@ -54,33 +53,33 @@ class CalibratedByBoard:
 
 @dataclass(slots=True)
 class FollowedSession:
-    """A session as the host follows it by the board's reports: what was taken, on which faces it lay."""
+    """A session as the host follows it by the board's reports: the accepted moves, the faces it lay on."""
 
     sensor: RecordedSensor
     moves: int
     tell: Callable[[OfTheHand], None]
     reports: list[HandReport] = field(default_factory=list)
-    _taken: list[HandMove] = field(default_factory=list)
+    _accepted: list[HandMove] = field(default_factory=list)
     _lay: list[Face] = field(default_factory=list)
-    _asked: bool = False
+    _has_asked: bool = False
 
     def take(self, report: HandReport) -> None:
-        """Take the board's report; what is new in it is told. Its button begins anew, and so does all of this."""
+        """Take the board's report and report its news. If its button has begun a new session, this begins one too."""
         wrong = None
         if self.reports and report.judged < self.reports[-1].judged:
-            self.reports, self._taken, self._lay, self._asked = [], [], [], False
+            self.reports, self._accepted, self._lay, self._has_asked = [], [], [], False
         if new := report.judged > (self.reports[-1].judged if self.reports else 0):
             self.reports.append(report)
-            wrong = self._judged(report)
+            wrong = self._judge(report)
         first = not self._lay and report.after is not None
         if first and report.after is not None:
-            self._rested(report, report.after)
-        if report.state not in ("done", "failed") and (new or first or not self._asked):
+            self._note_rest(report, report.after)
+        if report.state not in ("done", "failed") and (new or first or not self._has_asked):
             self._ask(wrong)
 
-    def _judged(self, report: HandReport) -> Fault | None:
+    def _judge(self, report: HandReport) -> Fault | None:
         if report.after is not None:
-            self._rested(report, report.after)
+            self._note_rest(report, report.after)
         if report.outcome == "nothing":
             return None
         if report.outcome != "taken" or report.before is None or report.after is None:
@@ -90,44 +89,44 @@ class FollowedSession:
         before, after = self._face(report.before), self._face(report.after)
         kind: Literal["flip", "turn"] = "flip" if before != after else "turn"
         turns = int(report.whole)
-        self._taken.append(HandMove(kind, before, after, turns))
+        self._accepted.append(HandMove(kind, before, after, turns))
         self.tell(HandMoveTaken(report.move_us, report.after_us, kind, before, after, turns))
         return None
 
-    def _rested(self, report: HandReport, face: str) -> None:
+    def _note_rest(self, report: HandReport, face: str) -> None:
         self._lay.append(self._face(face))
         self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
 
     def _ask(self, wrong: Fault | None) -> None:
-        """Ask for the next move of the list, which goes on until the board is content."""
+        """Ask for the next move of the list, which goes on until the board has enough."""
         flips = self.moves
-        while (left := still_open(WantedMoves(flips, 0), self._taken, self._lay)).done:
+        while (remaining := still_open(WantedMoves(flips, 0), self._accepted, self._lay)).done:
             flips += len(ROUND)
-        instruction = next_instruction(left, self._lay[-1] if self._lay else None)
+        instruction = next_instruction(remaining, self._lay[-1] if self._lay else None)
         again, why = (None, "") if wrong is None else (wrong.name, f"{wrong.what}. {wrong.remedy}.")
         if instruction is not None:
             self.tell(HandAsked(instruction, again, why))
-        self._asked = True
+        self._has_asked = True
 
     def _face(self, of_sensor: str) -> Face:
         return rotate_face(of_sensor, np.array(self.sensor.mounting).T)
 
 
 @contextmanager
-def calibrated_by_board(
+def calibrate_by_board(
     config: RigConfig, name: str, moves: int, scale_std: float, tell: Callable[[OfTheHand], None]
 ) -> Iterator[tuple[Board, CalibratedByBoard]]:
-    """The calibration of one sensor by its board, which is still connected in the `with` block.
+    """Calibrate one sensor by its board, which stays connected in the `with` block.
 
-    It is done after so many moves, at least, when the scale's standard uncertainty is no larger. Raises Refused
-    `clock_unknown`, `first_face_not_told`, and as `board_source`; Fault `board_unverified`, `board_disagrees`, what was
-    wrong with ten moves in a row, and as the board says.
+    It ends after `moves` at least, when the standard uncertainty of the scale is at most `scale_std`. Raise Refused
+    `clock_unknown`, `first_face_not_told`, and as `open_board_source`; Fault `board_unverified`, `board_disagrees`, the
+    error of ten refused moves in a row, and the board's own.
     """
     arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
-    with ExitStack() as held:
+    with ExitStack() as stack:
         with refusing():
-            source = held.enter_context(
-                board_source(config, lambda sensor, samples: arrived.put((sensor, samples)), calibrated=False)
+            source = stack.enter_context(
+                open_board_source(config, lambda sensor, samples: arrived.put((sensor, samples)), calibrated=False)
             )
             index, described = source.set_up[name].index, source.set_up[name].described
             _check(name, described, source.board)
@@ -138,15 +137,15 @@ def calibrated_by_board(
             _follow(source, session)
             source.board.stop()
             solved = source.board.hand_solution()
-        samples = np.concatenate([samples for sensor, samples in drained(arrived) if sensor == name])
+        samples = np.concatenate([samples for sensor, samples in drain(arrived) if sensor == name])
         agreement = compare_with_board(_readings(described, samples), session.reports, solved)
         yield source.board, CalibratedByBoard(index, solved, agreement)
 
 
-def kept_by_board(board: Board) -> CalibratedByBoard:
-    """What the board keeps of the last session by hand, which its button or a host began: no readings are left of it.
+def read_kept_solution(board: Board) -> CalibratedByBoard:
+    """Return the board's solution of the last session by hand, begun by its button or a host; its readings are gone.
 
-    Raises Refused `no_answer_by_hand`, BoardError as `Board.hand_report` does.
+    Raise Refused `no_answer_by_hand`, BoardError as `Board.hand_report` does.
     """
     report = board.hand_report()
     if report.state == "done":
@@ -180,7 +179,7 @@ def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
 
 
 def _follow(source: BoardSource, session: FollowedSession) -> None:
-    """Look on until it is done. Raises Fault for what was wrong with the last of ten refused moves."""
+    """Follow the session to its end. Raise Fault for the error of the last of ten refused moves."""
     while True:
         report = source.board.hand_report()
         session.take(report)

@@ -26,7 +26,7 @@ def test_a_long_dwell_is_recorded_with_few_states_after_a_while(tmp_path: Path) 
         path, config=run.config, settings=run.settings, provenance=PROVENANCE, turner=UR, sensors={"gyro": SENSOR}
     ) as acquisition.recorder:
         states(acquisition, 0.0, 2.0)
-        with acquisition.standing():
+        with acquisition.thin_states():
             states(acquisition, 2.0, 62.0)
         states(acquisition, 62.0, 64.0)
     time_s = read_run(path).states["time_s"]

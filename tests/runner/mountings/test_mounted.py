@@ -8,7 +8,7 @@ from rig.data.quantity import FIELD
 from rig.data.recording.channel import triad_channel
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Refused
-from rig.runner.mounted import CalibratedBefore, Memory, Mounted, ask_of_other_boards, mounted
+from rig.runner.mounted import CalibratedBefore, Memory, Mounted, ask_of_other_boards, find_mounted
 from rig.station.station import Stations, always_yes
 
 HERE, THERE = "0123456789abcdef01234567", "f" * 24
@@ -23,7 +23,7 @@ def before(board: str | None, day: str = "2026-11-20", *, simulated: bool = Fals
 
 
 def carried(*known: CalibratedBefore, moved: frozenset[str] = frozenset(), clock: str | None = None) -> Mounted:
-    return mounted({"gyro": sensor("G-0042", clock)}, HERE, Memory(known, None, moved), simulated=False)
+    return find_mounted({"gyro": sensor("G-0042", clock)}, HERE, Memory(known, None, moved), simulated=False)
 
 
 class Operator:
@@ -46,7 +46,7 @@ def test_the_operator_reads_what_is_turned_and_when_it_was_calibrated() -> None:
 
 
 def test_a_history_that_says_nothing_is_not_taken_for_an_empty_one() -> None:
-    known = mounted({"gyro": sensor("G-0042")}, HERE, Memory(silent="the history is off"), simulated=False)
+    known = find_mounted({"gyro": sensor("G-0042")}, HERE, Memory(silent="the history is off"), simulated=False)
     assert list(known.lines())[1:] == [
         "gyro: lsm9ds1 G-0042.",
         "What was calibrated before is not known: the history is off.",

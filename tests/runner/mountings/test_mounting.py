@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.motion.steps import Stage
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.runner.announcement import mounting
-from rig.runner.mounting import Felt, refuse_hanging_otherwise, refuse_turning_otherwise, refuse_unsteady
+from rig.runner.mounting import GyroscopeReadings, refuse_hanging_otherwise, refuse_turning_otherwise, refuse_unsteady
 from rig.turners.registry import words_of
 from support.recordings.synthetic_run import SENSITIVITY, SENSOR
 
@@ -31,11 +31,11 @@ NOMINAL = stage(np.eye(3))
 QUARTER = stage(mount_matrix(StageMountSection(x="+y", y="-x", z="+z")))
 
 
-def reading(rates_rad_s: Array, seed: int = 1) -> Felt:
+def reading(rates_rad_s: Array, seed: int = 1) -> GyroscopeReadings:
     samples = np.zeros(COUNT, SENSOR.sample_dtype)
     noise = 0.035 * np.random.default_rng(seed).standard_normal((COUNT, 3))
     samples["counts"] = np.round((rates_rad_s + noise) / SENSITIVITY)
-    return Felt("gyro", SENSOR, samples)
+    return GyroscopeReadings("gyro", SENSOR, samples)
 
 
 def test_noise_and_bias_are_rest() -> None:
@@ -79,12 +79,12 @@ def test_another_axis_another_sign_and_hardly_a_turn_are_told(about: int, angle_
     assert "turn the board by 90° about wrist 3" in refused.value.remedy
 
 
-def hanging(force_m_s2: list[float]) -> Felt:
+def hanging(force_m_s2: list[float]) -> GyroscopeReadings:
     channels = (*SENSOR.channels, triad_channel(ACCELERATION, UNIT_M_S2, 32767, 2 * 9.80665))
     sensor = RecordedSensor(SENSOR.part, SENSOR.serial_number, SENSOR.rate_hz, channels)
     samples = np.zeros(COUNT, sensor.sample_dtype)
     samples[sensor.channel(ACCELERATION).column] = np.round(np.array(force_m_s2) / UNIT_M_S2)
-    return Felt("gyro", sensor, samples)
+    return GyroscopeReadings("gyro", sensor, samples)
 
 
 def test_gravity_is_where_the_mounting_says_or_the_axis_is_named() -> None:
