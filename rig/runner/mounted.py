@@ -26,7 +26,7 @@ class CalibratedBefore:
 
     @property
     def words(self) -> str:
-        """Its day and its verdict."""
+        """The day and the verdict of the calibration, and its number."""
         return f"{self.day}, {self.verdict.upper()} (calibration {self.number})"
 
 

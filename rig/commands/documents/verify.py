@@ -18,16 +18,13 @@ if TYPE_CHECKING:
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
 WRONG, NOT_TRUSTED = 1, 4
-TRUST_PROBLEMS = {
-    "not_signed",
-    "signer_unknown",
-    "signer_not_trusted",
-}  # the file is unchanged, but its signer is not trusted
+# The file is unchanged, but its signer is not trusted.
+TRUST_PROBLEMS = {"not_signed", "signer_unknown", "signer_not_trusted"}
 STATUSES = (
-    "exit status: 0 no file was changed, and signed by whom --trust and --signer say, or attached to one that is, or "
-    f"known to the history that --history names; {WRONG} a file was altered, or the history contradicts it; "
-    f"{NOT_TRUSTED} nobody who is trusted has signed a file: it is not signed, signed by another, or there is no "
-    "--trust; 2 it could not be found out"
+    "exit status: 0 every file is valid: unchanged, and signed by a signer that --trust and --signer accept, or "
+    f"attached to such a file, or in the history that --history names; {WRONG} a file is not valid: altered, or "
+    f"the history contradicts it; {NOT_TRUSTED} no trusted signer has signed a file: not signed, signed by another, "
+    "or there is no --trust; 2 there is no answer: a file or the history cannot be read"
 )
 
 
@@ -186,6 +183,7 @@ def _print_file(documents: VerifiedFile) -> None:
 
 
 def _describe_state(problems: Sequence[Refused]) -> str:
+    """Return the status; in ETSI EN 319 102-1: TOTAL-PASSED, TOTAL-FAILED, INDETERMINATE."""
     if not problems:
         return "valid"
     altered = {problem.name for problem in problems} - TRUST_PROBLEMS
@@ -193,7 +191,7 @@ def _describe_state(problems: Sequence[Refused]) -> str:
 
 
 TRUST_WORDS = {
-    None: "whether that is the laboratory's, compare yourself, or give --trust",
+    None: "compare it with the laboratory's yourself, or give --trust",
     True: "trusted by --trust",
     False: "not trusted",
 }
