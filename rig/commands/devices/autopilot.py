@@ -1,4 +1,4 @@
-"""`rig autopilot …`: write a calibration into an autopilot's parameters, and bring the old ones back."""
+"""`rig autopilot …`: write a calibration into an autopilot's parameters, or restore the old ones."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -25,25 +25,25 @@ BEYOND = {
 
 
 def add(autopilot: ArgumentParser) -> None:
-    """The commands of `rig autopilot`."""
+    """Add the commands of `rig autopilot`."""
     commands = autopilot.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    text = "write the calibration of a run that passed into the autopilot's parameters; the old ones are kept in a file"
+    text = "write the calibration of a passed run into the autopilot's parameters; a file keeps the old ones"
     store = commands.add_parser("store", help=text, description=text)
     add_config(store)
     add_run(store, "result", "a run folder or its result.json", metavar="RESULT")
-    store.add_argument("--old", type=Path, metavar="FILE", help="file for the old values (default: beside the result)")
-    text = "bring the autopilot back to the parameters in a file that `store` kept"
+    store.add_argument("--old", type=Path, metavar="FILE", help="file for the old values (default: by the result)")
+    text = "restore the autopilot's parameters from a file that `store` wrote"
     restore = commands.add_parser("restore", help=text, description=text)
     add_config(restore)
-    restore.add_argument("file", type=Path, metavar="FILE", help="the file that `store` named")
-    restore.add_argument("--new", action="store_true", help="to the new values in it, not to the old ones")
+    restore.add_argument("file", type=Path, metavar="FILE", help="file that `store` wrote")
+    restore.add_argument("--new", action="store_true", help="restore the new values in it, not the old ones")
     for command, name in ((store, "store"), (restore, "restore")):
         command.add_argument("--yes", action="store_true", help="do not ask before the autopilot is changed")
         command.set_defaults(of_autopilot=name)
 
 
 def run(options: Namespace) -> int:
-    """Carry out the command of `rig autopilot` that is meant."""
+    """Carry out the chosen command of `rig autopilot`."""
     return {"store": _store, "restore": _restore}[options.of_autopilot](options)
 
 
@@ -55,10 +55,10 @@ def _store(options: Namespace) -> int:
     from rig.station.confirm import agreed_or_refused
 
     result = read_passed_result(options.result)
-    with _connected(options) as (link, sections):
+    with _connect(options) as (link, sections):
         for problem in find_unfinished_change(link):
             raise problem
-        wanted = _values(link.identity.firmware, result, options.result, sections)
+        wanted = _read_values(link.identity.firmware, result, options.result, sections)
         old = link.parameters(wanted)
         if missing := wanted.keys() - old.keys():
             raise Refused(
@@ -70,11 +70,11 @@ def _store(options: Namespace) -> int:
             name: AutopilotParameter(name, old[name].type, encode_value(value), link.identity.firmware)
             for name, value in wanted.items()
         }
-        planned = ParameterChange(autopilot_id(link), link.identity.firmware, old, new, _kept(options))
-        agreed_or_refused([f"In the {link.identity.words}:", *_announced(planned, "new")], "store", options.yes)
+        planned = ParameterChange(autopilot_id(link), link.identity.firmware, old, new, _backup_path(options))
+        agreed_or_refused([f"In the {link.identity.words}:", *_announce(planned, "new")], "store", options.yes)
         planned.keep()
         say(f"the old parameters are kept in {planned.backup}")
-        _changed(link, planned, "new")
+        _change(link, planned, "new")
         for line in BEYOND.values():
             say(f"not stored: {line}")
     return 0
@@ -86,7 +86,7 @@ def _restore(options: Namespace) -> int:
     from rig.station.confirm import agreed_or_refused
 
     planned = read_change(options.file)
-    with _connected(options) as (link, _):
+    with _connect(options) as (link, _):
         if (planned.autopilot_id, planned.firmware) != (autopilot_id(link), link.identity.firmware):
             raise Refused(
                 "autopilot_other_uid",
@@ -95,12 +95,12 @@ def _restore(options: Namespace) -> int:
                 "Connect that autopilot, or give the file of this one",
             )
         which = "new" if options.new else "old"
-        agreed_or_refused([f"In the {link.identity.words}:", *_announced(planned, which)], "restore", options.yes)
-        _changed(link, planned, which)
+        agreed_or_refused([f"In the {link.identity.words}:", *_announce(planned, which)], "restore", options.yes)
+        _change(link, planned, which)
     return 0
 
 
-def _changed(link: "AutopilotLink", planned: "ParameterChange", which: str) -> None:
+def _change(link: "AutopilotLink", planned: "ParameterChange", which: str) -> None:
     from rig.errors import Fault, raised_as
     from rig.sensors.mavlink.writing import change
 
@@ -110,18 +110,18 @@ def _changed(link: "AutopilotLink", planned: "ParameterChange", which: str) -> N
     say(f"written and read back, bit by bit: {len(to)} parameters, the {which} ones")
 
 
-def _announced(planned: "ParameterChange", which: str) -> Iterator[str]:
+def _announce(planned: "ParameterChange", which: str) -> Iterator[str]:
     to, others = (planned.new, planned.old) if which == "new" else (planned.old, planned.new)
-    for name, each in to.items():
-        yield f"  {name}: {each.value:.9g}, instead of {others[name].value:.9g}"
+    for name, parameter in to.items():
+        yield f"  {name}: {parameter.value:.9g}, instead of {others[name].value:.9g}"
 
 
-def _values(
+def _read_values(
     firmware: int, result: "ResultDocument", path: Path, sections: Mapping[str, "SensorSection"]
 ) -> dict[str, float]:
-    """The parameters that hold what the run found of these sensors.
+    """Return the parameters that hold the run's calibrations of these sensors.
 
-    Raises Refused `not_in_result`, and as `refuse_other_sensor`.
+    Raise Refused `not_in_result`, and as `refuse_other_sensor`.
     """
     from math import degrees
 
@@ -133,27 +133,27 @@ def _values(
     from rig.sensors.mavlink.dialect import ARDUPILOT
     from rig.sensors.mavlink.source import mavlink_section
 
-    called = ARDUPILOTS if firmware == ARDUPILOT else PX4
+    parameters_of = ARDUPILOTS if firmware == ARDUPILOT else PX4
     values: dict[str, float] = {}
-    for found in calibrations(result).sensors:
-        section = sections.get(found.sensor)
-        if section is None or found.quantity not in IMU:
+    for calibration in calibrations(result).sensors:
+        section = sections.get(calibration.sensor)
+        if section is None or calibration.quantity not in IMU:
             continue
-        of = found.part, found.serial_number
-        range_deg_s = degrees(found.full_scale or 0.0) if found.quantity == RATE else section.range_deg_s
-        refuse_other_sensor(f"{path}: the calibration of {found.sensor}", *of, range_deg_s, section)
-        values |= dict(called[found.quantity](mavlink_section(section).instance, found))
-        if found.quantity == RATE and firmware == ARDUPILOT:
-            values["INS_GYR_CAL"] = 0.0  # or it finds offsets of its own at each boot
+        part_and_number = calibration.part, calibration.serial_number
+        range_deg_s = degrees(calibration.full_scale or 0.0) if calibration.quantity == RATE else section.range_deg_s
+        refuse_other_sensor(f"{path}: the calibration of {calibration.sensor}", *part_and_number, range_deg_s, section)
+        values |= dict(parameters_of[calibration.quantity](mavlink_section(section).instance, calibration))
+        if calibration.quantity == RATE and firmware == ARDUPILOT:
+            values["INS_GYR_CAL"] = 0.0  # otherwise it estimates offsets of its own at each boot
     if not values:
         raise Refused(
             "not_in_result", f"{path} has no calibration for {', '.join(sections)}", "Give a run that calibrated them"
         )
-    # Of ArduPilot's correction by temperature, which is off where a calibration was made.
+    # Parameters of ArduPilot's temperature correction, which is off during a calibration.
     return {name: value for name, value in values.items() if not name.endswith("_CALTEMP")}
 
 
-def _kept(options: Namespace) -> Path:
+def _backup_path(options: Namespace) -> Path:
     if options.old is not None:
         return Path(options.old).resolve()
     result = Path(options.result)
@@ -162,8 +162,8 @@ def _kept(options: Namespace) -> Path:
 
 
 @contextmanager
-def _connected(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
-    """The only autopilot of a configuration, in its simulated laboratory if it has one, and the IMUs it is read by."""
+def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
+    """Connect to the only autopilot of a configuration, in its simulated laboratory if it has one, with its IMUs."""
     from rig.commands.laboratory.claims import claim_sensor
     from rig.commands.laboratory.laboratory import simulated_laboratory
     from rig.commands.laboratory.own_address import load_at_own_address
@@ -174,12 +174,12 @@ def _connected(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[st
 
     with ExitStack() as stack:
         loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))
-        sensors = {name: each for name, each in loaded.config.sensors.items() if each.mavlink is not None}
-        found = [(port, sections) for port, _, sections in group_by_port(sensors)]
-        if len(found) != 1:
+        sensors = {name: section for name, section in loaded.config.sensors.items() if section.mavlink is not None}
+        autopilots = [(port, sections) for port, _, sections in group_by_port(sensors)]
+        if len(autopilots) != 1:
             raise Refused(
                 "no_autopilot_section",
-                f"{options.config} has sensors of {len(found)} autopilots",
+                f"{options.config} has sensors of {len(autopilots)} autopilots",
                 "Give a configuration with the sensors of one",
             )
         if loaded.simulated:
@@ -188,7 +188,7 @@ def _connected(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[st
             say(
                 f"simulated laboratory: its autopilot's memory lasts as long as this command, {memory}", file=sys.stderr
             )
-        ((port, sections),) = found
+        ((port, sections),) = autopilots
         name, section = next(iter(sections.items()))
         stack.enter_context(claim_sensor(name, port))
         stack.enter_context(raised_as(Refused))

@@ -1,4 +1,4 @@
-"""What `rig board info` and `calibration` do: look at the board, read and change the calibrations it has stored."""
+"""The commands `rig board info` and `calibration`: inspect the board, read and change its stored calibrations."""
 
 import sys
 from argparse import Namespace
@@ -35,8 +35,8 @@ from rig.station.plain_text import say
 
 
 @dataclass(frozen=True, slots=True)
-class _Place:
-    """A configured sensor's place on the board."""
+class BoardSlot:
+    """A configured sensor on the board, with its stored calibration."""
 
     name: str
     section: SensorSection
@@ -46,85 +46,89 @@ class _Place:
 
 def info(options: Namespace) -> int:
     """Print the board's identity, health, sensors and stored calibrations."""
-    with _connected(options) as (config, board), refusing():
+    with _connect(options) as (config, board), refusing():
         calibrations = [
             board.read_calibration(sensor.index) if sensor.quantity == "rate" else None
             for sensor in board.identity.sensors
         ]
         names: dict[str, str] = {section.part: name for name, section in config.parts_on_board.items()}
-        follows_crystal(board)  # of a board that has just started one waits for the crystal
+        follows_crystal(board)  # waits for the crystal of a board that has just started
         status = board.status()
         sensors = tuple(
             BoardSensorRow(sensor, names.get(spell_part(sensor.part)), counts, stored)
             for sensor, counts, stored in zip(board.identity.sensors, status.sensors, calibrations, strict=True)
         )
-        found = BoardInfo(require_board_section(config).port, board.identity, status, sensors)
-    print_info(found, as_json=options.json)
+        board_info = BoardInfo(require_board_section(config).port, board.identity, status, sensors)
+    print_info(board_info, as_json=options.json)
     return 0
 
 
 def read(options: Namespace) -> int:
-    """Print the calibrations the board has stored, of one sensor or of all."""
-    with _connected(options) as (config, board):
-        places = _places(board, config, options.sensor, config.sensors)
-    for place in places:
-        if place.stored is not None and place.stored.calibration.serial_number != place.section.serial_number:
-            say(f"{place.name}: stored for another sensor than {place.section.serial_number}", file=sys.stderr)
-    print_stored({place.name: place.stored for place in places}, as_json=options.json)
+    """Print the stored calibrations of the board, of one sensor or of all."""
+    with _connect(options) as (config, board):
+        slots = _read_slots(board, config, options.sensor, config.sensors)
+    for slot in slots:
+        if slot.stored is not None and slot.stored.calibration.serial_number != slot.section.serial_number:
+            say(f"{slot.name}: stored for another sensor than {slot.section.serial_number}", file=sys.stderr)
+    print_stored({slot.name: slot.stored for slot in slots}, as_json=options.json)
     return 0
 
 
 def write(options: Namespace) -> int:
-    """Store a run's calibration on the board, of one sensor or of all that were to be calibrated."""
+    """Store a run's calibration on the board, of one sensor or of all that the configuration calibrates."""
     result = read_passed_result(options.result)
-    with _connected(options) as (config, board):
+    with _connect(options) as (config, board):
         refuse_other_firmware(board.identity)
-        places = _places(board, config, options.sensor, config.to_calibrate)
-        found = {place.name: _result_of(place, result, options.result) for place in places}
-        for place in places:
-            find_sensor(board.identity, place.name, place.section)
-        agreed_or_refused(_on(board, (_replacing(place, found[place.name]) for place in places)), "store", options.yes)
+        slots = _read_slots(board, config, options.sensor, config.to_calibrate)
+        calibrations = {slot.name: _select_calibration(slot, result, options.result) for slot in slots}
+        for slot in slots:
+            find_sensor(board.identity, slot.name, slot.section)
+        agreed_or_refused(
+            _announce(board, (_describe_replacement(slot, calibrations[slot.name]) for slot in slots)),
+            "store",
+            options.yes,
+        )
         with changing():
-            for place in places:
-                board.configure(place.index, place.section.rate_hz, place.section.range_deg_s)
-                record = store(board, place.index, found[place.name])
-                say(f"stored: {place.name}, {_in_words(record)}")
+            for slot in slots:
+                board.configure(slot.index, slot.section.rate_hz, slot.section.range_deg_s)
+                record = store(board, slot.index, calibrations[slot.name])
+                say(f"stored: {slot.name}, {_describe_record(record)}")
     return 0
 
 
 def erase(options: Namespace) -> int:
-    """Let the board forget the calibration of one sensor or of all that are configured."""
-    with _connected(options) as (config, board):
+    """Erase the calibrations of one sensor or of all configured ones."""
+    with _connect(options) as (config, board):
         refuse_other_firmware(board.identity)
-        places = [place for place in _places(board, config, options.sensor, config.sensors) if place.stored is not None]
-        if not places:
+        slots = [slot for slot in _read_slots(board, config, options.sensor, config.sensors) if slot.stored is not None]
+        if not slots:
             print("nothing to erase: no calibration is stored")
             return 0
-        losses = (f"{place.name}: erases {_in_words(place.stored)}" for place in places if place.stored is not None)
-        agreed_or_refused(_on(board, losses), "erase", options.yes)
+        losses = (f"{slot.name}: erases {_describe_record(slot.stored)}" for slot in slots if slot.stored is not None)
+        agreed_or_refused(_announce(board, losses), "erase", options.yes)
         with changing():
-            for place in places:
-                board.erase_calibration(place.index)
-                if board.read_calibration(place.index) is not None:
+            for slot in slots:
+                board.erase_calibration(slot.index)
+                if board.read_calibration(slot.index) is not None:
                     raise Fault(
                         "not_erased",
-                        f"the board still has a calibration for {place.name} after it was erased",
+                        f"the board still has a calibration for {slot.name} after it was erased",
                         "Try again; if that does not help, replace the microcontroller board",
                     )
-                say(f"erased: {place.name}")
+                say(f"erased: {slot.name}")
     return 0
 
 
 @contextmanager
-def _connected(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
-    """The board of a configuration, in its simulated laboratory if it has one."""
+def _connect(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
+    """Connect to the board of a configuration, in its simulated laboratory if it has one."""
     with ExitStack() as stack:
         loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))
         section = require_board_section(loaded.config)
         if loaded.simulated:
             stack.enter_context(simulated_laboratory(loaded.text))
-            kept = loaded.flash_file
-            memory = f"is kept in {kept}" if kept else "too, unless world.board.flash_file names a file that keeps it"
+            file = loaded.flash_file
+            memory = f"is kept in {file}" if file else "too, unless world.board.flash_file names a file that keeps it"
             say(f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr)
         stack.enter_context(claim_board(section.port))
         with refusing():
@@ -132,10 +136,12 @@ def _connected(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
         yield loaded.config, board
 
 
-def _places(board: Board, config: RigConfig, sensor: str | None, among: Mapping[str, SensorSection]) -> list[_Place]:
-    """The configured sensors a command is about, and what is stored for them.
+def _read_slots(
+    board: Board, config: RigConfig, sensor: str | None, among: Mapping[str, SensorSection]
+) -> list[BoardSlot]:
+    """Return the sensors of a command, with their stored calibrations.
 
-    Raises Refused `no_such_sensor`, `sensor_missing`.
+    Raise Refused `no_such_sensor`, `sensor_missing`.
     """
     among = {name: section for name, section in among.items() if section.on_board}
     if sensor is not None and sensor not in among:
@@ -144,56 +150,56 @@ def _places(board: Board, config: RigConfig, sensor: str | None, among: Mapping[
             f"--sensor {sensor}: the configuration has no such sensor for this",
             f"Choose one of: {', '.join(among)}",
         )
-    places = []
+    slots = []
     for name in [sensor] if sensor is not None else among:
         section = config.sensors[name]
         index = sensor_entry(board.identity, name, section).index
         with refusing():
-            places.append(_Place(name, section, index, board.read_calibration(index)))
-    return places
+            slots.append(BoardSlot(name, section, index, board.read_calibration(index)))
+    return slots
 
 
-def _result_of(place: _Place, result: ResultDocument, path: Path) -> Calibration:
-    """The run's calibration of a sensor. Raises Refused `not_in_result`, and as `refuse_other_sensor`."""
-    entry = result.gyroscopes.get(place.name)
+def _select_calibration(slot: BoardSlot, result: ResultDocument, path: Path) -> Calibration:
+    """Return the run's calibration of a sensor. Raise Refused `not_in_result`, and as `refuse_other_sensor`."""
+    entry = result.gyroscopes.get(slot.name)
     if entry is None or entry.role == "reference":
         raise Refused(
             "not_in_result",
-            f"{path} has no calibration for sensors.{place.name}",
+            f"{path} has no calibration for sensors.{slot.name}",
             f"It has: {', '.join(result.gyroscopes) or 'none'}; choose one with --sensor",
         )
     if entry.range_rad_s is None:
         raise Refused(
             "not_in_result",
-            f"{path} does not say in which range {place.name} was read: its readings were recorded elsewhere",
+            f"{path} does not say in which range {slot.name} was read: its readings were recorded elsewhere",
             "Calibrate it on the board that is to keep its calibration",
         )
-    calibration, range_deg_s = f"{path}: the calibration of {place.name}", degrees(entry.range_rad_s)
-    refuse_other_sensor(calibration, entry.part, entry.serial_number, range_deg_s, place.section)
-    return calibration_of(entry, result.over_temperature.get(place.name, {}).get(RATE.name))
+    calibration, range_deg_s = f"{path}: the calibration of {slot.name}", degrees(entry.range_rad_s)
+    refuse_other_sensor(calibration, entry.part, entry.serial_number, range_deg_s, slot.section)
+    return calibration_of(entry, result.over_temperature.get(slot.name, {}).get(RATE.name))
 
 
-def _on(board: Board, changes: Iterable[str]) -> list[str]:
+def _announce(board: Board, changes: Iterable[str]) -> list[str]:
     return [f"On the board {board.identity.unique_id}:", *(f"  {change}" for change in changes)]
 
 
-def _replacing(place: _Place, calibration: Calibration) -> str:
+def _describe_replacement(slot: BoardSlot, calibration: Calibration) -> str:
     scale = " ".join(f"{value:.5f}" for value in calibration.scale)
     bias = " ".join(f"{value:+.5f}" for value in calibration.bias_rad_s)
-    old = f"replaces {_in_words(place.stored)}" if place.stored is not None else "nothing was stored before"
-    return f"{place.name}: scale {scale}, bias {bias} rad/s{_corrected_from(calibration)}; {old}"
+    old = f"replaces {_describe_record(slot.stored)}" if slot.stored is not None else "nothing was stored before"
+    return f"{slot.name}: scale {scale}, bias {bias} rad/s{_describe_range(calibration)}; {old}"
 
 
-def _corrected_from(calibration: Calibration) -> str:
+def _describe_range(calibration: Calibration) -> str:
     if calibration.polynomials is None:
         return ""
     low, high = calibration.polynomials.range_c
     return f", at {calibration.temperature_c:g} °C, corrected by temperature from {low:.1f} to {high:.1f} °C"
 
 
-def _in_words(stored: StoredCalibration) -> str:
+def _describe_record(stored: StoredCalibration) -> str:
     calibration = stored.calibration
     return (
         f"record {stored.sequence} of {calibration.written_utc:%Y-%m-%d %H:%M} UTC for {stored.part} "
-        f"{calibration.serial_number} at {stored.range_deg_s:g} °/s{_corrected_from(calibration)}"
+        f"{calibration.serial_number} at {stored.range_deg_s:g} °/s{_describe_range(calibration)}"
     )

@@ -1,4 +1,4 @@
-"""What `rig board flash` does: put the firmware that comes with this program onto the board."""
+"""`rig board flash`: put the firmware that comes with this program onto the board."""
 
 from argparse import Namespace
 from collections.abc import Callable
@@ -13,22 +13,22 @@ from rig.station.plain_text import say
 
 
 def flash(options: Namespace) -> int:
-    """Put the shipped image onto the board, through its debug probe or by a copy to its USB drive."""
+    """Flash the shipped image, through the board's debug probe or by a copy to its USB drive."""
     with refusing():
         image = flashing.load_shipped_image()
-        put: Callable[[], object]
+        carry_out: Callable[[], object]
         if options.drive is not None:
             target = Path(options.drive) if options.drive else flashing.find_drive()
             flashing.refuse_other_drive(target)
-            put = partial(flashing.flash_by_drive, image, target)
-            way, calibrations = f"the drive {target}", "may be lost: read them out first"
+            carry_out = partial(flashing.flash_by_drive, image, target)
+            route, calibrations = f"the drive {target}", "may be lost: read them out first"
         else:
             probe = flashing.find_probe(options.probe)
-            put = partial(flashing.flash_by_probe, image, probe)
-            way, calibrations = f"the debug probe {probe.unique_id}", "stay"
+            carry_out = partial(flashing.flash_by_probe, image, probe)
+            route, calibrations = f"the debug probe {probe.unique_id}", "stay"
     agreed_or_refused(
         [
-            f"The board at {way} gets the firmware {FIRMWARE_VERSION} ({len(image)} bytes).",
+            f"The board at {route} gets the firmware {FIRMWARE_VERSION} ({len(image)} bytes).",
             f"SHA-256 {flashing.sha256(image)}.",
             f"Nothing else may use the board meanwhile. Calibrations it has stored {calibrations}.",
         ],
@@ -36,6 +36,6 @@ def flash(options: Namespace) -> int:
         options.yes,
     )
     with changing():
-        put()
+        carry_out()
     say(f"flashed: firmware {FIRMWARE_VERSION}, SHA-256 {flashing.sha256(image)}; see it with `rig board info CONFIG`")
     return 0

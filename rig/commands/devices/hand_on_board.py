@@ -1,6 +1,6 @@
-"""`rig board hand`: the board calibrates a gyroscope that is turned by hand; says what to do, and checks the answer.
+"""`rig board hand`: the board calibrates a gyroscope that is turned by hand; its result is checked.
 
-With `--fetch` the board has done so alone, begun by its button: its answer is taken as it is.
+With `--fetch` the board has done so alone, begun by its button: its result is taken as it is.
 """
 
 import json
@@ -40,13 +40,13 @@ if TYPE_CHECKING:
     from rig.runner.by_hand.on_board import CalibratedByBoard
 
 MOVES = range(8, 201)
-UNCHECKED = "the board's own answer alone: no readings are left by which double precision could check it"
+UNCHECKED = "the board's own result: its readings are gone, so double precision cannot check it"
 
 
 def hand(options: Namespace) -> int:
-    """Let the board calibrate, or fetch what it keeps; print it, and how far double precision differs.
+    """Let the board calibrate, or fetch its last result; print it, and how far double precision differs.
 
-    Raises Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and as
+    Raise Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and as
     `calibrate_by_board` and `read_kept_solution`; Fault as the first of them.
     """
     if options.moves not in MOVES or not 0 < options.scale_std < 1:
@@ -60,41 +60,45 @@ def hand(options: Namespace) -> int:
     with ExitStack() as stack:
         loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))
         config = loaded.config
-        among = _sensors(config, options.sensor)
+        among = _select_sensors(config, options.sensor)
         operator = None
         if loaded.simulated:
             operator = SimulatedOperator(stack.enter_context(simulated_laboratory(loaded.text)))
         stack.enter_context(claim_board(require_board_section(config).port))
-        of_board = _fetched(config, among) if options.fetch else _made(config, next(iter(among)), options, operator)
-        board, name, found = stack.enter_context(of_board)
+        session = (
+            _fetch_session(config, among)
+            if options.fetch
+            else _run_session(config, next(iter(among)), options, operator)
+        )
+        board, name, by_board = stack.enter_context(session)
         calibration = Calibration(
             model="matrix_times_m_plus_b",
             serial_number=config.sensors[name].serial_number,
             written_utc=datetime.now(UTC),
-            temperature_c=found.solved.temperature_c,
-            matrix=found.solved.matrix,
-            bias_rad_s=found.solved.bias_rad_s,
+            temperature_c=by_board.solved.temperature_c,
+            matrix=by_board.solved.matrix,
+            bias_rad_s=by_board.solved.bias_rad_s,
         )
         crystal = 1e-6 * config.uncertainty.crystal_ppm / math.sqrt(3)
-        scale_u = 2 * math.hypot(found.solved.scale_std, REAL_HANDS, crystal)
+        scale_u = 2 * math.hypot(by_board.solved.scale_std, REAL_HANDS, crystal)
         if options.json:
-            print(json.dumps(_document(name, found, calibration, scale_u), indent=2))
+            print(json.dumps(_document(name, by_board, calibration, scale_u), indent=2))
         else:
-            for line in _lines(name, found, calibration, scale_u):
+            for line in _describe(name, by_board, calibration, scale_u):
                 say(line)
         if options.write:
-            unchecked = [f"  {UNCHECKED}"] if found.agreement is None else []
+            unchecked = [f"  {UNCHECKED}"] if by_board.agreement is None else []
             agreed_or_refused([f"On the board {board.identity.unique_id}: {name}", *unchecked], "store", options.yes)
             with changing():
-                if options.fetch:  # a record is of a sensor that is set up
-                    board.configure(found.index, config.sensors[name].rate_hz, config.sensors[name].range_deg_s)
-                record = store(board, found.index, calibration)
+                if options.fetch:  # a record needs a configured sensor
+                    board.configure(by_board.index, config.sensors[name].rate_hz, config.sensors[name].range_deg_s)
+                record = store(board, by_board.index, calibration)
             say(f"stored: {name}, record {record.sequence}", file=sys.stderr)
     return 0
 
 
-def _sensors(config: RigConfig, wanted: str | None) -> dict[str, SensorSection]:
-    """The sensors that may be meant, the wanted one alone where one is. Raises Refused `no_such_sensor`."""
+def _select_sensors(config: RigConfig, wanted: str | None) -> dict[str, SensorSection]:
+    """Return the sensors of the command, only the wanted one if it is named. Raise Refused `no_such_sensor`."""
     among = {name: section for name, section in config.to_calibrate.items() if section.on_board}
     if not among or (wanted is not None and wanted not in among):
         raise Refused(
@@ -106,10 +110,10 @@ def _sensors(config: RigConfig, wanted: str | None) -> dict[str, SensorSection]:
 
 
 @contextmanager
-def _made(
+def _run_session(
     config: RigConfig, name: str, options: Namespace, operator: SimulatedOperator | None
 ) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
-    """A session that the board makes now, and the operator with it."""
+    """Run a session on the board now, with the operator."""
     from rig.runner.by_hand.on_board import calibrate_by_board
 
     def tell(event: OfTheHand) -> None:
@@ -118,22 +122,24 @@ def _made(
         if operator is not None:
             operator.event(event)
 
-    with calibrate_by_board(config, name, options.moves, options.scale_std, tell) as (board, found):
-        yield board, name, found
+    with calibrate_by_board(config, name, options.moves, options.scale_std, tell) as (board, by_board):
+        yield board, name, by_board
 
 
 @contextmanager
-def _fetched(config: RigConfig, among: dict[str, SensorSection]) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
-    """What the board keeps of its last session, of one of the sensors that may be meant."""
+def _fetch_session(
+    config: RigConfig, among: dict[str, SensorSection]
+) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
+    """Fetch the result of the board's last session, of one of these sensors."""
     from rig.runner.by_hand.on_board import read_kept_solution
 
     section = require_board_section(config)
-    with ExitStack() as held:
+    with ExitStack() as stack:
         with refusing():
-            board = held.enter_context(Board(section.port, section.baud, lambda batch: None))
+            board = stack.enter_context(Board(section.port, section.baud, lambda batch: None))
             refuse_other_firmware(board.identity)
-            found = read_kept_solution(board)
-        part = spell_part(board.identity.sensors[found.index].part)
+            by_board = read_kept_solution(board)
+        part = spell_part(board.identity.sensors[by_board.index].part)
         name = next((name for name, sensor in among.items() if sensor.part == part), None)
         if name is None:
             raise Refused(
@@ -143,8 +149,10 @@ def _fetched(config: RigConfig, among: dict[str, SensorSection]) -> Iterator[tup
             )
         sensor = among[name]
         find_sensor(board.identity, name, sensor)
-        refuse_other_sensor("the board's answer by hand", part, sensor.serial_number, found.solved.range_deg_s, sensor)
-        yield board, name, found
+        refuse_other_sensor(
+            "the board's answer by hand", part, sensor.serial_number, by_board.solved.range_deg_s, sensor
+        )
+        yield board, name, by_board
 
 
 def _document(name: str, by_board: "CalibratedByBoard", calibration: Calibration, scale_u: float) -> dict[str, Any]:
@@ -164,7 +172,7 @@ def _document(name: str, by_board: "CalibratedByBoard", calibration: Calibration
     }
 
 
-def _lines(name: str, by_board: "CalibratedByBoard", calibration: Calibration, scale_u: float) -> Iterator[str]:
+def _describe(name: str, by_board: "CalibratedByBoard", calibration: Calibration, scale_u: float) -> Iterator[str]:
     scale = " ".join(f"{value:.5f}" for value in calibration.scale)
     bias = " ".join(f"{value:+.6f}" for value in calibration.bias_rad_s)
     agreement, std = by_board.agreement, by_board.solved.scale_std

@@ -1,4 +1,4 @@
-"""`rig kvh info`: look at a KVH 1775 at a port or in a configuration. Nothing in its memory is changed."""
+"""`rig kvh info`: inspect a KVH 1775 at a port or in a configuration. Nothing in its memory is changed."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -23,9 +23,9 @@ LEAST_MESSAGES = 3
 
 
 def add(parser: ArgumentParser) -> None:
-    """The commands of `rig kvh`: one today."""
+    """Add the command of `rig kvh`."""
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    text = "its number, the settings in its memory, its built-in test, what it sends; changes nothing"
+    text = "print its serial number, settings, built-in test and messages; changes nothing"
     info = commands.add_parser("info", help=text, description=text)
     info.add_argument("target", metavar="PORT_OR_CONFIG", help="its serial port, or a YAML configuration file")
     add_set(info, "change one value of the file")
@@ -34,36 +34,36 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print what is at the port, or every KVH 1775 of the configuration, that is given; 2 if one has a problem."""
+    """Print the KVH 1775 at the given port, or every one of the given configuration; return 2 if one has a problem."""
     from rig.commands.laboratory.own_address import load_at_own_address
     from rig.report.terminal.kvh_info import print_kvh_info
 
     target, baud = options.target, options.baud
     with ExitStack() as stack:
-        places = {target: (target, baud or 921600)}
+        ports = {target: (target, baud or 921600)}
         if Path(target).is_file():
             loaded = stack.enter_context(load_at_own_address(Path(target), options.overrides))
-            places = {
+            ports = {
                 name: (section.serial.port, baud or section.serial.baud)
                 for name, section in loaded.config.sensors.items()
                 if section.serial is not None and section.part == "kvh1775"
             }
-            if not places:
+            if not ports:
                 raise Refused("no_kvh_section", f"{target} has no KVH 1775", "Give a port, or another configuration")
             if loaded.simulated:
                 stack.enter_context(simulated_laboratory(loaded.text))
         problems = []
-        for name, (port, speed) in places.items():
-            found = _look(name, port, speed)
-            print_kvh_info(found, as_json=options.json)
-            problems += [found.problem] if found.problem is not None else []
+        for name, (port, speed) in ports.items():
+            info = _look(name, port, speed)
+            print_kvh_info(info, as_json=options.json)
+            problems += [info.problem] if info.problem is not None else []
     for problem in problems:
         say(f"rig: {problem}", file=sys.stderr)
     return 2 if problems else 0
 
 
 def _look(name: str, port: str, baud: int) -> "KvhInfo":
-    """Raises Refused where nothing can be asked at all."""
+    """Query one instrument. Raise Refused if it does not answer at all."""
     import numpy as np
 
     from rig.commands.laboratory.claims import claim_sensor
@@ -72,26 +72,26 @@ def _look(name: str, port: str, baud: int) -> "KvhInfo":
     from rig.sensors.kvh1775.driver import Kvh1775
     from rig.sensors.kvh1775.settings import Kvh1775Settings
 
-    seen: list[NDArray[Any]] = []
+    batches: list[NDArray[Any]] = []
     with (
         raised_as(Refused),
         claim_sensor(name, port),
-        closing(Kvh1775(name, port, baud, lambda messages, *_: seen.append(messages))) as kvh,
+        closing(Kvh1775(name, port, baud, lambda messages, *_: batches.append(messages))) as kvh,
     ):
-        found = KvhInfo(name, port, baud, kvh.serial_number, dict(kvh.settings))
+        info = KvhInfo(name, port, baud, kvh.serial_number, dict(kvh.settings))
         try:
             kvh.run()
-            found = replace(found, built_in_test=kvh.test().values.hex(" "))
+            info = replace(info, built_in_test=kvh.test().values.hex(" "))
             rate_hz = float(kvh.settings["DR"])
             kvh.start(Kvh1775Settings(rate_hz, cast("Format", kvh.settings["OUTPUTFMT"]), "rate"))
             kvh.listen(LOOK_S + LEAST_MESSAGES / rate_hz)
         except SensorError as error:
-            found = replace(found, problem=str(error))
-        if not seen:
-            return found
-        messages = np.concatenate(seen)
+            info = replace(info, problem=str(error))
+        if not batches:
+            return info
+        messages = np.concatenate(batches)
         return replace(
-            found,
+            info,
             messages=len(messages),
             lost=kvh.lost,
             rotation=tuple(messages["rotation"].mean(axis=0, dtype=np.float64).tolist()),

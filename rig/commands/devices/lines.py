@@ -1,4 +1,4 @@
-"""`rig lines PORT`: look at a device that prints lines, and write its section, or a whole file that runs by hand."""
+"""`rig lines PORT`: inspect a device that prints lines, and write its section or a complete configuration by hand."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -19,72 +19,74 @@ def add(parser: ArgumentParser) -> None:
     """Add the arguments of `rig lines`."""
     parser.add_argument("port", metavar="PORT", help="its serial port, or socket://host:port")
     parser.add_argument("--baud", type=int, metavar="BD", help="speed of its line (default: the usual ones are tried)")
-    parser.add_argument("--name", default="imu", metavar="NAME", help="what the sensor is called (default: imu)")
+    parser.add_argument("--name", default="imu", metavar="NAME", help="name of the sensor (default: imu)")
     parser.add_argument(
         "--seconds",
         type=float,
         nargs=2,
         default=SECONDS,
         metavar=("STILL", "TURNED"),
-        help="how long it lies still, and is turned then (default: 4 6)",
+        help="duration at rest, and of the turns that follow (default: 4 6)",
     )
     parser.add_argument(
-        "--write", type=Path, metavar="FILE", help="write a whole configuration that runs by hand, a new file"
+        "--write", type=Path, metavar="FILE", help="write a complete configuration by hand to a new file"
     )
     add_stated(parser)
 
 
 def add_stated(parser: ArgumentParser) -> None:
-    """Add the arguments for what no line shows."""
-    parser.add_argument("--serial-number", metavar="NUMBER", help="of this specimen")
+    """Add the arguments for values that no line shows."""
+    parser.add_argument("--serial-number", metavar="NUMBER", help="serial number of this specimen")
     parser.add_argument(
         "--range-deg-s", metavar="DEG_S", help="full scale to which the device's program sets the gyroscope"
     )
-    parser.add_argument("--range-g", metavar="G", help="… and the accelerometer")
+    parser.add_argument("--range-g", metavar="G", help="full scale to which it sets the accelerometer")
 
 
 def run(options: Namespace) -> int:
-    """Print the section on stdout, or write the file, and say on stderr what is known and what is not.
+    """Print the section on stdout, or write the file, and report on stderr what the lines show and what they do not.
 
-    Return 0, or 1 if the file has something to be filled in. Raise Refused as `section_of`, `stated` and `written`.
+    Return 0, or 1 if the file needs more values. Raise Refused as `look_at_device`, `ask_stated` and `write_checked`.
     """
-    if not all(0.5 <= each <= 600 for each in options.seconds):
+    if not all(0.5 <= duration_s <= 600 for duration_s in options.seconds):
         raise Refused("bad_option", "--seconds are two times from 0.5 to 600", "Give for example --seconds 4 6")
     if options.write is None:
         from rig.sensors.lines.written import StatedProperties
 
-        known = StatedProperties(options.serial_number, options.range_deg_s, options.range_g)
-        section = section_of(options.port, options.baud, options.name, tuple(options.seconds), known)
+        given_values = StatedProperties(options.serial_number, options.range_deg_s, options.range_g)
+        section = look_at_device(options.port, options.baud, options.name, tuple(options.seconds), given_values)
         _tell('write what is known in place of "?"; rig check refuses the section until then')
         sys.stdout.write(section)
         return 0
-    from rig.commands.devices.written import refuse_existing, written
+    from rig.commands.devices.written import refuse_existing, write_checked
     from rig.config.first_configuration import Answers
 
     refuse_existing(options.write)
-    known = stated(options, by_hand=True)
-    section = section_of(options.port, options.baud, options.name, tuple(options.seconds), known)
-    return written(options.write, Answers("hand", "lines", options.port, sensors=section))
+    given_values = ask_stated(options, by_hand=True)
+    section = look_at_device(options.port, options.baud, options.name, tuple(options.seconds), given_values)
+    return write_checked(options.write, Answers("hand", "lines", options.port, sensors=section))
 
 
-def stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
-    """Ask what no line shows and no option says; without a terminal it stays open. Raise Refused `bad_option`."""
-    from rig.commands.devices.questions import answered
+def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
+    """Ask for values that neither lines nor options give; without a terminal they stay open. Raise Refused
+    `bad_option`.
+    """
+    from rig.commands.devices.questions import ask
     from rig.config.sensors.sensor_sections import check_serial_number
     from rig.sensors.lines.written import StatedProperties
 
-    asked = {
+    questions = {
         "serial_number": ("serial number of this specimen", "--serial-number", check_serial_number),
         "range_deg_s": ("full scale of the gyroscope in its program, °/s", "--range-deg-s", positive_number),
         "range_g": ("full scale of the accelerometer in its program, g", "--range-g", positive_number),
     }
-    given = {key: getattr(options, key) for key in asked}
-    found = {
-        key: answered(question, option, valid, given=given[key])
-        for key, (question, option, valid) in asked.items()
-        if given[key] is not None or sys.stdin.isatty()
+    options_given = {key: getattr(options, key) for key in questions}
+    answers = {
+        key: ask(question, option, valid, value=options_given[key])
+        for key, (question, option, valid) in questions.items()
+        if options_given[key] is not None or sys.stdin.isatty()
     }
-    return StatedProperties(**found, by_hand=by_hand)
+    return StatedProperties(**answers, by_hand=by_hand)
 
 
 def positive_number(text: str) -> str:
@@ -98,8 +100,10 @@ def positive_number(text: str) -> str:
     return text
 
 
-def section_of(port: str, baud: int | None, name: str, seconds: tuple[float, float], known: "StatedProperties") -> str:
-    """Look at a device for ten seconds and return its section as YAML; say what the lines show.
+def look_at_device(
+    port: str, baud: int | None, name: str, seconds: tuple[float, float], user: "StatedProperties"
+) -> str:
+    """Look at a device for ten seconds and return its section as YAML; print what the lines show.
 
     Raise Refused as `listen`, and `lines_no_pattern` if its lines have nothing in common.
     """
@@ -113,16 +117,16 @@ def section_of(port: str, baud: int | None, name: str, seconds: tuple[float, flo
         baud, lines, still_s = listen(port, baud, _tell, seconds)
     try:
         shape = find_shape(lines)
-        found = guess(shape, still_s)
+        layout = guess(shape, still_s)
     except NoShape as why:
         raise Refused(
             "lines_no_pattern", f"{port}: {why}", "Let its program print one sample a line, numbers only"
         ) from why
-    for reason in found.reasons:
+    for reason in layout.reasons:
         _tell(reason)
-    for gap in found.gaps:
+    for gap in layout.gaps:
         _tell(f"CANNOT TELL {gap}")
-    return printable_lines(section(shape, found, port, baud, name, user=known))
+    return printable_lines(section(shape, layout, port, baud, name, user=user))
 
 
 def _tell(what: str) -> None:

@@ -1,4 +1,4 @@
-"""`rig new FILE`: a configuration from a few questions, written with comments and checked."""
+"""`rig new FILE`: write a configuration from a few questions, with comments, and check it."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.devices.lines import SECONDS, add_stated, positive_number, section_of, stated
-from rig.commands.devices.questions import answered, chosen
-from rig.commands.devices.written import refuse_existing, written
+from rig.commands.devices.lines import SECONDS, add_stated, ask_stated, look_at_device, positive_number
+from rig.commands.devices.questions import ask, ask_choice
+from rig.commands.devices.written import refuse_existing, write_checked
 from rig.errors import RigError
 from rig.station.plain_text import say
 
@@ -31,14 +31,14 @@ ANOTHER = "another"
 
 def add(parser: ArgumentParser) -> None:
     """Add the arguments of `rig new`: the file, and an option for each question."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the configuration, a new file, such as my.yaml")
+    parser.add_argument("file", type=Path, metavar="FILE", help="new configuration file, such as my.yaml")
     parser.add_argument("--turner", choices=TURNERS, help="what turns the sensors")
     parser.add_argument("--sensor", choices=SOURCES, help="what measures")
-    parser.add_argument("--port", metavar="PORT", help="where that answers: /dev/ttyACM0, COM3, socket://host:port")
-    parser.add_argument("--part", metavar="PART", help="which sensor is on the board")
+    parser.add_argument("--port", metavar="PORT", help="port of the sensor: /dev/ttyACM0, COM3, socket://host:port")
+    parser.add_argument("--part", metavar="PART", help="the sensor on the board")
     add_stated(parser)
-    parser.add_argument("--host", metavar="ADDRESS", help="of the arm's controller")
-    parser.add_argument("--model", metavar="MODEL", help="of the arm or the servomotor")
+    parser.add_argument("--host", metavar="ADDRESS", help="address of the arm's controller")
+    parser.add_argument("--model", metavar="MODEL", help="model of the arm or the servomotor")
     parser.add_argument("--payload-kg", metavar="KG", help="mass of all that the arm's flange carries")
     parser.add_argument("--servo-port", metavar="PORT", help="serial port of the servomotor's adapter")
     parser.add_argument(
@@ -49,12 +49,12 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Ask what no option says, write the file and check it; return 0, or 1 if something is to be filled in.
+    """Ask what no option says, write the file and check it; return 0, or 1 if values remain to be filled in.
 
     Raise Refused `not_answered`, `bad_option`, `configuration_not_written`.
     """
     refuse_existing(options.file)
-    return written(options.file, _answers(options))
+    return write_checked(options.file, _answers(options))
 
 
 def _answers(options: Namespace) -> "Answers":
@@ -62,17 +62,17 @@ def _answers(options: Namespace) -> "Answers":
     from rig.config.sensors.sensor_catalogue import PARTS
     from rig.config.sensors.sensor_sections import check_serial_number
 
-    turner = chosen("What turns the sensors?", "--turner", TURNERS, options.turner)
+    turner = ask_choice("What turns the sensors?", "--turner", TURNERS, options.turner)
     sources = {key: words for key, words in SOURCES.items() if key != "kvh1775" or turner == "arm"}
-    source = chosen("What measures?", "--sensor", sources, options.sensor)
+    source = ask_choice("What measures?", "--sensor", sources, options.sensor)
     arm = _turner_answers(turner, options)
     port = _port("Where does it answer?", "--port", options.port)
     if source == "lines":
         return Answers(turner, source, port, **_lines_answers(options, port, by_hand=turner == "hand"), **arm)  # type: ignore[arg-type]
     parts = {name: name for name, part in PARTS.items() if not part.own_port and name != "mavlink"}
-    part = {"part": chosen("Which sensor is it?", "--part", parts, options.part)} if source == "board" else {}
-    serial_number = answered(
-        "serial number of this specimen", "--serial-number", check_serial_number, given=options.serial_number
+    part = {"part": ask_choice("Which sensor is it?", "--part", parts, options.part)} if source == "board" else {}
+    serial_number = ask(
+        "serial number of this specimen", "--serial-number", check_serial_number, value=options.serial_number
     )
     return Answers(turner, source, port, serial_number, **part, **arm)  # type: ignore[arg-type]
 
@@ -84,35 +84,35 @@ def _turner_answers(turner: str, options: Namespace) -> dict[str, object]:
 
     if turner == "arm":
         usual = ArmSection.model_fields["model"]
-        payload = answered(
+        payload = ask(
             "mass on the flange (board, holder, cable), kg", "--payload-kg", positive_number, "0.35", options.payload_kg
         )
         return {
-            "arm_host": answered(
-                "address of the arm (pendant: Settings, System, Network)", "--host", check_host, given=options.host
+            "arm_host": ask(
+                "address of the arm (pendant: Settings, System, Network)", "--host", check_host, value=options.host
             ),
-            "arm_model": chosen("Which arm is it?", "--model", _literals(usual.annotation), options.model),
+            "arm_model": ask_choice("Which arm is it?", "--model", _literals(usual.annotation), options.model),
             "payload_kg": float(payload),
         }
     if turner == "servo":
         models = _literals(ServoSection.model_fields["model"].annotation)
         return {
             "servo_port": _port("Where is the servomotor's adapter?", "--servo-port", options.servo_port),
-            "servo_model": chosen("Which servomotor is it?", "--model", models, options.model),
+            "servo_model": ask_choice("Which servomotor is it?", "--model", models, options.model),
         }
     return {}
 
 
 def _lines_answers(options: Namespace, port: str, *, by_hand: bool) -> dict[str, object]:
-    """Return what a look at the device shows; if it is not looked at or does not answer, what is asked."""
+    """Return what the device shows; if it is not inspected or does not answer, the answers of the user."""
     choices = {"yes": "yes: ten seconds, and nothing is left to look up", "no": "no: write an example, to be edited"}
-    known = stated(options, by_hand=by_hand)
-    if chosen("Look at the device now?", "--listen", choices, options.listen) == "yes":
+    user_values = ask_stated(options, by_hand=by_hand)
+    if ask_choice("Look at the device now?", "--listen", choices, options.listen) == "yes":
         try:
-            return {"sensors": section_of(port, None, "imu", SECONDS, known)}
+            return {"sensors": look_at_device(port, None, "imu", SECONDS, user_values)}
         except RigError as error:
             say(f"{error}\nThe file gets an example in its place; `rig lines {port}` writes it later.", sys.stderr)
-    stated_here = {key: getattr(known, key) for key in ("serial_number", "range_deg_s", "range_g")}
+    stated_here = {key: getattr(user_values, key) for key in ("serial_number", "range_deg_s", "range_g")}
     return {key: value for key, value in stated_here.items() if value is not None}
 
 
@@ -122,18 +122,18 @@ def _literals(annotation: object) -> Mapping[str, str]:
     return {str(value): str(value) for value in get_args(annotation)}
 
 
-def _port(question: str, option: str, given: str | None) -> str:
-    """Return a port: one of those that this computer has, or another that is typed."""
+def _port(question: str, option: str, chosen_port: str | None) -> str:
+    """Return a port: one of this computer's, or another that the user types."""
     from rig.config.section import check_port
 
-    if given is None:
+    if chosen_port is None:
         from serial.tools.list_ports import comports
 
-        found = [port for port in sorted(comports()) if port.hwid != "n/a"]  # a name without a device behind it
-        there = {port.device: f"{port.device} ({port.description})" for port in found}
-        choices = {**there, ANOTHER: "another, or one that is not plugged in yet"}
-        given = chosen(question, option, choices) if there else ANOTHER
-        if given != ANOTHER:
-            return given
-        given = None
-    return answered("port, such as /dev/ttyUSB0, COM3 or socket://host:port", option, check_port, given=given)
+        ports = [port for port in sorted(comports()) if port.hwid != "n/a"]  # a name without a device behind it
+        plugged_in = {port.device: f"{port.device} ({port.description})" for port in ports}
+        choices = {**plugged_in, ANOTHER: "another, or one that is not plugged in yet"}
+        chosen_port = ask_choice(question, option, choices) if plugged_in else ANOTHER
+        if chosen_port != ANOTHER:
+            return chosen_port
+        chosen_port = None
+    return ask("port, such as /dev/ttyUSB0, COM3 or socket://host:port", option, check_port, value=chosen_port)

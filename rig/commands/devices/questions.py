@@ -1,4 +1,4 @@
-"""Asks at the terminal what the command line has not said; without a terminal the option is named that says it."""
+"""Questions at the terminal for values that the command line does not give; without a terminal the option is named."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -8,29 +8,33 @@ from rig.errors.quoting import printable
 from rig.station.plain_text import say
 
 
-def answered(
-    question: str, option: str, valid: Callable[[str], str] = str, usual: str | None = None, given: str | None = None
+def ask(
+    question: str,
+    option: str,
+    valid: Callable[[str], str] = str,
+    usual: str | None = None,
+    value: str | None = None,
 ) -> str:
-    """Return the answer to a question: what is `given` by the option, or what is typed, asked again until it is valid.
+    """Return the answer to a question: the option's value, or the typed text, asked again until it is valid.
 
-    `valid` returns an answer as it is used, and raises ValueError for one that cannot be. `usual` is what Enter means.
-    Raise Refused `not_answered`, and `bad_option` for a given answer that is not valid.
+    `valid` returns an answer as it is used, and raises ValueError for an invalid one. `usual` is the meaning of Enter.
+    Raise Refused `not_answered`, and `bad_option` for an invalid option.
     """
-    if given is not None:
+    if value is not None:
         try:
-            return valid(given)
+            return valid(value)
         except ValueError as error:
-            raise Refused("bad_option", f"{option} {printable(given)}: {error}", "Give another value") from None
+            raise Refused("bad_option", f"{option} {printable(value)}: {error}", "Give another value") from None
     while True:
-        typed = _typed(question, option, usual)
+        typed = _read_typed(question, option, usual)
         try:
             return valid(typed)
         except ValueError as error:
             say(f"  {error}", sys.stderr)
 
 
-def chosen(question: str, option: str, choices: Mapping[str, str], given: str | None = None) -> str:
-    """Return the key of one of the choices, by its number or by itself; Enter means the first. Raise as `answered`."""
+def ask_choice(question: str, option: str, choices: Mapping[str, str], value: str | None = None) -> str:
+    """Return the key of one of the choices, by its number or itself; Enter means the first. Raise as `ask`."""
     keys = [*choices]
 
     def key_of(text: str) -> str:
@@ -40,25 +44,25 @@ def chosen(question: str, option: str, choices: Mapping[str, str], given: str | 
             return keys[int(text) - 1]
         raise ValueError(f"type a number from 1 to {len(keys)}")
 
-    if given is None:
+    if value is None:
         _refuse_without_terminal(question, option)
         say(question, sys.stderr)
         for number, words in enumerate(choices.values(), 1):
             say(f"  {number}  {words}", sys.stderr)
-    return answered("  number", option, key_of, usual="1", given=given)
+    return ask("  number", option, key_of, usual="1", value=value)
 
 
 def _refuse_without_terminal(question: str, option: str) -> None:
     if not sys.stdin.isatty():
-        raise _nobody(question, option)
+        raise _no_terminal(question, option)
 
 
-def _nobody(question: str, option: str) -> Refused:
-    what = f"there is no terminal at which this could be answered: {question}"
+def _no_terminal(question: str, option: str) -> Refused:
+    what = f"there is no terminal to answer this question: {question}"
     return Refused("not_answered", what, f"Give the answer with {option}")
 
 
-def _typed(question: str, option: str, usual: str | None) -> str:
+def _read_typed(question: str, option: str, usual: str | None) -> str:
     from rich.console import Console
     from rich.prompt import Prompt
 
@@ -67,5 +71,5 @@ def _typed(question: str, option: str, usual: str | None) -> str:
         console = Console(stderr=True, highlight=False, markup=False)
         typed = Prompt.ask(question, console=console, default=usual, show_default=usual is not None)
     except EOFError:
-        raise _nobody(question, option) from None
+        raise _no_terminal(question, option) from None
     return (typed or "").strip()

@@ -1,4 +1,4 @@
-"""Writes a first configuration to a file, checks it, and says what is still to be filled in and what comes next."""
+"""The writing of a first configuration, its check, and the next steps."""
 
 import os
 from pathlib import Path
@@ -16,8 +16,9 @@ def refuse_existing(path: Path) -> None:
         raise _not_written(path, "it is there already")
 
 
-def written(path: Path, answers: Answers) -> int:
-    """Write the configuration of the answers, a new file, and check it; return 0, or 1 if something is to be filled in.
+def write_checked(path: Path, answers: Answers) -> int:
+    """Write the configuration of the answers to a new file and check it; return 0, or 1 if values remain to be filled
+    in.
 
     Raise Refused `configuration_not_written`.
     """
@@ -50,7 +51,7 @@ def written(path: Path, answers: Answers) -> int:
 
 
 def _schema_from(schema: Path, path: Path) -> str:
-    """Return where the schema is, seen from the file: relative to it if both lie below one folder, else as a URL."""
+    """Return the path of the schema from the file: relative if both lie below one folder, else a URL."""
     folder = path.resolve().parent
     if schema.is_relative_to(folder) or folder.is_relative_to(schema.parent.parent):
         return Path(os.path.relpath(schema, folder)).as_posix()

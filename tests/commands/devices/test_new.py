@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from rig.cli import main
-from rig.commands.devices.written import written
+from rig.commands.devices.written import write_checked
 from rig.config.first_configuration import Answers
 from rig.config.load import load
 from rig.config.schema import config_schema
@@ -72,7 +72,7 @@ def test_the_section_that_a_look_gives_becomes_a_whole_file(tmp_path: Path) -> N
         ]
     )
     path = tmp_path / "my.yaml"
-    assert written(path, Answers("hand", "lines", "COM4", sensors=section)) == 0
+    assert write_checked(path, Answers("hand", "lines", "COM4", sensors=section)) == 0
     config = load(path).config
     assert config.procedure.name == "by_hand" and config.uncertainty.crystal_ppm == 50 and config.board is None
 
