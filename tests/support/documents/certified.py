@@ -1,4 +1,4 @@
-"""Results with a budget, and what a reader finds on the certificates made of them."""
+"""Results with a budget, and the content of their certificates as a reader finds it."""
 
 import functools
 from collections.abc import Collection, Mapping
@@ -59,7 +59,7 @@ LABORATORY = StatedFacts(
 
 @functools.cache
 def result() -> ResultDocument:
-    """Of a recording in which all that a budget needs is known. No board took part: the checks of one are left out."""
+    """Return the result of a recording whose budget is complete. The checks of a board are left out."""
     document = document_of(calibrate([synthetic_run(Setup(told=NOMINAL))]))
     checks = tuple(check for check in document.checks if not check.name.startswith("gyro.board"))
     return document.model_copy(update={"checks": checks, "verdict": "pass"})
@@ -68,7 +68,7 @@ def result() -> ResultDocument:
 def accelerometer(
     correction: Matrix3 = ((1.02, 0.01, 0.0), (0.0, 0.98, -0.01), (0.0, 0.0, 1.01)),
 ) -> AccelerometerEntry:
-    """One beside the gyroscope."""
+    """Return an accelerometer's entry for the gyroscope's sensor."""
     none: Vector3 = (0.0, 0.0, 0.0)
     covariance = tuple(tuple(1e-8 * (i == j) * (1 if i < 3 else 100) for j in range(6)) for i in range(6))
     dwell = {"index": 0, "name": "x up", "attitude": IDENTITY, "mean_m_s2": none, "mean_std_m_s2": none}
@@ -79,7 +79,7 @@ def accelerometer(
         "samples": 600,
         "duration_s": 3.0,
     }
-    said: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "part": "lsm9ds1",
         "serial_number": "LSM9DS1-001",
         "range_m_s2": 19.6,
@@ -111,17 +111,17 @@ def accelerometer(
         "warnings": (),
     }
     return AccelerometerEntry.model_validate(
-        _budgeted(said, KnownSize("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
+        _budgeted(fields, KnownSize("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
     )
 
 
-def _budgeted(said: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
-    """The same with a budget of its noise and of how well the reference's size is known."""
-    noise = np.linalg.cholesky(np.array(said["covariance"]))
+def _budgeted(fields: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
+    """Add a budget of noise and of the reference's uncertainty."""
+    noise = np.linalg.cholesky(np.array(fields["covariance"]))
     exact = AttitudeError(0.0, 0.0)
     spread = Spread(
-        np.array(said["scale"]),
-        np.array(said["covariance"]),
+        np.array(fields["scale"]),
+        np.array(fields["covariance"]),
         noise,
         np.eye(6),
         exact,
@@ -130,16 +130,16 @@ def _budgeted(said: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
         noise_freedom=np.full(6, np.inf),
     )
     budget = reference_budget(spread, size)
-    return {**said, "covariance_combined": budget.covariance.tolist(), "budget": budget_entry(budget)}
+    return {**fields, "covariance_combined": budget.covariance.tolist(), "budget": budget_entry(budget)}
 
 
 def with_accelerometer(found: AccelerometerEntry | None = None) -> ResultDocument:
-    """That result with an accelerometer."""
+    """Return the result with an accelerometer."""
     return result().model_copy(update={"accelerometers": {"gyro": found or accelerometer()}})
 
 
 def magnetometer() -> MagnetometerEntry:
-    """One as mounted, whose parameters hang together."""
+    """Return a magnetometer as mounted, with correlated parameters."""
     none: Vector3 = (0.0, 0.0, 0.0)
     size = np.array([2e-4, 2e-4, 2e-4, 5e-9, 5e-9, 5e-9])
     covariance = (0.9 * np.eye(6) + 0.1) * np.outer(size, size)
@@ -153,7 +153,7 @@ def magnetometer() -> MagnetometerEntry:
     }
     test = {"change_t": (1e-8, 0.0, 0.0), "std_t": (2e-8, 2e-8, 2e-8), "chi_square": 1.0, "limit": 16.0}
     alike = {"chi_square": 70.0, "degrees_of_freedom": 64, "limit": 104.0, "attitude_error_rad": 2e-4}
-    said: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "part": "lsm9ds1_magnetometer",
         "serial_number": "COMPASS-7",
         "range_t": 4e-4,
@@ -184,20 +184,20 @@ def magnetometer() -> MagnetometerEntry:
         "warnings": (),
     }
     return MagnetometerEntry.model_validate(
-        _budgeted(said, KnownSize("size of the field", 0.01, False, 48.0, "µT", "not given"))
+        _budgeted(fields, KnownSize("size of the field", 0.01, False, 48.0, "µT", "not given"))
     )
 
 
 def reversal(document: ResultDocument) -> ReversalEntry:
-    """Of that magnetometer, in this run and one after it; never turned over along x."""
-    own = magnetometer()
-    as_mounted = {"mounting": IDENTITY, "bias_t": own.bias_t, "bias_std_t": (5e-9,) * 3, "field_base_t": own.bias_t}
+    """Return the reversal of that magnetometer, from this run and a later one; never turned over along x."""
+    entry = magnetometer()
+    as_mounted = {"mounting": IDENTITY, "bias_t": entry.bias_t, "bias_std_t": (5e-9,) * 3, "field_base_t": entry.bias_t}
     began = (document.provenance.started_utc, "2026-11-22T18:00:00+00:00")
     return ReversalEntry.model_validate(
         {
-            "part": own.part,
-            "serial_number": own.serial_number,
-            "scale": own.scale,
+            "part": entry.part,
+            "serial_number": entry.serial_number,
+            "scale": entry.scale,
             "scale_std": (1.4e-4,) * 3,
             "bias_t": (21.003e-6, -34.009e-6, 15.002e-6),
             "bias_std_t": (3.6e-9,) * 3,
@@ -216,11 +216,16 @@ def reversal(document: ResultDocument) -> ReversalEntry:
 
 
 def bias_drift(unit: str, *, slope: bool) -> DriftEntry:
-    """Three repeats, the last of them warmer; x falls, then rises."""
+    """Return three repeats, the last of them warmer; x falls, then rises."""
     biases = ((3e-6, 1e-6, 0.0), (1e-6, 2e-6, 0.0), (9e-6, 3e-6, 1e-6))
     stds = ((3e-7,) * 3, (4e-7,) * 3, (5e-7,) * 3)
-    found = {"slope": (2e-6, 6e-7, 2e-7), "std": (2e-7,) * 3, "range_c": (22.0, 26.0), "correlation_with_time": 0.4}
-    found["degrees_of_freedom"] = (None,) * 3
+    slope_of = {
+        "slope": (2e-6, 6e-7, 2e-7),
+        "std": (2e-7,) * 3,
+        "range_c": (22.0, 26.0),
+        "correlation_with_time": 0.4,
+    }
+    slope_of["degrees_of_freedom"] = (None,) * 3
     return DriftEntry.model_validate(
         {
             "unit": unit,
@@ -238,7 +243,7 @@ def bias_drift(unit: str, *, slope: bool) -> DriftEntry:
             "steps": [{"repeat": 3, "axis": "x", "change": biases[2], "std": stds[2]}],
             "false_alarm_probability": 0.02,
             "largest_change": (8e-6, 2e-6, 1e-6),
-            "temperature_slope": found if slope else {"error": "temperature_range_too_small: 1 °C"},
+            "temperature_slope": slope_of if slope else {"error": "temperature_range_too_small: 1 °C"},
             "earth_rate_known": False,
             "degrees_of_freedom": (None,) * 3,
             "part": "lsm9ds1",
@@ -250,7 +255,7 @@ def bias_drift(unit: str, *, slope: bool) -> DriftEntry:
 
 
 def over_temperature() -> OverTemperatureEntry:
-    """A gyroscope from 20 to 40 °C, whose scale factors rise and whose biases bend."""
+    """Return a gyroscope from 20 to 40 °C with linear scale factors and quadratic biases."""
     nothing, steps = (0.0, 0.0, 0.0), range(17)
     row = {"scale": (1.1, 1.2, 1.3), "bias": (0.01, 0.02, 0.03), "expanded_scale": (1e-4,) * 3}
     return OverTemperatureEntry.model_validate(
@@ -288,7 +293,7 @@ def everything() -> ResultDocument:
     )
     sensor = document.gyroscopes["gyro"]
     assert isinstance(sensor.vector_model, VectorEntry)
-    felt = {
+    gravity_terms = {
         "g_sensitivity_rad_s_per_m_s2": ((1e-4, 2e-5, 0.0), (0.0, -1e-4, 0.0), (3e-5, 0.0, 1.2e-4)),
         "g_sensitivity_std_rad_s_per_m_s2": ((1.3e-6,) * 3,) * 3,
     }
@@ -306,11 +311,11 @@ def everything() -> ResultDocument:
         birge_ratio=0.8,
         degrees_of_freedom=None,
     )
-    seen = {"vector_model": sensor.vector_model.model_copy(update=felt), "earth_rate": turning}
+    updates = {"vector_model": sensor.vector_model.model_copy(update=gravity_terms), "earth_rate": turning}
     drifts = {"rate": bias_drift("rad/s", slope=True), "acceleration": bias_drift("m/s²", slope=False)}
     return document.model_copy(
         update={
-            "gyroscopes": {"gyro": sensor.model_copy(update=seen)},
+            "gyroscopes": {"gyro": sensor.model_copy(update=updates)},
             "magnetometers": {"compass": magnetometer()},
             "bias_drift": {"gyro": drifts},
         }
@@ -318,7 +323,7 @@ def everything() -> ResultDocument:
 
 
 def compared(document: ResultDocument) -> ResultDocument:
-    """The same where the computer's clock was one that the controller's could be held against."""
+    """Return the result with a comparison of the controller's clock with the computer's."""
     assert document.clock is not None
     clock = document.clock.model_copy(
         update={"comparisons": (ClockComparisonEntry(clock="the computer's clock", error=1e-6, std=1e-6),)}
@@ -331,7 +336,7 @@ def certificate(
     stated: StatedFacts = LABORATORY,
     reversals: Mapping[str, ReversalEntry] = MappingProxyType({}),
 ) -> Certificate:
-    """Of that result, by a laboratory that says all it can."""
+    """Return the certificate of a result, by a laboratory that states all it can."""
     return certificate_of(document or result(), stated, reversals)
 
 
@@ -374,7 +379,7 @@ class Page(HTMLParser):
 
 
 def read(found: Certificate) -> Page:
-    """Every element of the page is closed as it was opened."""
+    """Parse the page of a certificate, and assert that every element is closed."""
     page = Page()
     page.feed(certificate_page(found))
     page.close()
@@ -384,7 +389,7 @@ def read(found: Certificate) -> Page:
 
 
 def planted(value: Any, text: str, kept: Collection[str]) -> Any:
-    """A document in which every text that somebody else could have written is `text`."""
+    """Return a document in which every text that others could have written is `text`."""
     if isinstance(value, dict):
         return {key: each if key in kept else planted(each, text, kept) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -30,7 +30,7 @@ def of_three_parts() -> ResultDocument:
 def failed(result: ResultDocument, *names: str) -> ResultDocument:
     """The result with checks of these names far beyond their limits."""
     checks = [
-        each.model_copy(update={"passed": False, "value": 3 * (each.limit or 1)}) if each.name in names else each
-        for each in result.checks
+        check.model_copy(update={"passed": False, "value": 3 * (check.limit or 1)}) if check.name in names else check
+        for check in result.checks
     ]
     return result.model_copy(update={"checks": tuple(checks), "verdict": "fail"})

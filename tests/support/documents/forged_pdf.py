@@ -44,24 +44,24 @@ def replaced(old: bytes, new: bytes) -> Forgery:
     return forge
 
 
-def flipped(of: bytes, further: int) -> Forgery:
-    """One bit, so many bytes behind the first `of`."""
+def flipped(pattern: bytes, further: int) -> Forgery:
+    """Flip one bit, `further` bytes behind the first `pattern`."""
 
     def forge(content: bytes) -> bytes:
-        found = bytearray(content)
-        found[content.index(of) + further] ^= 1
-        return bytes(found)
+        data = bytearray(content)
+        data[content.index(pattern) + further] ^= 1
+        return bytes(data)
 
     return forge
 
 
-def hex_changed(content: bytes, at: int) -> bytes:
-    digit = b"0" if content[at : at + 1] != b"0" else b"1"
-    return content[:at] + digit + content[at + 1 :]
+def hex_changed(content: bytes, offset: int) -> bytes:
+    digit = b"0" if content[offset : offset + 1] != b"0" else b"1"
+    return content[:offset] + digit + content[offset + 1 :]
 
 
 def signature_changed(content: bytes) -> bytes:
-    """Its value, which lies among certificates and a time stamp."""
+    """Change the signature's value, which lies among certificates and a time stamp."""
     (signature,) = PdfFileReader(io.BytesIO(content)).embedded_signatures
     value = signature.signer_info["signature"].native.hex().encode()
     return hex_changed(content, content.lower().index(value) + 20)
@@ -76,7 +76,7 @@ def without_signature(content: bytes) -> bytes:
 
 
 def updated(change: Callable[[IncrementalPdfFileWriter], object]) -> Forgery:
-    """An incremental update, as an editor makes one."""
+    """Make an incremental update, as an editor does."""
 
     def forge(content: bytes) -> bytes:
         writer = IncrementalPdfFileWriter(io.BytesIO(content))
@@ -108,7 +108,7 @@ def no_page(writer: IncrementalPdfFileWriter) -> None:
 
 
 def note(writer: IncrementalPdfFileWriter) -> None:
-    """An annotation over the page, as a reader's comment."""
+    """Put an annotation over the page, as a reader's comment."""
     box = ArrayObject(map(NumberObject, (0, 0, 500, 800)))
     names = {"/Type": "/Annot", "/Subtype": "/FreeText"}
     annotation = DictionaryObject({pdf_name(key): NameObject(value) for key, value in names.items()})
@@ -142,13 +142,13 @@ def signature_object(change: Callable[[Any], object]) -> Callable[[IncrementalPd
 
 
 def uncertified(writer: IncrementalPdfFileWriter) -> None:
-    """Another page, and nothing that says that a signature forbids it."""
+    """Replace a page, and remove the rule that forbids it."""
     other_page(writer)
     del writer.root["/Perms"]
 
 
 def signed_again(content: bytes) -> bytes:
-    """A second signature, by somebody, over a page that says something else."""
+    """Sign a changed page a second time, by a stranger."""
     by = signing_as(holder("Laboratory", holder("Authority")))
     about = PdfSignatureMetadata(field_name="Other", md_algorithm="sha256")
     writer = IncrementalPdfFileWriter(io.BytesIO(updated(uncertified)(content)))
@@ -156,37 +156,37 @@ def signed_again(content: bytes) -> bytes:
 
 
 def ranged(change: Callable[[list[int], int], Sequence[int]]) -> Forgery:
-    """Another range of what is signed."""
+    """Change the signed byte range."""
 
     def forge(content: bytes) -> bytes:
         begin = content.index(b"/ByteRange [")
         end = content.index(b"]", begin) + 1
         numbers = list(map(int, content[begin + 12 : end - 1].split()))
-        said = " ".join(map(str, change(numbers, len(content))))
-        return content[:begin] + f"/ByteRange [{said}]".encode().ljust(end - begin) + content[end:]
+        numbers_text = " ".join(map(str, change(numbers, len(content))))
+        return content[:begin] + f"/ByteRange [{numbers_text}]".encode().ljust(end - begin) + content[end:]
 
     return forge
 
 
 def moved_end(content: bytes) -> bytes:
-    """The end that is signed moved back, and something between (signature wrapping)."""
+    """Move the signed end back and insert content (signature wrapping)."""
     inserted = b"\n9 0 obj\n(k = 1 1 1)\nendobj\n"
     forged = ranged(lambda numbers, _: [*numbers[:2], numbers[2] + len(inserted), numbers[3]])(content)
-    at = content.index(b">", content.index(b"/Contents <")) + 1
-    return forged[:at] + inserted + forged[at:]
+    offset = content.index(b">", content.index(b"/Contents <")) + 1
+    return forged[:offset] + inserted + forged[offset:]
 
 
 def mixed_case(content: bytes) -> bytes:
-    at = content.index(b"/Contents <") + 11
-    return content[:at] + content[at : at + 40].swapcase() + content[at + 40 :]
+    offset = content.index(b"/Contents <") + 11
+    return content[:offset] + content[offset : offset + 40].swapcase() + content[offset + 40 :]
 
 
-def _none(found: Any, key: str) -> None:
-    found[pdf_name(key)] = NullObject()
+def _none(node: Any, key: str) -> None:
+    node[pdf_name(key)] = NullObject()
 
 
-def _removed(found: Any, key: str) -> None:
-    del found[key]
+def _removed(node: Any, key: str) -> None:
+    del node[key]
 
 
 def _language(writer: IncrementalPdfFileWriter) -> None:

@@ -14,24 +14,24 @@ Forgery = Callable[[bytes], bytes]
 
 
 def contained(change: Callable[[Any, Any], object]) -> Forgery:
-    """Another container in place of the signature's: `change` gets its content and its one SignerInfo."""
+    """Replace the signature's container: `change` gets its content and its one SignerInfo."""
 
     def forge(content: bytes) -> bytes:
         begin = content.index(b"/Contents <") + 11
         end = content.index(b">", begin)
-        held = bytes.fromhex(content[begin:end].decode())
-        container = cms.ContentInfo.load(held[: parser.peek(held)])
+        contents = bytes.fromhex(content[begin:end].decode())
+        container = cms.ContentInfo.load(contents[: parser.peek(contents)])
         change(container["content"], container["content"]["signer_infos"][0])
-        made: bytes = container.dump(force=True).hex().encode()
-        assert len(made) <= end - begin
-        return content[:begin] + made.ljust(end - begin, b"0") + content[end:]
+        replacement: bytes = container.dump(force=True).hex().encode()
+        assert len(replacement) <= end - begin
+        return content[:begin] + replacement.ljust(end - begin, b"0") + content[end:]
 
     return forge
 
 
-def certificate_added(of: Callable[[], Holder]) -> Forgery:
+def certificate_added(make_holder: Callable[[], Holder]) -> Forgery:
     def change(signed: Any, _: Any) -> None:
-        der = of().chain[0].public_bytes(Encoding.DER)
+        der = make_holder().chain[0].public_bytes(Encoding.DER)
         signed["certificates"] = [
             *signed["certificates"],
             cms.CertificateChoices("certificate", asn1.Certificate.load(der)),
@@ -41,7 +41,7 @@ def certificate_added(of: Callable[[], Holder]) -> Forgery:
 
 
 def certificate_altered(signed: Any, _: Any) -> None:
-    """The copy of the authority's certificate, which no signature of a document covers, with another first day."""
+    """Change the first day of the authority's certificate, which no signature of a document covers."""
     altered = []
     for choice in signed["certificates"]:
         der = choice.chosen.dump()
@@ -53,12 +53,12 @@ def certificate_altered(signed: Any, _: Any) -> None:
 
 
 def server_altered(stamped: Any, _: Any) -> None:
-    """A second certificate of the time server before its own, of the same number, with another first day."""
-    (own,) = {choice.chosen.dump() for choice in stamped["certificates"] if not choice.chosen.ca}
-    begin = own.index(b"0\x1e\x17\r") + 4
-    other = own[:begin] + b"20" + own[begin + 2 :]
+    """Insert before the time server's certificate a second one of the same number, with another first day."""
+    (certificate,) = {choice.chosen.dump() for choice in stamped["certificates"] if not choice.chosen.ca}
+    begin = certificate.index(b"0\x1e\x17\r") + 4
+    other = certificate[:begin] + b"20" + certificate[begin + 2 :]
     stamped["certificates"] = [
-        cms.CertificateChoices("certificate", asn1.Certificate.load(der)) for der in (other, own)
+        cms.CertificateChoices("certificate", asn1.Certificate.load(der)) for der in (other, certificate)
     ]
 
 
@@ -70,12 +70,12 @@ def lists_added(signed: Any, _: Any) -> None:
 
 
 def said_unsigned(_: Any, info: Any) -> None:
-    said = cms.CMSAttribute({"type": "signing_time", "values": [cms.Time("utc_time", "200101000000Z")]})
-    info["unsigned_attrs"] = [*(info["unsigned_attrs"] or ()), said]
+    signing_time = cms.CMSAttribute({"type": "signing_time", "values": [cms.Time("utc_time", "200101000000Z")]})
+    info["unsigned_attrs"] = [*(info["unsigned_attrs"] or ()), signing_time]
 
 
 def stamped_by_a_stranger(signed: Any, info: Any) -> None:
-    """A time stamp of the same signature by another time server."""
+    """Replace the time stamp by one of another time server."""
     import asyncio
     from hashlib import sha256
 

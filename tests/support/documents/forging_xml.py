@@ -1,4 +1,4 @@
-"""Tools to forge a signed digital certificate: changes of its text, its tree and its signature."""
+"""Forgeries of a signed digital certificate: changes of its text, its tree and its signature."""
 
 import copy
 import re
@@ -29,13 +29,13 @@ def replaced(old: bytes, new: bytes) -> Forgery:
 
 
 def element(path: str, change: Callable[[Any], object]) -> Forgery:
-    """The first element of this path changed."""
+    """Change the first element of this path."""
 
     def forge(content: bytes) -> bytes:
         root = etree.fromstring(content)
-        found = root.find(path) if path else root
-        assert found is not None, path
-        change(found)
+        node = root.find(path) if path else root
+        assert node is not None, path
+        change(node)
         return written(root)
 
     return forge
@@ -50,22 +50,22 @@ def signed_info(change: Callable[[Any], object]) -> Forgery:
 
 
 def text(new: str) -> Callable[[Any], None]:
-    def change(found: Any) -> None:
-        assert found.text != new
-        found.text = new
+    def change(node: Any) -> None:
+        assert node.text != new
+        node.text = new
 
     return change
 
 
 def attribute(name: str, value: str) -> Callable[[Any], None]:
-    return lambda found: found.set(name, value)
+    return lambda node: node.set(name, value)
 
 
 def within(tag: str, inside: str | Any | None = None, **attributes: str) -> Callable[[Any], None]:
-    """One more element at the end of one, holding a text or another element."""
+    """Append an element that holds a text or another element."""
 
-    def change(found: Any) -> None:
-        added = etree.SubElement(found, tag, **attributes)
+    def change(node: Any) -> None:
+        added = etree.SubElement(node, tag, **attributes)
         if isinstance(inside, str):
             added.text = inside
         elif inside is not None:
@@ -74,67 +74,67 @@ def within(tag: str, inside: str | Any | None = None, **attributes: str) -> Call
     return change
 
 
-def removed(found: Any) -> None:
-    found.getparent().remove(found)
+def removed(node: Any) -> None:
+    node.getparent().remove(node)
 
 
-def first_last(found: Any) -> None:
-    found.append(found[0])
+def first_last(node: Any) -> None:
+    node.append(node[0])
 
 
 def better_results(root: Any) -> Any:
-    """The set of results with other numbers."""
+    """Return the set of results with other numbers."""
     results = copy.deepcopy(root.find(f"{DCC}measurementResults"))
     for value in results.iter(f"{SI}valueXMLList"):
         value.text = "1 1 1"
     return results
 
 
-def of_another(found: Any) -> None:
+def of_another(node: Any) -> None:
     stranger = holder("Laboratory", holder("Authority")).certificates().decode()
-    found.text = stranger.split("-----")[2]
+    node.text = stranger.split("-----")[2]
 
 
-def results_beside(found: Any) -> None:
-    """The one that real_world.md tells of: a second set of results in an Object of the signature."""
-    within(f"{DS}Object", better_results(found.getroottree().getroot()))(found)
+def results_beside(node: Any) -> None:
+    """Put a second set of results into an Object of the signature, a known attack."""
+    within(f"{DS}Object", better_results(node.getroottree().getroot()))(node)
 
 
-def properties_doubled(found: Any) -> None:
-    """Other properties of the same Id, before those that are signed."""
-    other = copy.deepcopy(found.find(f".//{XADES}SignedProperties"))
+def properties_doubled(node: Any) -> None:
+    """Put other properties of the same Id before the signed ones."""
+    other = copy.deepcopy(node.find(f".//{XADES}SignedProperties"))
     other.find(f".//{XADES}Description").text = "A calibration certificate"
     holder_ = etree.Element(f"{DS}Object")
     holder_.append(other)
-    found.insert(0, holder_)
+    node.insert(0, holder_)
 
 
-def properties_elsewhere(found: Any) -> None:
-    """What is signed moved into another Object, and other properties in its place."""
-    signed = found.find(f".//{XADES}SignedProperties")
+def properties_elsewhere(node: Any) -> None:
+    """Move the signed properties into another Object, and replace them."""
+    signed = node.find(f".//{XADES}SignedProperties")
     other = copy.deepcopy(signed)
     other.set("Id", "other")
     other.find(f".//{XADES}Description").text = "A calibration certificate"
     signed.getparent().replace(signed, other)
-    etree.SubElement(found, f"{DS}Object").append(signed)
+    etree.SubElement(node, f"{DS}Object").append(signed)
 
 
 def wrapped(content: bytes) -> bytes:
-    """What was signed is moved aside, under a name, and something else stands in its place."""
+    """Move the signed content aside under another name, and replace it (signature wrapping)."""
     root = etree.fromstring(content)
-    found = root.find(f"{DS}Signature")
-    found.getparent().remove(found)
+    node = root.find(f"{DS}Signature")
+    node.getparent().remove(node)
     aside = etree.fromstring(etree.tostring(root))
     aside.set("Id", "aside")
-    etree.SubElement(found, f"{DS}Object").append(aside)
-    found.find(f"{DS}SignedInfo/{DS}Reference").set("URI", "#aside")
+    etree.SubElement(node, f"{DS}Object").append(aside)
+    node.find(f"{DS}SignedInfo/{DS}Reference").set("URI", "#aside")
     next(root.iter(f"{SI}valueXMLList")).text = "1 1 1"
-    root.append(found)
+    root.append(node)
     return written(root)
 
 
 def wrapped_around(content: bytes) -> bytes:
-    """All of what was signed, signature included, inside a certificate that says something else."""
+    """Wrap the signed document, with its signature, in a certificate with other content."""
     signed = etree.fromstring(content)
     outer = copy.deepcopy(signed)
     outer.remove(outer.find(f"{DS}Signature"))
@@ -146,28 +146,28 @@ def wrapped_around(content: bytes) -> bytes:
 def signature_in(path: str) -> Forgery:
     def forge(content: bytes) -> bytes:
         root = etree.fromstring(content)
-        found = root.find(f"{DS}Signature")
-        root.remove(found)
-        root.find(path).insert(0, found)
+        node = root.find(f"{DS}Signature")
+        root.remove(node)
+        root.find(path).insert(0, node)
         return written(root)
 
     return forge
 
 
-def first(found: Any) -> None:
-    found.getparent().insert(0, found)
+def first(node: Any) -> None:
+    node.getparent().insert(0, node)
 
 
-def twice(found: Any) -> None:
-    found.getparent().append(copy.deepcopy(found))
+def twice(node: Any) -> None:
+    node.getparent().append(copy.deepcopy(node))
 
 
-def inside_itself(found: Any) -> None:
-    within(f"{DS}Object", copy.deepcopy(found))(found)
+def inside_itself(node: Any) -> None:
+    within(f"{DS}Object", copy.deepcopy(node))(node)
 
 
 def redigested(algorithm: str, digest: Callable[[bytes], Any]) -> Forgery:
-    """The value changed, and the digest made again to fit it, under this algorithm."""
+    """Change the value, and compute its digest again with this algorithm."""
 
     def forge(content: bytes) -> bytes:
         root = etree.fromstring(content)
@@ -176,31 +176,31 @@ def redigested(algorithm: str, digest: Callable[[bytes], Any]) -> Forgery:
         bare.remove(bare.find(f"{DS}Signature"))
         reference = root.find(f".//{DS}Reference")
         reference.find(f"{DS}DigestMethod").set("Algorithm", algorithm)
-        made = digest(etree.tostring(bare, method="c14n")).digest()
-        reference.find(f"{DS}DigestValue").text = b64encode(made).decode()
+        value = digest(etree.tostring(bare, method="c14n")).digest()
+        reference.find(f"{DS}DigestValue").text = b64encode(value).decode()
         return written(root)
 
     return forge
 
 
-def keyed_by_what_is_public(found: Any) -> None:
-    """A message authentication code in place of a signature: its "secret" would be the certificate."""
+def keyed_by_what_is_public(node: Any) -> None:
+    """Replace the signature by a message authentication code whose "secret" is the public certificate."""
     import hmac
 
-    info = found.find(f"{DS}SignedInfo")
+    info = node.find(f"{DS}SignedInfo")
     method = "http://www.w3.org/2001/04/xmldsig-more#hmac-sha256"
     info.find(f"{DS}SignatureMethod").set("Algorithm", method)
-    public = b64decode(found.find(f".//{DS}X509Certificate").text)
-    made = hmac.digest(public, etree.tostring(info, method="c14n"), "sha256")
-    found.find(f"{DS}SignatureValue").text = b64encode(made).decode()
+    public = b64decode(node.find(f".//{DS}X509Certificate").text)
+    code = hmac.digest(public, etree.tostring(info, method="c14n"), "sha256")
+    node.find(f"{DS}SignatureValue").text = b64encode(code).decode()
 
 
-def padded(found: Any) -> None:
-    found.text = found.text[:20] + "\n!" + found.text[20:]
+def padded(node: Any) -> None:
+    node.text = node.text[:20] + "\n!" + node.text[20:]
 
 
 def typed(declarations: str, outside: str = "") -> Forgery:
-    """A document type before the root."""
+    """Insert a document type before the root."""
     document_type = f"<!DOCTYPE x {outside}[{declarations}]>"
     return lambda content: content.replace(b"?>", f"?>{document_type}".encode(), 1)
 
@@ -215,7 +215,7 @@ def before_root(added: bytes) -> Forgery:
 
 
 def declared(declaration: str, encoding: str) -> Forgery:
-    """The text under another declaration and in another encoding."""
+    """Return the text with another declaration and encoding."""
 
     def forge(content: bytes) -> bytes:
         body = content.decode().partition("?>")[2].strip()
@@ -225,12 +225,12 @@ def declared(declaration: str, encoding: str) -> Forgery:
 
 
 def swapped_names(content: bytes) -> bytes:
-    """Each of two prefixes for the other's names."""
+    """Exchange the namespaces of two prefixes."""
     one, two = b'xmlns:dcc="https://ptb.de/dcc"', b'xmlns:si="https://ptb.de/si"'
     assert one in content and two in content
     swapped = content.replace(one, b'xmlns:dcc="https://ptb.de/si"', 1)
     return swapped.replace(two, b'xmlns:si="https://ptb.de/dcc"', 1)
 
 
-def on_start_tag(of: bytes, added: bytes) -> Forgery:
-    return lambda content: re.sub(rb"<" + of + rb"(?=[ >])", rb"<" + of + b" " + added, content, count=1)
+def on_start_tag(tag: bytes, added: bytes) -> Forgery:
+    return lambda content: re.sub(rb"<" + tag + rb"(?=[ >])", rb"<" + tag + b" " + added, content, count=1)

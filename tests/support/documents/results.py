@@ -24,5 +24,5 @@ def result_document(sensors: Mapping[str, GyroscopeEntry], *, passed: bool = Tru
 def without_budget(document: ResultDocument) -> ResultDocument:
     """Return the result of an estimator that has no uncertainty budget."""
     nothing = {"covariance_combined": None, "budget": None}
-    gyroscopes = {name: each.model_copy(update=nothing) for name, each in document.gyroscopes.items()}
+    gyroscopes = {name: gyroscope.model_copy(update=nothing) for name, gyroscope in document.gyroscopes.items()}
     return document.model_copy(update={"gyroscopes": gyroscopes})

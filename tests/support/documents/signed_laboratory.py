@@ -57,7 +57,7 @@ class Laboratory:
 
 
 def names_of(said: str) -> list[str]:
-    return [problem["name"] for each in json.loads(said)["files"] for problem in each["problems"]]
+    return [problem["name"] for file in json.loads(said)["files"] for problem in file["problems"]]
 
 
 @contextmanager

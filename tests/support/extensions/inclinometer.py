@@ -106,12 +106,12 @@ def _line(rise: Array, means: Array, variances: Array) -> tuple[Array, Array]:
 
 def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
     made = {}
-    for each in outcome.of_kinds:
-        if each.quantity == INCLINATION and each.found is not None and isinstance(each.found.found, Solution):
-            found = {key: np.asarray(value).tolist() for key, value in vars(each.found.found).items()}
-            of = each.sensor.part, each.sensor.serial_number
+    for kind in outcome.of_kinds:
+        if kind.quantity == INCLINATION and kind.found is not None and isinstance(kind.found.found, Solution):
+            found = {key: np.asarray(value).tolist() for key, value in vars(kind.found.found).items()}
+            of = kind.sensor.part, kind.sensor.serial_number
             found["covariance_combined"] = found["covariance"]
-            made[each.name] = InclinometerEntry(part=of[0], serial_number=of[1], estimator="lines", **found)
+            made[kind.name] = InclinometerEntry(part=of[0], serial_number=of[1], estimator="lines", **found)
     return made
 
 

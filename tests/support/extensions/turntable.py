@@ -219,7 +219,7 @@ def carried_out(rig: Verbs) -> None:
 def analysed(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
     """Whether the gyroscope reads the table's speed along z to a tenth."""
     recordings = observe_runs(runs)
-    turns = [turn for each in recordings for turn in each.sensors["gyro"].revolutions]
+    turns = [turn for recording in recordings for turn in recording.sensors["gyro"].revolutions]
     off = max(abs(turn.axis_flange[2] * turn.average.mean_rad_s[2] / turn.speed_rad_s - 1) for turn in turns)
     check = Check("gyro.speed", float(off), 0.1, "1", Meaning(kind="fitness"))
     origin = Origin(runs[0].provenance, {}, (), (), datetime.now(UTC))

@@ -107,7 +107,7 @@ def _stopping(swings: _Swings, world: World, time_s: Array) -> tuple[Array, Arra
 
 
 def _coloured(world: World, count: int, rng: np.random.Generator) -> Array:
-    """(count, 3) rad."""
+    """Return correlated errors (count, 3) in rad."""
     if world.colour_s == 0:
         return world.attitude_rad * rng.normal(size=(count, 3))
     kept = np.exp(-1 / (world.looks_hz * world.colour_s))
@@ -116,14 +116,14 @@ def _coloured(world: World, count: int, rng: np.random.Generator) -> Array:
 
 
 def turning(followed: Followed) -> Turning:
-    """What the rig solves: rows as long as the looks are apart."""
+    """Return the rig's solution, with rows as long as the interval of the looks."""
     half_s = np.median(np.diff(followed.looks_s)) / 2.1
     rows_s = np.column_stack([followed.looks_s - half_s, followed.looks_s + half_s])
     return Turning(followed.time_s, followed.readings, rows_s, followed.attitudes)
 
 
 def write(folder: Path, followed: Followed, rates_rad_s: Array | None = None) -> list[Path]:
-    """As `rig solve --attitudes` takes them; with rates (k, 3) if they are given."""
+    """Write the files of `rig solve --attitudes`; with rates (k, 3) if given."""
     read = ["time_s", "x_rad_s", "y_rad_s", "z_rad_s"]
     samples = write_table(folder / "samples.csv", read, followed.time_s, followed.readings)
     half_s = np.median(np.diff(followed.looks_s)) / 2.1

@@ -1,4 +1,4 @@
-"""Recordings of a sensor on a box that the simulated hand turns: readings as CSV, and the truth beside them."""
+"""Recordings of a sensor on a box that the simulated hand turns: readings as CSV, and the truth."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -60,7 +60,7 @@ class Recorded:
 
     @property
     def truth(self) -> Array:
-        """(6,) k and b of g = K (m + b)."""
+        """Return k and b (6,) of g = K (m + b)."""
         return np.concatenate([1 / np.linalg.norm(self.matrix, axis=1), -self.bias])
 
 
@@ -90,7 +90,7 @@ def handle(
 
 
 def creeping(recorded: Recorded, start_s: float, end_s: float, turning_rad_s: Array) -> Recorded:
-    """The recording of a body that turned slowly (3,) where it lay; the hand turns it back as it takes it up."""
+    """Return the recording of a body that turned slowly (3,) in a rest; the hand turns it back as it takes it up."""
     rates = recorded.rates.copy()
     there = (recorded.time_s >= start_s) & (recorded.time_s <= end_s)
     after = (recorded.time_s > end_s) & (recorded.time_s <= end_s + 0.15)
@@ -100,14 +100,14 @@ def creeping(recorded: Recorded, start_s: float, end_s: float, turning_rad_s: Ar
 
 
 def bent(rates: Array, nonlinearity: float, seed: int) -> Array:
-    """(n, 3) deviations from a straight line: each axis has an even and an odd one, of sizes of its own."""
+    """Return deviations (n, 3) from a straight line: each axis has an even and an odd one, of different sizes."""
     even, odd = nonlinearity * np.random.default_rng(seed + 2_000_000).normal(size=(2, 3))
     deviations: Array = rates * (even * rates / FAST_RAD_S + odd * (rates / FAST_RAD_S) ** 2)
     return deviations
 
 
 def write(path: Path, recorded: Recorded, *, level: bool = True) -> Path:
-    """The file of `rig solve --turns`, with the accelerometer's columns or without."""
+    """Write the file of `rig solve --turns`, with the accelerometer's columns or without."""
     columns = ("time_s", *RATE, *(LEVEL if level else ()))
     readings = np.hstack([recorded.rates, recorded.acceleration]) if level else recorded.rates
     return write_table(path, columns, recorded.time_s, readings)

@@ -1,6 +1,6 @@
-"""Files that were made to harm whoever reads them: bags, PX4's logs and tables. Each is made when it is asked for.
+"""Files made to harm their reader: bags, logs of PX4 and tables. Each is created on demand.
 
-What they do is known from the formats alone: "ROS 2 bag" (rosbag2's metadata.yaml and sqlite3 storage), "MCAP File
+Their content is known from the formats alone: "ROS 2 bag" (rosbag2's metadata.yaml and sqlite3 storage), "MCAP File
 Format" (mcap.dev/spec), "ULog File Format" (docs.px4.io).
 """
 
@@ -27,7 +27,7 @@ Makes = Callable[[Path], Path]  # what lies in that folder afterwards, as it is 
 
 
 def reading(length: int = 0) -> bytes:
-    """A message of an IMU at rest, as CDR writes it; its frame claims to have a name of that length."""
+    """Return a message of an IMU at rest in CDR; its frame claims a name of this length."""
     frame = b"\0" if length == 0 else b""
     head = b"\0\1\0\0" + struct.pack("<iII", 1, 0, length or 1) + frame
     return head + bytes(-(len(head) - 4) % 8) + struct.pack("<37d", *[0.0] * 37)
@@ -61,7 +61,7 @@ def chunk(packed: bytes, size: int, packing: str = "zstd", end_ns: int = 2) -> b
 
 
 def mcap(*records: bytes, summary: bytes = b"", ends: bytes | None = None, **said: Any) -> Makes:
-    """A file of these records in a bag, of which its metadata says so much; `ends` in place of a footer."""
+    """Make a file of these records in a bag with metadata; `ends` replaces the footer."""
 
     def make(folder: Path) -> Path:
         head = MAGIC + record(1, text("ros2") + text("nobody"))
@@ -74,15 +74,15 @@ def mcap(*records: bytes, summary: bytes = b"", ends: bytes | None = None, **sai
 
 
 def indexed(*chunks: bytes) -> Makes:
-    """A file of these chunks with an index of them, all for the same time."""
+    """Make a file of these chunks with an index, all for the same time."""
     said = schema() + channel("/imu")
     head, index = len(MAGIC + record(1, text("ros2") + text("nobody"))) + len(said), b""
-    for each in chunks:
-        (packed_size,) = struct.unpack_from("<Q", each, 9 + 28 + 8)
-        (size,) = struct.unpack_from("<Q", each, 9 + 16)
-        told = struct.pack("<QQQQ", 0, 2, head, len(each)) + text(b"") + struct.pack("<Q", 0) + text("zstd")
+    for chunk in chunks:
+        (packed_size,) = struct.unpack_from("<Q", chunk, 9 + 28 + 8)
+        (size,) = struct.unpack_from("<Q", chunk, 9 + 16)
+        told = struct.pack("<QQQQ", 0, 2, head, len(chunk)) + text(b"") + struct.pack("<Q", 0) + text("zstd")
         index += record(8, told + struct.pack("<QQ", packed_size, size))
-        head += len(each)
+        head += len(chunk)
     return mcap(said, *chunks, summary=said + index)
 
 
@@ -96,7 +96,7 @@ def metadata(
     folder: Path, storage: str, *files: str, packed: str = "", start: str = "1", offers: Sequence[object] = ("/imu",),
     kind: str = IMU,
 ) -> Path:  # fmt: skip
-    """What a bag says of itself, beside its files: that it `offers` these topics, all of one kind."""
+    """Write a bag's metadata: it `offers` these topics, all of one kind."""
     mode = f'  compression_format: zstd\n  compression_mode: "{packed}"\n' if packed else ""
     told = "".join(f"    - {file}\n" for file in files)
     topics = "".join(
@@ -114,7 +114,7 @@ def metadata(
 
 
 def database(folder: Path, *statements: str, data: bytes | None = None, name: str = "bag_0.db3") -> Path:
-    """A bag of ROS 2 in SQLite, with these statements before its one message."""
+    """Write a bag of ROS 2 in SQLite, with these statements before its one message."""
     with sqlite3.connect(folder / name) as made:
         made.execute("CREATE TABLE topics(id INTEGER, name TEXT, type TEXT, serialization_format TEXT,"
                      " offered_qos_profiles TEXT)")  # fmt: skip
@@ -141,7 +141,7 @@ def packed_db3(folder: Path) -> Path:
 
 
 def beside_db3(lay: Callable[[Path], object], name: str = "bag_1.db3") -> Makes:
-    """A bag of two files, the second of which is no file."""
+    """Make a bag of two files, the second of which is not a regular file."""
 
     def make(folder: Path) -> Path:
         database(folder)
@@ -165,7 +165,7 @@ def deep(path: Path) -> None:
 
 
 def laughs(name: str = "", levels: int = 9, times: int = 9) -> str:
-    """YAML in which every line stands for many times the one before."""
+    """Return YAML in which every line expands to many times the previous one (billion laughs)."""
     lines = [f"a0: &a0 [{', '.join(['lol'] * times)}]"]
     lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * times)}]" for n in range(1, levels)]
     return "\n".join([*lines, name]) + "\n"
@@ -206,7 +206,7 @@ def alone(name: str, lay: Callable[[Path], object]) -> Makes:
 
 
 def crowd(folder: Path) -> Path:
-    """A bag among twenty thousand other files."""
+    """Make a bag among twenty thousand other files."""
     for number in range(20_000):
         os.mknod(folder / f"{number}")
     return db3()(folder)
@@ -238,7 +238,7 @@ def table(content: bytes, name: str = "log.csv") -> Makes:
 
 
 def gzipped(start: bytes, repeated: bytes, size: int) -> Makes:
-    """A table of `size` bytes, in which nearly everything is the same."""
+    """Make a table of `size` bytes that consists of repetitions."""
 
     def lay(path: Path) -> None:
         block = repeated * (1_000_000 // len(repeated))
@@ -251,7 +251,7 @@ def gzipped(start: bytes, repeated: bytes, size: int) -> Makes:
 
 
 def asked(make: Callable[[], Makes]) -> Makes:
-    """What takes long to pack, packed when it is asked for."""
+    """Create on demand a file that takes long to compress."""
 
     def made(folder: Path) -> Path:
         return make()(folder)

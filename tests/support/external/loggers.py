@@ -1,4 +1,4 @@
-"""Logs as other people's loggers write them: stamps that are rounded or of arrival, losses, knocks, a large bias.
+"""Logs in the style of other loggers: rounded stamps or stamps of arrival, losses, knocks, a large bias.
 
 Nothing is shared with the rig. The truth is m = F ω + b, and diag k of g = K (m + b) is one over the columns of F⁻¹.
 """
@@ -66,7 +66,9 @@ class Stamps:
 
 
 def swept(rate_hz: float, seed: int = 1, noise_rad_s: float = 5e-4, bias_rad_s: Array | None = None) -> Log:
-    """A table's sweeps of a whole turn in 4 s, six ways, with ramps well outside of their rows, and rests between."""
+    """Draw a table's sweeps of one revolution in 4 s, in six directions, with ramps outside their rows, and rests
+    between.
+    """
     rng = np.random.default_rng(seed)
     period_s = 2 * REST_S + 2 * RAMP_S + 4.6
     time_s = np.arange(round((6 * period_s) * rate_hz)) / rate_hz
@@ -82,7 +84,7 @@ def swept(rate_hz: float, seed: int = 1, noise_rad_s: float = 5e-4, bias_rad_s: 
 def turned_slowly(
     mean_rad_s: float, bias_rad_s: Array, seed: int = 1, rate_hz: float = 100.0, rest_s: float = 5.0
 ) -> Log:
-    """A servo's turns from rest to rest that begin and end gently: a raised cosine, six ways."""
+    """Draw a servo's turns from rest to rest with a raised-cosine profile, in six directions."""
     rng = np.random.default_rng(seed)
     lasts_s = 2 * np.pi / mean_rad_s
     period_s = lasts_s + rest_s
@@ -120,7 +122,7 @@ def laid_down(
     seed: int = 1,
     noise_m_s2: float = 5e-3,
 ) -> Log:
-    """An accelerometer on six faces, a joined log of each; rows [start_s, end_s, qw, qx, qy, qz] of the faces."""
+    """Draw an accelerometer on six faces in one log, and rows [start_s, end_s, qw, qx, qy, qz] of the faces."""
     rng = np.random.default_rng(seed)
     each, move_s = round(dwell_s * rate_hz), 4.0
     start_s = np.arange(6) * (dwell_s + move_s)
@@ -133,7 +135,7 @@ def laid_down(
 
 
 def write_rates(folder: Path, log: Log, stamps: Stamps | None = None, motion: str = "speed_rad_s") -> tuple[Path, Path]:
-    """The two files of `rig solve --sweeps`."""
+    """Write the two files of `rig solve --sweeps`."""
     stamped_s, kept = (stamps or Stamps()).of(log.time_s)
     samples = write_table(
         folder / "samples.csv", ["time_s", *(f"{a}_rad_s" for a in AXES)], stamped_s, log.readings[kept]
@@ -144,7 +146,7 @@ def write_rates(folder: Path, log: Log, stamps: Stamps | None = None, motion: st
 
 
 def write_forces(folder: Path, log: Log, stamps: Stamps | None = None, *beside: tuple[str, Array]) -> tuple[Path, Path]:
-    """The two files of `rig solve --attitudes`, with columns (n,) `beside`."""
+    """Write the two files of `rig solve --attitudes`, with further columns (n,)."""
     stamped_s, kept = (stamps or Stamps()).of(log.time_s)
     names = ["time_s", *(f"{a}_m_s2" for a in AXES), *(name for name, _ in beside)]
     samples = write_table(

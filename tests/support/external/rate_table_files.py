@@ -34,14 +34,14 @@ FIELD_NOISE_T = 2e-7
 
 
 def write_all(folder: Path) -> None:
-    """Both pairs of files."""
+    """Write both pairs of files."""
     rng = np.random.default_rng(2019)
     _still(folder, rng)
     _swinging(folder, rng)
 
 
 def _still(folder: Path, rng: np.random.Generator) -> None:
-    """Sixteen attitudes at rest, accelerometer and magnetometer."""
+    """Write sixteen attitudes at rest, for accelerometer and magnetometer."""
     turned = draw_attitudes(STILL)
     time_s = np.arange(round(STILL * (DWELL_S + BETWEEN_S) * RATE_HZ)) / RATE_HZ
     where = turned[(time_s // (DWELL_S + BETWEEN_S)).astype(int)]
@@ -57,7 +57,7 @@ def _still(folder: Path, rng: np.random.Generator) -> None:
 
 
 def _swinging(folder: Path, rng: np.random.Generator) -> None:
-    """All three axes swing: an attitude and a rate for every sample of the gyroscope."""
+    """Write an attitude and a rate for every sample of the gyroscope, while all three axes oscillate."""
     turned, rates = simulate_oscillation(SWINGING_S)
     felt = (GYRO_REFERENCE_RAD_S @ turned + rates) @ GYRO_MATRIX.T + GYRO_BIAS_RAD_S
     felt += GYRO_RANDOM_WALK * np.sqrt(RATE_HZ) * rng.normal(size=felt.shape)
@@ -72,7 +72,7 @@ def _swinging(folder: Path, rng: np.random.Generator) -> None:
 
 
 def _quaternions(turned: Array) -> Array:
-    """(N, 4) qw qx qy qz."""
+    """Return quaternions (N, 4) qw qx qy qz."""
     quaternions: Array = Rotation.from_matrix(turned).as_quat()[:, [3, 0, 1, 2]]
     return quaternions
 

@@ -106,9 +106,9 @@ class Bench:
         for pid in pids:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
-        for each in self.companions:
-            each.kill()
-            each.wait()
+        for companion in self.companions:
+            companion.kill()
+            companion.wait()
         if self.process is not None:
             self.ended(END_S)
 

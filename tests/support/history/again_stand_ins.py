@@ -1,4 +1,4 @@
-"""What stands in for solving, where who solves is what is tested. A module that worker processes can import."""
+"""Stand-ins for solutions, in tests of the workers. A module that worker processes can import."""
 
 import os
 import signal
@@ -13,31 +13,31 @@ DEADLY, WAITING = "deadly", "waiting"
 
 
 def task(key: str, *places: Path) -> Task:
-    """Recordings of nothing, by the name of the answer."""
+    """Return a task without recordings, named by its answer."""
     return Task(key, (), tuple(("bench", str(each)) for each in places), (), None)
 
 
 def told(task: Task) -> Answer:
-    """An answer at once: what the worker is, and how many threads its linear algebra may have."""
+    """Answer at once with the worker's process and the threads of its linear algebra."""
     return RecomputedResult(task.key, (str(os.getpid()), os.environ.get("OPENBLAS_NUM_THREADS", "")), ())
 
 
 def deadly(task: Task) -> Answer:
-    """As `told`; one recording kills whoever solves it."""
+    """Answer as `told`; one recording kills its worker."""
     if task.key == DEADLY:
         os.kill(os.getpid(), signal.SIGKILL)
     return told(task)
 
 
 def failing(task: Task) -> Answer:
-    """As `told`; one recording meets a defect of the program."""
+    """Answer as `told`; one recording meets a defect of the program."""
     if task.key == DEADLY:
         raise ZeroDivisionError("a defect")
     return told(task)
 
 
 def waiting(task: Task) -> Answer:
-    """As `told`; some wait until there is a result in their folder."""
+    """Answer as `told`; some wait until their folder has a result."""
     if task.key.startswith(WAITING):
         deadline_s = time.monotonic() + 60
         while not (Path(task.places[0][1]) / RESULT).exists() and time.monotonic() < deadline_s:

@@ -1,4 +1,4 @@
-"""Rounds on one history: a station with its heartbeat, and others who come and go beside it at drawn moments."""
+"""Rounds on one history: a station with its heartbeat, and other users who come and go at random moments."""
 
 import json
 import os
@@ -55,7 +55,7 @@ class Round:
 
 
 def drawn(seed: int) -> Round:
-    """One to three guests, the first by turns of each kind."""
+    """Draw one to three guests, the first of each kind in turn."""
     of_seed, whole = random.Random(seed), seed % WHOLE_EVERY == FIRST_WHOLE
     kinds = [OTHERS[seed % len(OTHERS)], *of_seed.choices(OTHERS, k=of_seed.randint(0, 2))]
     guests = [
@@ -76,7 +76,7 @@ class Rounds:
         self._environment = {**os.environ, "RIG_HISTORY": place, "RIG_PAGE_TOKEN": "a-token-of-this-test"}
 
     def carry_out(self, this: Round) -> None:
-        """Let them all work, and end; then what was said to be entered is there, once, and the history is whole."""
+        """Let all work and end; then every reported entry is there once, and the history is valid."""
         with ExitStack() as stack:
             station = stack.enter_context(
                 self._whole(this) if this.whole else self._station(f"A{this.seed}", this.seed)
@@ -101,20 +101,20 @@ class Rounds:
         self.check(this)
 
     def check(self, this: Round) -> None:
-        """What was said to be entered is there, and the history is whole."""
+        """Assert that every reported entry is there, and that the history is valid."""
         if not self.place.startswith("postgresql"):
             with closing(sqlite3.connect(self.place)) as connection:
                 whole = connection.execute("PRAGMA integrity_check").fetchall()
             assert whole == [("ok",)], f"{this}: {whole}"
         with open_history(self.place) as history:
-            there = {each.id: each.serial_number for each in history.calibrations(replaced_too=True)}
+            there = {past.id: past.serial_number for past in history.calibrations(replaced_too=True)}
         lost = {number: serial for number, serial in self.entered.items() if there.get(number) != serial}
         assert not lost, f"{this}: entered, and not there: {lost}"
         verified = rig_here("history", "verify", "--history", self.place)
         assert verified.returncode == 0, f"{this}: {verified.stdout}"
 
     def _take(self, user: "_User", this: Round) -> None:
-        """What it said to be entered: a station of here, one as it is, and an import."""
+        """Note the entries that a user reported: a station's, a run's, an import's."""
         said = user.said.read_text(encoding="utf-8").splitlines(keepends=True)
         whole_lines = [line for line in said if line.endswith("\n")]
         assert user.process.returncode < 0 or "Traceback" not in "".join(said), f"{this}: {''.join(said)}"
@@ -186,14 +186,14 @@ class _User:
             )  # fmt: skip
 
     def begun(self, words: str) -> "_User":
-        """It, when it has said so."""
+        """Wait until the user has reported these words, and return it."""
         wait_for(
             lambda: words in self.said.read_text(encoding="utf-8") or self.process.poll() is not None, words, BUSY_S
         )
         return self
 
     def ends(self) -> None:
-        """Wait until it has; a station ends when its standard input does."""
+        """Wait until it has ended; a station ends when its standard input does."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         self.process.wait(BUSY_S)
@@ -211,7 +211,7 @@ def _sleep_until(moment_s: float) -> None:
 
 
 def recorded(folder: Path) -> Path:
-    """A recording of a sensor that is called as the folder, which is solved when it is imported."""
+    """Return a recording of a sensor named as the folder, solved when it is imported."""
     folder.mkdir()
     shutil.copy(RECORDINGS / "six_observation" / "run.h5", folder)
     with h5py.File(folder / "run.h5", "r+") as file:
@@ -220,5 +220,5 @@ def recorded(folder: Path) -> Path:
 
 
 def rounds(first: int, count: int) -> Iterator[Round]:
-    """So many, from this seed on."""
+    """Yield this many rounds, from this seed on."""
     yield from map(drawn, range(first, first + count))

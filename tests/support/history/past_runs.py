@@ -1,4 +1,4 @@
-"""Finished runs for a history: that of a verified run, its sensor and its numbers changed."""
+"""Finished runs for a history, with another sensor and other numbers than the verified run."""
 
 import json
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ def finished(
     passed: bool = True,
     solved_after_s: float = 60.0,
 ) -> FinishedRun:
-    """One that began `day` days after the first."""
+    """Return a run that began `day` days after the first."""
     text = document(day, scale, bias_rad_s, serial_number, rig, passed=passed, solved_after_s=solved_after_s)
     return FinishedRun(
         text=compact(json.loads(text.text())),
@@ -52,7 +52,7 @@ def document(
     passed: bool,
     solved_after_s: float,
 ) -> ResultDocument:
-    """The result, its checks those of scale and bias alone."""
+    """Return the result, with only the checks of scale and bias."""
     assert isinstance(SENSOR.vector_model, VectorEntry)
     without_gravity = {"g_sensitivity_rad_s_per_m_s2": None, "g_sensitivity_std_rad_s_per_m_s2": None}
     sensor = SENSOR.model_copy(
@@ -76,9 +76,9 @@ def document(
             "arm_serial_number": f"arm of {rig}",
         }
     )
-    checks = tuple(each for each in VERIFIED.checks if each.name in ("gyro.scale_deviation", "gyro.condition"))
+    checks = tuple(check for check in VERIFIED.checks if check.name in ("gyro.scale_deviation", "gyro.condition"))
     checks = tuple(
-        each.model_copy(update={"passed": passed or each.name != "gyro.condition", "limit": 0.02}) for each in checks
+        check.model_copy(update={"passed": passed or check.name != "gyro.condition", "limit": 0.02}) for check in checks
     )
     return VERIFIED.model_copy(
         update={"gyroscopes": {"gyro": sensor}, "verification": {}, "checks": checks, "provenance": provenance}
@@ -86,7 +86,7 @@ def document(
 
 
 def enter_many(url: str, worker: int, entries: int) -> int:
-    """Enter runs that no other `worker` has; how many were new. A module of the tests itself no process can import."""
+    """Enter runs that no other `worker` has, and return how many were new. Processes cannot import a test module."""
     first = finished(worker)
     began = first.document.provenance.started_utc
     new = 0

@@ -1,4 +1,4 @@
-"""A session by hand in virtual time: the simulated operator at the table, a sensor in the hand, no board between."""
+"""A session by hand in virtual time: the simulated operator at the table, a sensor in the hand, no board."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -71,12 +71,12 @@ class Table:
         )
 
     def sit(self) -> None:
-        """Go through the session. Raises Fault as it does, TimeoutError where it has no end."""
+        """Go through the session. Raise Fault as it does, TimeoutError if it does not end."""
         self.session.carry_out(lambda: None)
 
     @property
     def handled(self) -> HandRecording:
-        """Its rests and moves, as they are found afterwards, without what was refused."""
+        """Return its rests and moves as the analysis finds them, without refused ones."""
         segmenter, not_counted = Segmenter(range_of(SENSOR)), NotCounted()
         segmenter.feed(*readings_of(SENSOR, np.concatenate(self.samples)))
         for event in self.events:
@@ -85,24 +85,24 @@ class Table:
 
     @property
     def solution(self) -> HandSolution:
-        """What it gives."""
+        """Return the solution of the session."""
         return solve_by_hand(self.handled, TOLD)
 
     @property
     def again(self) -> list[str]:
-        """By which names something was asked again."""
+        """Return the names of the errors for which something was asked again."""
         refused = (HandMoveRefused, HandRestRefused, HandBegunAnew)
-        return [each.again for each in self.events if isinstance(each, refused)]
+        return [event.again for event in self.events if isinstance(event, refused)]
 
     @property
     def reminded(self) -> list[str]:
-        """The names with which the line says that something is to be done again."""
-        return [each.again for each in self.events if isinstance(each, HandAsked) and each.again is not None]
+        """Return the names of the reminders to repeat something."""
+        return [event.again for event in self.events if isinstance(event, HandAsked) and event.again is not None]
 
     @property
     def taken(self) -> list[HandMoveTaken]:
-        """The moves that count."""
-        return [each for each in self.events if isinstance(each, HandMoveTaken)]
+        """Return the moves that count."""
+        return [event for event in self.events if isinstance(event, HandMoveTaken)]
 
     def _note(self, event: OfTheHand) -> None:
         self.events.append(event)
@@ -111,7 +111,7 @@ class Table:
             self.operator.instruct(asked.say, asked.face, asked.turns, again=event.again is not None)
 
     def _pass(self, _: float) -> None:
-        """Time in which readings come."""
+        """Let time pass, in which readings arrive."""
         count = round(LOOK_S * RATE_HZ)
         times = self.time_s + np.arange(1, count + 1) / RATE_HZ
         felt = []
@@ -136,7 +136,7 @@ class Table:
         self.acquisition.on_samples("gyro", samples)
 
     def _creeping(self, rates: Array) -> Array:
-        """(n, 3) what the item turns in the rest in which it creeps, and back as the hand takes it up."""
+        """Return the slow rotation (n, 3) of the item in one rest, and its reversal when the hand takes it up."""
         turning = np.zeros_like(rates)
         for row, still in enumerate(not rate.any() for rate in rates):
             self._laid_down += still and not self._still

@@ -1,4 +1,4 @@
-"""The command line as somebody types it, on fast simulated laboratories of their own."""
+"""The command line as a user types it, on fast simulated laboratories of their own."""
 
 import subprocess
 import sys
@@ -22,7 +22,7 @@ CI = CONFIGS / "ci.yaml"
 def rig(
     *arguments: str | Path, timeout_s: float = PATIENCE_S, stdin: int = subprocess.DEVNULL
 ) -> subprocess.CompletedProcess[str]:
-    """`rig …`, until it has ended."""
+    """Run `rig …` to its end."""
     with started(*arguments, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
             said, errors = process.communicate(timeout=timeout_s)
@@ -32,13 +32,13 @@ def rig(
 
 
 def python(*arguments: str | Path, timeout_s: float = PATIENCE_S) -> subprocess.CompletedProcess[str]:
-    """`python …`, until it has ended."""
+    """Run `python …` to its end."""
     command = [sys.executable, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)
 
 
 def rig_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    """`rig …` without a process of its own, which saves a second: for commands that only read and reckon."""
+    """Run `rig …` in this process, which saves a second: for commands that only read and compute."""
     said, errors = StringIO(), StringIO()
     words = [*map(str, arguments)]
     with redirect_stdout(said), redirect_stderr(errors):
@@ -47,7 +47,7 @@ def rig_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 def configuration(folder: Path, changes: dict[str, Any] | None = None, procedure: dict[str, Any] | None = None) -> Path:
-    """ci.yaml on an address of its own, with changes, or with another `procedure` altogether."""
+    """Write ci.yaml with an address of its own and with changes, or with another `procedure`."""
     host = fresh_host()
     address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
     document = merge(merge(yaml.safe_load(load(CI).text), address), changes or {})
@@ -59,7 +59,7 @@ def configuration(folder: Path, changes: dict[str, Any] | None = None, procedure
 
 
 def wait_for_log(folder: Path, words: str, times: int = 1) -> None:
-    """Until the run's log says so, so many times."""
+    """Wait until the run's log has these words this many times."""
     log = folder / "log.txt"
 
     def said() -> bool:

@@ -1,4 +1,4 @@
-"""What recordings of hidden worlds say, held against the truth that was drawn for them."""
+"""Results of recordings of hidden worlds, compared with the drawn truth."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ OF_GRAVITY = "accelerometer scale", "accelerometer bias"
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """Three values of one sensor: how far they are from the truth, their u and their U, each (3,)."""
+    """Three values of one sensor: their errors, their u and their U, each (3,)."""
 
     part: str
     parameter: str
@@ -38,7 +38,7 @@ class Stated:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A solved recording: what it states, its checks, and the name of the fault it ended in, if any."""
+    """A solved recording: its stated values, its checks, and the name of the fault that ended it, if any."""
 
     folder: Path
     stated: tuple[Stated, ...]
@@ -47,13 +47,13 @@ class Judged:
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Why it did not pass; an undamaged one has nothing here."""
+        """Return why it did not pass; empty for an undamaged recording."""
         failed = tuple(check.name for check in self.checks if not check.passed)
         return failed if self.fault is None else (self.fault, *failed)
 
 
 def solved(folder: Path) -> Judged:
-    """The run in `folder`/run, whose laboratory is `folder`/config.yaml, solved by the code as it is now."""
+    """Solve the run in `folder`/run, whose laboratory is `folder`/config.yaml, by today's code."""
     document: dict[str, Any] = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
     try:
         outcome = judged(open_run(folder / "run"), DEFAULT_ESTIMATOR)
@@ -68,7 +68,7 @@ def _stated(outcome: Outcome, document: Mapping[str, Any]) -> Iterable[Stated]:
         if name not in outcome.settings.to_calibrate:
             continue
         assert result.uncertainty is not None
-        speed_rad_s = float(np.mean([each.speed_rad_s for each in result.observations]))
+        speed_rad_s = float(np.mean([observation.speed_rad_s for observation in result.observations]))
         true = true_gyroscope(document, name, recording, speed_rad_s)
         found = np.concatenate([result.scale, result.bias_rad_s])
         yield from _split(result.sensor.part, (SCALE, BIAS), found - true, result.uncertainty)
@@ -80,7 +80,7 @@ def _stated(outcome: Outcome, document: Mapping[str, Any]) -> Iterable[Stated]:
 
 
 def true_gyroscope(document: Mapping[str, Any], name: str, recording: ObservedRun, speed_rad_s: float) -> np.ndarray:
-    """(6,) the scale over the times of the sweeps, the bias over the whole time that anything was averaged."""
+    """Return the true scale over the sweeps' times and the true bias over all averages, together (6,)."""
     seen = recording.sensors[name]
     sweeps = [(turn.average.start_s, turn.average.end_s) for turn in seen.revolutions]
     averages = [*sweeps, *((rest.start_s, rest.end_s) for rest in seen.rests)]
@@ -109,7 +109,7 @@ def true_accelerometer(document: Mapping[str, Any], name: str, found: Accelerome
 
 
 def _warmer_k(sensor: SimulatedSensorSection, time_s: float) -> float:
-    """Than where its errors hold, `temperature_c`, of a part that gets power at zero."""
+    """Return by how much a part, powered at time zero, is warmer than `temperature_c`, where its errors hold."""
     if sensor.start_temperature_c is None:
         return 0.0
     return float((sensor.start_temperature_c - sensor.temperature_c) * np.exp(-time_s / sensor.warm_up_s))
@@ -139,7 +139,7 @@ class Held:
 
 
 def held(runs: Iterable[Judged]) -> dict[tuple[str, str], Held]:
-    """By part and parameter."""
+    """Compare stated values with the truth, by part and parameter."""
     found: dict[tuple[str, str], list[Stated]] = {}
     for run in runs:
         for each in run.stated:

@@ -1,7 +1,7 @@
-"""Whole simulated laboratories that nobody has seen: everything drawn within what the configuration states of it.
+"""Complete simulated laboratories with hidden truth: everything is drawn within what the configuration states of it.
 
-Each is a configuration for `rig run`, with `uncertainty` as it stands when nobody changes it. What arm, clocks and
-sensors are off by lies within it and within the data sheets of rig/config/sensors/sensor_catalogue.py.
+Each is a configuration for `rig run`, with the default `uncertainty`. The errors of arm, clocks and sensors lie within
+it and within the data sheets of rig/config/sensors/sensor_catalogue.py.
 """
 
 import subprocess
@@ -52,12 +52,12 @@ UNLIMITED = {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": None
 
 
 def quiet(seed: int) -> dict[str, Any]:
-    """One LSM9DS1 with little noise."""
+    """Return a world with one LSM9DS1 with little noise."""
     return _single(seed, QUIET_RAD_S)
 
 
 def noisy(seed: int) -> dict[str, Any]:
-    """One LSM9DS1 with the noise of demo.yaml."""
+    """Return a world with one LSM9DS1 with the noise of demo.yaml."""
     return _single(seed, NOISY_RAD_S)
 
 
@@ -68,7 +68,7 @@ def _single(seed: int, noise_rad_s: float) -> dict[str, Any]:
 
 
 def pair(seed: int) -> dict[str, Any]:
-    """A quiet LSM9DS1 and an ADIS16465, both calibrated."""
+    """Return a world with a quiet LSM9DS1 and an ADIS16465, both calibrated."""
     rng = np.random.default_rng(seed)
     document = merge(_document("lsm9ds1_adis16465"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
     document["procedure"]["verify"] = False
@@ -78,7 +78,7 @@ def pair(seed: int) -> dict[str, Any]:
 
 
 def imu(seed: int) -> dict[str, Any]:
-    """Three gyroscopes and the accelerometers beside them."""
+    """Return a world with three gyroscopes and their accelerometers."""
     rng = np.random.default_rng(seed)
     document = merge(_document("imu"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(45, 90))))
     site = document["site"]
@@ -88,7 +88,7 @@ def imu(seed: int) -> dict[str, Any]:
 
 
 def kvh(seed: int) -> dict[str, Any]:
-    """A KVH 1775 that finds the Earth's rate, and feels nothing of gravity, as its configuration states."""
+    """Return a world with a KVH 1775 that measures the Earth's rate and has no g-sensitivity, as it states."""
     rng = np.random.default_rng(seed)
     document = merge(_document("own_port/kvh1775_earth"), _laboratory(seed, rng, speed_deg_s=60.0))
     document["world"]["site"]["gravity_m_s2"] = 9.80061 + float(rng.uniform(-5e-4, 5e-4))  # what rocks make of it
@@ -109,7 +109,7 @@ def kvh(seed: int) -> dict[str, Any]:
 
 
 def by_its_sheet(part: str, seed: int) -> dict[str, Any]:
-    """A part with its accelerometer, as far off as its data sheet says that a delivered one may be."""
+    """Return a world with a part and its accelerometer, with errors up to those of its data sheet for delivered parts."""
     rng = np.random.default_rng(seed)
     document = merge(_document(part), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(45, 90))))
     site = document["site"]
@@ -145,7 +145,9 @@ def _with_mountings(document: dict[str, Any], rng: np.random.Generator) -> dict[
 
 
 def autopilot(seed: int) -> dict[str, Any]:
-    """An autopilot's IMU: ArduPilot's in single precision, or PX4's in whole mrad/s, with corrections to be undone."""
+    """Return a world with an autopilot's IMU: ArduPilot's in single precision, or PX4's in whole mrad/s, corrections
+    on.
+    """
     rng = np.random.default_rng(seed)
     document = merge(_document("own_port/autopilot"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
     document["world"]["time_scale"] = 8
@@ -168,9 +170,9 @@ def autopilot(seed: int) -> dict[str, Any]:
 
 
 def by_message(message: str, noise_rad_s: float, *, vibrates: bool, seed: int) -> dict[str, Any]:
-    """An autopilot's IMU of so much noise before its filter, read by such a message, on an arm that may not vibrate.
+    """Return a world with an autopilot's IMU of this noise before its filter, read by this message.
 
-    Of three seeds one is an autopilot that provides no temperature.
+    The arm vibrates only if `vibrates`. One seed of three is an autopilot that provides no temperature.
     """
     document = autopilot(2 * seed)  # ArduPilot's, which has every message
     sensor = document["world"]["sensors"]["imu1"]
@@ -181,7 +183,7 @@ def by_message(message: str, noise_rad_s: float, *, vibrates: bool, seed: int) -
 
 
 def with_digits(decimals: int, noise_rad_s: float, *, vibrates: bool, seed: int) -> dict[str, Any]:
-    """A device that prints degrees per second with so many digits, which the section says for every other seed."""
+    """Return a world with a device that prints °/s with these decimals, which the section states for odd seeds."""
     document = prints_lines(3 * seed)
     document["world"]["sensors"]["imu"]["noise_rad_s"] = noise_rad_s
     printed = document["sensors"]["imu"]["lines"]
@@ -200,7 +202,7 @@ def _shaking(document: dict[str, Any], *, vibrates: bool) -> dict[str, Any]:
 
 
 def prints_lines(seed: int) -> dict[str, Any]:
-    """A device that prints lines, by its own time, by a number that it counts, or by both; some of them are lost."""
+    """Return a world with a device that prints lines, by its own time, by a counter, or by both; some are lost."""
     rng = np.random.default_rng(seed)
     document = merge(_document("own_port/lines"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
     document["world"]["time_scale"] = 8
@@ -221,13 +223,13 @@ def prints_lines(seed: int) -> dict[str, Any]:
 
 
 def on_another_arm(model: str, seed: int) -> dict[str, Any]:
-    """As `quiet`, on another arm."""
+    """Return the world `quiet` on another arm."""
     document: dict[str, Any] = merge(quiet(seed), {"arm": {"model": model}})
     return document
 
 
 def rippled(family: Callable[[int], dict[str, Any]], seed: int) -> dict[str, Any]:
-    """As a family, on an arm whose ripple and vibrations come at any order of the turn."""
+    """Return a world of a family, on an arm whose ripple and vibrations come at any order of the revolution."""
     document = family(seed)
     turn_hz = document["procedure"]["speed_deg_s"] / 360
     rates_hz = [each["rate_hz"] for each in document["sensors"].values() if each]
@@ -273,7 +275,7 @@ def _document(name: str) -> dict[str, Any]:
 
 
 def _laboratory(seed: int, rng: np.random.Generator, *, speed_deg_s: float) -> dict[str, Any]:
-    """Site, arm and board, and limits that no part of these could be beyond."""
+    """Return site, arm and board, and limits that none of these parts can exceed."""
     site = {"latitude_deg": float(rng.uniform(-65, 65)), "heading_deg": float(rng.uniform(0, 360))}
     return {
         "site": site,
@@ -324,7 +326,7 @@ def _with_sensors(document: dict[str, Any], rng: np.random.Generator, noise: Map
     sensors = {name: each for name, each in document["sensors"].items() if each is not None}
     changes = {
         "sensors": {name: {"mounting": _mounting(rng)} for name in sensors},
-        "world": {"sensors": {name: _sensor(rng, each, noise[each["part"]]) for name, each in sensors.items()}},
+        "world": {"sensors": {name: _sensor(rng, sensor, noise[sensor["part"]]) for name, sensor in sensors.items()}},
     }
     changed: dict[str, Any] = merge(document, changes)
     return changed
@@ -361,7 +363,7 @@ def _of_force(rng: np.random.Generator, part: str) -> list[list[float]]:
 
 
 def _accelerometer(rng: np.random.Generator, section: Mapping[str, Any]) -> dict[str, Any]:
-    """What bends it and what a degree changes are half-widths of its data sheet."""
+    """Draw an accelerometer whose nonlinearity and temperature terms have the half-widths of its data sheet."""
     part = section["part"]
     (scale, bias_m_s2), sheet = ACCELEROMETERS[part], PARTS[part]
     over_g = sheet.acceleration_nonlinear_over_g or section["acceleration"]["range_g"]
@@ -384,12 +386,12 @@ def _accelerometer(rng: np.random.Generator, section: Mapping[str, Any]) -> dict
 
 
 def _lag(whole_ms: float) -> dict[str, float]:
-    """Half of it a low-pass, half of it a delay."""
+    """Split a lag into half a low-pass filter and half a delay."""
     return {"bandwidth_hz": 1e3 / (np.pi * whole_ms), "delay_ms": whole_ms / 2}
 
 
 def _odd(rng: np.random.Generator, part: str, section: Mapping[str, Any]) -> float:
-    """Per rad/s; at full scale the reading is no farther from a straight line than the part's data sheet says."""
+    """Draw the odd nonlinearity per rad/s; at full scale it stays within the part's data sheet."""
     return float(rng.uniform(-1, 1) * PARTS[part].nonlinearity_percent / 100 / _full_rad_s(part, section))
 
 
@@ -413,7 +415,7 @@ def _offset(rng: np.random.Generator) -> list[float]:
 
 
 def _mounting(rng: np.random.Generator) -> dict[str, str]:
-    """One of the 24 right-handed ones."""
+    """Draw one of the 24 right-handed mountings."""
     all_of_them = [
         {axis: f"{'+' if sign > 0 else '-'}{'xyz'[way]}" for axis, sign, way in zip("xyz", signs, order, strict=True)}
         for order in permutations(range(3))
@@ -424,18 +426,18 @@ def _mounting(rng: np.random.Generator) -> dict[str, str]:
 
 
 def first_seed(family: str) -> int:
-    """Those of a family follow each other, and no two families share one."""
+    """Return the first seed of a family; no two families share one."""
     return 1000 * (1 + list(FAMILIES).index(family))
 
 
 def recorded(family: str, seed: int, folder: Path) -> None:
-    """`rig run` in `folder`, which keeps its configuration, its run folder and what it said."""
+    """Run `rig run` in `folder`, which keeps its configuration, its run folder and its output."""
     host = f"127.{100 + seed // 1000}.{seed % 1000 // 200 + 1}.{seed % 200 + 1}"
     run_in(at_address(FAMILIES[family](seed), host), folder)
 
 
 def run_in(document: Mapping[str, Any], folder: Path) -> None:
-    """`rig run` of a configuration in `folder`, as of `recorded`."""
+    """Run `rig run` with a configuration in `folder`, as `recorded`."""
     folder.mkdir(parents=True)
     config = folder / "config.yaml"
     config.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
@@ -446,7 +448,7 @@ def run_in(document: Mapping[str, Any], folder: Path) -> None:
 
 
 def at_address(document: dict[str, Any], host: str) -> dict[str, Any]:
-    """The laboratory on a loopback address of its own: `document`, changed."""
+    """Give the laboratory a loopback address of its own, by a change of `document`."""
     document["arm"]["host"] = host
     if "board" in document:
         document["board"]["port"] = f"socket://{host}:7321"

@@ -1,7 +1,7 @@
-"""Many calibrations in a row in one laboratory: what each found, and what it left behind in the processes that stay.
+"""Many calibrations in a row in one laboratory: their results, and the resources that the lasting processes keep.
 
-Two processes live all the time: the world, and a station, which is one interpreter that is given one command line of
-`rig` after the other, as a notebook or a script in a laboratory does. Some runs are commands in processes of their own.
+Two processes live all the time: the world, and a station, an interpreter that carries out one command line of `rig`
+after the other, as a notebook or a laboratory's script does. Some runs are processes of their own.
 """
 
 import json
@@ -57,7 +57,7 @@ class Footprint:
 
     @classmethod
     def of(cls, pid: int) -> Self:
-        """Of a process that runs."""
+        """Return the footprint of a running process."""
         process = Path("/proc") / str(pid)
         memory = (process / "smaps_rollup").read_text().splitlines()
         rss_kib = next(line.split()[1] for line in memory if line.startswith("Rss:"))
@@ -86,7 +86,7 @@ class Calibration:
 
     @property
     def wraps(self) -> int:
-        """How often the board's counter wrapped while it sampled."""
+        """Return how often the board's counter wrapped while it sampled."""
         return self.board_us[1] // WRAP_US - self.board_us[0] // WRAP_US
 
 
@@ -99,7 +99,7 @@ class Life:
 
     @property
     def wraps(self) -> int:
-        """How often the board's counter wrapped in all."""
+        """Return how often the board's counter wrapped in all."""
         return int(self.board[1].uptime_s * 1e6) // WRAP_US
 
 
@@ -119,7 +119,7 @@ class Station:
         self.pid = self._process.pid
 
     def rig(self, *arguments: str) -> int:
-        """The exit status of `rig` with these arguments."""
+        """Run `rig` with these arguments and return its exit status."""
         assert self._process.stdin is not None and self._process.stdout is not None
         self._process.stdin.write(json.dumps(arguments) + "\n")
         self._process.stdin.flush()
@@ -147,9 +147,9 @@ class Bench:
 
 
 def live(folder: Path, runs: int) -> Iterator[Calibration | Life]:
-    """So many runs in one laboratory: each when it has ended, all of them in the end.
+    """Run this many calibrations in one laboratory; yield each when it has ended, and return all.
 
-    Before the third the laboratory waits for so long that the board's counter should wrap in the middle of it.
+    Before the third the laboratory waits so long that the board's counter should wrap in the middle of it.
     """
     done: list[Calibration] = []
     history = folder / "history.sqlite"
@@ -233,7 +233,7 @@ class Course:
 
 
 def courses(runs: Sequence[Calibration]) -> list[Course]:
-    """Of all parameters, over the runs that passed; the slope's uncertainty from what the runs scatter."""
+    """Return the course of every parameter over the passed runs; the slope's uncertainty is that of their scatter."""
     number = np.array([run.number for run in runs], float)
     found, std = np.array([run.found for run in runs]), np.array([run.std for run in runs])
     away = number - number.mean()
@@ -249,7 +249,7 @@ def courses(runs: Sequence[Calibration]) -> list[Course]:
 
 
 def complaints(life: Life, warm_up: int, sigma: float = 3.0) -> list[str]:
-    """What is not as promised after the first `warm_up` runs; chance deviates by `sigma` as often as a normal does."""
+    """Return broken promises after the first `warm_up` runs; chance exceeds `sigma` as often as a normal variable does."""
     found = [f"run {run.number} ended with status {run.status}" for run in life.runs if run.status]
     if found:
         return found

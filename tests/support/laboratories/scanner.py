@@ -1,4 +1,4 @@
-"""A script in place of the scanner and the operator: types at a station's terminal, and reads what it is told."""
+"""A script in place of the scanner and the operator: it types at a station's terminal and reads the output."""
 
 import os
 import pty
@@ -27,15 +27,15 @@ class Scanner:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def types(self, line: str) -> None:
-        """A line and Enter."""
+        """Type a line and Enter."""
         os.write(self._terminal, f"{line}\n".encode())
 
     def waits_for(self, words: str) -> None:
-        """Until that is said, after what was waited for before."""
+        """Wait for these words, after those waited for before."""
         self._read = self.sees(words)
 
     def sees(self, words: str) -> int:
-        """Until that is said; it can be waited for again."""
+        """Wait for these words without a move of the reading position."""
         with self._more:
             self._more.wait_for(lambda: self._end(words) >= 0 or self._over, PATIENCE_S)
             end = self._end(words)
@@ -43,12 +43,12 @@ class Scanner:
             return end
 
     def said(self, words: str) -> bool:
-        """Whether it was said, ever."""
+        """Return whether these words were ever printed."""
         with self._more:
             return words in self._told
 
     def _end(self, words: str) -> int:
-        """Where they end, after what was read; -1 where they are not there."""
+        """Return the end of the words behind the reading position; -1 if they are not there."""
         at = self._told.find(words, self._read)
         return at + len(words) if at >= 0 else -1
 
@@ -65,7 +65,7 @@ class Scanner:
 
 @contextmanager
 def station(*arguments: str | Path, start: Callable[..., "subprocess.Popen[Any]"] = started) -> Iterator[Scanner]:
-    """`rig station …`, ended by force if it has not ended by itself when the block does."""
+    """Run `rig station …`, ended by force if it has not ended by itself after the block."""
     terminal, far_end = pty.openpty()
     modes = termios.tcgetattr(far_end)
     modes[3] &= ~termios.ECHO

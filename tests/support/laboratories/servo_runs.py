@@ -1,4 +1,4 @@
-"""Whole runs on a simulated servo, in real time, and what is done to one while it goes on."""
+"""Complete runs on a simulated servo in real time, and actions on them while they run."""
 
 import json
 import signal
@@ -40,7 +40,7 @@ class Seen:
     acted_s: float = 0.0
 
     def control(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """One request of the laboratory, one reply."""
+        """Send one request to the laboratory, and return its reply."""
         with socket.create_connection(self.control_at, PATIENCE_S) as channel:
             channel.sendall(json.dumps(dict(request)).encode() + b"\n")
             reply: dict[str, Any] = json.loads(channel.makefile("rb").readline())
@@ -48,23 +48,23 @@ class Seen:
         return reply
 
     def interrupt(self) -> None:
-        """Ctrl-C."""
+        """Send Ctrl-C."""
         self.process.send_signal(signal.SIGINT)
 
     @property
     def at_rest_after_s(self) -> float:
-        """How long after what was done the shaft was last seen to turn; the world ends soon after it stands."""
+        """Return how long after the action the shaft last turned; the world ends soon after it stands still."""
         moved = [time_s for time_s, rate in self.rates if abs(rate) > STANDS_RAD_S]
         return max([0.0, *(time_s - self.acted_s for time_s in moved if time_s > self.acted_s)])
 
     @property
     def stood(self) -> bool:
-        """Whether the shaft was seen at rest in the end."""
+        """Return whether the shaft was at rest in the end."""
         return bool(self.rates) and abs(self.rates[-1][1]) <= STANDS_RAD_S
 
 
 def configured(folder: Path, changes: Mapping[str, Any] | None = None) -> Path:
-    """configs/servo.yaml, quick and so changed, at an address of its own."""
+    """Write configs/servo.yaml, shortened and changed, at an address of its own."""
     host = fresh_host()
     document = yaml.safe_load((CONFIGS / "servo.yaml").read_text(encoding="utf-8"))
     address = {"turner": {"port": f"socket://{host}:7323"}, "board": {"port": f"socket://{host}:7321"}}
@@ -77,7 +77,7 @@ def configured(folder: Path, changes: Mapping[str, Any] | None = None) -> Path:
 
 def carried_out(*command: str | Path, config: Path, when: str = "", times: int = 1, act: Act | None = None,
                 after_s: float = 0.0) -> Seen:  # fmt: skip
-    """`rig …` until it has ended; when it says something the n-th time `act` is done, so long after that."""
+    """Run `rig …` to its end; when it prints the words the n-th time, do `act` after this delay."""
     document = yaml.safe_load(config.read_text(encoding="utf-8"))
     host = document["board"]["port"].removeprefix("socket://").partition(":")[0]
     process = started(*command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -101,7 +101,7 @@ def carried_out(*command: str | Path, config: Path, when: str = "", times: int =
 
 
 def _watch(seen: Seen) -> None:
-    """How fast the shaft is, until the laboratory has ended."""
+    """Follow the shaft's speed until the laboratory has ended."""
     try:
         with socket.create_connection(seen.control_at, PATIENCE_S) as channel:
             replies = channel.makefile("rb")

@@ -1,4 +1,4 @@
-"""Runs of `rig run` with a configuration of their own, and what they stated."""
+"""Runs of `rig run` with a configuration of their own, and their stated results."""
 
 import json
 from dataclasses import dataclass
@@ -25,16 +25,16 @@ class WholeRun:
     result: dict[str, Any]
 
     def stated(self, sensor: str) -> np.ndarray:
-        """(6,) scale and bias."""
+        """Return scale and bias (6,)."""
         entry = self.result["gyroscopes"][sensor]
         return np.array(entry["scale"] + entry["bias_rad_s"])
 
     def stated_std(self, sensor: str) -> np.ndarray:
-        """(6,) their combined standard uncertainties."""
+        """Return their combined standard uncertainties (6,)."""
         return np.asarray(np.sqrt(np.diag(self.result["gyroscopes"][sensor]["covariance_combined"])))
 
     def truth(self, sensor: str, speed_rad_s: float) -> np.ndarray:
-        """(6,) of the simulated sensor over the time of this run's averages, the scale at that speed."""
+        """Return the true scale and bias (6,) over the times of this run's averages, the scale at that speed."""
         seen = self.observed.sensors[sensor]
         averages = [*(turn.average for turn in seen.revolutions), *seen.rests]
         from_s, to_s = min(a.start_s for a in averages), max(a.end_s for a in averages)
@@ -42,7 +42,7 @@ class WholeRun:
 
 
 def whole_run(document: dict[str, Any], folder: Path) -> WholeRun:
-    """Run it in `folder`, which is made, on an address of its own."""
+    """Run in `folder`, which is created, on an address of its own."""
     host = fresh_host()
     document["arm"]["host"], document["board"]["port"] = host, f"socket://{host}:7321"
     folder.mkdir()

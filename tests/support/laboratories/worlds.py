@@ -36,20 +36,20 @@ _addresses = itertools.count()
 
 
 def fresh_host() -> str:
-    """A loopback address nothing else uses: the ports of a robot are fixed, so every robot needs its own address."""
+    """Return a loopback address that nothing else uses, as a robot's ports are fixed."""
     number, pid = next(_addresses), os.getpid()
     return f"127.{20 + number % 200}.{pid // 250 % 250 + 1}.{pid % 250 + 1}"
 
 
 def merge(base: Any, changes: Any) -> Any:
-    """`base` with the nested `changes` laid over it."""
+    """Return `base` with the nested `changes` applied."""
     if isinstance(base, Mapping) and isinstance(changes, Mapping):
         return {**base, **{key: merge(base.get(key), value) for key, value in changes.items()}}
     return changes
 
 
 def hardware(config: Path, folder: Path) -> Path:
-    """`folder`/hardware.yaml: a configuration without its world, as of a rig that finds its devices there."""
+    """Write `folder`/hardware.yaml: a configuration without its world, as for real devices."""
     document = yaml.safe_load(config.read_text(encoding="utf-8"))
     del document["world"]
     path = folder / "hardware.yaml"
@@ -58,7 +58,7 @@ def hardware(config: Path, folder: Path) -> Path:
 
 
 def late_path(config_path: Path) -> Path:
-    """Where a world says what held steps that came late."""
+    """Return the file in which a world notes the causes of late steps."""
     return config_path.with_suffix(".late.txt")
 
 
@@ -76,7 +76,7 @@ class WorldHandle:
         self._replies = self._socket.makefile("rb")
 
     def control(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """One request (`{"do": NAME, …}`), one reply; a refusal fails the test."""
+        """Send one request (`{"do": NAME, …}`) and return the reply; a refusal fails the test."""
         self._socket.sendall(json.dumps(dict(request)).encode() + b"\n")
         reply: dict[str, Any] = json.loads(self._replies.readline())
         assert reply["ok"], f"{request}: {reply}"
@@ -104,7 +104,7 @@ World = Callable[..., WorldHandle]
 
 @contextmanager
 def worlds(folder: Path) -> Iterator[World]:
-    """A starter of worlds whose configurations lie in `folder`; every world has ended when the block does."""
+    """Yield a starter of worlds whose configurations lie in `folder`; every world ends with the block."""
     running: list[WorldHandle] = []
 
     def start(changes: Mapping[str, Any] | None = None) -> WorldHandle:
@@ -143,6 +143,6 @@ def worlds(folder: Path) -> Iterator[World]:
 
 @pytest.fixture
 def world(tmp_path: Path) -> Iterator[World]:
-    """Starts worlds: `world({"world": {"time_scale": 1}})` is an ideal demo.yaml so changed, on a fresh address."""
+    """Yield a starter of worlds: `world({"world": {"time_scale": 1}})` is demo.yaml with changes, on a fresh address."""
     with worlds(tmp_path) as start:
         yield start

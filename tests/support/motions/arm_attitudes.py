@@ -1,4 +1,4 @@
-"""Static attitudes of a UR10e, and an arm whose geometry is not quite what it says."""
+"""Static attitudes of a UR10e, and an arm with geometric errors."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,17 +11,18 @@ from rig.motion.geometry import NOMINAL, flange_attitude, flange_pose
 
 
 def joints_rad(wrists_deg: tuple[WristAngles, ...]) -> Array:
-    """(N, 6) joint angles, base, shoulder and elbow at home."""
+    """Return joint angles (N, 6), with base, shoulder and elbow at home."""
     return np.radians([(0.0, -90.0, 90.0, *wrists) for wrists in wrists_deg])
 
 
 def attitudes_of(joints: Array) -> Array:
-    """(N, 3, 3) from the flange into the base, by the arm's own account."""
+    """Return attitudes (N, 3, 3) from the flange into the base, as the arm reports them."""
     return np.array([flange_attitude(q).T for q in joints])
 
 
 def crooked(joints: Array, rms_rad: float, rng: np.random.Generator) -> Array:
-    """(N, 3, 3) as they are, with the wrists' twists, zeros and encoder waves off by `rms_rad` each.
+    """Return the true attitudes (N, 3, 3), with errors of the wrists' twists, zeros and encoder waves of `rms_rad`
+    each.
 
     They are the same in every attitude of one arm.
     """
@@ -29,7 +30,7 @@ def crooked(joints: Array, rms_rad: float, rng: np.random.Generator) -> Array:
 
 
 def crooked_arm(rms_rad: float, rng: np.random.Generator) -> Callable[[Array], Array]:
-    """Poses (N, 4, 4) of the flange of such an arm as they are, at the joint angles (N, 6) that it tells."""
+    """Return the true poses (N, 4, 4) of such an arm's flange, at the joint angles (N, 6) that it reports."""
     alpha, theta = np.array(NOMINAL.alpha_rad), np.array(NOMINAL.theta_rad)
     alpha[3:5] += rms_rad * rng.normal(size=2)
     theta[3:] += rms_rad * rng.normal(size=3)

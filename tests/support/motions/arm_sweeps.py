@@ -1,7 +1,7 @@
-"""Sweeps and dwells of a UR10e that carries an accelerometer: what it feels, from where its flange goes.
+"""Sweeps and dwells of a UR10e that carries an accelerometer, whose readings follow from the motion of the flange.
 
-The acceleration comes from second differences of the flange's way through the arm as it is; nothing is shared with the
-closed forms of `rig.estimation.reference.accelerometer_model`.
+The acceleration comes from second differences of the flange's true motion; nothing is shared with the closed forms of
+`rig.estimation.reference.accelerometer_model`.
 """
 
 from collections.abc import Callable
@@ -40,7 +40,7 @@ class Truth:
     delay_s: float
 
     def theta(self) -> Array:
-        """(22,) as `rig.estimation.reference.accelerometer_model` orders it."""
+        """Return the parameters (22,) in the order of `rig.estimation.reference.accelerometer_model`."""
         return np.concatenate(
             [self.matrix.ravel(), self.reference_m_s2, self.bias_m_s2, self.lever_arm_m, [self.delay_s], np.zeros(3)]
         )
@@ -48,7 +48,7 @@ class Truth:
 
 @cache
 def planned(axes: int, speed_deg_s: float = 60.0) -> tuple[Sweep, ...]:
-    """The sweeps of the procedure about three or six axes."""
+    """Return the sweeps of the procedure about three or six axes."""
     text = CONFIG.format(
         speed_deg_s=speed_deg_s, rest_s=0.0, repeats=1, part="lsm9ds1", procedure=f", axes: {axes}", uncertainty=""
     )
@@ -59,12 +59,12 @@ def planned(axes: int, speed_deg_s: float = 60.0) -> tuple[Sweep, ...]:
 
 
 def signed_speed(sweep: Sweep) -> float:
-    """rad/s of the joint."""
+    """Return the joint's speed in rad/s."""
     return sweep.speed_rad_s if sweep.direction == "ccw" else -sweep.speed_rad_s
 
 
 def joints_at(sweep: Sweep, angle_rad: Array) -> Array:
-    """(n, 6) with the swept joint turned by angles (n,) from the revolution's lower end."""
+    """Return joint angles (n, 6), the swept joint turned by angles (n,) from the revolution's lower end."""
     joints = np.tile(sweep.start_q_rad, (len(angle_rad), 1))
     joints[:, sweep.joint] = sweep.revolution_rad[0] + angle_rad
     return joints
@@ -73,7 +73,7 @@ def joints_at(sweep: Sweep, angle_rad: Array) -> Array:
 def specific_force(
     poses: Poses, sweep: Sweep, motion: tuple[Array, Array, Array], reference_m_s2: Array, lever_arm_m: Array
 ) -> Array:
-    """(n, 3) in the flange's frame, of a sensor there, by the joint's angle, speed and acceleration, each (n,)."""
+    """Return the specific force (n, 3) in the flange's frame, by the joint's angle, speed and acceleration, each (n,)."""
     angle, speed, acceleration = motion
     before, here, after = (poses(joints_at(sweep, angle + step)) for step in (-STEP_RAD, 0.0, STEP_RAD))
     way = [each[:, :3, :3] @ lever_arm_m + each[:, :3, 3] for each in (before, here, after)]
@@ -86,7 +86,7 @@ def specific_force(
 def recorded_sweeps(
     truth: Truth, poses: Poses, sweeps: tuple[Sweep, ...], density_ug: float, rng: np.random.Generator
 ) -> Sweeps:
-    """The first harmonics of evenly turning sweeps, with white noise of µg/√Hz."""
+    """Return the first harmonics of uniform sweeps, with white noise in µg/√Hz."""
     harmonics, covariances = [], []
     angle = np.arange(POINTS) * 2 * np.pi / POINTS
     columns = np.column_stack([np.full(POINTS, 0.5), np.cos(angle), np.sin(angle)]) * 2 / POINTS
@@ -102,7 +102,7 @@ def recorded_sweeps(
 
 
 def with_readings(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...]) -> Sweeps:
-    """What the arm's own account says of its sweeps."""
+    """Return the sweeps as the arm reports them."""
     joints = np.array([joints_at(sweep, np.zeros(1))[0] for sweep in sweeps])
     places = np.arange(len(sweeps)), slice(None), [sweep.joint for sweep in sweeps]
     poses = flange_pose(joints)
@@ -119,7 +119,7 @@ def with_readings(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...
 
 
 def recorded_dwells(truth: Truth, poses: Poses, joints: Array, density_ug: float, rng: np.random.Generator) -> Dwells:
-    """Rests at joint angles (N, 6), with white noise of µg/√Hz."""
+    """Return rests at joint angles (N, 6), with white noise in µg/√Hz."""
     std = density_ug * MICRO_G / np.sqrt(DWELL_S)
     felt = np.einsum("nji,j->ni", poses(joints)[:, :3, :3], truth.reference_m_s2)
     readings = felt @ truth.matrix.T + truth.bias_m_s2
@@ -156,11 +156,11 @@ class Samples:
 
 
 def recorded_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling, rng: np.random.Generator) -> Samples:
-    """A revolution as it is recorded."""
+    """Return one revolution as it is recorded."""
     phases, speed = rng.uniform(0, 2 * np.pi, len(sampling.cycles)), signed_speed(sweep)
 
     def motion(time_s: Array) -> tuple[Array, Array, Array]:
-        """The joint's angle, speed, acceleration: a ripple locked to the angle it is driven by."""
+        """Return the joint's angle, speed and acceleration, with a ripple locked to the commanded angle."""
         smooth, share = np.pi + speed * time_s, sampling.vibration * np.sqrt(2 / len(sampling.cycles))
         waves = [(cycles, cycles * smooth + phase) for cycles, phase in zip(sampling.cycles, phases, strict=True)]
         return (

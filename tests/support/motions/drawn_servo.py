@@ -1,6 +1,6 @@
-"""Runs on the simulated servo in virtual time: its registers are written and read as the driver does, nobody waits.
+"""Runs on the simulated servo in virtual time, whose registers are written and read as the driver does.
 
-What is drawn anew in each run: the encoder's phases and the noise, the gear's and the adapter's errors, the sensor.
+Each run draws the encoder's phases and the noise, the errors of gear and adapter, and the sensor.
 """
 
 from collections.abc import Callable
@@ -82,7 +82,7 @@ class Far:
 
 
 def loaded(overrides: tuple[str, ...] = ()) -> Loaded:
-    """configs/servo.yaml."""
+    """Load configs/servo.yaml."""
     return parse(CONFIG, overrides=overrides, turners={"servo": ServoSection})
 
 
@@ -97,10 +97,10 @@ def drawn_servo(
     truth: ServoTruth | None = None,
     source: Source | None = None,
 ) -> Drawn:
-    """A run of configs/servo.yaml with these `overrides`, with the samples of another `source` than a board.
+    """Draw a run of configs/servo.yaml with these `overrides`, with the samples of another `source` than a board.
 
-    One reading has that noise, the scale factors lie between those `scales`. The sensor sits `mounting_deg` off its
-    mounting, the item off each stage's by `adapter_deg`, ways drawn anew.
+    One reading has that noise, the scale factors lie between those `scales`. The sensor's mounting is wrong by
+    `mounting_deg`, the item's in each stage by `adapter_deg`, in random directions.
     """
     rng = np.random.default_rng([seed, 43])
     configuration = loaded((*(f"uncertainty.{each}" for each in KNOWN), *overrides))
@@ -146,7 +146,7 @@ def drawn_servo(
 
 
 def _leaning(rng: np.random.Generator, known: UncertaintySection) -> Array:
-    """(3, 3) unit rows: a sensor's axes, not quite at right angles."""
+    """Return unit rows (3, 3): a sensor's axes, not quite orthogonal."""
     angle = np.radians(known.non_orthogonality_deg or 0.0)
     axes = np.eye(3) + np.tril(angle * rng.uniform(-1, 1, (3, 3)), -1)
     unit: Array = axes / np.linalg.norm(axes, axis=1, keepdims=True)
@@ -162,7 +162,7 @@ def _direction(rng: np.random.Generator) -> Array:
 def _driven(
     far: Far, plan: Plan, period_s: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, tuple[Recorded, ...], float]:
-    """The states of a stage, what happened in it, and when it ended."""
+    """Return the states of a stage, its events, and the time of its end."""
     time_s = BEGINS_S
     home = round(plan.home_q_rad[0] / (2 * np.pi) * 4096)
     for register, values in ((DRIVE_MODE, (4,)), (OPERATING_MODE, (4,)), (TORQUE, (1,)), (PROFILE, (500, 1500))):
@@ -216,7 +216,7 @@ def _sampled(
     *,
     rate_hz: float,
 ) -> tuple[RecordedSensor, np.ndarray]:
-    """The samples of a gyroscope that sits by `rows` (3, 3) on the shaft, `until` a time, by a drifting clock."""
+    """Return the samples of a gyroscope mounted by `rows` (3, 3) on the shaft, `until` a time, by a drifting clock."""
     (scale, bias), (end_s, drift, noise_rad_s) = model, until
     time_s = np.arange(BEGINS_S + 0.2, end_s - 0.2, 1 / rate_hz)
     rates = np.array([servo.rate_at(each) for each in time_s.tolist()])

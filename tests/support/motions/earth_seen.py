@@ -1,7 +1,7 @@
-"""What a gyroscope on a UR10e sees of the Earth, in sweeps and in attitudes, on an arm that is not what it says.
+"""The Earth's rate as a gyroscope on a UR10e senses it, in sweeps and attitudes, on an arm with geometric errors.
 
-The flange's mean rates come from differences of its attitudes along the way through the arm as it is; nothing is shared
-with the estimator but the plan and the arm's own account.
+The flange's mean rates come from differences of its attitudes along the true motion; the estimator shares nothing with
+them but the plan and the arm's own report.
 """
 
 from collections.abc import Callable, Iterator
@@ -39,9 +39,9 @@ ARM_RAD = 6e-4  # half of what `uncertainty.axis_deg` allows, as a standard devi
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A gyroscope's angle random walk (rad/√s), and how its bias wanders.
+    """A gyroscope's angle random walk (rad/√s) and its bias drift.
 
-    `scatter_rad_s` from one average to the next, `walk_rad_s_sqrt_s`, and steadily by `warming_rad_s_s`.
+    `scatter_rad_s` from one average to the next, a random walk of `walk_rad_s_sqrt_s`, and a steady `warming_rad_s_s`.
     """
 
     density: float
@@ -102,7 +102,7 @@ class Stretch:
 
 
 def recorded(session: Session, seed: int) -> tuple[Seen, Truth]:
-    """What the rig makes of one session of an arm and a gyroscope drawn by `seed`: sweeps first, as they were made."""
+    """Return the rig's averages of one session of an arm and a gyroscope drawn by `seed`, sweeps first."""
     rng = np.random.default_rng(seed)
     poses = crooked_arm(session.arm_rad, rng)
     heading = rng.uniform(0, 2 * np.pi)
@@ -112,7 +112,7 @@ def recorded(session: Session, seed: int) -> tuple[Seen, Truth]:
     rests = list(_rests(session, poses, rng))
     stretches = [*sweeps, *rests]
 
-    lengths = np.array([each.duration_s for each in stretches])
+    lengths = np.array([stretch.duration_s for stretch in stretches])
     turns = len(sweeps)
     places = [place for pair in zip(range(turns), range(turns, 2 * turns), strict=True) for place in pair]
     places += range(2 * turns, len(stretches))  # a rest after each sweep, then dwells
@@ -120,10 +120,10 @@ def recorded(session: Session, seed: int) -> tuple[Seen, Truth]:
     starts[places] = np.cumsum([0.0, *(lengths[places[:-1]] + PAUSE_S)])
     windows = np.column_stack([starts, starts + lengths])
 
-    attitudes = np.array([each.attitude for each in stretches])
-    told = np.array([each.told for each in stretches])
+    attitudes = np.array([stretch.attitude for stretch in stretches])
+    told = np.array([stretch.told for stretch in stretches])
     wandered, whole = _wandering(session.part, windows, rng)
-    rates = np.array([each.rate_rad_s for each in stretches]) + attitudes @ earth
+    rates = np.array([stretch.rate_rad_s for stretch in stretches]) + attitudes @ earth
     pulled = attitudes @ -UP @ np.reshape(session.g_sensitivity_rad_s_g, (3, 3)).T
     means = rates @ GYRO_MATRIX.T + pulled + GYRO_BIAS_RAD_S + wandered
     variances = np.repeat((session.part.density**2 / lengths)[:, None], 3, axis=1)
@@ -135,21 +135,23 @@ def recorded(session: Session, seed: int) -> tuple[Seen, Truth]:
     seen = Seen(
         means_rad_s=means + noise,
         variances_rad2_s2=variances,
-        turns_rad_s=np.array([each.turn_rad_s for each in stretches]),
+        turns_rad_s=np.array([stretch.turn_rad_s for stretch in stretches]),
         earth_rate_rad_s=np.zeros(3),
         speed_std_rad_s=np.zeros(len(means)),
         attitudes=told,
         gravity_m_s2=9.80665 * told @ -UP,
         windows_s=windows,
-        joints=tuple(each.joint for each in stretches),
-        axis_errors_rad_s=std[:, None, None] * np.stack([each.axis_errors_rad_s for each in stretches], axis=1),
+        joints=tuple(stretch.joint for stretch in stretches),
+        axis_errors_rad_s=std[:, None, None] * np.stack([stretch.axis_errors_rad_s for stretch in stretches], axis=1),
     )
     return seen, Truth(earth, heading, GYRO_BIAS_RAD_S + whole)
 
 
 @cache
 def _turns(axes: int) -> tuple[tuple[Sweep, float, Array, Array, Array], ...]:
-    """Each sweep, its signed speed, its joint angles (POINTS + 1, 6), its axis and mean attitude as told by the arm."""
+    """Return of each sweep its signed speed, joint angles (POINTS + 1, 6), axis and mean attitude as the arm reports
+    them.
+    """
     angles = np.linspace(0, 2 * np.pi, POINTS + 1)
     found = []
     for sweep in planned(axes):
@@ -178,7 +180,7 @@ def _sweeps(session: Session, poses: Callable[[Array], Array], rng: np.random.Ge
 def _rests(session: Session, poses: Callable[[Array], Array], rng: np.random.Generator) -> Iterator[Stretch]:
     dwells = joints_rad(session.wrists_deg) if session.dwell_s else np.zeros((0, 6))
     home = [(HOME_RAD, REST_S)] * len(_turns(session.axes))
-    for angles, duration in [*home, *((each, session.dwell_s) for each in dwells)]:
+    for angles, duration in [*home, *((dwell, session.dwell_s) for dwell in dwells)]:
         stands = angles + np.r_[np.zeros(3), rng.choice([-0.5, 0.5], 3)] * session.hysteresis_rad
         attitude, told = (each[0, :3, :3].T for each in (poses(stands[None]), flange_pose(angles[None])))
         yield Stretch(duration, np.zeros(3), attitude, told, np.zeros(3), np.zeros((len(AXIS_ERRORS), 3)), None)
@@ -206,7 +208,7 @@ def _vibrating(session: Session, windows_s: Array, turns: int, rng: np.random.Ge
 
 
 def _wandering(part: Part, windows_s: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """(N, 3) by which the bias of each average is off, and (3,) its mean over all the time."""
+    """Return the bias error of each average (N, 3), and its mean (3,) over the whole time."""
     times = np.arange(0.0, windows_s.max(), 0.1)
     walk = np.cumsum(part.walk_rad_s_sqrt_s * np.sqrt(0.1) * rng.normal(size=(len(times), 3)), axis=0)
     walk += part.warming_rad_s_s * times[:, None] * rng.choice([-1.0, 1.0], 3)

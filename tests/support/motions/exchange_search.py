@@ -1,4 +1,4 @@
-"""Which attitudes tell most: an exchange search for the largest determinant of the information (Fedorov, 1972)."""
+"""An exchange search for the attitudes with the largest determinant of the information (Fedorov, 1972)."""
 
 import numpy as np
 
@@ -6,18 +6,18 @@ from rig.estimation.arrays import Array
 
 
 def information(rows: Array) -> Array:
-    """(N, p, p) what each attitude adds, from the weighted equations (N, 3, p)."""
+    """Return the information (N, p, p) of each attitude, from the weighted equations (N, 3, p)."""
     added: Array = np.swapaxes(rows, -1, -2) @ rows
     return added
 
 
 def log_determinant(information: Array, chosen: list[int]) -> float:
-    """Of the information of those attitudes together; -inf if they leave something undetermined."""
+    """Return the log determinant of these attitudes' information; -inf if they leave a parameter undetermined."""
     return float(np.linalg.slogdet(information[chosen].sum(axis=0))[1])
 
 
 def exchange_search(information: Array, count: int, rng: np.random.Generator, starts: int) -> list[int]:
-    """The best `count` different attitudes: from random ones, the best exchange of one for another, while any gains."""
+    """Return the best `count` different attitudes, by exchanges from random starts while any improves the determinant."""
     found = [_exchanged(information, rng.permutation(len(information))[:count].tolist()) for _ in range(starts)]
     return max(found, key=lambda chosen: log_determinant(information, chosen))
 

@@ -1,4 +1,4 @@
-"""What a magnetometer on the simulated arm reads in attitudes, without a board."""
+"""Readings of a magnetometer on the simulated arm in attitudes, without a board."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ def seen(
     mounting: Mapping[str, str] = UPRIGHT,
     method: Method = "attitude_weighted",
 ) -> Seen:
-    """What the attitudes for magnetometers tell of it, `extension_mm` from the flange of an arm without errors."""
+    """Solve the attitudes of a magnetometer at `extension_mm` from the flange of an arm without errors."""
     section = MountingSection.model_validate(mounting)
     simulated = SimulatedMagnetometerSection.model_validate(TRUTH)
     mounted = MountedMagnetometer(section, simulated, offset_mm=(0.0, 0.0, extension_mm))
@@ -73,7 +73,7 @@ def seen(
 
 
 def _matrix() -> np.ndarray:
-    """F of the truth, as the world's own sensor has it: what it reads of unit fields."""
+    """Return the true F as the world's own sensor has it: the readings in unit fields."""
     from firmware_host.emulator.parts.magnetometer import Magnetometer, MagnetometerTruth
 
     truth = MagnetometerTruth(

@@ -44,7 +44,7 @@ class Warmed:
 
 
 def warmed() -> Warmed:
-    """The board taken up through its range by its heater and down again."""
+    """Take the board by its heater up through its range and down again."""
     body, course = HeatedBody(BOARD), TemperatureCourse(FROM_C, TO_C, GAP_K, both_directions=True)
     part, ramp, rows, starts, duty = (
         body.part("gyro"),
@@ -74,7 +74,7 @@ def warmed() -> Warmed:
 
 
 def seen(of: Warmed, seed: int) -> RepeatedMeans:
-    """What the estimator is given of one sensor, drawn in its noise, its drift and how the axes of the arm lean."""
+    """Return the estimator's input for one sensor, with drawn noise, drift and tilt of the arm's axes."""
     rng = np.random.default_rng([31, seed])
     windows = np.array([
         (start + at + after, start + at + after + lasts)

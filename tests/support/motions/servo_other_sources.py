@@ -1,4 +1,4 @@
-"""A drawn servo, read by a device that prints lines or an autopilot: their bytes go through the rig's drivers."""
+"""A drawn servo, read by a device that prints lines or by an autopilot; their bytes pass through the rig's drivers."""
 
 import threading
 import time
@@ -33,7 +33,7 @@ Model = tuple[Array, Array]
 def by_lines(
     servo: SimulatedServo, rows: Array, model: Model, until: Until, rng: np.random.Generator
 ) -> tuple[RecordedSensor, np.ndarray]:
-    """A device that prints its time and three rates in steps of 0.001 °/s."""
+    """Sample a device that prints its time and three rates in steps of 0.001 °/s."""
     end_s, drift, _ = until
     listening = threading.Event()
     ended = threading.Event()
@@ -77,7 +77,7 @@ def by_lines(
 def by_autopilot(
     servo: SimulatedServo, rows: Array, model: Model, until: Until, rng: np.random.Generator
 ) -> tuple[RecordedSensor, np.ndarray]:
-    """ArduPilot's first IMU behind its low-pass, with offsets to be undone."""
+    """Sample ArduPilot's first IMU behind its low-pass filter, with offsets to be undone."""
     end_s, drift, _ = until
     begun_s: list[float] = []
     felt = _felt(servo, rows)
@@ -112,11 +112,11 @@ class _Taken:
 
     @property
     def quiet_s(self) -> float:
-        """How long nothing has come."""
+        """Return how long nothing has arrived."""
         return time.monotonic() - self._last_s
 
     def all_of(self, source: SampleSource, ended: Callable[[], bool]) -> np.ndarray:
-        """All samples, once it has ended."""
+        """Return all samples once the source has ended."""
         while not ended():
             source.check()
             time.sleep(0.01)
@@ -124,7 +124,7 @@ class _Taken:
 
 
 def _felt(servo: SimulatedServo, rows: Array) -> Callable[[float], Sequence[float]]:
-    """Rate, rad/s, and specific force, g, on a shaft that stands upright."""
+    """Return rate in rad/s and specific force in g on a vertical shaft."""
     along = rows[:, 2]
 
     def at(time_s: float) -> Sequence[float]:

@@ -46,7 +46,7 @@ class Drawn:
     walk: float
 
     def at(self, temperature_c: float) -> Array:
-        """(6,) k and c where the thermometer says that temperature, in use."""
+        """Return k and c (6,) at that temperature of the thermometer, in use."""
         even, tilted = self.gradient_k
         warmer_k = even + tilted * (2 * temperature_c - FROM_C - TO_C) / (TO_C - FROM_C)
         powers = (temperature_c + warmer_k - REFERENCE_C) ** np.arange(3)
@@ -65,7 +65,7 @@ def drawn(
     noise: float = 3e-4,
     walk: float = 2e-6,
 ) -> Drawn:
-    """A gyroscope with slopes and curvatures at the size of a data sheet's."""
+    """Draw a gyroscope with slopes and curvatures of the size in a data sheet."""
     first = rng.uniform(1.1, 1.2, 3)
     scale = np.array([first, first * rng.uniform(-1, 1, 3) * DATA_SHEET_SCALE_K, first * rng.uniform(-1, 1, 3) * 3e-6])
     ways = rng.uniform(-1, 1, (2, 3))
@@ -79,7 +79,7 @@ def drawn(
 
 @dataclass(frozen=True)
 class Session:
-    """So many sets of sweeps and rests; `windows_s` (N, 2), `felt` (N, 3), the thermometer's `temperature_c` (N,)."""
+    """A number of sets of sweeps and rests: `windows_s` (N, 2), `felt` (N, 3), the thermometer's `temperature_c` (N,)."""
 
     windows_s: Array
     felt: Array
@@ -89,7 +89,7 @@ class Session:
 
 
 def session(repeats: int = 14, *, both_directions: bool = True) -> Session:
-    """From 20 to 60 °C and, if `both_directions`, back again."""
+    """Return a session from 20 to 60 °C and, if `both_directions`, back again."""
     felt = np.tile(PLACES, (repeats, 1))
     lasted = np.where(felt.any(axis=1), SWEPT_S, RESTED_S)
     ends = np.cumsum(lasted + BETWEEN_S)
@@ -102,7 +102,7 @@ def session(repeats: int = 14, *, both_directions: bool = True) -> Session:
 
 
 def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
-    """(N, 3) mean readings."""
+    """Return the mean readings (N, 3)."""
     warm = of.temperature_c + sensor.lag_s * of.warming_k_s - REFERENCE_C
     powers = np.vander(warm, 3, increasing=True)
     within = (of.temperature_c - FROM_C) / (TO_C - FROM_C)
@@ -120,14 +120,14 @@ def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
 
 
 def repeated(means: Array, of: Session, noise: float) -> RepeatedMeans:
-    """What the estimator takes."""
+    """Return the estimator's input."""
     return RepeatedMeans(means, np.full(means.shape, noise**2), of.felt, of.places, of.windows_s, of.temperature_c)
 
 
 def write_files(
     sensor: Drawn, of: Session, rng: np.random.Generator, folder: Path, rate_hz: float = 20.0
 ) -> tuple[Path, Path]:
-    """Samples with a column of temperature, and the sweeps, as `rig solve --sweeps` takes them."""
+    """Write the sweeps and the samples with a column of temperature, as `rig solve --sweeps` takes them."""
     means, rows = readings(sensor, of, rng), []
     for mean, (start_s, end_s), warm in zip(means, of.windows_s, of.temperature_c, strict=True):
         times = np.arange(start_s + 0.5 / rate_hz, end_s, 1 / rate_hz)
@@ -145,36 +145,44 @@ def write_files(
 
 
 def external(means: Array, of: Session, noise: float) -> ExternalData:
-    """The same as `averaged` makes of files."""
+    """Return the same as `averaged` makes of files."""
     averages = [
         Average(mean, np.full(3, noise**2), np.full(3, noise), 100, start_s, end_s, warm, freedom=np.full(3, 99.0))
         for mean, (start_s, end_s), warm in zip(means, of.windows_s.tolist(), of.temperature_c.tolist(), strict=True)
     ]
     sweeps = [
         Observation(
-            row, None, None, *nearest_axis(felt), felt / np.linalg.norm(felt), float(np.linalg.norm(felt)), 0.0, 0, each
+            row,
+            None,
+            None,
+            *nearest_axis(felt),
+            felt / np.linalg.norm(felt),
+            float(np.linalg.norm(felt)),
+            0.0,
+            0,
+            average,
         )
-        for row, (felt, each) in enumerate(zip(of.felt, averages, strict=True), start=1)
+        for row, (felt, average) in enumerate(zip(of.felt, averages, strict=True), start=1)
         if felt.any()
     ]
-    rests = [each for felt, each in zip(of.felt, averages, strict=True) if not felt.any()]
+    rests = [average for felt, average in zip(of.felt, averages, strict=True) if not felt.any()]
     return ExternalData(tuple(sweeps), tuple(rests))
 
 
 def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemperature:
-    """Polynomials with all of the uncertainty that sweeps of files have."""
+    """Return polynomials with the full uncertainty that sweeps of files have."""
     moved, found = files_to_reference(external(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C)
     solution = solve_swept(moved, "vector")
     sign = np.diag(RATE.parameter_signs)
     lines = tuple(
         TemperatureLine(
-            each.name,
-            each.kind,
-            each.distribution,
-            each.source,
-            each.freedom,
-            sign @ each.covariance @ sign,
+            contributor.name,
+            contributor.kind,
+            contributor.distribution,
+            contributor.source,
+            contributor.freedom,
+            sign @ contributor.covariance @ sign,
         )
-        for each in budget_of(solution, moved).contributors
+        for contributor in budget_of(solution, moved).contributors
     )
     return combine_with_reference(found, np.r_[solution.scale, -solution.bias_rad_s], lines)

@@ -1,4 +1,4 @@
-"""Connections that somebody opens to the operator's page to do harm."""
+"""Harmful connections to the operator's page."""
 
 import socket
 import threading
@@ -11,7 +11,7 @@ from support.processes.waiting import PATIENCE_S
 
 @contextmanager
 def opened(url: str, path: str, more: str = "", *, source: str = "") -> Iterator[socket.socket]:
-    """A request whose answer nobody has read yet."""
+    """Send a request, and leave its answer unread."""
     place = urlsplit(url)
     address = (place.hostname or "", place.port or 0)
     with closing(socket.create_connection(address, 10, (source, 0) if source else None)) as connection:
@@ -21,7 +21,7 @@ def opened(url: str, path: str, more: str = "", *, source: str = "") -> Iterator
 
 @contextmanager
 def half_a_request(url: str, *, source: str = "") -> Iterator[socket.socket]:
-    """A connection whose request never ends."""
+    """Open a connection whose request never ends."""
     place = urlsplit(url)
     address = (place.hostname or "", place.port or 0)
     with closing(socket.create_connection(address, 10, (source, 0) if source else None)) as connection:
@@ -31,7 +31,7 @@ def half_a_request(url: str, *, source: str = "") -> Iterator[socket.socket]:
 
 
 def alive(connection: socket.socket) -> bool:
-    """Whether the other side still holds it."""
+    """Return whether the other side still holds the connection."""
     connection.setblocking(False)
     try:
         return connection.recv(1 << 16) != b""

@@ -101,7 +101,7 @@ def more(samples: SamplesTaken | None) -> SamplesTaken | None:
     """Of each sensor one more that reads the same."""
     if samples is None:
         return None
-    return SamplesTaken(tuple(replace(each, samples=each.samples + 1) for each in samples.sensors))
+    return SamplesTaken(tuple(replace(sensor, samples=sensor.samples + 1) for sensor in samples.sensors))
 
 
 @contextmanager

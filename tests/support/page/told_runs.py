@@ -1,4 +1,4 @@
-"""The events of runs that nobody made, for the page: plan of demo.yaml, an arm that follows it, readings to match."""
+"""Events of invented runs for the page: the plan of demo.yaml, an arm that follows it, and readings."""
 
 import math
 from collections.abc import Iterator
@@ -62,18 +62,18 @@ ABOUT = About(
 
 
 def planned() -> Plan:
-    """The movement of demo.yaml."""
+    """Return the movement of demo.yaml."""
     return load_configured(DEMO).phase.plan()
 
 
 def state(time_s: float, q_rad: Joints, qd_rad_s: Joints) -> ArmState:
-    """A healthy arm."""
+    """Return the state of a healthy arm."""
     playing = RobotMode.RUNNING, SafetyMode.NORMAL, RuntimeState.PLAYING
     return ArmState(time_s, time_s, q_rad, qd_rad_s, 1.0, 1.0, *playing, 3, 1)
 
 
 def report(q_rad: Joints) -> ArmReport:
-    """An arm that stands so, of which its dashboard alone tells the model."""
+    """Return the report of an arm in this posture, whose model only its dashboard gives."""
     return ArmReport(
         host="127.0.0.2",
         version=(5, 14, 0, 0),
@@ -88,12 +88,12 @@ def report(q_rad: Joints) -> ArmReport:
 
 
 def servo_state(time_s: float, angle_rad: float) -> ServoState:
-    """A healthy servo that stands."""
+    """Return the state of a healthy servo at rest."""
     return ServoState(time_s, time_s, (angle_rad,), (0.0,), 0.001, 0, 0, 0, 0, 0.0, 12.0, 30.0)
 
 
 def servo_report(state: ServoState) -> ServoReport:
-    """A servo as it comes from its maker, in extended position mode, seen so."""
+    """Return the report of a servo with factory settings, in extended position mode."""
     return ServoReport(
         port="/dev/servo",
         servo_id=1,
@@ -115,7 +115,7 @@ def servo_report(state: ServoState) -> ServoReport:
 
 
 def before_it_moves(plan: Plan) -> Iterator[RunEvent]:
-    """Up to the question."""
+    """Yield the events up to the question."""
     stands = report(plan.start_q_rad)
     yield ArmConnected(stands)
     yield PhaseStarted("six_observation", plan, SENSORS)
@@ -123,7 +123,7 @@ def before_it_moves(plan: Plan) -> Iterator[RunEvent]:
 
 
 def moving(plan: Plan, until_s: float, step_s: float = STEP_S) -> Iterator[RunEvent]:
-    """From the first motion on, as far as that."""
+    """Yield the events from the first motion to this time."""
     yield SamplingStarted()
     time_s, done_s, q = 0.0, 0.0, plan.start_q_rad
     for number, step in enumerate(plan.steps, 1):
@@ -177,7 +177,7 @@ def _observed(sweep: Sweep) -> RunEvent:
 
 
 def look(plan: Plan, sweeps: int) -> Look:
-    """What is known after so many sweeps."""
+    """Return the page's estimates after this many sweeps."""
     rows = []
     for sweep in plan.sweeps[:sweeps]:
         axis = max(range(3), key=lambda i: abs(sweep.axis_flange[i]))
@@ -226,7 +226,7 @@ def look(plan: Plan, sweeps: int) -> Look:
 
 
 def judged(folder: Path, *, passed: bool) -> Iterator[RunEvent]:
-    """Checks and verdict."""
+    """Yield checks and verdict."""
     yield DocumentWritten(folder / "certificate.html")
     limit = 0.002 if passed else 0.0002
     for check in (

@@ -34,9 +34,9 @@ def six_found() -> ResultDocument:
     """What a recording of one of them gave, of all."""
     one = read_result(IMU)
     checks = tuple(
-        each.model_copy(update={"name": each.name.replace("gyro", name), "sensor": each.sensor and name})
+        check.model_copy(update={"name": check.name.replace("gyro", name), "sensor": check.sensor and name})
         for name in PARTS
-        for each in one.checks
+        for check in one.checks
     )
     return one.model_copy(
         update={
@@ -62,9 +62,9 @@ def six_judged(folder: Path, *, passed: bool = True, broken: Collection[str] = (
     if not passed:
         limit = found.checks[0]
         yield Checked(Check(limit.name, 0.177, 0.1, "1", limit.means, 0.0012))
-    for each in found.checks:
-        if each.name.partition(".")[2] in broken and each.limit is not None:
-            yield Checked(Check(each.name, 3 * each.limit, each.limit, each.unit, each.means))
+    for check in found.checks:
+        if check.name.partition(".")[2] in broken and check.limit is not None:
+            yield Checked(Check(check.name, 3 * check.limit, check.limit, check.unit, check.means))
     yield VerdictReached(passed and not broken)
     yield Remembered("the history", (12, 13), tuple(_since(found)))
 

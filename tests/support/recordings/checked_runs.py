@@ -1,4 +1,4 @@
-"""Checks of recordings against themselves, and what chance says of what they found."""
+"""Consistency checks of recordings, and the p-values of their findings."""
 
 from collections.abc import Sequence
 
@@ -16,14 +16,14 @@ Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], Surroundings]
 
 
 def solved(run: RunData) -> Solved:
-    """What checks are made of, of a recording of one gyroscope."""
+    """Return the inputs of the checks for a recording of one gyroscope."""
     recordings = observe_recordings([run])
     surroundings = surroundings_of(recordings, recordings[0].run.settings)
     return recordings, solve_observed(run.sensors, recordings, surroundings), surroundings
 
 
 def checks_of(found: Solved, rate: float = RATE) -> tuple[Check, ...]:
-    """With limits that are exceeded in such a share of undamaged recordings, each."""
+    """Check with limits that undamaged recordings exceed with this probability each."""
     recordings, results, surroundings = found
     return contradictions(
         recordings, results, ["gyro"], surroundings, recordings[0].run.settings, false_alarms=rate * STATISTICS
@@ -31,22 +31,22 @@ def checks_of(found: Solved, rate: float = RATE) -> tuple[Check, ...]:
 
 
 def checked(run: RunData) -> tuple[Check, ...]:
-    """As a run is judged."""
+    """Check a recording as a run is judged."""
     return checks_of(solved(run))
 
 
 def failed(checks: Sequence[Check]) -> set[str]:
-    """Their names, without the sensor's and the sweep's."""
+    """Return the names of failed checks, without the sensor's and the sweep's."""
     return {kind_of(check) for check in checks if not check.passed}
 
 
 def kind_of(check: Check) -> str:
-    """The name of the check, of whatever sensor and sweep."""
+    """Return the name of a check without its sensor and sweep."""
     return check.name.split(".")[1]
 
 
 def probability(check: Check, rate: float = RATE) -> float:
-    """Of χ² as large, with as many degrees of freedom as the limit for that rate shows."""
+    """Return the probability of a χ² as large, with the degrees of freedom that the limit for that rate implies."""
     from scipy.special import chdtrc, chdtri
 
     limit = float(check.limit or 0.0)

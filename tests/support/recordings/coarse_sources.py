@@ -100,7 +100,7 @@ def stated(seen: Drawn) -> Stated:
     assert result.uncertainty is not None
     (observed,) = recordings
     averages = [turn.average for turn in observed.sensors["gyro"].revolutions] + [*observed.sensors["gyro"].rests]
-    first_s, last_s = min(each.start_s for each in averages), max(each.end_s for each in averages)
+    first_s, last_s = min(average.start_s for average in averages), max(average.end_s for average in averages)
     inside = (seen.time_s >= first_s) & (seen.time_s <= last_s)
     true = np.concatenate([seen.scale, -seen.bias_rad_s[inside].mean(axis=0)])
     checks = contradictions(recordings, results, ["gyro"], surroundings, seen.run.settings).checks

@@ -1,4 +1,4 @@
-"""A frozen recording's accelerations or fields, damaged on purpose, and what is told of them."""
+"""Accelerations or fields of a frozen recording, damaged on purpose, and the checks that detect it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -50,28 +50,28 @@ class Readings:
     @property
     def turning(self) -> Mask:
         """All sweeps."""
-        found: Mask = np.any([self.within(each.window) for each in swept(self.run)], axis=0)
-        return found
+        mask: Mask = np.any([self.within(each.window) for each in swept(self.run)], axis=0)
+        return mask
 
-    def dwell(self, place: int) -> Mask:
-        """From shortly before to shortly after."""
-        window = list(dwelt(self.run))[place].window
+    def dwell(self, index: int) -> Mask:
+        """Return the mask from shortly before to shortly after a dwell."""
+        window = list(dwelt(self.run))[index].window
         return self.within(Window(window.start_s - 0.05, window.end_s + 0.05))
 
-    def half_of_dwell(self, place: int) -> Mask:
-        """The second half."""
-        window = list(dwelt(self.run))[place].window
+    def half_of_dwell(self, index: int) -> Mask:
+        """Return the mask of the second half of a dwell."""
+        window = list(dwelt(self.run))[index].window
         return self.within(Window((window.start_s + window.end_s) / 2, window.end_s))
 
-    def sweep(self, place: int) -> Mask:
-        return self.within(list(swept(self.run))[place].window)
+    def sweep(self, index: int) -> Mask:
+        return self.within(list(swept(self.run))[index].window)
 
     def within(self, window: Window) -> Mask:
         inside: Mask = (self.time_s >= window.start_s) & (self.time_s < window.end_s)
         return inside
 
-    def feeling(self, felt: Array) -> "Readings":
-        return replace(self, counts=np.round(felt / self.count).astype(np.int64))
+    def feeling(self, forces: Array) -> "Readings":
+        return replace(self, counts=np.round(forces / self.count).astype(np.int64))
 
     def recording(self) -> RunData:
         samples = self.run.samples[self.sensor].copy()
@@ -90,7 +90,7 @@ def recorded(folder: str) -> RunData:
 
 @cache
 def readings_of(folder: str, sensor: str) -> Readings:
-    """An undamaged recording's."""
+    """Return the readings of an undamaged recording."""
     run = recorded(folder)
     observed = observe_recordings([run])[0]
     magnetometer = run.measuring(FIELD).get(sensor)
@@ -121,7 +121,7 @@ class Told:
 
 
 def told_of(run: RunData) -> Told:
-    """Raises Fault."""
+    """Check a recording's accelerometers and magnetometers. Raise Fault."""
     recordings = observe_recordings([run])
     accelerometers = calibrate_accelerometers(recordings, run.settings)
     magnetometers = calibrate_magnetometers(recordings, run.settings, accelerometers)
@@ -130,55 +130,55 @@ def told_of(run: RunData) -> Told:
 
 
 def offset(by: float, where: Callable[[Readings], Mask]) -> Damage:
-    return lambda seen: seen.feeling(seen.felt + by * ASKEW * where(seen)[:, None])
+    return lambda readings: readings.feeling(readings.felt + by * ASKEW * where(readings)[:, None])
 
 
 def bent(change: Callable[[Array], Array]) -> Damage:
-    """By what each axis adds that reads so much."""
-    return lambda seen: seen.feeling(seen.felt + change(seen.felt))
+    """Add to each axis a function of its reading."""
+    return lambda readings: readings.feeling(readings.felt + change(readings.felt))
 
 
 def scaled(by: float, where: Callable[[Readings], Mask], axes: Sequence[int] = (0, 1, 2)) -> Damage:
-    def damage(seen: Readings) -> Readings:
-        felt = seen.felt
-        felt[np.ix_(where(seen), np.array(axes))] *= by
-        return seen.feeling(felt)
+    def damage(readings: Readings) -> Readings:
+        forces = readings.felt
+        forces[np.ix_(where(readings), np.array(axes))] *= by
+        return readings.feeling(forces)
 
     return damage
 
 
 def turned(angle_deg: float, where: Callable[[Readings], Mask]) -> Damage:
-    def damage(seen: Readings) -> Readings:
-        felt, there = seen.felt, where(seen)
-        felt[there] = felt[there] @ Rotation.from_rotvec(np.radians(angle_deg) * AXIS).as_matrix().T
-        return seen.feeling(felt)
+    def damage(readings: Readings) -> Readings:
+        forces, chosen = readings.felt, where(readings)
+        forces[chosen] = forces[chosen] @ Rotation.from_rotvec(np.radians(angle_deg) * AXIS).as_matrix().T
+        return readings.feeling(forces)
 
     return damage
 
 
 def converted(change: Callable[[NDArray[np.int64]], NDArray[np.int64]]) -> Damage:
-    """By what the converter or the bus does to the bits."""
-    return lambda seen: replace(seen, counts=change(seen.counts))
+    """Change the bits of the readings, as a converter or a bus does."""
+    return lambda readings: replace(readings, counts=change(readings.counts))
 
 
 def stuck(axis: int, where: Callable[[Readings], Mask], at: float | None = None) -> Damage:
-    """At a value, or at the first reading there."""
+    """Hold an axis at a value, or at its first reading."""
 
-    def damage(seen: Readings) -> Readings:
-        counts, there = seen.counts.copy(), where(seen)
-        counts[there, axis] = counts[there, axis][0] if at is None else round(at / seen.count)
-        return replace(seen, counts=counts)
+    def damage(readings: Readings) -> Readings:
+        counts, chosen = readings.counts.copy(), where(readings)
+        counts[chosen, axis] = counts[chosen, axis][0] if at is None else round(at / readings.count)
+        return replace(readings, counts=counts)
 
     return damage
 
 
 def spike(by: float, where: Callable[[Readings], Mask]) -> Damage:
-    """One reading, in the middle."""
+    """Change one reading, in the middle."""
 
-    def damage(seen: Readings) -> Readings:
-        there = np.flatnonzero(where(seen))
-        felt = seen.felt
-        felt[there[len(there) // 2]] += by * ASKEW
-        return seen.feeling(felt)
+    def damage(readings: Readings) -> Readings:
+        chosen = np.flatnonzero(where(readings))
+        forces = readings.felt
+        forces[chosen[len(chosen) // 2]] += by * ASKEW
+        return readings.feeling(forces)
 
     return damage

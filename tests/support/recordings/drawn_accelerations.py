@@ -1,4 +1,4 @@
-"""Accelerometers drawn with all that their data sheets let them do, on crooked arms: sessions, and damages to them."""
+"""Accelerometers drawn within their data sheets, on arms with errors: their sessions, and faults planted in them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -45,7 +45,7 @@ AVERAGED = 500.0  # readings in a mean
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """One run's readings, what of scale and bias is true of them (6,), and what is known of sensor and arm."""
+    """The readings of one run, the true scale and bias (6,), and the prior knowledge of sensor and arm."""
 
     part: str
     truth: Truth
@@ -77,7 +77,7 @@ class Session:
 
 
 def sheet_of(part: str) -> Datasheet:
-    """What is known of an accelerometer of that kind."""
+    """Return the data sheet of an accelerometer of this kind."""
     known = PARTS[part]
     return Datasheet(
         known.acceleration_nonlinearity_percent,
@@ -89,9 +89,10 @@ def sheet_of(part: str) -> Datasheet:
 
 
 def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_K, *, evenly: bool = True) -> Session:
-    """Eighteen dwells after sweeps about six axes, at temperatures that stray by so much.
+    """Draw eighteen dwells after sweeps about six axes, at temperatures that vary by `warmer_k`.
 
-    What a data sheet bounds is `evenly` drawn within its bounds, or normal with the standard deviation of that.
+    Errors bounded by a data sheet are drawn `evenly` within the bounds, or from a normal distribution of that standard
+    deviation.
     """
     rng, sheet = np.random.default_rng([seed, 7]), sheet_of(part)
     density = PARTS[part].acceleration_noise_ug_sqrt_hz
@@ -138,7 +139,7 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
 
 
 def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
-    """The solution, its budget, and by how much scale and bias (6,) are off."""
+    """Return the solution, its budget, and the errors of scale and bias (6,)."""
     movement = session.movement
     solution = solve_imu(
         movement.dwells,
@@ -157,7 +158,7 @@ def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
 
 
 def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
-    """What is held against itself."""
+    """Return the inputs of the checks of consistency."""
     turned = planned(AXES)
     stood = [
         *map(Posture, JOINTS),
@@ -171,7 +172,7 @@ def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
 
 
 def told_of(session: Session, solution: ImuSolution, rate: float) -> set[str]:
-    """The names of what is beyond its limit."""
+    """Return the names of the statistics beyond their limit."""
     found = check_reference(read_of(session, solution), rate)
     beyond = {name for name, (value, limit) in found.statistics.items() if value > limit}
     return beyond | ({"disturbed"} if found.disturbed else set())
@@ -195,13 +196,13 @@ def bent(change: Callable[[Array], Array], scale: float = 0.0) -> Damage:
 
 
 def stepped(session: Session, size: float) -> Session:
-    """The bias changes half-way; true is its mean."""
+    """Change the bias half-way; the true value is its mean."""
     more = per_axis((repeat_by_segment(session.late, session.movement) * session.movement.constant())[:, None] * ASKEW)
     return session.reading(size * more @ np.ones(3), np.concatenate([np.zeros(3), size * ASKEW / 2]))
 
 
 def scaled(axes: Array) -> Damage:
-    """Scale factors change half-way; true is their mean."""
+    """Change the scale factors half-way; the true value is their mean."""
 
     def damage(session: Session, size: float) -> Session:
         more = per_axis(_along(session) * repeat_by_segment(session.late, session.movement)[:, None])
@@ -211,24 +212,24 @@ def scaled(axes: Array) -> Damage:
 
 
 def swept(session: Session, size: float) -> Session:
-    """Another bias in sweeps alone, of which that at rest is meant."""
+    """Give sweeps alone another bias; the true bias is that at rest."""
     turning = session.movement.constant()
     turning[: len(JOINTS)] = 0.0
     return session.reading(size * per_axis(turning[:, None] * ASKEW) @ np.ones(3))
 
 
 def disturbed(session: Session, size: float) -> Session:
-    """Another reading in one dwell."""
+    """Change the readings of one dwell."""
     more = np.zeros((len(session.movement.readings()), 3))
     more[3] = size * ASKEW
     return session.reading(more.ravel())
 
 
 def _along(session: Session) -> Array:
-    """(K, 3) what each axis feels."""
+    """Return the specific force (K, 3) of each axis."""
     return np.asarray(find_force(session.truth.theta(), session.movement) @ session.truth.matrix.T, dtype=np.float64)
 
 
 def _parameters(truth: Truth, chi: Array) -> Array:
-    """(6,) by the readings at 1 g up and down, and at 0 g."""
+    """Return the parameters (6,) by the readings at 1 g up and down, and at 0 g."""
     return np.concatenate([1 / (np.linalg.norm(truth.matrix, axis=1) + chi * GRAVITY**2), truth.bias_m_s2])

@@ -1,7 +1,7 @@
-"""Recordings of whole sensors on whole arms, drawn from what the configuration states of both: nothing is damaged.
+"""Recordings of complete sensors on complete arms, drawn from what a configuration states of both: nothing is damaged.
 
-What the arm's encoders do not see lies within `uncertainty.*`, what the sensor does beside its noise within its data
-sheet: so p-values of checks that know as much, and no more, are uniform.
+Errors that the arm's encoders do not see lie within `uncertainty.*`, those of the sensor within its data sheet. The
+p-values of checks that use exactly this knowledge are uniform.
 """
 
 from collections.abc import Callable
@@ -102,7 +102,7 @@ class Drawn:
 def drawn(
     seed: int, kind: Kind, setup: Setup | None = None, ripple: Ripple | None = None, *, vibrates: bool = True
 ) -> Drawn:
-    """The movement is that of `setup`, if any; it is as uneven as `ripple` says, or as is usual, or not at all."""
+    """Draw a recording. The movement is that of `setup`; its unevenness is `ripple`, or usual, or none."""
     rng = np.random.default_rng(seed)
     seen = rng.spawn(1)[0]
     setup = replace(
@@ -144,7 +144,7 @@ def drawn(
 
 
 def damaged(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
-    """With so much (n, 3) added to the readings."""
+    """Return the recording with this (n, 3) added to the readings."""
     samples = seen.run.samples["gyro"].copy()
     samples["counts"] += np.round(by_rad_s / kind.sensor.channel(RATE).unit_per_count).astype(samples["counts"].dtype)
     return replace(seen.run, samples={"gyro": samples})
@@ -166,7 +166,7 @@ def _beside_the_encoders(
     *,
     vibrates: bool = True,
 ) -> tuple[Array, Array, DenavitHartenberg]:
-    """True angles and speeds, and how the arm is made; the encoders see neither."""
+    """Return true angles, true speeds and the arm's true geometry, none of which the encoders see."""
     q, qd = motion.joints(time_s)
     axis_rad, again_rad = np.radians([known.axis_deg, known.repeatability_deg])
     true, speed = q.copy(), qd.copy()
@@ -200,8 +200,8 @@ def _beside_the_encoders(
     lines_hz = [hertz]
     if motion.unseen_hz:
         vibration, lines_hz = motion.unseen_rad_s, list(motion.unseen_hz)
-    for each in lines_hz:
-        wave = np.cos(2 * np.pi * each * time_s[:, None] + rng.uniform(0, 6, 3))
+    for line_hz in lines_hz:
+        wave = np.cos(2 * np.pi * line_hz * time_s[:, None] + rng.uniform(0, 6, 3))
         speed[:, WRISTS] += vibration * np.sqrt(2 / len(lines_hz)) * wave
     twist = np.zeros(6)
     twist[list(WRISTS)] = axis_rad * rng.uniform(-1, 1, 3)
@@ -210,7 +210,9 @@ def _beside_the_encoders(
 
 
 def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, speed_rad_s: float) -> tuple[Array, Array]:
-    """(n, 3) by a sensor askew, whose axes are not square, not linear, and feel gravity; and its scale (3,)."""
+    """Return the rates (n, 3) of a misaligned, non-orthogonal, nonlinear sensor that senses gravity, and its scale
+    (3,).
+    """
     part = PARTS[kind.sensor.part]
     along = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
     most_rad = np.radians(part.non_orthogonality_deg) / 2  # the other axis of an angle may lean as far
@@ -226,7 +228,7 @@ def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, spee
 
 
 def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:
-    """(n, 3) of a random walk and of processes that forget in times an octave or two apart."""
+    """Return the bias drift (n, 3): a random walk, and processes whose time constants are an octave or two apart."""
     from scipy.signal import lfilter
 
     step_s = 1 / kind.sensor.rate_hz
@@ -242,7 +244,7 @@ def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:
 
 
 def _looked_at_late(run: RunData, motion: Motion, setup: Setup, rng: np.random.Generator) -> RunData:
-    """The encoders are not looked at quite when a state says."""
+    """Read the encoders slightly after the time of a state."""
     arm = run.states.copy()
     late_s = rng.uniform(0, 1e-4) * rng.standard_normal(len(arm))
     q_rad, _ = motion.joints(arm["time_s"] + late_s)

@@ -26,15 +26,15 @@ QUARTER_TURNS = (
 
 
 def staged(setup: Setup, stages: Sequence[str] = QUARTER_TURNS) -> Setup:
-    """The same movement in stages."""
+    """Return the same movement in stages."""
     return replace(setup, procedure=(*setup.procedure, ("stages", f"[{', '.join(stages)}]")))
 
 
 def drawn_stages(seed: int, kind: Kind, setup: Setup, off_deg: Array) -> tuple[list[RunData], Array]:
-    """A recording of each stage that `setup` names, and the (3,) scale factors that were drawn.
+    """Draw a recording of each stage of `setup`; return them and the drawn scale factors (3,).
 
-    `off_deg` (S, 3) are rotation vectors by which what the item feels is turned beside its mounts. Sensor and arm are
-    the same in all stages; the noise, the wandering and the clock are each stage's own.
+    `off_deg` (S, 3) are rotation vectors of the item's mounting errors. Sensor and arm are the same in all stages;
+    noise, bias drift and clock are each stage's own.
     """
     runs: list[RunData] = []
     scale: Array = np.ones(3)
@@ -73,7 +73,7 @@ def drawn_stages(seed: int, kind: Kind, setup: Setup, off_deg: Array) -> tuple[l
 
 
 def of_stage(setup: Setup, stage: int, rng: np.random.Generator) -> Motion:
-    """The movement of one stage, and the settings of its recording."""
+    """Return the movement of one stage, and the settings of its recording."""
     motion = Motion(setup, rng)
     config = parse(motion.config).config
     assert isinstance(config.procedure, SixSweepsSection)

@@ -19,7 +19,7 @@ def frozen() -> list[Path]:
 
 
 def freeze(run: Path, kind: str) -> Path:
-    """A finished run into its place among the frozen recordings, compressed; returns where that is."""
+    """Copy a finished run, compressed, to the frozen recordings. Return its folder."""
     folder = RECORDINGS / kind
     folder.mkdir()
     for name in (CONFIG, RESULT):
@@ -34,7 +34,7 @@ def _recordings(folder: Path) -> list[Path]:
 
 
 def _compress(source: Path, target: Path) -> None:
-    """The same attributes and rows: a run file as it is written has room for more."""
+    """Copy attributes and rows compressed, as a run file reserves room for more."""
     import h5py
 
     with h5py.File(source) as file, h5py.File(target, "w") as copy:

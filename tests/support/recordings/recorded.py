@@ -1,4 +1,4 @@
-"""Sensors as recordings describe them, made anew with one thing changed."""
+"""Sensors of recordings with one property changed."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,6 +8,8 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 
 
 def with_channel(sensor: RecordedSensor, quantity: Quantity | Scalar = RATE, **changes: Any) -> RecordedSensor:
-    """The sensor with something else said of one of its channels."""
-    changed = (replace(each, **changes) if each.quantity == quantity.name else each for each in sensor.channels)
+    """Return the sensor with changed properties of one of its channels."""
+    changed = (
+        replace(channel, **changes) if channel.quantity == quantity.name else channel for channel in sensor.channels
+    )
     return replace(sensor, channels=tuple(changed))

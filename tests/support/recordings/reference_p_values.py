@@ -1,4 +1,4 @@
-"""What chance says of what accelerometers and magnetometers contradict."""
+"""p-values of the consistency checks of accelerometers and magnetometers."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ RATES = np.concatenate([np.geomspace(1e-4, 0.02, 5), np.linspace(0.05, 0.95, 19)
 
 
 def p_values(read: ReferenceModel) -> dict[str, float]:
-    """The rate of false alarms at which each statistic is just beyond its limit."""
+    """Return the false-alarm probability at which each statistic is just beyond its limit."""
     beyond: dict[str, float] = {}
     for rate in RATES:
         for name, (value, limit) in check_reference(read, float(rate)).statistics.items():

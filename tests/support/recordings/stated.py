@@ -1,6 +1,6 @@
-"""Two results of one recording, held against each other by what their numbers mean: by the uncertainty they state.
+"""Comparison of two results of one recording, by the uncertainties that they state.
 
-A processor's rounding is no difference, and neither is the order in which its kernel adds.
+Rounding by another processor is no difference, nor is the order in which its kernel adds.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -24,9 +24,10 @@ Number = tuple[str, float, float]  # its name, its value, and of what it may mov
 
 
 def differences(expected: ResultDocument, found: ResultDocument) -> list[str]:
-    """Every number of `expected` that `found` lacks or has otherwise, verdict and checks too; there may be more.
+    """Return every number of `expected` that differs in `found` or is missing, with verdict and checks.
 
-    A value is held by its standard uncertainty, an uncertainty by its own size, a check by its limit, a count as it is.
+    A value is compared by its standard uncertainty, an uncertainty by its own size, a check by its limit, a count
+    exactly.
     """
     told = _moved(_numbers(expected), _numbers(found))
     said = {check.name: _said(check) for check in found.checks}
@@ -39,18 +40,18 @@ def differences(expected: ResultDocument, found: ResultDocument) -> list[str]:
 
 
 def _said(check: CheckEntry) -> tuple[object, ...]:
-    """Whether it passed, and what it is of: one of fitness may say more of that than it did."""
+    """Return whether a check passed and its subject; a check of fitness may say more of that in a later version."""
     means = check.means
     return check.passed, means if means.kind == "conformity" else (means.kind, means.sweep)
 
 
 def solved_otherwise(run: Path, printed: str) -> list[str]:
-    """The same of a run's result and of what `rig solve --json` prints of it."""
+    """Return the differences between a run's result and the output of `rig solve --json`."""
     return differences(read_result(run), ResultDocument.model_validate_json(printed))
 
 
 def moved_parameters(expected: Iterable[Parameter], found: Iterable[Parameter]) -> list[str]:
-    """The same of one sensor's parameters."""
+    """Return the differences of one sensor's parameters."""
     return _moved(_of_parameters("", expected), _of_parameters("", found))
 
 
@@ -106,10 +107,10 @@ def _of_attitudes(document: ResultDocument) -> Iterator[Number]:
 
 
 def _of_parameters(of: str, parameters: Iterable[Parameter]) -> Iterator[Number]:
-    for each in parameters:
-        yield f"{of}{each.name}", each.value, each.std
-        yield f"{of}u({each.name})", each.std, each.std
-        yield f"{of}s({each.name})", each.std_statistical, each.std_statistical
+    for parameter in parameters:
+        yield f"{of}{parameter.name}", parameter.value, parameter.std
+        yield f"{of}u({parameter.name})", parameter.std, parameter.std
+        yield f"{of}s({parameter.name})", parameter.std_statistical, parameter.std_statistical
 
 
 def _of_comparison(name: str, compared: ComparisonEntry) -> Iterator[Number]:

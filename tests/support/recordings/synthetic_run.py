@@ -61,7 +61,7 @@ SENSITIVITY = float(np.radians(8.75e-3))
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What a synthetic recording is made of."""
+    """The settings of a synthetic recording."""
 
     seed: int = 1
     speed_deg_s: float = 60.0
@@ -97,7 +97,7 @@ class Setup:
 
 
 def truth(setup: Setup) -> Array:
-    """(6,) kx ky kz bx by bz."""
+    """Return the true parameters (6,) kx ky kz bx by bz."""
     return np.array([*setup.scale, *setup.bias_rad_s])
 
 
@@ -129,7 +129,7 @@ class Motion:
         self.end_s = float(self.ends[-1]) + 1.0
 
     def joints(self, time_s: Array) -> tuple[Array, Array]:
-        """q (n, 6) and its derivative with respect to time (n, 6), at rising times (n,)."""
+        """Return q (n, 6) and its time derivative (n, 6) at increasing times (n,)."""
         here = np.array(self.plan.home_q_rad)
         smooth, speed = np.tile(here, (len(time_s), 1)), np.zeros((len(time_s), 6))
         places = [np.searchsorted(time_s, 101.0), *np.searchsorted(time_s, self.ends, side="right")]
@@ -155,7 +155,7 @@ class Motion:
         return q, qd
 
     def events(self) -> tuple[Recorded, ...]:
-        """As the procedure writes them."""
+        """Return the events as the procedure writes them."""
         events = []
         for step, end in zip(self.plan.steps, self.ends, strict=True):
             for event, time_s in zip(_events(step), (float(end - step.duration_s), float(end)), strict=False):
@@ -164,13 +164,13 @@ class Motion:
 
 
 def true_rate(motion: Motion, time_s: Array, kinematics: DenavitHartenberg = NOMINAL) -> Array:
-    """(n, 3) angular velocity of the flange in its frame, rad/s."""
+    """Return the angular velocity (n, 3) of the flange in its frame, in rad/s."""
     q, qd = motion.joints(time_s)
     return flange_rate(q, qd, kinematics)
 
 
 def synthetic_run(setup: Setup) -> RunData:
-    """A whole recording."""
+    """Compute a complete recording."""
     rng = np.random.default_rng(setup.seed)
     motion = Motion(setup, rng)
     board_s, controller_s = sample_times(setup, motion)
@@ -180,7 +180,7 @@ def synthetic_run(setup: Setup) -> RunData:
 
 
 def true_force(setup: Setup, motion: Motion, time_s: Array) -> Array:
-    """(n, 3) specific force in g where the sensor sits, as the simulated laboratory has it."""
+    """Return the specific force (n, 3) in g at the sensor, as the simulated laboratory computes it."""
     (q, qd), step_s = motion.joints(time_s), 1e-4
     qdd = (motion.joints(time_s + step_s)[1] - motion.joints(time_s - step_s)[1]) / (2 * step_s)
     turns = [(np.cos(angle), np.sin(angle)) for angle in q.T]
@@ -191,13 +191,13 @@ def true_force(setup: Setup, motion: Motion, time_s: Array) -> Array:
 
 
 def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
-    """Board times (n,) and the controller times (n,) they stand for; sampling starts and ends with the recording."""
+    """Return board times (n,) and their controller times (n,); sampling starts and ends with the recording."""
     controller = np.arange(100.3, motion.end_s - 0.4, 1 / setup.sample_rate_hz)
     return (controller - setup.boot_s) / (1 + setup.drift), controller
 
 
 def readings(setup: Setup, rate: Array, rng: np.random.Generator, force_g: Array | None = None) -> Array:
-    """Counts (n, 3) of a sensor that feels the flange's rate (n, 3) and what force there is."""
+    """Return the counts (n, 3) of a sensor at the flange's rate (n, 3) and specific force."""
     mounted = rotation(np.array(setup.mounting_error_rad))
     turned = rate @ mounted.T
     turned = turned * (1 + setup.odd_per_rad_s * np.abs(turned) + setup.even_per_rad_s * turned)
@@ -219,7 +219,7 @@ def sizes_of(parts: Mapping[str, str]) -> dict[str, dict[str, float]]:
 
 
 def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> RunData:
-    """The recording of given readings."""
+    """Return the recording of given readings."""
     samples = np.zeros(len(board_s), SAMPLE_DTYPE)
     samples["sequence"] = 1000 + np.arange(len(board_s))
     samples["board_time_us"] = np.round(board_s * 1e6)
@@ -256,14 +256,14 @@ SENSOR = RecordedSensor(
 
 
 def _events(step: Step) -> tuple[Event, ...]:
-    """At the beginning and at the end of a step."""
+    """Return the events at the beginning and at the end of a step."""
     if isinstance(step, Sweep):
         return SweepStarted(step), SweepFinished(step)
     return (RestStarted(), RestFinished()) if isinstance(step, Rest) else ()
 
 
 def _trapezoid(since_s: Array, step: Sweep | Transfer) -> tuple[Array, Array]:
-    """Fraction of the way (n,) and its rate (n,) in 1/s."""
+    """Return the fraction of the motion (n,) and its derivative (n,) in 1/s."""
     way = float(np.max(np.abs(np.array(step.target_q_rad) - np.array(step.start_q_rad))))
     ramp = min(step.speed_rad_s / step.acceleration_rad_s2, step.duration_s / 2)
     top = step.acceleration_rad_s2 * ramp

@@ -54,9 +54,9 @@ def recording(
     lag_s: float = 0.0,
     axes: Array | None = None,
 ) -> RunData:
-    """Sensors `gyro` and `reference`; the board corrects the gyro's readings by `stored`; None leaves them raw.
+    """Compute a recording of `gyro` and `reference`; the board corrects the gyro by `stored`, None leaves it raw.
 
-    The gyro's filter lags the reference's by `lag_s`; `axes` (3, 3) are what it feels in place of the flange's.
+    The gyro's filter lags the reference's by `lag_s`; `axes` (3, 3) replace the flange's axes for the gyro.
     """
     skew = {"gyro": np.eye(3) if axes is None else axes, "reference": np.eye(3)}
     rng = np.random.default_rng(setup.seed)
