@@ -109,7 +109,7 @@ def kvh(seed: int) -> dict[str, Any]:
 
 
 def by_its_sheet(part: str, seed: int) -> dict[str, Any]:
-    """Return a world with a part and its accelerometer, with errors up to those of its data sheet for delivered parts."""
+    """Return a world with a part and its accelerometer, with errors up to those of its data sheet."""
     rng = np.random.default_rng(seed)
     document = merge(_document(part), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(45, 90))))
     site = document["site"]

@@ -249,7 +249,7 @@ def courses(runs: Sequence[Calibration]) -> list[Course]:
 
 
 def complaints(life: Life, warm_up: int, sigma: float = 3.0) -> list[str]:
-    """Return broken promises after the first `warm_up` runs; chance exceeds `sigma` as often as a normal variable does."""
+    """Return broken promises after the first `warm_up` runs; chance exceeds `sigma` as often as in a normal law."""
     found = [f"run {run.number} ended with status {run.status}" for run in life.runs if run.status]
     if found:
         return found

@@ -143,6 +143,6 @@ def worlds(folder: Path) -> Iterator[World]:
 
 @pytest.fixture
 def world(tmp_path: Path) -> Iterator[World]:
-    """Yield a starter of worlds: `world({"world": {"time_scale": 1}})` is demo.yaml with changes, on a fresh address."""
+    """Yield a starter of worlds: `world({"world": {"time_scale": 1}})` is demo.yaml, changed, on a fresh address."""
     with worlds(tmp_path) as start:
         yield start

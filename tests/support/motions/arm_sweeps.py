@@ -73,7 +73,7 @@ def joints_at(sweep: Sweep, angle_rad: Array) -> Array:
 def specific_force(
     poses: Poses, sweep: Sweep, motion: tuple[Array, Array, Array], reference_m_s2: Array, lever_arm_m: Array
 ) -> Array:
-    """Return the specific force (n, 3) in the flange's frame, by the joint's angle, speed and acceleration, each (n,)."""
+    """Return the specific force (n, 3) in the flange's frame, by the joint's angle, speed, acceleration, each (n,)."""
     angle, speed, acceleration = motion
     before, here, after = (poses(joints_at(sweep, angle + step)) for step in (-STEP_RAD, 0.0, STEP_RAD))
     way = [each[:, :3, :3] @ lever_arm_m + each[:, :3, 3] for each in (before, here, after)]

@@ -17,7 +17,7 @@ def log_determinant(information: Array, chosen: list[int]) -> float:
 
 
 def exchange_search(information: Array, count: int, rng: np.random.Generator, starts: int) -> list[int]:
-    """Return the best `count` different attitudes, by exchanges from random starts while any improves the determinant."""
+    """Return the best `count` different attitudes, by exchanges from random starts while any gains."""
     found = [_exchanged(information, rng.permutation(len(information))[:count].tolist()) for _ in range(starts)]
     return max(found, key=lambda chosen: log_determinant(information, chosen))
 

@@ -79,7 +79,7 @@ def drawn(
 
 @dataclass(frozen=True)
 class Session:
-    """A number of sets of sweeps and rests: `windows_s` (N, 2), `felt` (N, 3), the thermometer's `temperature_c` (N,)."""
+    """Sets of sweeps and rests: `windows_s` (N, 2), `felt` (N, 3), the thermometer's `temperature_c` (N,)."""
 
     windows_s: Array
     felt: Array
