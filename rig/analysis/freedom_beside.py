@@ -95,7 +95,7 @@ def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, A
 
     Where the readings tell no wandering, there is no line of it: the walk is the flicker of the data sheet, and known.
     """
-    return {NOISE: noise, **({WANDERING: walk} if explained.bias.found else {})}
+    return {NOISE: noise, **({WANDERING: walk} if explained.bias.is_drifting else {})}
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.estimation.statistics.rounding import Steps, found_steps, rounding_left
+from rig.estimation.statistics.rounding import Steps, bound_rounding_variance, find_steps
 from rig.observation.statistics.beside_lines import average_rest
 from rig.observation.statistics.mean import even_mean
 from rig.observation.windows import Window
@@ -21,7 +21,7 @@ def test_what_rounding_leaves_in_a_mean_is_bounded_and_the_bound_is_near(sigma_c
     left = np.mean((means - x) ** 2)
     on_three = np.tile([[-1.0], [0.0], [1.0]], (9, 3))  # readings that tell their noise
     scatter = np.full(3, sigma_counts**2 + 1 / 12)
-    bound = float(rounding_left(on_three, Steps(1.0), np.zeros((27, 3)), scatter)[0])
+    bound = float(bound_rounding_variance(on_three, Steps(1.0), np.zeros((27, 3)), scatter)[0])
     assert left <= bound * (1 + 1e-6)
     assert left >= 6 / np.pi**2 * bound * (1 - 1e-3)  # the first harmonic alone: never far above what is there
 
@@ -45,9 +45,9 @@ def test_a_mean_of_numbers_in_coarse_steps_errs_as_it_says(sigma: float, *, cut:
 def test_the_steps_are_found_in_readings_that_come_in_them(step: float) -> None:
     rng = np.random.default_rng(3)
     readings = rng.standard_normal((3000, 3)) * [0.1, 0.3, 2000.0]
-    found = found_steps(np.round(np.round(readings / step) * step, 2))
+    found = find_steps(np.round(np.round(readings / step) * step, 2))
     assert found[:2] == pytest.approx(step, abs=0.006) and found[2] == 0, "noise of many steps hides them"
-    assert np.all(found_steps(readings) == 0)
+    assert np.all(find_steps(readings) == 0)
 
 
 @pytest.mark.parametrize("other", [slice(0, 2), slice(2, 4), slice(0, 5), slice(0, 233, 2)])

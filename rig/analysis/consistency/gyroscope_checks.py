@@ -46,7 +46,7 @@ from rig.analysis.consistency.whitened_segments import (
 )
 from rig.analysis.gyroscope.segments import Segments
 from rig.estimation.arrays import Array
-from rig.estimation.statistics.bias_process import BiasProcess, bias_process, likeliest
+from rig.estimation.statistics.bias_process import BiasProcess, bias_process, select_by_akaike
 
 # At most these of one gyroscope, besides the check of its worst sweep.
 CHECKS = (
@@ -271,7 +271,7 @@ def _estimate_bias_process(
         segments.times_s,
         common,
         instability_rad_s=instability_rad_s,
-        chosen=likeliest,
+        chosen=select_by_akaike,
     )
 
 

@@ -16,7 +16,7 @@ from rig.data.checked import Finite, Positive
 from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE, Quantity, Scalar
 from rig.estimation.arrays import Array
-from rig.estimation.statistics.rounding import Steps, cut_steps, found_steps
+from rig.estimation.statistics.rounding import Steps, cut_steps, find_steps
 
 ColumnName = Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,39}$")]
 MAX_CHANNELS: Final = 16
@@ -61,7 +61,7 @@ class Channel:
         """
         if self.step is not None:
             return cut_steps(readings, self.step / 2)
-        return Steps(self.resolution if trusts_counts else np.maximum(self.resolution, found_steps(readings)))
+        return Steps(self.resolution if trusts_counts else np.maximum(self.resolution, find_steps(readings)))
 
     def counts(self, samples: NDArray[Any]) -> NDArray[Any]:
         """Return the numbers (n,) or (n, 3) in samples (n,), as they were recorded."""

@@ -1,14 +1,14 @@
-"""A body that is laid down again: what a placement itself does to a reading, beside its noise and its tilt.
+"""Errors of repeated placements: the effect of a placement itself on a reading, besides noise and tilt.
 
     v_m = F (s + φ s²) + b + E ε + η,   ε ~ N(0, δ² 1),   η ~ N(0, ζ² 1)
 
-ε turns the body (`rig.estimation.reference.attitude_error`) and leaves the size of what is felt alone; η does not: a
-bias that another stress or another warmth has moved, what its neighbourhood adds. Longer dwells make neither smaller. A
-solution from six faces has hardly anything left over that tells ζ from δ, so no one value of them is taken: θ and its
-covariance are means over both, as likely as the residuals make them: restricted likelihood, with every δ equally likely
-before and ζ about a milli-g, or far from it (half-Cauchy; Gelman, Bayesian Analysis 1 (2006) 515).
+ε turns the body (`rig.estimation.reference.attitude_error`) and does not change the norm of the reference; η does: a
+bias changed by stress or temperature, a local disturbance. Longer dwells reduce neither. A solution from six faces has
+hardly any redundancy to separate ζ from δ, so θ and its covariance are averaged over both, weighted by the restricted
+likelihood with a uniform prior of δ and a half-Cauchy prior of ζ with a scale of a milli-g (Gelman, Bayesian Analysis 1
+(2006) 515).
 
-Rests of which no attitude is known tell ζ as well: whichever way the body lay, the reference's size is what it is.
+Rests of unknown attitude determine ζ as well: the reference's norm is the same in every attitude.
 """
 
 from dataclasses import dataclass, replace
@@ -19,14 +19,14 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.attitude_error import AttitudeError, Placed, effects
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, F, free_directions, jacobian, predicted
 
-SMALLEST_RAD, LARGEST_RAD, GRID = 1e-6, 0.1, 24  # of δ, and of ζ in terms of the reference
-USUAL = 1e-3  # of the reference: half of all sensors repeat so well when they are laid down again (a milli-g)
-ANY_RAD = 1.0  # standard deviation of an attitude that nobody has told
+SMALLEST_RAD, LARGEST_RAD, GRID = 1e-6, 0.1, 24  # of δ, and of ζ relative to the reference
+USUAL = 1e-3  # of the reference: median repeatability of a placement (a milli-g)
+ANY_RAD = 1.0  # standard deviation of an unknown attitude
 
 
 @dataclass(frozen=True, slots=True)
 class LaidDown:
-    """θ (p,) and its covariance (p, p), the sum of what `causes` do by name; the sizes found, one standard deviation.
+    """θ (p,) with its covariance (p, p), the sum of `causes` by name, and the estimated standard deviations.
 
     `placement_std` is ζ in the unit of the readings, `attitude_error` δ.
     """
@@ -44,7 +44,9 @@ NOISE, ATTITUDES, PLACEMENTS = "noise", "attitudes", "placements"
 
 @dataclass(frozen=True, slots=True)
 class _Linear:
-    """The readings of N placements about a solution: `residuals` (N, 3), `design` (N, 3, q), noise (N, 3), tilt."""
+    """The linearised readings of N placements: `residuals` (N, 3), `design` (N, 3, q), noise (N, 3), E, stated std
+    (N,).
+    """
 
     residuals: Array
     design: Array
@@ -53,11 +55,11 @@ class _Linear:
     std_rad: Array
 
     def fits(self, delta: float, zetas: Array) -> "_Fits":
-        """The fits for given sizes of the errors: steps, their covariances by causes, the restricted likelihoods."""
-        spread = self.turned * np.hypot(self.std_rad, delta)[:, None, None]
+        """Return the fits for δ and all ζ (k,): steps, covariances by causes, restricted log-likelihoods."""
+        tilts = self.turned * np.hypot(self.std_rad, delta)[:, None, None]
         errors = {
             NOISE: np.eye(3) * self.variances[:, :, None],
-            ATTITUDES: spread @ np.swapaxes(spread, -1, -2),
+            ATTITUDES: tilts @ np.swapaxes(tilts, -1, -2),
             PLACEMENTS: zetas[:, None, None, None] ** 2 * np.eye(3),
         }
         covariance = errors[NOISE] + errors[ATTITUDES] + errors[PLACEMENTS]
@@ -69,41 +71,41 @@ class _Linear:
         unit = unit[:, :, None] * unit[:, None]
         inverse = np.linalg.inv(information * unit) * unit
         steps = (inverse @ (across @ self.residuals.ravel())[..., None])[..., 0]
-        left = self.residuals[..., None] - self.design @ steps[:, None, :, None]
-        chi_square = np.sum(left * np.linalg.solve(covariance, left), axis=(1, 2, 3))
-        sizes = np.linalg.slogdet(covariance)[1].sum(axis=1) + np.linalg.slogdet(information)[1]
+        residuals = self.residuals[..., None] - self.design @ steps[:, None, :, None]
+        chi_square = np.sum(residuals * np.linalg.solve(covariance, residuals), axis=(1, 2, 3))
+        log_determinants = np.linalg.slogdet(covariance)[1].sum(axis=1) + np.linalg.slogdet(information)[1]
         causes = {
             name: inverse @ across @ (error @ weighted).reshape(len(zetas), -1, columns) @ inverse
             for name, error in errors.items()
         }
-        return _Fits(steps, causes, -0.5 * (chi_square + sizes))
+        return _Fits(steps, causes, -0.5 * (chi_square + log_determinants))
 
 
 @dataclass(frozen=True, slots=True)
 class _Fits:
-    """Steps (k, q), their covariances (k, q, q) by causes, the logarithms (k,) of the likelihood."""
+    """Steps (k, q), their covariances (k, q, q) by causes, the log-likelihoods (k,)."""
 
     steps: Array
     causes: dict[str, Array]
     likelihood: Array
 
 
-def laid_down(theta: Array, placed: Placed, elsewhere: Array, elsewhere_variances: Array) -> LaidDown:
-    """What is laid down beside a solution θ (p,): by what that leaves, and means (k, 3) of rests without attitude."""
-    whole = _with(theta, placed, elsewhere, elsewhere_variances)
-    free = free_directions(theta, norm_known=whole.norm_known)
+def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances: Array) -> LaidDown:
+    """Return θ with placement errors from a solution θ (p,), and the means (k, 3) of rests without attitude."""
+    all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
+    free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _Linear(
-        whole.readings - predicted(theta, whole.attitudes, whole.v_bar),
-        jacobian(theta, whole.attitudes, whole.v_bar) @ free,
-        whole.variances,
-        effects(theta, whole.attitudes, whole.v_bar),
-        whole.attitude_std_rad,
+        all_rests.readings - predicted(theta, all_rests.attitudes, all_rests.v_bar),
+        jacobian(theta, all_rests.attitudes, all_rests.v_bar) @ free,
+        all_rests.variances,
+        effects(theta, all_rests.attitudes, all_rests.v_bar),
+        all_rests.attitude_std_rad,
     )
     size = float(np.linalg.norm(theta[REFERENCE]))
     sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, GRID)
-    looked = np.array([(delta, size * ratio) for delta in sizes for ratio in sizes])
+    grid = np.array([(delta, size * ratio) for delta in sizes for ratio in sizes])
     fits = [linear.fits(delta, size * sizes) for delta in sizes.tolist()]
-    likelihood = np.concatenate([fit.likelihood for fit in fits]) + _before(looked, size)
+    likelihood = np.concatenate([fit.likelihood for fit in fits]) + _find_log_prior(grid, size)
     weights = np.exp(likelihood - likelihood.max())
     weights /= weights.sum()
     steps = np.concatenate([fit.steps for fit in fits])
@@ -113,49 +115,51 @@ def laid_down(theta: Array, placed: Placed, elsewhere: Array, elsewhere_variance
         for name in (NOISE, ATTITUDES, PLACEMENTS)
     }
     causes[PLACEMENTS] = causes[PLACEMENTS] + free @ ((steps - step).T * weights @ (steps - step)) @ free.T
-    found = theta + free @ step
-    if whole.norm_known:
-        found[REFERENCE] *= size / np.linalg.norm(found[REFERENCE])
-    delta, zeta = weights @ looked
-    spread = np.sqrt(weights @ (looked - weights @ looked) ** 2)
+    averaged = theta + free @ step
+    if all_rests.norm_known:
+        averaged[REFERENCE] *= size / np.linalg.norm(averaged[REFERENCE])
+    delta, zeta = weights @ grid
+    stds = np.sqrt(weights @ (grid - weights @ grid) ** 2)
     return LaidDown(
-        theta=found,
+        theta=averaged,
         covariance=np.sum(list(causes.values()), axis=0),
         causes=causes,
-        attitude_error=AttitudeError(float(delta), float(spread[0])),
+        attitude_error=AttitudeError(float(delta), float(stds[0])),
         placement_std=float(zeta),
-        placement_uncertainty=float(spread[1]),
+        placement_uncertainty=float(stds[1]),
     )
 
 
-def _before(looked: Array, size: float) -> Array:
-    """(n,) logarithm of how likely δ and ζ are before anything is seen, on a grid of their logarithms."""
-    delta, zeta = looked.T
-    known: Array = np.log(delta) + np.log(zeta) - np.log1p((zeta / (USUAL * size)) ** 2)
-    return known
+def _find_log_prior(grid: Array, size: float) -> Array:
+    """Return the log prior (n,) of δ and ζ on a grid of their logarithms."""
+    delta, zeta = grid.T
+    log_prior: Array = np.log(delta) + np.log(zeta) - np.log1p((zeta / (USUAL * size)) ** 2)
+    return log_prior
 
 
-def _with(theta: Array, placed: Placed, elsewhere: Array, variances: Array) -> Placed:
-    """The rests without an attitude beside the others, each turned so that it reads what it reads."""
-    if not len(elsewhere) or not placed.norm_known:
+def _add_unplaced(theta: Array, placed: Placed, unplaced: Array, variances: Array) -> Placed:
+    """Return the rests with those without an attitude, each turned to the attitude nearest to its reading."""
+    if not len(unplaced) or not placed.norm_known:
         return placed
-    felt = (elsewhere - theta[BIAS]) @ np.linalg.inv(theta[F].reshape(3, 3)).T
-    attitudes = np.array([_turning(each, theta[REFERENCE]) for each in felt])
+    forces = (unplaced - theta[BIAS]) @ np.linalg.inv(theta[F].reshape(3, 3)).T
+    attitudes = np.array([_align(force, theta[REFERENCE]) for force in forces])
     return replace(
         placed,
-        readings=np.concatenate([placed.readings, elsewhere]),
+        readings=np.concatenate([placed.readings, unplaced]),
         variances=np.concatenate([placed.variances, variances]),
         attitudes=np.concatenate([placed.attitudes, attitudes]),
-        v_bar=np.concatenate([placed.v_bar, np.zeros_like(elsewhere)]),
-        attitude_std_rad=np.concatenate([placed.attitude_std_rad, np.full(len(elsewhere), ANY_RAD)]),
+        v_bar=np.concatenate([placed.v_bar, np.zeros_like(unplaced)]),
+        attitude_std_rad=np.concatenate([placed.attitude_std_rad, np.full(len(unplaced), ANY_RAD)]),
     )
 
 
-def _turning(felt: Array, reference: Array) -> Array:
-    """The smallest rotation (3, 3), body to table, by which the reference (3,) is felt in a direction (3,)."""
+def _align(force: Array, reference: Array) -> Array:
+    """Return the smallest rotation (3, 3), body to table, that maps a force (3,) to the direction of the reference
+    (3,).
+    """
     from scipy.spatial.transform import Rotation
 
-    one, other = (each / np.linalg.norm(each) for each in (felt, reference))
+    one, other = (vector / np.linalg.norm(vector) for vector in (force, reference))
     axis, cosine = np.cross(one, other), float(one @ other)
     sine = float(np.linalg.norm(axis))
     if sine < 1e-9:

@@ -259,7 +259,7 @@ def _evaluate_readings(explained: Explained) -> Iterator[Contributor]:
     bias, (flicker, wandering) = explained.bias, _split_bias_covariance(explained)
     noise = explained.solution.covariance - flicker - wandering
     yield evaluate_a(NOISE, "scatter of the readings", noise, _find_noise_freedom(explained))
-    if bias.found:
+    if bias.is_drifting:
         source = "scatter of rests and sweeps about each other"
         yield evaluate_a(WANDERING, source, wandering, float(bias.freedom))
     if bias.instability_rad_s:

@@ -24,7 +24,7 @@ from rig.estimation.reference.attitude_error import PASSES, SETTLED
 from rig.estimation.reference.reading_errors import noise, select_sweeps, walking
 from rig.estimation.reference.reference_model import REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions
 from rig.estimation.reference.shared_errors import Decorrelation, decorrelate, estimate_common_error
-from rig.estimation.statistics.expected_sizes import Scattered, expected_disturbances, expected_sizes
+from rig.estimation.statistics.expected_sizes import ResidualInputs, expected_disturbances, expected_sizes
 
 # Prior odds of one disturbed dwell or sweep in a run against none, and of another bias in all sweeps.
 ODDS = 1 / 19
@@ -123,7 +123,7 @@ def refit_with_components(
     residuals = (movement.readings() - predicted(fit.theta, movement)).ravel()
     modelled, variances = noise(fit.theta, movement), np.diag(movement.noise())
     of_arm = partial(combine_effects, *split_effects(fit.theta, movement))
-    scattered = Scattered(residuals, fit.jacobian, modelled, of_arm, walking(sensor, movement), variances)
+    scattered = ResidualInputs(residuals, fit.jacobian, modelled, of_arm, walking(sensor, movement), variances)
     components = expected_sizes(scattered, own_shares)
     unit = float(np.sqrt(np.median(variances)))
     separate = [np.diag(np.sqrt(variances))[:, segment] for segment in movement.segments()]

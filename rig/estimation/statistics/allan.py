@@ -1,14 +1,14 @@
-"""The Allan deviation of a sensor at rest, and what it says of random walk and bias instability.
+"""The Allan deviation of a sensor at rest, with its random walk and bias instability.
 
     σ²(τ) = ⟨(ȳ_{k+m} − ȳ_k)²⟩ / 2,   τ = m τ₀
 
-over all overlapping pairs of neighbouring means ȳ of m readings (NIST SP 1065, section 5.2.4, of readings in place of
-frequencies). Pairs lie within one stretch of readings, never across two: between them the sensor may have been turned.
+over all overlapping pairs of adjacent means ȳ of m readings (NIST SP 1065, section 5.2.4, with readings instead of
+frequencies). Pairs lie within one interval of readings, never across two: between them the sensor may have turned.
 
-How well σ² is known is said by its equivalent degrees of freedom (Howe, Allan and Barnes 1981; NIST SP 1065, table
-5), those of the noise that prevails about τ by the curve's own slope. σ² times these over its truth is then χ².
-White noise has the slope −1/2 and σ = N/√τ, N being the random walk; the least σ, where the curve is flat, is 0.664
-times the bias instability B (IEEE Std 952-1997, C.1.1 and C.1.3).
+The equivalent degrees of freedom of σ² (Howe, Allan and Barnes 1981; NIST SP 1065, table 5) are those of the dominant
+noise about τ by the curve's own slope. σ² times these over its true value is then χ². White noise has the slope −1/2
+and σ = N/√τ, N being the random walk; the least σ, at the flat part of the curve, is 0.664 times the bias instability B
+(IEEE Std 952-1997, C.1.1 and C.1.3).
 """
 
 from collections.abc import Sequence
@@ -24,23 +24,23 @@ from rig.estimation.refusals import check_finite
 Noise = Literal["white", "flicker", "random_walk"]
 
 COVERAGE = 0.95  # of the confidence intervals
-RANDOM_WALK_TAU_S = 1.0  # where random walk is read: beyond the sensor's filter, before its bias moves
-RANDOM_WALK_KNOWN = 0.1  # relative standard deviation
-SLOPE_ALLOWED = 0.05  # what the slope may differ from −1/2 beside its own uncertainty: N would be 5 % off
-INSTABILITY_KNOWN = 0.2
+RANDOM_WALK_TAU_S = 1.0  # at which random walk is read: beyond the sensor's filter, before its bias drifts
+RANDOM_WALK_STD = 0.1  # relative standard deviation
+SLOPE_ALLOWED = 0.05  # deviation of the slope from −1/2, besides its uncertainty: an error of N of 5 %
+INSTABILITY_STD = 0.2
 FLICKER = float(np.sqrt(2 * np.log(2) / np.pi))  # 0.664: least σ over bias instability
 BEYOND = 3.0  # standard deviations by which the least σ must exceed what white noise alone gives there
-FEWEST = 3  # readings of a stretch
-ENOUGH_S = 40.0  # random walk is known to `RANDOM_WALK_KNOWN` from then on, where the noise is white
-ENOUGH_FOR_A_FLOOR_S = 600.0  # few gyroscopes have their least deviation sooner
+FEWEST = 3  # readings of an interval
+ENOUGH_S = 40.0  # white noise gives a random walk to `RANDOM_WALK_STD` from then on
+ENOUGH_FOR_A_FLOOR_S = 600.0  # few gyroscopes reach their least deviation sooner
 
 
 @dataclass(frozen=True, slots=True)
 class AllanCurve:
     """Overlapping Allan deviation: `tau_s` (T,), `deviation`, `low`, `high` (T, 3) in the unit of the readings.
 
-    `low` and `high` bound the truth with the probability 95 %; `freedom` (T, 3) are the equivalent degrees of freedom.
-    `total_s` is how long was recorded in all.
+    `low` and `high` bound the true value with a probability of 95 %; `freedom` (T, 3): equivalent degrees of freedom.
+    `total_s` is the total duration.
     """
 
     tau_s: Array
@@ -52,14 +52,14 @@ class AllanCurve:
 
     @property
     def relative_std(self) -> Array:
-        """(T, 3) standard deviation of each deviation, as a fraction of it."""
+        """The standard deviation (T, 3) of each deviation, as a fraction of it."""
         std: Array = 1 / np.sqrt(2 * self.freedom)
         return std
 
 
 @dataclass(frozen=True, slots=True)
 class Read:
-    """What is read off the curve of one axis, its standard deviation, and at which τ."""
+    """A value read off the curve of one axis, its standard deviation, and its τ."""
 
     value: float
     std: float
@@ -68,17 +68,17 @@ class Read:
 
 @dataclass(frozen=True, slots=True)
 class AllanAxis:
-    """Noise of one axis: N in the readings' unit times √s, B in that unit; or the Fault that says why there is none."""
+    """The noise of one axis: N in the readings' unit times √s, B in that unit; or the Fault that prevents it."""
 
     random_walk: Read | Fault
     bias_instability: Read | Fault
 
 
 def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
-    """The overlapping Allan deviation of stretches (nᵢ, 3) of readings taken every `interval_s`.
+    """Return the overlapping Allan deviation of intervals (nᵢ, 3) of readings at a period of `interval_s`.
 
-    τ stands about at the powers of two, 1 s among them. Raises Fault `not_finite`, and `recording_too_short` where
-    no stretch has three readings.
+    τ is approximately at the powers of two, 1 s among them. Raise Fault `not_finite`, and `recording_too_short` if no
+    interval has three readings.
     """
     used = [np.asarray(stretch, dtype=np.float64) for stretch in stretches if len(stretch) >= FEWEST]
     if not used:
@@ -89,12 +89,12 @@ def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
     longest = (max(map(len, phases)) - 1) // 2
     factors = {2**power for power in range(longest.bit_length())} | {round(RANDOM_WALK_TAU_S / interval_s)}
     chosen = np.array(sorted(factor for factor in factors if 1 <= factor <= longest))
-    squares = np.array([_variance(phases, factor) for factor in chosen])
+    squares = np.array([_average_squares(phases, factor) for factor in chosen])
     points = [len(phase) for phase in phases]
     tau_s, deviation = chosen * interval_s, np.sqrt(squares)
     freedom = np.array(
         [
-            [_freedom(points, int(factor), _prevailing(slope)) for slope in slopes]
+            [_freedom(points, int(factor), _classify_noise(slope)) for slope in slopes]
             for factor, slopes in zip(chosen, _slopes(tau_s, deviation), strict=True)
         ]
     )
@@ -103,18 +103,20 @@ def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
 
 
 def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
-    """What the curve of one axis tells."""
+    """Return random walk and bias instability by the curve of one axis."""
     walk = _random_walk(curve, axis)
     return AllanAxis(walk, _instability(curve, axis, walk))
 
 
 def too_short(what: str, enough_s: float = ENOUGH_S) -> Fault:
-    """The error for what a longer recording would tell, one of about `enough_s`."""
+    """Return the error for a value that needs a longer recording, of about `enough_s`."""
     return Fault("recording_too_short", what, f"Record at rest for {enough_s:.0f} s or more, in one stretch")
 
 
 def equivalent_freedom(points: int, factor: int, noise: Noise) -> float:
-    """Equivalent degrees of freedom of σ² from so many phases (readings + 1) at τ = `factor` τ₀, at least 1."""
+    """Return the equivalent degrees of freedom of σ² from `points` phases (readings + 1) at τ = `factor` τ₀, at least
+    1.
+    """
     n, m = float(points), float(factor)
     if noise == "white":
         freedom = (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m**2 / (4 * m**2 + 5)
@@ -125,8 +127,8 @@ def equivalent_freedom(points: int, factor: int, noise: Noise) -> float:
     return max(freedom, 1.0)
 
 
-def _variance(phases: Sequence[Array], factor: int) -> Array:
-    """(3,) σ² at τ = `factor` τ₀ over all stretches that reach so far."""
+def _average_squares(phases: Sequence[Array], factor: int) -> Array:
+    """Return σ² (3,) at τ = `factor` τ₀ over all intervals long enough."""
     total, count = np.zeros(3), 0
     for phase in phases:
         if len(phase) > 2 * factor:
@@ -138,15 +140,15 @@ def _variance(phases: Sequence[Array], factor: int) -> Array:
 
 
 def _freedom(points: Sequence[int], factor: int, noise: Noise) -> float:
-    """Freedom of all stretches together: independent, each counts by its share of the pairs (Satterthwaite)."""
+    """Return the dof of all intervals together, independent and weighted by their pairs (Satterthwaite)."""
     reach = [n for n in points if n > 2 * factor]
     pairs = np.array([n - 2 * factor for n in reach], dtype=np.float64)
-    own = np.array([equivalent_freedom(n, factor, noise) for n in reach])
-    return float(pairs.sum() ** 2 / np.sum(pairs**2 / own))
+    of_interval = np.array([equivalent_freedom(n, factor, noise) for n in reach])
+    return float(pairs.sum() ** 2 / np.sum(pairs**2 / of_interval))
 
 
 def _slopes(tau_s: Array, deviation: Array) -> Array:
-    """(T, 3) slopes of log σ over log τ, between the neighbours of each τ; that of white noise where there is one τ."""
+    """Return the slopes (T, 3) of log σ over log τ between the neighbours of each τ; −1/2 if there is one τ."""
     if len(tau_s) < 2:
         return np.full(deviation.shape, -0.5)
     logarithm = np.log(np.maximum(deviation, np.finfo(np.float64).tiny))
@@ -154,35 +156,36 @@ def _slopes(tau_s: Array, deviation: Array) -> Array:
     return slopes
 
 
-def _prevailing(slope: float) -> Noise:
-    """The noise whose slope, −1/2, 0 or 1/2, is nearest."""
+def _classify_noise(slope: float) -> Noise:
+    """Return the noise whose slope, −1/2, 0 or 1/2, is nearest."""
     if slope < -0.25:
         return "white"
     return "flicker" if slope < 0.25 else "random_walk"
 
 
 def _bounds(deviation: Array, freedom: Array) -> tuple[Array, Array]:
+    """Return the lower and upper confidence bounds (T, 3) of the deviation by χ²."""
     from scipy.special import chdtri
 
-    beside = (1 - COVERAGE) / 2
-    return deviation * np.sqrt(freedom / chdtri(freedom, beside)), deviation * np.sqrt(
-        freedom / chdtri(freedom, 1 - beside)
+    tail = (1 - COVERAGE) / 2
+    return deviation * np.sqrt(freedom / chdtri(freedom, tail)), deviation * np.sqrt(
+        freedom / chdtri(freedom, 1 - tail)
     )
 
 
 def _random_walk(curve: AllanCurve, axis: int) -> Read | Fault:
-    """N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there as that of white noise does."""
-    at = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
-    tau_s, known = float(curve.tau_s[at]), float(curve.relative_std[at, axis])
+    """Return N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there as that of white noise does."""
+    index = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
+    tau_s, relative_std = float(curve.tau_s[index]), float(curve.relative_std[index, axis])
     if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:
         return too_short(f"no stretch reaches {RANDOM_WALK_TAU_S:g} s, where random walk is read")
-    if known > RANDOM_WALK_KNOWN:
-        worst = float(curve.relative_std[at].max())  # one sentence for all axes
+    if relative_std > RANDOM_WALK_STD:
+        worst = float(curve.relative_std[index].max())  # one sentence for all axes
         return too_short(
-            f"random walk would be known to {100 * worst:.0f} %, {100 * RANDOM_WALK_KNOWN:.0f} % is the most",
-            max(ENOUGH_S, curve.total_s * (worst / RANDOM_WALK_KNOWN) ** 2),
+            f"random walk would be known to {100 * worst:.0f} %, {100 * RANDOM_WALK_STD:.0f} % is the most",
+            max(ENOUGH_S, curve.total_s * (worst / RANDOM_WALK_STD) ** 2),
         )
-    # To either side by about two, so that the slope does not hang on one point.
+    # A factor of about two to either side, so that the slope does not depend on one point.
     below, above = (int(np.argmin(np.abs(np.log(curve.tau_s / (tau_s * by))))) for by in (0.5, 2.0))
     if below == above:
         return too_short(f"the curve has no second point beside {RANDOM_WALK_TAU_S:g} s to tell its slope")
@@ -196,16 +199,16 @@ def _random_walk(curve: AllanCurve, axis: int) -> Read | Fault:
             "Look at the curve: something vibrates, the readings are filtered over that time, or the bias "
             "moves that fast",
         )
-    value = float(curve.deviation[at, axis] * np.sqrt(tau_s))
-    return Read(value, value * known, tau_s)
+    value = float(curve.deviation[index, axis] * np.sqrt(tau_s))
+    return Read(value, value * relative_std, tau_s)
 
 
 def _instability(curve: AllanCurve, axis: int, walk: Read | Fault) -> Read | Fault:
-    """B from the least σ, if the curve has its floor within what is well known."""
-    known = curve.relative_std[:, axis]
-    usable = np.flatnonzero(known <= INSTABILITY_KNOWN)
+    """Return B from the least σ, if the curve has its minimum in the well-determined part."""
+    relative_std = curve.relative_std[:, axis]
+    usable = np.flatnonzero(relative_std <= INSTABILITY_STD)
     if not len(usable):
-        return too_short(f"no point of the curve is known to {100 * INSTABILITY_KNOWN:.0f} %", ENOUGH_FOR_A_FLOOR_S)
+        return too_short(f"no point of the curve is known to {100 * INSTABILITY_STD:.0f} %", ENOUGH_FOR_A_FLOOR_S)
     last = int(usable[-1])
     least = int(usable[np.argmin(curve.deviation[usable, axis])])
     tau_s, deviation = float(curve.tau_s[least]), float(curve.deviation[least, axis])
@@ -216,10 +219,10 @@ def _instability(curve: AllanCurve, axis: int, walk: Read | Fault) -> Read | Fau
             "Look at the curve: something moves or vibrates, or the readings are filtered over that time",
         )
     by_noise = walk.value / np.sqrt(tau_s) if isinstance(walk, Read) else 0.0
-    if least == last or deviation < by_noise * (1 + BEYOND * known[least]):
+    if least == last or deviation < by_noise * (1 + BEYOND * relative_std[least]):
         return too_short(
             f"the deviation still falls at {curve.tau_s[last]:.3g} s, the longest known to "
-            f"{100 * INSTABILITY_KNOWN:.0f} %",
+            f"{100 * INSTABILITY_STD:.0f} %",
             max(ENOUGH_FOR_A_FLOOR_S, 2 * curve.total_s),
         )
-    return Read(deviation / FLICKER, deviation / FLICKER * float(known[least]), tau_s)
+    return Read(deviation / FLICKER, deviation / FLICKER * float(relative_std[least]), tau_s)

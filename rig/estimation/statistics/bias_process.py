@@ -1,10 +1,10 @@
-"""A bias that does not stand still: flicker, a random walk, and what scatters from one average to the next.
+"""Bias drift: flicker, a random walk, and scatter between averages.
 
-The readings are averaged over windows. A random walk of rate q (rad/s per √s) makes the bias of a later window differ
-from that of an earlier one the more the farther they are apart; flicker noise is between that and a scatter s that has
-no memory. How much of flicker a part of its kind has is known, for few averages tell it; walk and scatter beside that
-are found from the averages themselves by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971)
-545), the likelihood of what no value of the fitted parameters changes in them.
+The readings are averaged over windows. A random walk of rate q (rad/s per √s) changes the bias more the farther two
+windows are apart; flicker noise is between that and a scatter s without memory. The size of the flicker is given, as
+few averages determine it; walk and scatter besides it are estimated from the averages by restricted maximum likelihood
+(Patterson and Thompson, Biometrika 58 (1971) 545), the likelihood of the contrasts that do not depend on the fitted
+parameters.
 """
 
 from collections.abc import Callable
@@ -15,21 +15,20 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 
-STEPS = 25  # of either size on its grid
-PRICE = 1.0  # of walk, and of scatter, in the logarithm of the likelihood
-SPAN = 300.0  # largest size over the smallest that is looked at
-CHANGED = float(np.sqrt(2))  # times its Allan deviation, by which flicker changes from one mean to the next
+STEPS = 25  # of either standard deviation on its grid
+PRICE = 1.0  # of a parameter, in the log-likelihood (Akaike, IEEE Trans. Autom. Control 19 (1974) 716)
+SPAN = 300.0  # largest over smallest standard deviation of the grid
+CHANGED = float(np.sqrt(2))  # change of flicker between adjacent means over its Allan deviation
 
-# (2,) walk and scatter, of sizes (K, 2) and the logarithms of their likelihoods (K,).
+# Walk and scatter (2,) by pairs of sizes (K, 2) and their log-likelihoods (K,).
 Chosen = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True, slots=True)
 class BiasProcess:
-    """How the bias wanders: `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero where nothing but noise was seen.
+    """A drifting bias: `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero if only noise was detected.
 
-    `freedom` is how many differences these were found from, `instability_rad_s` the Allan deviation
-    that its flicker is known to have.
+    `freedom`: the number of contrasts used, `instability_rad_s`: the given Allan deviation of its flicker.
     """
 
     walk_rad_s_sqrt_s: float
@@ -38,23 +37,23 @@ class BiasProcess:
     instability_rad_s: float = 0.0
 
     @property
-    def found(self) -> bool:
-        """Whether more than noise and the known was seen."""
+    def is_drifting(self) -> bool:
+        """True if more than noise and the given flicker was detected."""
         return self.walk_rad_s_sqrt_s > 0.0 or self.scatter_rad_s > 0.0
 
     @property
     def steady(self) -> bool:
-        """Whether there is nothing but noise."""
-        return not self.found and self.instability_rad_s == 0.0
+        """True if there is only noise."""
+        return not self.is_drifting and self.instability_rad_s == 0.0
 
     def covariance(self, windows_s: ArrayLike) -> Array:
-        """(N, N) covariance that it adds to means over windows (N, 2), about the mean bias over all they span."""
-        walked = self.walk_rad_s_sqrt_s**2 * walk_covariance(windows_s)
-        found: Array = walked + self.scatter_rad_s**2 * np.eye(len(walked))
-        return found if self.instability_rad_s == 0.0 else found + _flicker(self.instability_rad_s, windows_s)
+        """Return the added covariance (N, N) of means over windows (N, 2), about the mean over their whole span."""
+        walk = self.walk_rad_s_sqrt_s**2 * walk_covariance(windows_s)
+        drift: Array = walk + self.scatter_rad_s**2 * np.eye(len(walk))
+        return drift if self.instability_rad_s == 0.0 else drift + _flicker(self.instability_rad_s, windows_s)
 
-    def wandered_rad_s(self, duration_s: float) -> float:
-        """Standard deviation of the change of the bias in so much time."""
+    def drift_std_rad_s(self, duration_s: float) -> float:
+        """Return the standard deviation of the change of the bias in `duration_s`."""
         flickered_rad_s = CHANGED * self.instability_rad_s
         return float(
             np.hypot(self.walk_rad_s_sqrt_s * np.sqrt(duration_s), np.hypot(self.scatter_rad_s, flickered_rad_s))
@@ -62,44 +61,44 @@ class BiasProcess:
 
 
 def walk_covariance(windows_s: ArrayLike) -> Array:
-    """(N, N) covariance of the means of a random walk of rate 1 over windows (N, 2) [start, end] that do not overlap.
+    """Return the covariance (N, N) of the means of a random walk of rate 1 over disjoint windows (N, 2) [start, end].
 
-    Counted from the walk's mean over the whole time from the first start to the last end.
+    The walk is counted from its mean over the whole time from the first start to the last end.
     """
     windows = np.asarray(windows_s, dtype=np.float64)
     start, end = (windows - windows.min()).T
     span = float(end.max())
     middle, length = (start + end) / 2, end - start
-    together = np.minimum.outer(middle, middle)  # the earlier window lies before all of the later one
-    np.fill_diagonal(together, start + length / 3)
+    products = np.minimum.outer(middle, middle)  # the earlier window ends before the later one begins
+    np.fill_diagonal(products, start + length / 3)
     with_mean = middle - (start**2 + start * end + end**2) / (6 * span)
-    covariance: Array = together - with_mean[:, None] - with_mean[None, :] + span / 3
+    covariance: Array = products - with_mean[:, None] - with_mean[None, :] + span / 3
     return covariance
 
 
 def flicker_covariance(windows_s: ArrayLike) -> Array:
-    """(N, N) covariance of the means of flicker noise, whose Allan deviation is 1, over windows (N, 2) [start, end].
+    """Return the covariance (N, N) of the means of flicker noise of Allan deviation 1 over windows (N, 2) [start, end].
 
-    Values a time τ apart vary together by −ln(τ)/(2 ln 2), but for a constant without end: that deviation is the one of
-    noise of power B²/(2π f), B √(2 ln 2/π) (IEEE Std 952-1997, C.1.3). Counted from the mean over the whole time from
-    the first start to the last end there is no such constant.
+    Values a time τ apart have the covariance −ln(τ)/(2 ln 2), plus an infinite constant: this deviation is that of
+    noise of power B²/(2π f), B √(2 ln 2/π) (IEEE Std 952-1997, C.1.3). Relative to the mean over the whole time from
+    the first start to the last end the constant cancels.
     """
     windows = np.asarray(windows_s, dtype=np.float64)
-    whole = [windows.min(), windows.max()]
-    start, end = np.vstack([windows, whole]).T
+    span = [windows.min(), windows.max()]
+    start, end = np.vstack([windows, span]).T
     between = (
         _twice_integrated_logarithm(end[:, None] - start)
         - _twice_integrated_logarithm(start[:, None] - start)
         - _twice_integrated_logarithm(end[:, None] - end)
         + _twice_integrated_logarithm(start[:, None] - end)
     )
-    together = -between / np.outer(end - start, end - start) / (2 * np.log(2))
-    covariance: Array = together[:-1, :-1] - together[:-1, -1:] - together[-1:, :-1] + together[-1, -1]
+    means = -between / np.outer(end - start, end - start) / (2 * np.log(2))
+    covariance: Array = means[:-1, :-1] - means[:-1, -1:] - means[-1:, :-1] + means[-1, -1]
     return covariance
 
 
 def _twice_integrated_logarithm(x: Array) -> Array:
-    """The logarithm of |x| integrated twice: x² (2 ln |x| − 3) / 4."""
+    """Return the second antiderivative of ln |x|: x² (2 ln |x| − 3) / 4."""
     squares = x**2
     logarithms = np.log(squares, out=np.zeros_like(squares), where=squares > 0)
     integrated: Array = squares * (logarithms - 3) / 4
@@ -107,38 +106,39 @@ def _twice_integrated_logarithm(x: Array) -> Array:
 
 
 def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
+    """Return the covariance (N, N) of flicker of that Allan deviation."""
     covariance: Array = instability_rad_s**2 * flicker_covariance(windows_s)
     return covariance
 
 
-def expected(sizes: Array, likelihood: Array) -> Array:
-    """(2,) mean of sizes (K, 2), each as likely as it makes the averages.
+def average_posterior(sizes: Array, likelihood: Array) -> Array:
+    """Return the posterior mean (2,) of sizes (K, 2), with a spike-and-slab prior, log-uniform in the slab.
 
-    Before, each was as likely to be there as not, and of any order of magnitude. The likeliest sizes would by chance be
-    far too small in one run and too large in the next, and so would be every uncertainty.
+    The maximum of the likelihood would by chance be far too small in one run and too large in the next, and so would
+    every uncertainty (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
     """
-    belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
-    weights = np.exp(belief - belief.max())
+    log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
+    weights = np.exp(log_posterior - log_posterior.max())
     return np.asarray(weights @ sizes / weights.sum(), dtype=np.float64)
 
 
-def walking(sizes: Array, likelihood: Array) -> Array:
-    """(2,) root of the mean of the squares of sizes (K, 2): a walk of any size alike, a scatter as in `expected`.
+def average_walks(sizes: Array, likelihood: Array) -> Array:
+    """Return the root of the posterior mean square (2,) of sizes (K, 2) with a uniform prior of the walk.
 
-    For parameters that stand over a long time, as slopes over temperature do: most of their uncertainty may be of a
-    walk that the averages hardly show. So there is one, of any size alike before (Gelman, Bayesian Analysis 1 (2006)
-    515), and the covariance is the mean of those of all sizes. They stand on a grid of powers, so a size is as likely
-    before as the step to the next one is long.
+    The scatter has the prior of `average_posterior`. It is for parameters over a long time, as slopes over temperature:
+    most of their uncertainty may be by a walk that the averages hardly show. So a walk is certain, with a uniform prior
+    (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean. Sizes are on a geometric grid,
+    so the prior of one is proportional to the step to the next.
     """
-    belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
-    weights = sizes[:, 0] * np.exp(belief - belief.max())
+    log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
+    weights = sizes[:, 0] * np.exp(log_posterior - log_posterior.max())
     return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
 
 
-def likeliest(sizes: Array, likelihood: Array) -> Array:
-    """(2,) likeliest of sizes (K, 2), zero where they do not make the averages likelier by Akaike's price.
+def select_by_akaike(sizes: Array, likelihood: Array) -> Array:
+    """Return the sizes (2,) of maximum likelihood of (K, 2), zero unless they reduce Akaike's information criterion.
 
-    It holds no walk where noise alone would do: what is held against it is not excused by what is not there.
+    It includes no walk if noise explains the averages, so a walk that is absent cannot excuse a residual.
     """
     return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 
@@ -151,20 +151,19 @@ def bias_process(
     shared_rad2_s2: Array | None = None,
     *,
     instability_rad_s: float = 0.0,
-    chosen: Chosen = expected,
+    chosen: Chosen = average_posterior,
 ) -> BiasProcess:
-    """The process behind the mean readings (N, 3), which without it are `design` (N, p) × parameters + noise.
+    """Estimate the bias drift in mean readings (N, 3), which otherwise are `design` (N, p) × parameters + noise.
 
-    `variances_rad2_s2` (N, 3) are those of the noise, `windows_s` (N, 2) when was averaged. One process for the three
-    axes, so that few averages tell it. `shared_rad2_s2` (3, N, N) are covariances of what the averages have in common
-    beside their noise, `instability_rad_s` is what is known of the part, zero where nothing is. Walk and scatter are
-    those `chosen` of all sizes.
+    `variances_rad2_s2` (N, 3) are those of the noise, `windows_s` (N, 2) the averaging windows. The three axes have one
+    process, since few averages determine it. `shared_rad2_s2` (3, N, N) are covariances between the averages besides
+    their noise, `instability_rad_s` is that of the data sheet, zero if unknown. `chosen` selects walk and scatter.
     """
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     freedom = 3 * (len(z) - z.shape[1])
     if freedom < 3:
         return BiasProcess(0.0, 0.0, max(freedom, 0), instability_rad_s)
-    free = np.linalg.qr(z, mode="complete")[0][:, z.shape[1] :].T  # to which the parameters are nothing
+    free = np.linalg.qr(z, mode="complete")[0][:, z.shape[1] :].T  # contrasts, free of the parameters
     unit = walk_covariance(windows_s)
     flicker = _flicker(instability_rad_s, windows_s) if instability_rad_s else np.zeros(unit.shape)
     typical = float(np.median(variances))
@@ -173,21 +172,21 @@ def bias_process(
     squares = np.array([(walk, scatter) for walk in walks for scatter in grid])
     likelihood = np.zeros(len(squares))
     for axis in range(3):
-        own = np.diag(variances[:, axis]) + flicker
-        own = own if shared_rad2_s2 is None else own + shared_rad2_s2[axis]
-        covariances = free @ own @ free.T + walks[:, None, None] * (free @ unit @ free.T)
+        noise = np.diag(variances[:, axis]) + flicker
+        noise = noise if shared_rad2_s2 is None else noise + shared_rad2_s2[axis]
+        covariances = free @ noise @ free.T + walks[:, None, None] * (free @ unit @ free.T)
         likelihood += _likelihood(free @ means[:, axis], covariances, grid).ravel()
     walk, scatter = chosen(np.sqrt(squares), likelihood).tolist()
     return BiasProcess(walk, scatter, freedom, instability_rad_s)
 
 
-def _likelihood(seen: Array, noise: Array, scatters: Array) -> Array:
-    """(K, L) logarithms, up to a constant, for noise covariances (K, n, n), each with L squared scatters beside it.
+def _likelihood(contrasts: Array, noise: Array, scatters: Array) -> Array:
+    """Return log-likelihoods (K, L), up to a constant, of noise covariances (K, n, n) with L squared scatters each.
 
-    A scatter adds to every eigenvalue alike, so each covariance is taken apart but once.
+    A scatter is added to every eigenvalue, so each covariance is decomposed only once.
     """
     values, vectors = np.linalg.eigh(noise)
-    squares = np.square(seen @ vectors)[:, None]
+    squares = np.square(contrasts @ vectors)[:, None]
     sizes = values[:, None] + scatters[:, None]
     likelihood: Array = -0.5 * np.sum(np.log(sizes) + squares / sizes, axis=-1)
     return likelihood

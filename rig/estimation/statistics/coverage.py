@@ -1,8 +1,8 @@
-"""Coverage: by what a standard uncertainty u is multiplied, so that value ± U holds the true value 95.45 times in 100.
+"""Coverage: the factor k of a standard uncertainty u, so that value ± k u contains the true value 95.45 times in 100.
 
-An uncertainty that is itself known from few readings needs more than two of it: U = k u with k of Student's t for the
-effective degrees of freedom ν (JCGM 100, G.3 and G.6.4; EA-4/02 M:2022, annex E). 95.45 % is what two standard
-deviations of a normal distribution hold, so that k goes to 2 where ν has no end.
+If u is itself determined by few readings, k is above two: U = k u with k of Student's t for the effective degrees of
+freedom ν (JCGM 100, G.3 and G.6.4; EA-4/02 M:2022, annex E). 95.45 % is the probability within two standard deviations
+of a normal distribution, so k → 2 for ν → ∞.
 """
 
 import math
@@ -13,65 +13,65 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 
-COVERAGE_FACTOR = 2.0  # for ν → ∞, and where nobody counts ν
+COVERAGE_FACTOR = 2.0  # for ν → ∞, and if ν is not given
 PROBABILITY = math.erf(COVERAGE_FACTOR / math.sqrt(2))
-ROUNDING = 1e-9  # of ν, which may be a whole number but for the arithmetic
+ROUNDING = 1e-9  # of ν, which may be a whole number but for rounding
 
 
 def coverage_factors(freedom: ArrayLike) -> Array:
-    """k for degrees of freedom of any shape, infinite ones among them."""
-    whole, factors = _whole(freedom), np.full(np.shape(freedom), COVERAGE_FACTOR)
-    if np.isfinite(whole).any():
+    """Return k for degrees of freedom of any shape, infinite ones included."""
+    whole_dof, factors = _round_down(freedom), np.full(np.shape(freedom), COVERAGE_FACTOR)
+    if np.isfinite(whole_dof).any():
         from scipy.special import stdtrit
 
-        known = np.isfinite(whole)
-        factors[known] = stdtrit(whole[known], (1 + PROBABILITY) / 2)
+        finite = np.isfinite(whole_dof)
+        factors[finite] = stdtrit(whole_dof[finite], (1 + PROBABILITY) / 2)
     return factors
 
 
 def covered(factors: ArrayLike, freedom: ArrayLike) -> Array:
-    """The probability that value ± k u holds the true value, for k and ν of one shape."""
+    """Return the probability that value ± k u contains the true value, for k and ν of one shape."""
     return 1 - 2 * beyond(factors, freedom)
 
 
 def beyond(distances: ArrayLike, freedom: ArrayLike) -> Array:
-    """The probability that the true value lies farther than this on one side, in standard uncertainties."""
-    away, whole = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _whole(freedom))
-    found = np.array([math.erfc(each / math.sqrt(2)) / 2 for each in away.ravel()]).reshape(away.shape)
-    if np.isfinite(whole).any():
+    """Return the probability that the true value is farther than this on one side, in standard uncertainties."""
+    distance, whole_dof = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _round_down(freedom))
+    tails = np.array([math.erfc(value / math.sqrt(2)) / 2 for value in distance.ravel()]).reshape(distance.shape)
+    if np.isfinite(whole_dof).any():
         from scipy.special import stdtr
 
-        known = np.isfinite(whole)
-        found[known] = stdtr(whole[known], -away[known])
-    return found
+        finite = np.isfinite(whole_dof)
+        tails[finite] = stdtr(whole_dof[finite], -distance[finite])
+    return tails
 
 
 def false_alarm_of_each(of_all: float, tests: int) -> float:
-    """Return the rate of false alarms of each of so many `tests`, so that one of them at least is rarer than `of_all`.
+    """Return the false-alarm probability of each of `tests` tests, so that that of any of them is at most `of_all`.
 
-    Bonferroni's inequality: it holds however the tests depend on each other.
+    Bonferroni's inequality: it holds for dependent tests, too.
     """
     return of_all / tests
 
 
 def joint_factors(values: int, freedom: ArrayLike, probability: float) -> Array:
-    """Return the simultaneous coverage factor: k so that all of `values` intervals ± k u hold their true values.
+    """Return the simultaneous coverage factor: k so that all of `values` intervals ± k u contain their true values.
 
-    With a probability of 95.45 % at least, by Bonferroni's inequality. `freedom`: degrees of freedom of any shape; for
+    With that `probability` at least, by Bonferroni's inequality. `freedom`: degrees of freedom of any shape; for
     one value k is that of `coverage_factors`.
     """
-    whole, tail = _whole(freedom), false_alarm_of_each(1 - probability, values) / 2
+    whole_dof, tail = _round_down(freedom), false_alarm_of_each(1 - probability, values) / 2
     factors = np.full(np.shape(freedom), -NormalDist().inv_cdf(tail))
-    if np.isfinite(whole).any():
+    if np.isfinite(whole_dof).any():
         from scipy.special import stdtrit
 
-        known = np.isfinite(whole)
-        factors[known] = -stdtrit(whole[known], tail)
+        finite = np.isfinite(whole_dof)
+        factors[finite] = -stdtrit(whole_dof[finite], tail)
     return factors
 
 
 def freedom_of(factor: float) -> float:
-    """Return the whole number of degrees of freedom whose coverage factor this is: infinite for 2."""
+    """Return the whole number of degrees of freedom with this coverage factor: infinite for 2."""
     if factor <= COVERAGE_FACTOR:
         return math.inf
     from scipy.special import stdtridf
@@ -80,18 +80,18 @@ def freedom_of(factor: float) -> float:
 
 
 def effective_freedom(variances: ArrayLike, freedom: ArrayLike) -> Array:
-    """ν (…) of sums of independent `variances` (n, …), each known with `freedom` (n, …): Welch–Satterthwaite.
+    """Return ν (…) of sums of independent `variances` (n, …) with `freedom` (n, …): Welch–Satterthwaite.
 
-    JCGM 100, G.4.1; infinite where all are known.
+    JCGM 100, G.4.1; infinite if all are exact.
     """
-    parts, known = np.asarray(variances, dtype=np.float64), np.asarray(freedom, dtype=np.float64)
+    parts, degrees = np.asarray(variances, dtype=np.float64), np.asarray(freedom, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = parts.sum(axis=0) ** 2 / np.sum(parts**2 / known, axis=0)
-    freedom_of_sums: Array = np.where(np.isnan(found), np.inf, found)  # of nothing at all
+        effective = parts.sum(axis=0) ** 2 / np.sum(parts**2 / degrees, axis=0)
+    freedom_of_sums: Array = np.where(np.isnan(effective), np.inf, effective)  # 0/0 without variances
     return freedom_of_sums
 
 
-def _whole(freedom: ArrayLike) -> Array:
-    """ν as a table has it: the next lower whole number (JCGM 100, G.6.4), one at least."""
-    whole: Array = np.floor(np.maximum(np.asarray(freedom, dtype=np.float64) * (1 + ROUNDING), 1.0))
-    return whole
+def _round_down(freedom: ArrayLike) -> Array:
+    """Return ν as tabulated: the next lower whole number (JCGM 100, G.6.4), at least one."""
+    rounded: Array = np.floor(np.maximum(np.asarray(freedom, dtype=np.float64) * (1 + ROUNDING), 1.0))
+    return rounded

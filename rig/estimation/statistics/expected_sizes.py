@@ -1,8 +1,9 @@
-"""What only the readings tell the size of, beside errors that they share: expected, not likeliest.
+"""Expected variance components of readings with shared errors, in place of the most likely ones.
 
-How far an arm is off, how far a bias walks, and what disturbed one dwell alone: as
-`rig.estimation.statistics.bias_process` and `rig.estimation.reference.shared_errors`, together. Few readings tell any;
-the likeliest would by chance be none at all in one run and too large in the next, and so would be every uncertainty.
+They are the arm's errors, the bias random walk, and the disturbance of single dwells, as in
+`rig.estimation.statistics.bias_process` and `rig.estimation.reference.shared_errors`, together. Few readings determine
+them; the most likely values would by chance be zero in one run and too large in the next, and so would every
+uncertainty.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,96 +15,103 @@ from rig.estimation.arrays import Array
 
 WALKS = 12  # on their grid
 SPAN = 100.0  # largest walk over the smallest
-SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # of δ: no arm is better than the first
+SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # of δ: no arm is better than the smallest
 
-OWN_SHARES = (0.001, 0.01, 0.1, 0.5)  # of δ²: an arm's errors may nearly all come back, or half of them
+OWN_SHARES = (0.001, 0.01, 0.1, 0.5)  # of δ²: nearly all of an arm's errors may be constant, or half
 LOUDEST, VOLUMES = 30.0, 8  # of a disturbance, in standard deviations of the noise
 
 
 @dataclass(frozen=True, slots=True)
-class Scattered:
-    """What a fit leaves (n,) of readings, its columns `slopes` (n, q), and what is known of their errors.
+class ResidualInputs:
+    """Residuals (n,) of a fit, its columns `slopes` (n, q), and the covariances of the errors.
 
-    `known` (n, n) is the covariance without arm and walk, `effects(share)` (n, P) what the arm's errors do of which
-    that share is new in each dwell, `walk` (n, n) the covariance of a walk of rate 1; `noise` (n,) the variances of the
-    readings' own, by which a walk's order of magnitude is reckoned.
+    `covariance` (n, n): without arm and walk; `effects(fraction)` (n, P): of the arm's errors with that independent
+    fraction in each dwell; `walk` (n, n): the covariance of a walk of rate 1; `noise` (n,): the variances of the
+    readings' own noise, the scale of the walk's grid.
     """
 
-    left: Array
+    residuals: Array
     slopes: Array
-    known: Array
+    covariance: Array
     effects: Callable[[float], Array]
     walk: Array
     noise: Array
 
 
 @dataclass(frozen=True, slots=True)
-class Sizes:
-    """What readings tell: what the bias walks in a second, δ, and which share of δ² is new in each dwell."""
+class ErrorSizes:
+    """The bias random walk in a second, δ, and the fraction of δ² that is independent in each dwell."""
 
     walk: float
     std_rad: float
     own_share: float
 
 
-def expected_sizes(seen: Scattered, shares: Sequence[float]) -> Sizes:
-    """Mean squares over all sizes, each as likely as it makes the readings.
+def expected_sizes(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSizes:
+    """Return the posterior mean squares of the variance components.
 
-    Before, the walk was as likely to be there as not, it and δ were of any order of magnitude, and each of the `shares`
-    was as likely as the others.
+    Priors: spike-and-slab of the walk, log-uniform of its slab and of δ, equal probabilities of the `shares`.
     """
-    standing = np.diag(seen.walk) > 0
-    typical = np.sqrt(np.median(seen.noise[standing]) / np.median(np.diag(seen.walk)[standing]))
+    constant = np.diag(fit.walk) > 0
+    typical = np.sqrt(np.median(fit.noise[constant]) / np.median(np.diag(fit.walk)[constant]))
     walks = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN**0.5, WALKS)])
     sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, SIZES)
-    columns = seen.slopes.shape[1]
-    free = np.linalg.qr(seen.slopes, mode="complete")[0][:, columns:].T  # to which the columns are nothing
-    left, known, walk = free @ seen.left, free @ seen.known @ free.T, free @ seen.walk @ free.T
-    whites = [np.linalg.inv(np.linalg.cholesky(known + rate**2 * walk)) for rate in walks]
-    of_arm = [free @ seen.effects(share) for share in shares]
-    belief = np.array([[_likelihood(left, white, effects, sizes) for white in whites] for effects in of_arm])
-    belief[:, 1:] -= np.log(WALKS)
-    weights = np.exp(belief - belief.max())
+    columns = fit.slopes.shape[1]
+    free = np.linalg.qr(fit.slopes, mode="complete")[0][:, columns:].T  # contrasts, free of the columns
+    residuals, covariance, walk = (
+        free @ fit.residuals,
+        free @ fit.covariance @ free.T,
+        free @ fit.walk @ free.T,
+    )
+    whiteners = [np.linalg.inv(np.linalg.cholesky(covariance + rate**2 * walk)) for rate in walks]
+    of_arm = [free @ fit.effects(share) for share in shares]
+    log_posterior = np.array(
+        [[_find_likelihoods(residuals, whitener, effects, sizes) for whitener in whiteners] for effects in of_arm]
+    )
+    log_posterior[:, 1:] -= np.log(WALKS)
+    weights = np.exp(log_posterior - log_posterior.max())
     weights /= weights.sum()
-    walked, turned = weights.sum(axis=(0, 2)) @ walks**2, weights.sum(axis=1) @ sizes**2
-    new = turned @ shares / turned.sum()
-    return Sizes(float(np.sqrt(walked)), float(np.sqrt(turned.sum())), float(new))
+    walk_square, attitude_square = weights.sum(axis=(0, 2)) @ walks**2, weights.sum(axis=1) @ sizes**2
+    fraction = attitude_square @ shares / attitude_square.sum()
+    return ErrorSizes(float(np.sqrt(walk_square)), float(np.sqrt(attitude_square.sum())), float(fraction))
 
 
-def expected_disturbances(seen: Scattered, sizes: Sizes, causes: Sequence[Array], odds: Sequence[float]) -> Array:
-    """(k,) variance of each of the `causes`, of which (n, …) are the columns by one standard deviation.
+def expected_disturbances(
+    fit: ResidualInputs, sizes: ErrorSizes, causes: Sequence[Array], odds: Sequence[float]
+) -> Array:
+    """Return the variance (k,) of each of the `causes`, whose columns (n, …) are for one standard deviation.
 
-    Before, each was there by these `odds` (k,) against none, by any order of magnitude.
+    Priors: log-uniform, with `odds` (k,) of each against none.
     """
-    effects = sizes.std_rad * seen.effects(sizes.own_share)
-    white = np.linalg.inv(np.linalg.cholesky(seen.known + sizes.walk**2 * seen.walk + effects @ effects.T))
-    basis = np.linalg.qr(white @ seen.slopes)[0]
-    left = white @ seen.left
-    left = left - basis @ (basis.T @ left)
+    effects = sizes.std_rad * fit.effects(sizes.own_share)
+    whitener = np.linalg.inv(np.linalg.cholesky(fit.covariance + sizes.walk**2 * fit.walk + effects @ effects.T))
+    basis = np.linalg.qr(whitener @ fit.slopes)[0]
+    residuals = whitener @ fit.residuals
+    residuals = residuals - basis @ (basis.T @ residuals)
     volumes = np.geomspace(1.0, LOUDEST, VOLUMES) ** 2
-    belief = np.zeros((len(causes), VOLUMES))
-    for place, columns in enumerate(causes):
-        told = white @ columns
-        told = told - basis @ (basis.T @ told)
-        growth, directions = np.linalg.eigh(told.T @ told)
-        along = np.square(directions.T @ (told.T @ left))
+    log_posterior = np.zeros((len(causes), VOLUMES))
+    for row, columns in enumerate(causes):
+        projected = whitener @ columns
+        projected = projected - basis @ (basis.T @ projected)
+        growth, directions = np.linalg.eigh(projected.T @ projected)
+        components = np.square(directions.T @ (projected.T @ residuals))
         grown = 1 + volumes[:, None] * growth.clip(min=0.0)
-        told_of_it = 0.5 * np.sum(volumes[:, None] * along / grown - np.log(grown), axis=1)
-        belief[place] = np.log(odds[place] / VOLUMES) + told_of_it
-    most = max(float(belief.max()), 0.0)
-    weights = np.exp(belief - most)
+        log_likelihood = 0.5 * np.sum(volumes[:, None] * components / grown - np.log(grown), axis=1)
+        log_posterior[row] = np.log(odds[row] / VOLUMES) + log_likelihood
+    most = max(float(log_posterior.max()), 0.0)
+    weights = np.exp(log_posterior - most)
     expected: Array = weights @ volumes / (weights.sum() + np.exp(-most))
     return expected
 
 
-def _likelihood(left: Array, white: Array, effects: Array, sizes: Array) -> Array:
-    """(k,) logarithms of the likelihood of what is left (n,), up to a constant, for `sizes` (k,) of δ.
+def _find_likelihoods(residuals: Array, whitener: Array, effects: Array, sizes: Array) -> Array:
+    """Return log-likelihoods (k,) of residuals (n,), up to a constant, for `sizes` (k,) of δ.
 
-    `white` (n, n), triangular, leaves white all that is known beside the `effects` (n, P) of the arm.
+    `whitener` (n, n), triangular, is that of all modelled errors but the `effects` (n, P) of the arm.
     """
-    spread = white @ effects
-    growth, directions = np.linalg.eigh(spread @ spread.T)
-    squares = np.square(white @ left @ directions)
+    scaled = whitener @ effects
+    growth, directions = np.linalg.eigh(scaled @ scaled.T)
+    squares = np.square(whitener @ residuals @ directions)
     variance = 1 + np.square(sizes)[:, None] * growth.clip(min=0.0)
-    lost = np.sum(np.log(variance) + squares / variance, axis=1)
-    return np.asarray(np.log(np.diag(white)).sum() - lost / 2, dtype=np.float64)
+    deviance = np.sum(np.log(variance) + squares / variance, axis=1)
+    return np.asarray(np.log(np.diag(whitener)).sum() - deviance / 2, dtype=np.float64)

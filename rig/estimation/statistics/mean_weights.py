@@ -1,25 +1,25 @@
-"""Weights that make a mean: one linear functional for whatever is averaged over the same samples.
+"""Weights of a mean: one linear functional for all quantities averaged over the same samples.
 
-A reading is F ω + c beside what nobody wants in its mean. The weights w of a mean that is free of such nuisance columns
-N are orthogonal to them, so wᵀ m = F wᵀ ω + c: the reference of the mean of readings is the mean of ω under the very
-same weights, whatever the samples miss of a vibration and wherever they end. Least squares by groups and nuisance
-columns together has these weights in its rows (the Frisch–Waugh–Lovell theorem).
+A reading is F ω + c plus nuisance effects. Weights w orthogonal to the nuisance columns N give wᵀ m = F wᵀ ω + c: the
+reference of the mean of readings is the mean of ω by the same weights, even if the samples cover a vibration
+incompletely or end anywhere. Least squares by groups and nuisance columns together has these weights in its rows (the
+Frisch–Waugh–Lovell theorem).
 """
 
 import numpy as np
 
 from rig.estimation.arrays import Array
 
-ALIKE = 1e-2  # unit columns that differ by less are one
+ALIKE = 1e-2  # unit columns that differ by less are collinear
 
 
 def mean_weights(groups: Array, nuisance: Array) -> Array:
     """Return the weights (p, n) of the means of p groups of n samples that are free of nuisance columns.
 
-    groups (n, p): one where a sample belongs to a group, zero elsewhere; each sample belongs to one at most.
-    nuisance (n, k): the columns. What is not told from the groups and from the other columns is left as it is. Of all
-    such weights these have the least sum of squares, which is the variance of a mean of white noise of variance one. A
-    group without samples has no weights.
+    groups (n, p): one if a sample belongs to a group, zero otherwise; a sample belongs to at most one. nuisance (n, k):
+    the columns. Parts that are collinear with groups or other columns are not removed. Of all such weights these have
+    the least sum of squares, which is the variance of a mean of white noise of variance one. A group without samples
+    has no weights.
     """
     averages = groups.T / np.maximum(groups.sum(axis=0), 1.0)[:, None]
     means = averages @ nuisance
@@ -32,6 +32,6 @@ def mean_weights(groups: Array, nuisance: Array) -> Array:
 
 
 def even_groups(part: Array, parts: int) -> Array:
-    """Return groups (n, p) as of `mean_weights` of samples that are numbered by their part (n,), −1 for none."""
+    """Return the groups (n, p) for `mean_weights` by the part (n,) of each sample, −1 for none."""
     groups: Array = (part[:, None] == np.arange(parts)).astype(np.float64)
     return groups

@@ -1,11 +1,11 @@
-"""A linear fit whose errors' sizes are found from what it leaves: restricted maximum likelihood of a mixed model.
+"""A linear fit with variance components estimated from its residuals: restricted maximum likelihood of a mixed model.
 
     y = X θ + e,   cov e = (δ² A + σ² B) ⊗ 1₃,   θ_g ~ N(0, ψ_g²) for groups g of the columns
 
-y are n vectors in space, A and B are what two causes of error do from one to the next, each alike in all directions.
-The sizes δ, σ, ψ are those that make y likeliest, with θ integrated out (Patterson and Thompson, Biometrika 58 (1971)
-545; Harville, J. Am. Stat. Assoc. 72 (1977) 320). One transformation makes A and B diagonal together, so that a trial
-of other sizes costs but a weighting of the rows.
+y are n vectors in space, A and B the covariances by two causes of error, isotropic each. The standard deviations δ, σ,
+ψ maximise the likelihood of y with θ integrated out (Patterson and Thompson, Biometrika 58 (1971) 545; Harville, J. Am.
+Stat. Assoc. 72 (1977) 320). One generalised eigendecomposition diagonalises A and B together, so that a trial of other
+values only weights the rows.
 """
 
 from collections.abc import Sequence
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR, coverage_factors
 
-SPREAD = 4.0  # of ln size before the data are seen: a factor of 50 either way
-STEP = 0.25  # of ln size, for differences
+SPREAD = 4.0  # prior std of ln size: a factor of 50 either way
+STEP = 0.25  # of ln size, for numerical derivatives
 TRIALS = 300
 FEWEST_FREEDOM = 3.0  # below, Student's t hardly has a variance
 
@@ -27,8 +27,8 @@ FEWEST_FREEDOM = 3.0  # below, Student's t hardly has a variance
 class Mixed:
     """`observed` (n, 3), `design` (n, 3, p), A `scattered` and B `walked` (n, n), B positive definite.
 
-    `precision` (p,) of what is known of each column's size before, 0 where nothing is; `groups` of columns whose sizes
-    are drawn from one distribution of unknown width.
+    `precision` (p,): the prior precision of each column's coefficient, 0 if none; `groups` of columns whose
+    coefficients have a common prior of unknown variance.
     """
 
     observed: Array
@@ -40,21 +40,21 @@ class Mixed:
 
 
 @dataclass(frozen=True, slots=True)
-class Sizes:
-    """δ, σ, and ψ of every group."""
+class VarianceComponents:
+    """The standard deviations δ, σ, and ψ of every group."""
 
     scattered: float
     walked: float
     groups: tuple[float, ...]
 
     def logarithms(self) -> Array:
-        """(2 + groups,) logarithms of the sizes."""
+        """Return the logarithms (2 + groups,) of the standard deviations."""
         return np.asarray(np.log([self.scattered, self.walked, *self.groups]), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
-class Solved:
-    """θ (p,) with its `covariance` (p, p), the logarithm of the likelihood, and `residuals` (n, 3)."""
+class MixedFit:
+    """θ (p,) with its `covariance` (p, p), the log-likelihood, and `residuals` (n, 3)."""
 
     theta: Array
     covariance: Array
@@ -63,95 +63,98 @@ class Solved:
 
 
 class MixedModel:
-    """A `Mixed` with A and B made diagonal."""
+    """A `Mixed` with A and B diagonalised."""
 
     def __init__(self, mixed: Mixed) -> None:
         from scipy.linalg import eigh
 
         self.mixed = mixed
         spread, rotation = eigh(mixed.scattered, mixed.walked)
-        self._spread = np.maximum(spread, 0.0)  # of A, where B is one
+        self._spread = np.maximum(spread, 0.0)  # of A, if B is the identity
         count, _, columns = mixed.design.shape
         self._design = (rotation.T @ mixed.design.reshape(count, -1)).reshape(count, 3, columns)
         self._observed = rotation.T @ mixed.observed
 
-    def solve(self, sizes: Sizes) -> Solved:
-        """θ for given sizes."""
+    def solve(self, sizes: VarianceComponents) -> MixedFit:
+        """Return θ for given variance components."""
         theta, covariance, likelihood = self._fit(sizes)
-        return Solved(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
+        return MixedFit(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
 
-    def causes(self, sizes: Sizes, covariance: Array) -> tuple[Array, Array]:
-        """What δ and what σ make of θ's `covariance` (p, p); the rest of it is what was known of θ before."""
+    def causes(self, sizes: VarianceComponents, covariance: Array) -> tuple[Array, Array]:
+        """Return the parts of θ's `covariance` (p, p) by δ and by σ; the rest is by the prior of θ."""
         variances = sizes.scattered**2 * self._spread + sizes.walked**2
         columns = self._design.shape[2]
 
-        def of(part: Array) -> Array:
+        def propagate(part: Array) -> Array:
             design = (self._design * (np.sqrt(part) / variances)[:, None, None]).reshape(-1, columns)
             effect = covariance @ design.T
             return np.asarray(effect @ effect.T, dtype=np.float64)
 
-        return of(sizes.scattered**2 * self._spread), of(np.full_like(variances, sizes.walked**2))
+        return propagate(sizes.scattered**2 * self._spread), propagate(np.full_like(variances, sizes.walked**2))
 
-    def freedom(self, sizes: Sizes, wanted: Array) -> Array:
-        """Degrees of freedom (q,) of the variances of `wanted` (q, p) combinations of θ.
+    def freedom(self, sizes: VarianceComponents, wanted: Array) -> Array:
+        """Return the degrees of freedom (q,) of the variances of `wanted` (q, p) combinations of θ.
 
-        ½ (u/Δu)² of JCGM 100, G.4.2, with Δu from the curvature of the likelihood about its maximum, as Satterthwaite
-        has it: sizes found from few residuals are themselves uncertain.
+        ½ (u/Δu)² of JCGM 100, G.4.2, with Δu from the curvature of the log-likelihood at its maximum (Satterthwaite):
+        variance components by few residuals are themselves uncertain.
         """
         middle = sizes.logarithms()
         steps = STEP * np.eye(len(middle))
 
-        def at(logarithms: Array) -> tuple[float, Array]:
+        def evaluate(logarithms: Array) -> tuple[float, Array]:
             _, covariance, likelihood = self._fit(_sizes(logarithms))
             return likelihood, np.log(np.einsum("qi,ij,qj->q", wanted, covariance, wanted))
 
-        beside = [[at(middle + way * step) for way in (1, -1)] for step in steps]
-        slopes = np.array([(up[1] - down[1]) / (2 * STEP) for up, down in beside])
+        neighbours = [[evaluate(middle + sign * step) for sign in (1, -1)] for step in steps]
+        slopes = np.array([(up[1] - down[1]) / (2 * STEP) for up, down in neighbours])
         curvature = np.eye(len(middle)) / SPREAD**2
-        top = at(middle)[0]
-        for i, (up, down) in enumerate(beside):
+        top = evaluate(middle)[0]
+        for i, (up, down) in enumerate(neighbours):
             curvature[i, i] -= (up[0] + down[0] - 2 * top) / STEP**2
             for j in range(i):
-                corners = [at(middle + a * steps[i] + b * steps[j])[0] * a * b for a in (1, -1) for b in (1, -1)]
+                corners = [evaluate(middle + a * steps[i] + b * steps[j])[0] * a * b for a in (1, -1) for b in (1, -1)]
                 curvature[i, j] = curvature[j, i] = curvature[i, j] - sum(corners) / (4 * STEP**2)
         values, directions = np.linalg.eigh(curvature)
-        spread = (directions.T @ slopes) ** 2 / np.maximum(values, SPREAD**-2)[:, None]
-        freedom: Array = 2 / np.maximum(spread.sum(axis=0), 1e-9)
+        variances = (directions.T @ slopes) ** 2 / np.maximum(values, SPREAD**-2)[:, None]
+        freedom: Array = 2 / np.maximum(variances.sum(axis=0), 1e-9)
         return freedom
 
-    def likeliest(self, expected: Sizes, spread: Array | float = SPREAD, start: Sizes | None = None) -> Sizes:
-        """The likeliest sizes, by some of about the right order, from which nothing strays farther than the data ask.
+    def estimate_components(
+        self, expected: VarianceComponents, spread: Array | float = SPREAD, start: VarianceComponents | None = None
+    ) -> VarianceComponents:
+        """Return the variance components of maximum posterior probability, with log-normal priors about `expected`.
 
-        `spread` of their logarithms is how well they are known before; `start` where the search begins, if not there.
+        `spread` is the prior standard deviation of their logarithms; `start` is the first iterate, if not `expected`.
         """
         from scipy.optimize import minimize
 
         middle = expected.logarithms()
         begin, reach = (middle, 1.5) if start is None else (start.logarithms(), 0.3)
 
-        def lost(logarithms: Array) -> float:
-            strayed = float(np.sum(((logarithms - middle) / spread) ** 2)) / 2
+        def negative_log_posterior(logarithms: Array) -> float:
+            penalty = float(np.sum(((logarithms - middle) / spread) ** 2)) / 2
             try:
-                return strayed - self._factored(_sizes(logarithms))[2]
-            except np.linalg.LinAlgError:  # sizes so far apart that rounding is all there is
+                return penalty - self._factorise(_sizes(logarithms))[2]
+            except np.linalg.LinAlgError:  # ratios so large that rounding dominates
                 return float("inf")
 
         simplex = np.vstack([begin, begin + reach * np.eye(len(begin)) * np.where(np.arange(len(begin)) % 2, 1, -1)])
-        found = minimize(
-            lost,
+        optimum = minimize(
+            negative_log_posterior,
             begin,
             method="Nelder-Mead",
             options={"maxfev": TRIALS, "xatol": 0.05, "fatol": 0.02, "initial_simplex": simplex},
         )
-        return _sizes(np.asarray(found.x, dtype=np.float64))
+        return _sizes(np.asarray(optimum.x, dtype=np.float64))
 
-    def _fit(self, sizes: Sizes) -> tuple[Array, Array, float]:
-        lower, told, likelihood = self._factored(sizes)
+    def _fit(self, sizes: VarianceComponents) -> tuple[Array, Array, float]:
+        """Return θ (p,), its covariance (p, p) and the log-likelihood."""
+        lower, projection, likelihood = self._factorise(sizes)
         inverse = np.linalg.inv(lower)
-        return inverse.T @ told, inverse.T @ inverse, likelihood
+        return inverse.T @ projection, inverse.T @ inverse, likelihood
 
-    def _factored(self, sizes: Sizes) -> tuple[Array, Array, float]:
-        """L (p, p) of the information L Lᵀ, and L⁻¹ Xᵀ y (p,), both of white rows, and the likelihood's logarithm."""
+    def _factorise(self, sizes: VarianceComponents) -> tuple[Array, Array, float]:
+        """Return L (p, p) of the information L Lᵀ, L⁻¹ Xᵀ y (p,), both of whitened rows, and the log-likelihood."""
         from scipy.linalg import solve_triangular
 
         columns = self._design.shape[2]
@@ -160,31 +163,36 @@ class MixedModel:
         design = (self._design * weights[..., None]).reshape(-1, columns)
         observed = (self._observed * weights).reshape(-1)
         precision = self.mixed.precision.copy()
-        known = 0.0
+        log_prior = 0.0
         for group, size in zip(self.mixed.groups, sizes.groups, strict=True):
             precision[group] = size**-2.0
-            known -= 2 * len(group) * np.log(size)
+            log_prior -= 2 * len(group) * np.log(size)
         information = design.T @ design + np.diag(precision)
         unit = 1 / np.sqrt(np.diag(information))
         lower = np.linalg.cholesky(information * unit[:, None] * unit) / unit[:, None]
-        told = solve_triangular(lower, observed @ design, lower=True, check_finite=False)
-        left = float(observed @ observed - told @ told)
+        projection = solve_triangular(lower, observed @ design, lower=True, check_finite=False)
+        square = float(observed @ observed - projection @ projection)
         determinant = 2 * float(np.sum(np.log(np.diag(lower))))
-        return lower, told, -0.5 * (3 * float(np.sum(np.log(variances))) + determinant - known + left)
+        return (
+            lower,
+            projection,
+            -0.5 * (3 * float(np.sum(np.log(variances))) + determinant - log_prior + square),
+        )
 
 
-def widened(covariance: Array, freedom: Array) -> Array:
-    """A covariance (q, q) as wide as Student's t of so much freedom (q,): twice its root is then t's 95 %.
+def inflate_to_student(covariance: Array, freedom: Array) -> Array:
+    """Return a covariance (q, q) inflated to that of Student's t of `freedom` (q,): twice its root is then t's 95 %.
 
-    The variance of t is ν/(ν − 2), and none below ν = 2: then it is t's coverage factor that counts (JCGM 100, G.3).
+    The variance of t is ν/(ν − 2), and infinite below ν = 2: there t's coverage factor is used (JCGM 100, G.3).
     """
-    several = np.maximum(freedom, FEWEST_FREEDOM)
+    bounded = np.maximum(freedom, FEWEST_FREEDOM)
     by_coverage = coverage_factors(np.clip(freedom, 1.0, FEWEST_FREEDOM)) / COVERAGE_FACTOR
-    wider = np.where(freedom >= FEWEST_FREEDOM, np.sqrt(several / (several - 2)), by_coverage)
-    found: Array = covariance * wider[:, None] * wider
-    return found
+    ratio = np.where(freedom >= FEWEST_FREEDOM, np.sqrt(bounded / (bounded - 2)), by_coverage)
+    inflated: Array = covariance * ratio[:, None] * ratio
+    return inflated
 
 
-def _sizes(logarithms: Sequence[float] | Array) -> Sizes:
+def _sizes(logarithms: Sequence[float] | Array) -> VarianceComponents:
+    """Return the variance components by their logarithms."""
     first, second, *groups = np.exp(np.clip(logarithms, -60, 30)).tolist()
-    return Sizes(first, second, tuple(groups))
+    return VarianceComponents(first, second, tuple(groups))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_finite
-from rig.estimation.statistics.bias_process import BiasProcess, bias_process, walking
+from rig.estimation.statistics.bias_process import BiasProcess, average_walks, bias_process
 from rig.estimation.statistics.coverage import coverage_factors, effective_freedom
 
 HIGHEST = 3  # order: that of the autopilots
@@ -315,7 +315,7 @@ class _Fits:
             readings.variances,
             readings.windows_s,
             instability_rad_s=readings.instability,
-            chosen=walking,
+            chosen=average_walks,
         )
 
     def solve(self, orders: tuple[int, int]) -> _Fit:

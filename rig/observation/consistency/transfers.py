@@ -19,7 +19,7 @@ from rig.data.quantity import RATE
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
-from rig.estimation.statistics.rounding import rounding_left
+from rig.estimation.statistics.rounding import bound_rounding_variance
 from rig.motion.geometry import flange_attitude, flange_pose
 from rig.observation.average import Stream, between
 from rig.observation.consistency.segments import MotionInterval
@@ -85,7 +85,7 @@ def average_transfers(
                     clock_offset_s=recording.clock_offset_s,
                     mean_rad_s=readings.mean(axis=0),
                     scatter_rad2_s2=_scatter(readings, time_s, interval.motion, site.down_m_s2),
-                    rounding_rad2_s2=rounding_left(readings, stream.steps, moving, stream.steps.variance),
+                    rounding_rad2_s2=bound_rounding_variance(readings, stream.steps, moving, stream.steps.variance),
                     rate_rad_s=interval.motion.mean_rate(interval.start_s, interval.end_s),
                     gravity_m_s2=mean_specific_force_m_s2(interval, site.down_m_s2, extension_m),
                     attitude=interval.motion.attitude(interval.start_s, interval.end_s),

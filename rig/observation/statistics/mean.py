@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import even_groups
-from rig.estimation.statistics.rounding import Steps, rounding_left
+from rig.estimation.statistics.rounding import Steps, bound_rounding_variance
 from rig.observation.statistics.coloured_noise import fit_autoregression
 from rig.observation.statistics.tapered_weights import dof_at_zero, flank_s, noise_at_zero, vibrates, weights
 from rig.observation.windows import Window
@@ -110,7 +110,7 @@ def weighted_means(
 def _average_group(
     readings: Array, group: NDArray[np.bool_], weights: Array, *, smooth: Array, noise: MeanNoise, steps: Steps
 ) -> Mean:
-    rounding = rounding_left(readings[group], steps, smooth[group], noise.scatter)
+    rounding = bound_rounding_variance(readings[group], steps, smooth[group], noise.scatter)
     return Mean(
         mean=weights @ readings,
         variance=noise.in_a_mean * float(weights @ weights) + rounding,

@@ -43,7 +43,7 @@ def bias_process_entry(fit: Explained) -> BiasProcessEntry:
         BiasProcessEntry,
         fit.bias,
         averaging_time_s=float(np.ptp(fit.seen.windows_s)),
-        hour_std_rad_s=fit.bias.wandered_rad_s(HOUR_S),
+        hour_std_rad_s=fit.bias.drift_std_rad_s(HOUR_S),
     )
 
 
