@@ -58,7 +58,7 @@ def joint_factors(values: int, freedom: ArrayLike, probability: float) -> Array:
     """Return the simultaneous coverage factor: k so that all of `values` intervals ± k u contain their true values.
 
     With that `probability` at least, by Bonferroni's inequality. `freedom`: degrees of freedom of any shape; for
-    one value k is that of `coverage_factors`.
+    one value and `PROBABILITY` it is `coverage_factors`.
     """
     whole_dof, tail = _round_down(freedom), false_alarm_of_each(1 - probability, values) / 2
     factors = np.full(np.shape(freedom), -NormalDist().inv_cdf(tail))
