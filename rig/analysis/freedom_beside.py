@@ -122,7 +122,7 @@ def _of_matrix(solution: VectorSolution) -> Array:
 
 def _walk(explained: Explained) -> Array:
     """(3, p, p) what the wandering bias adds to the covariance of each axis' coefficients F, c (and G)."""
-    seen = explained.seen
+    seen = explained.inputs
     gravity = None if explained.solution.g_sensitivity is None else seen.pull_m_s2
     design = design_matrix(seen.rates_rad_s, gravity)
     if explained.bias.steady:

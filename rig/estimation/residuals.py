@@ -17,7 +17,7 @@ from rig.estimation.reference.triaxial import TriaxialSolution
 
 def residual_std_rad_s(explained: Explained) -> Array:
     """Return the standard deviations (N, 3) of the vector model's residuals: (1 − H) V (1 − H)ᵀ, hat matrix H."""
-    inputs, solution = explained.seen, explained.solution
+    inputs, solution = explained.inputs, explained.solution
     rates, pull = inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.pull_m_s2
     variances = inputs.variances_rad2_s2 + propagate_speed_std(rates, inputs.speed_std_rad_s, solution.matrix) ** 2
     shared = explained.bias.covariance(inputs.windows_s)

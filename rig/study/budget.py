@@ -18,7 +18,7 @@ from rig.estimation.gyroscope.budget import Unknown, budget
 from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED, SQUARE_MISSED
 from rig.estimation.gyroscope.own_errors import KnownSensor
 from rig.estimation.gyroscope.six_observation import PARAMETERS
-from rig.estimation.gyroscope.vector_fit import Seen, centripetal_m_s2, explain
+from rig.estimation.gyroscope.vector_fit import VectorInputs, centripetal_m_s2, explain
 from rig.estimation.gyroscope.vector_model import solve_vector_model
 from rig.estimation.statistics.bias_process import flicker_covariance
 from rig.study.report import Settings, StudyFinding, StudyReport, table
@@ -141,7 +141,7 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
     reported = nominal.rates_rad_s * (1 - clock + jitter)[:, None]
     truth = np.concatenate([scale, bias - mean_drift])
     corrected = reported * (1 + clock + rng.normal(0, effects.clock_known))
-    inputs = Seen(
+    inputs = VectorInputs(
         means_rad_s=means,
         variances_rad2_s2=variances,
         turns_rad_s=corrected,

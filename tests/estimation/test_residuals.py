@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.estimation.gyroscope.vector_fit import Explained, Seen, explain
+from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs, explain
 from rig.estimation.residuals import dwell_residual_std_m_s2, residual_std_rad_s
 from support.recordings import drawn_accelerations
 
@@ -21,7 +21,7 @@ def session(rng: np.random.Generator, walk_rad_s_sqrt_s: float = 0.0) -> Explain
     bias = walk_rad_s_sqrt_s * np.sqrt(10.0) * np.cumsum(rng.normal(size=(12, 3)), axis=0)
     attitudes = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(12)])
     return explain(
-        Seen(
+        VectorInputs(
             means_rad_s=swept @ MATRIX.T + 0.01 + bias + std * rng.normal(size=std.shape),
             variances_rad2_s2=std**2,
             turns_rad_s=turns,

@@ -62,7 +62,7 @@ def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tup
 
 def _means_of_solve(explained: Explained) -> Means:
     """Return the means from which the solution was computed."""
-    inputs_of_solve = explained.seen
+    inputs_of_solve = explained.inputs
     turns = np.flatnonzero(inputs_of_solve.turns_rad_s.any(axis=1))
     sweep = np.full(len(inputs_of_solve.turns_rad_s), REST)
     sweep[turns] = np.arange(len(turns))
@@ -74,7 +74,7 @@ def _error_over_expanded(patterns: Array, explained: Explained, mounting: Array,
 
     The means are solved again, as a bias that seems to drift because of the fault has a larger U, too.
     """
-    solution, inputs_of_solve = explained.solution, explained.seen
+    solution, inputs_of_solve = explained.solution, explained.inputs
     response = np.einsum("qni,kni->kq", solution.response, patterns) / np.sqrt(np.diag(solution.covariance))
     worst = patterns[int(np.argmax(np.abs(response).max(axis=1)))]
     try:

@@ -91,8 +91,8 @@ def collect_known_errors(
         arcs=any(observation.arc_rad is not None for observation in result.observations),
         jitter_s=surroundings.state_jitter_s,
         earth_rad_s=_earth(surroundings, name, result.earth),
-        sensor=None if explained is None else explained.seen.sensor,
-        temperature_times_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
+        sensor=None if explained is None else explained.inputs.sensor,
+        temperature_times_s=np.zeros(0) if explained is None else explained.inputs.windows_s.mean(axis=1),
         stamp_s=stamp_std_s or 0.0,
     )
 

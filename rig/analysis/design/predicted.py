@@ -33,7 +33,7 @@ from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget, budget
 from rig.estimation.gyroscope.six_observation_budget import six_observation_budget
-from rig.estimation.gyroscope.vector_fit import Seen, explain
+from rig.estimation.gyroscope.vector_fit import VectorInputs, explain
 from rig.estimation.statistics.bias_process import BiasProcess
 from rig.motion.state import TurnerIdentity
 from rig.motion.steps import TURN_RAD, Plan, Step, Sweep
@@ -96,7 +96,7 @@ def _mounting_rotation(angle_deg: float) -> Array:
     return rotation_by(np.radians(angle_deg) / np.sqrt(3) * np.array([1.0, -1.0, 1.0]))
 
 
-def _simulate_readings(inputs: Seen, matrix: Array) -> Array:
+def _simulate_readings(inputs: VectorInputs, matrix: Array) -> Array:
     """Return the readings (N, 3) of a sensor of F (3, 3), with the same noise each time: no two readings are equal."""
     noise = np.random.default_rng(len(inputs.windows_s)).standard_normal((len(inputs.windows_s), 3))
     readings: Array = inputs.rates_rad_s @ matrix.T + np.sqrt(inputs.variances_rad2_s2) * noise

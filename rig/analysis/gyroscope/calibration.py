@@ -24,7 +24,7 @@ from rig.estimation.gyroscope.estimate import Estimate
 from rig.estimation.gyroscope.known_turns import TurnedSolution
 from rig.estimation.gyroscope.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.gyroscope.six_observation_budget import six_observation_budget
-from rig.estimation.gyroscope.vector_fit import Explained, Seen, explain
+from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs, explain
 from rig.estimation.gyroscope.vector_model import VectorSolution, solve_vector_model
 from rig.estimation.refusals import check_duplicates
 from rig.observation.average import Average
@@ -200,7 +200,7 @@ def _budget_of(
     return None
 
 
-def _add_earth_rate(inputs: Seen, earth_rate: EarthRate | None) -> Seen:
+def _add_earth_rate(inputs: VectorInputs, earth_rate: EarthRate | None) -> VectorInputs:
     """Return the inputs with the estimated Earth's rate; without one, with that of the site, if it is stated."""
     return inputs if earth_rate is None else replace(inputs, earth_rate_rad_s=earth_rate.rate_rad_s)
 

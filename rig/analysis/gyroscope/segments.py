@@ -50,7 +50,7 @@ def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, si
 
     The Earth's rate is that of `explained`: given by the site, or estimated.
     """
-    inputs = explained.seen
+    inputs = explained.inputs
     placed = list(zip(windows, inputs.windows_s[:, 0], inputs.acceleration_m_s2, strict=True))
     segments = [segment for window in windows for segment in window.segments]
     rates = [segment.rate_rad_s + segment.attitude @ inputs.earth_rate_rad_s for segment in segments]
@@ -101,7 +101,7 @@ def append_transfers(
     unexplained = np.maximum([transfer.scatter_rad2_s2 for transfer in transfers] - noise, 0.0)
     roundings = np.array([transfer.rounding_rad2_s2 for transfer in transfers])
     vibration = _vibration_changes(windows, explained, times_s) / duration_s**2
-    earth_rad_s = explained.seen.earth_rate_rad_s
+    earth_rad_s = explained.inputs.earth_rate_rad_s
     rates = [transfer.rate_rad_s + transfer.attitude @ earth_rad_s for transfer in transfers]
     return replace(
         segments,
@@ -130,7 +130,7 @@ def _vibration_changes(windows: Sequence[SegmentedAverage], explained: Explained
     """
     rests = [
         (time_s, window.readings.swing_rad2)
-        for window, time_s in zip(windows, explained.seen.windows_s.mean(axis=1), strict=True)
+        for window, time_s in zip(windows, explained.inputs.windows_s.mean(axis=1), strict=True)
         if window.readings.sweep == REST and window.average.samples >= FEWEST_AT_REST  # fewer show no vibration
     ]
     if not rests:

@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Unknown
 from rig.estimation.gyroscope.earth_rate import EarthRate, EarthRatePrior
 from rig.estimation.gyroscope.own_errors import KnownSensor
-from rig.estimation.gyroscope.vector_fit import Seen
+from rig.estimation.gyroscope.vector_fit import VectorInputs
 from rig.motion.geometry import AXIS_ERRORS
 from rig.observation.average import Average
 from rig.observation.observe import Observation
@@ -40,7 +40,7 @@ class RecordingPart:
     mount: Array | None
 
 
-def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> Seen:
+def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> VectorInputs:
     """Return the arm's motion in each average of a sensor, in all recordings of a run, with the readings.
 
     A controller's clock that runs too fast makes its speeds too small; they are corrected.
@@ -62,7 +62,7 @@ def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings:
     return replace(inputs, sensor=_describe_recorded(surroundings, sensor, run.sensors[sensor], averages))
 
 
-def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surroundings) -> Seen:
+def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surroundings) -> VectorInputs:
     """Return the inputs of all parts of a run, revolutions before rests, without those of the sensor."""
     site, extension_m = surroundings.site, np.array(surroundings.extension_m)
     turns = [(turn, part.clock_offset_s) for part in parts for turn in part.turns]
@@ -74,7 +74,7 @@ def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surrounding
     lever_arms = np.concatenate([lever_arms_m(part.turns, extension_m, part.mount) for part in parts])
     stages = [part.stage for part in parts for _ in part.turns]
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
-    return Seen(
+    return VectorInputs(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
         variances_rad2_s2=np.array([average.variance_rad2_s2 - average.drift_rad2_s2 for average in averages]),
         turns_rad_s=np.concatenate([rates_rad_s * (1 + surroundings.clock.error), np.zeros((len(rests), 3))]),
@@ -129,7 +129,7 @@ def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array 
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
-    """Return the errors (P, N, 3) as in `Seen` of the arm's angles, whose half-width is `axis_deg`."""
+    """Return the errors (P, N, 3) as in `VectorInputs` of the arm's angles, whose half-width is `axis_deg`."""
     steady = np.array([name.startswith(("twist", "zero")) for name in AXIS_ERRORS])
     std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_FRACTION)
     errors = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]
@@ -137,7 +137,7 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
 
 
 def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array:
-    """Return the errors (P, N, 3) as in `Seen` of joints that return to a sweep's axis with limited repeatability."""
+    """Return the errors (P, N, 3) as in `VectorInputs` of joints that return imperfectly to a sweep's axis."""
     errors = np.array([turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None])
     tilts = uncertainty.repeatability_std_rad * np.swapaxes(errors[:, ZEROS], 0, 1)
     visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _group_by_axis(turns)])
@@ -147,7 +147,7 @@ def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncert
 
 
 def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array | None:
-    """Return the errors (P, N, 3) as in `Seen` of a joint's encoder at each angle where arcs begin or end.
+    """Return the errors (P, N, 3) as in `VectorInputs` of a joint's encoder at each angle where arcs begin or end.
 
     Sweeps in both directions have the same ends, so the same errors: these are no noise, and repeats do not average
     them out. None if all sweeps are whole revolutions, which end at the angle where they began.
@@ -167,7 +167,7 @@ def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncer
 
 
 def list_mount_rotations(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
-    """Return the rotations (3 S, N, 3) as in `Seen` of an item off its mount by `mount_deg` about any axis.
+    """Return the rotations (3 S, N, 3) as in `VectorInputs` of an item off its mount by `mount_deg` about any axis.
 
     None with one stage.
     """

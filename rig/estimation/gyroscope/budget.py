@@ -14,7 +14,7 @@ import numpy as np
 from rig.estimation.arrays import Array, perpendicular_unit_vectors
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.mount_squares import propagate_mount_squares
-from rig.estimation.gyroscope.vector_fit import Explained, Seen
+from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs
 from rig.estimation.statistics.bias_process import BiasProcess
 from rig.estimation.statistics.coverage import coverage_factors, effective_freedom
 
@@ -151,7 +151,7 @@ def budget(explained: Explained, unknown: Unknown) -> Budget:
 
 
 def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributor]:
-    solution, inputs = explained.solution, explained.seen
+    solution, inputs = explained.solution, explained.inputs
     matrix = solution.matrix
 
     def propagate(patterns: Array) -> Array:
@@ -216,7 +216,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
 
 def _evaluate_mounts(explained: Explained, unknown: Unknown, propagate: Propagate) -> Iterator[Contributor]:
     """Yield the contributors of the ends of arcs and of the mountings; `propagate` as in `_contributors`."""
-    inputs, matrix = explained.seen, explained.solution.matrix
+    inputs, matrix = explained.inputs, explained.solution.matrix
     if inputs.encoder_errors_rad_s is not None:
         spread = propagate(inputs.encoder_errors_rad_s @ matrix.T)
         stated = 2 * float(np.degrees(unknown.angle_std_rad))
@@ -227,7 +227,9 @@ def _evaluate_mounts(explained: Explained, unknown: Unknown, propagate: Propagat
         yield Contributor(MOUNTS, "B", "rectangular", half_width, "°", "uncertainty.mount_deg", np.inf, spread)
 
 
-def _evaluate_times(inputs: Seen, unknown: Unknown, turned: Array, propagate: Propagate) -> Iterator[Contributor]:
+def _evaluate_times(
+    inputs: VectorInputs, unknown: Unknown, turned: Array, propagate: Propagate
+) -> Iterator[Contributor]:
     """Yield the contributors of the times of the arm's states and of the sensor's samples."""
     per_s = np.sqrt(2) / np.diff(inputs.windows_s).T[0]
     per_sweep = np.eye(len(turned))[:, :, None]
@@ -243,8 +245,8 @@ def _evaluate_times(inputs: Seen, unknown: Unknown, turned: Array, propagate: Pr
 
 def _find_noise_freedom(explained: Explained) -> float:
     """Return the fewest degrees of freedom of scale and bias by the noise of the readings (JCGM 100, G.4.1)."""
-    variances = explained.solution.response**2 * explained.seen.variances_rad2_s2
-    freedom = np.broadcast_to(explained.seen.noise_freedom, variances.shape)
+    variances = explained.solution.response**2 * explained.inputs.variances_rad2_s2
+    freedom = np.broadcast_to(explained.inputs.noise_freedom, variances.shape)
     parts, freedoms = (array.reshape(len(variances), -1).T for array in (variances, freedom))
     return float(effective_freedom(parts, freedoms).min())
 
@@ -269,7 +271,7 @@ def _evaluate_readings(explained: Explained) -> Iterator[Contributor]:
 
 def _split_bias_covariance(explained: Explained) -> tuple[Array, Array]:
     """Return the covariances (6, 6) by flicker and by the rest of the bias drift."""
-    bias, response, windows_s = explained.bias, explained.solution.response, explained.seen.windows_s
+    bias, response, windows_s = explained.bias, explained.solution.response, explained.inputs.windows_s
 
     def propagate(part: BiasProcess) -> Array:
         covariance: Array = np.einsum("pni,nm,qmi->pq", response, part.covariance(windows_s), response)
@@ -279,7 +281,7 @@ def _split_bias_covariance(explained: Explained) -> tuple[Array, Array]:
     return propagate(flicker), propagate(replace(bias, instability_rad_s=0.0))
 
 
-def _tilt_axes(inputs: Seen, angle_rad: float) -> Array:
+def _tilt_axes(inputs: VectorInputs, angle_rad: float) -> Array:
     """Return the rates' errors (2 per axis, N, 3) by an axis tilted about two perpendicular directions."""
     patterns: list[Array] = []
     for joint in sorted(set(inputs.joints) - {None}, key=str):

@@ -30,7 +30,7 @@ from rig.estimation.arrays import Array, perpendicular_unit_vectors
 from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
 from rig.estimation.gyroscope.common_errors import CommonErrors
 from rig.estimation.gyroscope.nonlinearity import curvature
-from rig.estimation.gyroscope.vector_fit import Seen, solver
+from rig.estimation.gyroscope.vector_fit import VectorInputs, solver
 from rig.estimation.gyroscope.vector_model import MAX_CONDITION, VectorSolution, design_matrix, propagate_speed_std
 from rig.estimation.statistics.bias_process import bias_process
 
@@ -125,7 +125,7 @@ class EarthRate:
         return float(np.sqrt(slope @ self.covariance_rad2_s2 @ slope))
 
 
-def find_earth_rate(inputs: Seen, nominal_mounting: Array, prior: EarthRatePrior) -> EarthRate:
+def find_earth_rate(inputs: VectorInputs, nominal_mounting: Array, prior: EarthRatePrior) -> EarthRate:
     """Return the Earth's rate in the base frame; `inputs.earth_rate_rad_s` is not used.
 
     Raise Fault `earth_rate_and_g_sensitivity`, `earth_rate_not_observable`, and those of the vector model.
@@ -165,7 +165,9 @@ class _Fit:
     expected_rad2_s2: Array
 
 
-def _fit(inputs: Seen, mounting: Array, directions: Array, gravity: Array | None, prior: EarthRatePrior) -> _Fit:
+def _fit(
+    inputs: VectorInputs, mounting: Array, directions: Array, gravity: Array | None, prior: EarthRatePrior
+) -> _Fit:
     """Fit F, c, G, the arm's errors and, last of these, the Earth's rate along `directions` (d, 3) of the base."""
     speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
     durations = np.diff(inputs.windows_s).T[0]
@@ -218,7 +220,7 @@ def _tilt_sweeps(turns_rad_s: Array) -> Array:
     return np.array(patterns).reshape(-1, *turns_rad_s.shape)
 
 
-def _check_identifiable(inputs: Seen, directions: Array, gravity: Array | None) -> None:
+def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array | None) -> None:
     """Raise Fault unless sweeps and rests identify the Earth's rate with an ideal sensor."""
     conditioning, parameters = _condition(inputs, directions, gravity)
     if conditioning.rank < parameters and gravity is not None and len(directions) == 3:
@@ -236,7 +238,7 @@ def _check_identifiable(inputs: Seen, directions: Array, gravity: Array | None) 
     )
 
 
-def _condition(inputs: Seen, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
+def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
     """Return the conditioning of the design (3 N, 3 p + d), column blocks scaled alike, and its number of columns."""
     sweeps = inputs.turns_rad_s / (np.linalg.norm(inputs.turns_rad_s) / len(inputs.turns_rad_s) ** 0.5 or 1.0)
     scaled_gravity = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)

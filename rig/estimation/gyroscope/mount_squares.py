@@ -19,9 +19,9 @@ def propagate_mount_squares(explained: Explained) -> Array:
     For remaining errors ε ~ N(0, C) of the mounts, εᵀHε/2 has the mean tr(HC)/2 and the covariance tr(HCH'C)/2.
     """
     covariance = explained.mounts_covariance
-    if explained.seen.mount_turns_rad is None:
+    if explained.inputs.mount_turns_rad is None:
         return np.zeros((6, 6))
-    products = _find_curvatures(explained, explained.seen.mount_turns_rad) @ covariance
+    products = _find_curvatures(explained, explained.inputs.mount_turns_rad) @ covariance
     means = np.trace(products, axis1=1, axis2=2) / 2
     mean_square: Array = np.einsum("pij,qji->pq", products, products) / 2 + np.outer(means, means)
     return mean_square
@@ -32,7 +32,7 @@ def _find_curvatures(explained: Explained, turns_rad: Array) -> Array:
 
     The estimate of F is F + D + S if the rates are off in first and second order; k is 1 / ‖row of F‖.
     """
-    inputs, matrix = explained.seen, explained.solution.matrix
+    inputs, matrix = explained.inputs, explained.solution.matrix
     inverse = _find_regression(explained)  # (3, 4, N)
     first = np.cross(turns_rad, inputs.turns_rad_s)  # (E, N, 3)
     second = np.cross(turns_rad[:, None], first)  # (E, E, N, 3): one rotation after the other
@@ -49,7 +49,7 @@ def _find_curvatures(explained: Explained, turns_rad: Array) -> Array:
 
 def _find_regression(explained: Explained) -> Array:
     """Return the map (3, 4, N) from mean readings to F, row by row, and the offsets, for the given mounts."""
-    inputs, solution, bias = explained.seen, explained.solution, explained.bias
+    inputs, solution, bias = explained.inputs, explained.solution, explained.bias
     design = design_matrix(inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.pull_m_s2)
     of_speed = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, solution.matrix)
     shared = None if bias.steady else bias.covariance(inputs.windows_s)

@@ -12,7 +12,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Solution
 from rig.estimation.gyroscope.budget import AXES, MOUNTS, REPEATABILITY, Budget, Contributor, Unknown, budget
 from rig.estimation.gyroscope.six_observation import design
-from rig.estimation.gyroscope.vector_fit import Explained, Seen
+from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs
 from rig.estimation.statistics.bias_process import BiasProcess
 
 NOT_SQUARE = "angles between the axes"
@@ -23,7 +23,7 @@ def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown
 
     `axes_rad` is the half-width of the angles between the sensor's axes about 90°.
     """
-    inputs, solution = explained.seen, explained.solution
+    inputs, solution = explained.inputs, explained.solution
     response = response_of(six, inputs)
     by_speed = np.einsum("qni,ni->qn", response, _propagate_speeds(inputs, solution.matrix))
     drift = _propagate_drift(explained.bias, response, inputs.windows_s)
@@ -49,7 +49,7 @@ def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown
     return replace(of_readings, contributors=(*contributors, square))
 
 
-def response_of(solution: Solution, inputs: Seen) -> Array:
+def response_of(solution: Solution, inputs: VectorInputs) -> Array:
     """Return the derivative (6, N, 3) of scale and bias by the mean readings; zero for rests, which are not used.
 
     To first order, as in `Accumulator.solve`: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e with e = −2 Σ_j k_j² (m_j + b_j) δm_j.
@@ -75,7 +75,7 @@ def response_of(solution: Solution, inputs: Seen) -> Array:
     return response
 
 
-def _propagate_speeds(inputs: Seen, matrix: Array) -> Array:
+def _propagate_speeds(inputs: VectorInputs, matrix: Array) -> Array:
     """Return the effect (N, 3) of one standard deviation of each sweep's speed on its reading."""
     size = np.linalg.norm(inputs.turns_rad_s, axis=1, keepdims=True)
     directions = np.divide(inputs.turns_rad_s, size, out=np.zeros(inputs.turns_rad_s.shape), where=size > 0)

@@ -26,7 +26,7 @@ LEAST_LOAD = 0.25  # of the largest rate: a smaller one has less than a sixteent
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class VectorInputs:
     """The inputs of the vector model: sweeps first, then rests, N in all.
 
     - `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of their noise.
@@ -133,14 +133,14 @@ class Seen:
 class Explained:
     """The solution of the vector model, the bias drift, and the inputs of both.
 
-    `nonlinearity` is None if all sweeps had one speed. `mounts` (3 S,) are the errors of the mounts as in `Seen`, in
-    prior standard deviations, with the posterior covariance `mounts_covariance` (3 S, 3 S); S is 0 without mounting
-    anew.
+    `nonlinearity` is None if all sweeps had one speed. `mounts` (3 S,) are the errors of the mounts as in
+    `VectorInputs`, in prior standard deviations, with the posterior covariance `mounts_covariance` (3 S, 3 S); S is 0
+    without mounting anew.
     """
 
     solution: VectorSolution
     bias: BiasProcess
-    seen: Seen
+    inputs: VectorInputs
     nonlinearity: Nonlinearity | None
     mounts: Array = field(default_factory=partial(np.zeros, 0))
     mounts_covariance: Array = field(default_factory=partial(np.zeros, (0, 0)))
@@ -148,7 +148,7 @@ class Explained:
     @property
     def loads_rad_s(self) -> Array:
         """The least and largest rate (3, 2) along x, y, z, in either direction, of sweeps that determine its scale."""
-        sensed = np.abs(self.seen.turns_rad_s @ (self.solution.matrix * self.solution.scale[:, None]).T)
+        sensed = np.abs(self.inputs.turns_rad_s @ (self.solution.matrix * self.solution.scale[:, None]).T)
         largest = sensed.max(axis=0)
         smallest = np.where(sensed >= LEAST_LOAD * largest, sensed, np.inf).min(axis=0)
         loads: Array = np.column_stack([smallest, largest])
@@ -161,7 +161,7 @@ def centripetal_m_s2(turns_rad_s: Array, lever_arm_m: Array) -> Array:
     return inwards
 
 
-def explain(inputs: Seen, nominal_mounting: Array, process: BiasProcess | None = None) -> Explained:
+def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess | None = None) -> Explained:
     """Return scale, bias and mounting, with the g-sensitivity if the attitudes determine it.
 
     The bias drift is estimated from the means unless a `process` is given. Raise Fault as the vector model does.
@@ -178,7 +178,7 @@ def explain(inputs: Seen, nominal_mounting: Array, process: BiasProcess | None =
 
 
 def solver(
-    inputs: Seen,
+    inputs: VectorInputs,
     nominal_mounting: Array,
     gravity_m_s2: Array | None,
     speed_std_rad_s: Array,
@@ -205,7 +205,9 @@ def solver(
     return solve
 
 
-def _explain(inputs: Seen, mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None) -> Explained:
+def _explain(
+    inputs: VectorInputs, mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None
+) -> Explained:
     several = len(inputs.speeds_rad_s) > 1
     arm_errors = inputs.arm_errors_rad_s
 

@@ -57,8 +57,8 @@ def false_alarm_of_each(of_all: float, tests: int) -> float:
 def joint_factors(values: int, freedom: ArrayLike, probability: float) -> Array:
     """Return the simultaneous coverage factor: k so that all of `values` intervals ± k u contain their true values.
 
-    With that `probability` at least, by Bonferroni's inequality. `freedom`: degrees of freedom of any shape; for
-    one value and `PROBABILITY` it is `coverage_factors`.
+    With that `probability` at least, by Bonferroni's inequality. `freedom`: degrees of freedom of any shape; for one
+    value and `PROBABILITY` it is `coverage_factors`.
     """
     whole_dof, tail = _round_down(freedom), false_alarm_of_each(1 - probability, values) / 2
     factors = np.full(np.shape(freedom), -NormalDist().inv_cdf(tail))

@@ -42,7 +42,7 @@ def bias_process_entry(fit: Explained) -> BiasProcessEntry:
     return entry(
         BiasProcessEntry,
         fit.bias,
-        averaging_time_s=float(np.ptp(fit.seen.windows_s)),
+        averaging_time_s=float(np.ptp(fit.inputs.windows_s)),
         hour_std_rad_s=fit.bias.drift_std_rad_s(HOUR_S),
     )
 

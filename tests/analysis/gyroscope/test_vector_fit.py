@@ -89,4 +89,4 @@ def test_one_speed_tells_no_nonlinearity_and_is_named() -> None:
     explained = solved(THREE).explained
     assert explained is not None
     assert explained.nonlinearity is None
-    assert explained.seen.speeds_rad_s == pytest.approx((pi / 3,), rel=1e-3)
+    assert explained.inputs.speeds_rad_s == pytest.approx((pi / 3,), rel=1e-3)

@@ -21,7 +21,7 @@ def test_a_resumed_recording_begins_after_the_last_one_ended_whatever_the_comput
     again = replace(again, provenance=replace(again.provenance, started_utc=started.isoformat()))
     result = calibrate([first, again]).results["gyro"]
     assert result.explained is not None and result.uncertainty is not None
-    windows = result.explained.seen.windows_s
+    windows = result.explained.inputs.windows_s
     windows = windows[np.argsort(windows[:, 0])]
     assert (windows[1:, 0] > windows[:-1, 1]).all()
     off = np.array([*result.scale, *result.bias_rad_s]) - truth(SETUP)

@@ -65,7 +65,7 @@ def test_at_the_end_of_an_extension_it_circles_farther_out() -> None:
 def test_where_attitudes_do_not_tell_the_sensitivity_the_circling_does_not_either_but_is_in_its_uncertainty() -> None:
     explained = solved(WITHOUT_RESTS).explained
     assert explained is not None and explained.solution.g_sensitivity is None
-    standing_still = replace(explained, seen=replace(explained.seen, arms_m=None))
+    standing_still = replace(explained, inputs=replace(explained.inputs, arms_m=None))
     more = [budget(each, KNOWN).of("g-sensitivity")[3:] ** 2 for each in (explained, standing_still)]
     assert (more[0] > more[1]).all()
 

@@ -7,7 +7,7 @@ from rig.analysis.gyroscope.vector_inputs import list_mount_rotations
 from rig.config.procedures.stage_section import rotation_by
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import MOUNTS, Budget, Unknown, budget
-from rig.estimation.gyroscope.vector_fit import Seen, explain
+from rig.estimation.gyroscope.vector_fit import VectorInputs, explain
 
 MOUNT_DEG, SPEED_RAD_S, NOISE_RAD_S = 1.0, 1.0, 1e-7
 UNKNOWN = Unknown(
@@ -27,7 +27,7 @@ def solved(off_rad: Array, axes: Array, matrix: Array) -> tuple[Array, Budget]:
     rest, count = np.zeros((1, 3)), len(turns) + 1
     windows = 10.0 * np.arange(count)[:, None] + [0.0, 6.0]
     noise = NOISE_RAD_S * np.random.default_rng(1).standard_normal((count, 3))
-    seen = Seen(
+    seen = VectorInputs(
         means_rad_s=np.concatenate([felt, rest]) @ matrix.T + 0.01 + noise,
         variances_rad2_s2=np.full((count, 3), NOISE_RAD_S**2),
         turns_rad_s=np.concatenate([turns, rest]),

@@ -10,11 +10,11 @@ from rig.analysis.gyroscope.vector_inputs import collect_inputs
 from rig.analysis.surroundings import surroundings_of
 from rig.estimation.gyroscope.accumulator import Solution
 from rig.estimation.gyroscope.six_observation_budget import response_of
-from rig.estimation.gyroscope.vector_fit import Seen
+from rig.estimation.gyroscope.vector_fit import VectorInputs
 from rig.observation.observe import Observation
 from support.recordings.synthetic_run import Setup, synthetic_run
 
-Turns = tuple[tuple[Observation, ...], Solution, Seen]
+Turns = tuple[tuple[Observation, ...], Solution, VectorInputs]
 
 
 @pytest.fixture(scope="module")

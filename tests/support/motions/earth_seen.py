@@ -15,7 +15,7 @@ from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
 from rig.estimation.earth import DEG_H
-from rig.estimation.gyroscope.vector_fit import Seen
+from rig.estimation.gyroscope.vector_fit import VectorInputs
 from rig.estimation.statistics.rounding import Steps
 from rig.motion.geometry import AXIS_ERRORS, axis_errors, flange_axes, flange_pose
 from rig.motion.steps import Sweep
@@ -101,7 +101,7 @@ class Stretch:
     joint: str | None
 
 
-def recorded(session: Session, seed: int) -> tuple[Seen, Truth]:
+def recorded(session: Session, seed: int) -> tuple[VectorInputs, Truth]:
     """Return the rig's averages of one session of an arm and a gyroscope drawn by `seed`, sweeps first."""
     rng = np.random.default_rng(seed)
     poses = crooked_arm(session.arm_rad, rng)
@@ -132,7 +132,7 @@ def recorded(session: Session, seed: int) -> tuple[Seen, Truth]:
         noise, variances, windows = _vibrating(session, windows, turns, rng)
     else:
         noise = np.sqrt(variances) * rng.normal(size=means.shape)
-    seen = Seen(
+    seen = VectorInputs(
         means_rad_s=means + noise,
         variances_rad2_s2=variances,
         turns_rad_s=np.array([stretch.turn_rad_s for stretch in stretches]),
