@@ -34,7 +34,7 @@ def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, 
 def estimate_bias_drift(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
     """The outcome, as of `calibrate`, of attitudes gone through again and again: the bias by repeat too, and judged.
 
-    Raises Fault as `calibrate` and `bias_drifts` do.
+    Raises Fault as `calibrate` and `estimate_bias_drifts` do.
     """
     from rig.analysis import judging
 

@@ -23,12 +23,12 @@ from rig.analysis.outcome import Outcome, origin_of
 from rig.analysis.reference.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.reference.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.surroundings import surroundings_of
-from rig.analysis.temperature.bias_drift import bias_drifts
+from rig.analysis.temperature.bias_drift import estimate_bias_drifts
 from rig.analysis.temperature.over_temperature import (
     Polynomials,
-    taken_to_reference,
-    with_acceleration_polynomials,
-    with_rate_polynomials,
+    add_acceleration_polynomials,
+    add_rate_polynomials,
+    correct_recordings,
 )
 from rig.analysis.verdict import acceleration_checks, clock_checks, drift_checks, judge, verification_checks
 from rig.config.judging.judged_by import DecisionRule
@@ -60,12 +60,12 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         )
     found: Polynomials = {}
     if settings.reference_c is not None:
-        taken = taken_to_reference(recordings, settings, settings.reference_c)
+        taken = correct_recordings(recordings, settings, settings.reference_c)
         recordings, found = taken.recordings, taken.polynomials
     swept = _swept(runs, recordings, settings, chosen, found) if settings.planned_sweeps else _Swept(polynomials=found)
     accelerometers = calibrate_accelerometers(recordings, settings, swept.results)
     accelerometers, found = _over_temperature(
-        accelerometers, ACCELERATION, with_acceleration_polynomials, swept.polynomials
+        accelerometers, ACCELERATION, add_acceleration_polynomials, swept.polynomials
     )
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     of_kinds = kinds_on_arm(recordings, settings)
@@ -122,7 +122,7 @@ def _swept(
 ) -> _Swept:
     surroundings = surroundings_of(recordings, settings)
     results = solve_observed(runs[0].measuring(RATE), recordings, surroundings, estimator, settings.matrix_corrected)
-    results, polynomials = _over_temperature(results, RATE, with_rate_polynomials, polynomials)
+    results, polynomials = _over_temperature(results, RATE, add_rate_polynomials, polynomials)
     among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings, settings)
     onboard = {name: check_arithmetic(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
@@ -163,7 +163,7 @@ def drifted(runs: Sequence[RunData], estimator: str) -> Outcome:
     """Solve and judge attitudes gone through again and again, as `rig.analysis.analyses.estimate_bias_drift` says."""
     outcome = calibrated(runs, estimator, drifting=True)
     settings = outcome.settings
-    found, rule = bias_drifts(outcome.recordings, settings), _decision_rule(settings)
+    found, rule = estimate_bias_drifts(outcome.recordings, settings), _decision_rule(settings)
     checks = [check for name, each in found.items() for check in drift_checks(name, each, settings.limits, rule)]
     return replace(outcome, drifts=found, checks=(*outcome.checks, *checks))
 

@@ -154,10 +154,10 @@ def drift_checks(
     """The largest change of a bias between any two repeats."""
     checks = []
     for quantity, drift in drifts.items():
-        std = drift.held.largest_change_std
+        std = drift.scale_fixed.largest_change_std
         spread = _by_freedom(std, drift.freedom)
         checks.append(
-            _Held(sensor, quantity.name, limits, rule).nearest("bias_drift", drift.held.largest_change, spread)
+            _Held(sensor, quantity.name, limits, rule).nearest("bias_drift", drift.scale_fixed.largest_change, spread)
         )
     return tuple(checks)
 

@@ -7,7 +7,7 @@ import pytest
 
 from rig.analysis.analyses import calibrate
 from rig.analysis.outcome import Outcome
-from rig.analysis.temperature.over_temperature import taken_to_reference
+from rig.analysis.temperature.over_temperature import correct_recordings
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import settings_from_json
@@ -115,7 +115,7 @@ def test_an_accelerometer_in_dwells_is_taken_there_as_well() -> None:
     parts = {**recording.sensors, name: replace(recording.sensors[name], dwells=tuple(again), revolutions=(), rests=())}
     warmed = replace(recording, sensors=parts)
 
-    taken = taken_to_reference([warmed], replace(settings, planned_sweeps=()), REFERENCE_C)
+    taken = correct_recordings([warmed], replace(settings, planned_sweeps=()), REFERENCE_C)
 
     found = taken.polynomials[name][ACCELERATION]
     moved = np.array([dwell.reading.mean for dwell in taken.recordings[0].sensors[name].dwells])

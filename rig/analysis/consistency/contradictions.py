@@ -26,7 +26,7 @@ from rig.analysis.reference.acceleration import AccelerometerResult, calibrate_a
 from rig.analysis.reference.magnetic_field import MagnetometerResult
 from rig.analysis.solvable import solvable
 from rig.analysis.surroundings import Surroundings, surroundings_of
-from rig.analysis.temperature.over_temperature import taken_to_reference
+from rig.analysis.temperature.over_temperature import correct_recordings
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import RunSettings
@@ -191,7 +191,7 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
         if not recordings:
             return disturbed
         if settings.reference_c is not None:
-            recordings = taken_to_reference(recordings, settings, settings.reference_c).recordings
+            recordings = correct_recordings(recordings, settings, settings.reference_c).recordings
         chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
         surroundings = surroundings_of(recordings, settings)
         results = solve_observed(chosen, recordings, surroundings)

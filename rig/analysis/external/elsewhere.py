@@ -24,7 +24,7 @@ from rig.analysis.gyroscope.calibration import (
 )
 from rig.analysis.gyroscope.correction import diagonal_correction, matrix_correction
 from rig.analysis.installed_kinds import KindFound, OfKind
-from rig.analysis.temperature.over_temperature import files_to_reference, with_rate_polynomials
+from rig.analysis.temperature.over_temperature import add_rate_polynomials, correct_files
 from rig.data.quantity import RATE, Quantity
 from rig.data.recording.motion_file import Item, ReadElsewhere
 from rig.data.recording.settings import RunSettings
@@ -133,7 +133,7 @@ def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None)
             "Give sweeps at constant speed, with speed_rad_s; or leave out --reference-c",
         )
     if reference_c is not None:
-        data, polynomials = files_to_reference(data, reference_c)
+        data, polynomials = correct_files(data, reference_c)
     solution, faults = solve_swept(data, chosen), dict[str, Fault]()
     vector = (
         solution
@@ -161,7 +161,7 @@ def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None)
     )
     by_turns = data.turned if isinstance(solution, TurnedSolution) else None
     if polynomials is not None:
-        gyroscope, polynomials = with_rate_polynomials(gyroscope, polynomials)
+        gyroscope, polynomials = add_rate_polynomials(gyroscope, polynomials)
     notes = tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
     omitted = tuple((RATE, each) for each in data.omitted)
     return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes)

@@ -1,5 +1,5 @@
-"""The bias of every sensor repeat by repeat, of a run that goes through the same attitudes again and again: TRIAX,
-sections III-A and III-B, Figs. 4 and 6. Pure.
+"""The bias of every sensor by repeat, in a run that visits the same attitudes several times: TRIAX, sections III-A and
+III-B, Figs. 4 and 6. Pure.
 """
 
 from collections import defaultdict
@@ -31,8 +31,8 @@ SLOPE = "over_temperature"
 
 
 @dataclass(frozen=True, slots=True)
-class Anew:
-    """The bias of one repeat with everything found anew from it: (3,), and its standard deviation (3,)."""
+class ScaleFreeBias:
+    """The bias (3,) of one repeat with all parameters estimated from it, and its standard deviation (3,)."""
 
     bias: Array
     std: Array
@@ -42,17 +42,20 @@ class Anew:
 class BiasDrift:
     """The bias of one quantity of a sensor by repeat, rad/s or m/s².
 
-    `held`: scale, axes and reference are those of the first repeat (accelerometers), or nominal (gyroscopes). A
-    gyroscope's bias has what a scale that is not nominal makes of the Earth's rate in it, and all of the Earth's rate
-    where the site does not say it (`earth_rate_known`): the same in every repeat. `common_std` (3,) is what all biases
-    share beside that. `anew` is each repeat for itself, by its index. `time_s` and `temperature_c` (R,) are means over
-    each repeat, times since the first. `freedom` (3,) is that of `held.std`, `slope_freedom` (3,) that of the slope's
-    standard deviation. `faults` say by the name SLOPE why there is no slope.
+    A gyroscope's bias contains the effect of a scale that is not nominal on the Earth's rate, and all of the Earth's
+    rate if the site does not state it (`earth_rate_known`): the same in every repeat.
+
+    - `scale_fixed`: with scale, axes and reference of the first repeat (accelerometers), or nominal (gyroscopes).
+    - `common_std` (3,): the further standard deviation common to all biases.
+    - `scale_free`: the solution of every repeat by itself, by its index.
+    - `time_s`, `temperature_c` (R,): means over every repeat, times since the first.
+    - `freedom`, `slope_freedom` (3,): those of `scale_fixed.std` and of the slope's standard deviation.
+    - `faults`: by the name SLOPE, why there is no slope.
     """
 
-    held: BiasByRepeat
+    scale_fixed: BiasByRepeat
     common_std: Array
-    anew: Attempts[int, Anew]
+    scale_free: Attempts[int, ScaleFreeBias]
     time_s: Array
     temperature_c: Array
     over_temperature: BiasOverTemperature | None
@@ -66,10 +69,10 @@ Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
-    """What a sensor read in one dwell: means (3,), their variances, the attitude base → sensor, when, how warm.
+class DwellMean:
+    """A sensor's means (3,) in one dwell, their variances, the attitude base → sensor, time and temperature.
 
-    `freedom` (3,) is the variances'.
+    `freedom` (3,) is that of the variances.
     """
 
     mean: Array
@@ -80,44 +83,44 @@ class Stand:
     freedom: Array | float = np.inf
 
 
-def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
-    """Drift of every sensor to calibrate, over all recordings of a run; repeats that were not finished are left out.
+def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
+    """Return the drift of every sensor to calibrate, over all recordings of a run, by its finished repeats.
 
-    Raises Fault `not_all_attitudes` with fewer than two whole repeats, and as `solve_triaxial` for the first one.
+    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and as `solve_triaxial` for the first one.
     """
     site = settings.site
     repeats: defaultdict[int, dict[tuple[float, ...], int]] = defaultdict(dict)
     for planned in settings.planned_dwells:
         repeats[planned.repeat][planned.q_rad] = planned.index
     order = sorted(repeats[0])
-    table = [[found[q_rad] for q_rad in order] for _, found in sorted(repeats.items()) if len(found) == len(order)]
+    table = [[dwells[q_rad] for q_rad in order] for _, dwells in sorted(repeats.items()) if len(dwells) == len(order)]
     drifts: dict[str, dict[Quantity, BiasDrift]] = {}
     for name in settings.to_calibrate:
         sensor = recordings[0].run.sensors[name]
-        drifts[name] = {RATE: rate_drift(_whole(_rates(recordings, name, sensor), table), site)}
+        drifts[name] = {RATE: fit_rate_drift(_select_complete(_rates(recordings, name, sensor), table), site)}
         if sensor.measures(ACCELERATION):
-            accelerations = _whole(_accelerations(recordings, name, sensor), table)
-            drifts[name][ACCELERATION] = acceleration_drift(accelerations, site, second_order=settings.second_order)
+            accelerations = _select_complete(_accelerations(recordings, name, sensor), table)
+            drifts[name][ACCELERATION] = fit_acceleration_drift(accelerations, site, second_order=settings.second_order)
     return drifts
 
 
-def _whole(stands: Mapping[int, Stand], table: Sequence[Sequence[int]]) -> list[list[Stand]]:
-    """The whole repeats, attitudes in the same order."""
-    whole = [[stands[index] for index in repeat] for repeat in table if stands.keys() >= set(repeat)]
-    if len(whole) < FEWEST_REPEATS:
+def _select_complete(means: Mapping[int, DwellMean], table: Sequence[Sequence[int]]) -> list[list[DwellMean]]:
+    """Return the complete repeats, attitudes in the same order."""
+    complete = [[means[index] for index in repeat] for repeat in table if means.keys() >= set(repeat)]
+    if len(complete) < FEWEST_REPEATS:
         raise Fault(
             "not_all_attitudes",
-            f"{len(whole)} of {len(table)} repeats were finished, and a drift needs {FEWEST_REPEATS}",
+            f"{len(complete)} of {len(table)} repeats were finished, and a drift needs {FEWEST_REPEATS}",
             "Go on with `rig resume RUN_DIR`, or run the procedure again",
         )
-    return whole
+    return complete
 
 
-def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, Stand]:
-    """What the sensor's accelerometer read in each dwell, by the dwell's index."""
+def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, DwellMean]:
+    """Return the means of the sensor's accelerometer in every dwell, by the dwell's index."""
     mounting = np.array(sensor.mounting)
     return {
-        dwell.index: Stand(
+        dwell.index: DwellMean(
             dwell.reading.mean,
             dwell.reading.variance,
             mounting @ nearest_rotation(dwell.attitude),
@@ -130,15 +133,15 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
     }
 
 
-def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, Stand]:
-    """A dwell is a rest of the gyroscope's."""
-    mounting, found = np.array(sensor.mounting), {}
+def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, DwellMean]:
+    """Return the means of the gyroscope in every dwell, which is a rest for it."""
+    mounting, means = np.array(sensor.mounting), {}
     for recording in recordings:
         for index, (start_s, end_s) in dwell_times_s(recording.run).items():
             for rest in recording.sensors[name].rests:
                 inside = start_s <= rest.start_s and rest.end_s <= end_s
                 if inside and rest.attitude is not None:  # always where an arm made it
-                    found[index] = Stand(
+                    means[index] = DwellMean(
                         rest.mean_rad_s,
                         rest.variance_rad2_s2 - rest.drift_rad2_s2,
                         mounting @ nearest_rotation(rest.attitude),
@@ -146,15 +149,15 @@ def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor)
                         rest.temperature_c,
                         rest.freedom,
                     )
-    return found
+    return means
 
 
-def acceleration_drift(repeats: Sequence[Sequence[Stand]], site: Site, *, second_order: bool) -> BiasDrift:
-    """Drift of an accelerometer, from repeats of the same attitudes in the same order; the first finds what is held.
+def fit_acceleration_drift(repeats: Sequence[Sequence[DwellMean]], site: Site, *, second_order: bool) -> BiasDrift:
+    """Return the drift of an accelerometer, from repeats of the same attitudes in the same order.
 
-    Raises Fault as `solve_triaxial` and `bias_by_repeat` do.
+    The first determines the fixed parameters. Raise Fault as `solve_triaxial` and `bias_by_repeat` do.
     """
-    means, variances, attitudes = _stacked(repeats)
+    means, variances, attitudes = _stack(repeats)
 
     def solve(repeat: int) -> TriaxialSolution:
         return solve_triaxial(
@@ -167,18 +170,18 @@ def acceleration_drift(repeats: Sequence[Sequence[Stand]], site: Site, *, second
         )
 
     first = solve(0)
-    felt = np.einsum("rnji,j->rni", attitudes, first.reference)
+    sensed = np.einsum("rnji,j->rni", attitudes, first.reference)
     if first.second_order is not None:
-        felt = felt + first.second_order * felt**2
-    held = bias_by_repeat(means, variances, felt @ first.matrix.T, first.bias)
+        sensed = sensed + first.second_order * sensed**2
+    by_repeat = bias_by_repeat(means, variances, sensed @ first.matrix.T, first.bias)
     # What the first repeat's noise adds to its bias is in its own `std` already.
-    common = np.maximum(np.diag(first.covariance)[BIAS] - held.std[0] ** 2, 0.0)
-    return _drift(repeats, held, np.sqrt(common), solve, earth_rate_known=site.earth_rate_rad_s is not None)
+    common = np.maximum(np.diag(first.covariance)[BIAS] - by_repeat.std[0] ** 2, 0.0)
+    return _combine(repeats, by_repeat, np.sqrt(common), solve, earth_rate_known=site.earth_rate_rad_s is not None)
 
 
-def rate_drift(repeats: Sequence[Sequence[Stand]], site: Site) -> BiasDrift:
-    """Drift of a gyroscope, scale and axes held at their nominal values. Raises Fault as `bias_by_repeat` does."""
-    means, variances, attitudes = _stacked(repeats)
+def fit_rate_drift(repeats: Sequence[Sequence[DwellMean]], site: Site) -> BiasDrift:
+    """Return the drift of a gyroscope with nominal scale and axes. Raise Fault as `bias_by_repeat` does."""
+    means, variances, attitudes = _stack(repeats)
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
 
     def solve(repeat: int) -> TriaxialSolution:
@@ -188,30 +191,30 @@ def rate_drift(repeats: Sequence[Sequence[Stand]], site: Site) -> BiasDrift:
                 "a gyroscope at rest shows the Earth's rate, and the configuration does not state the site",
                 "Give site.latitude_deg and site.heading_deg",
             )
-        known = KnownNorm(float(np.linalg.norm(earth)), earth)
-        return solve_triaxial(means[repeat], attitudes[repeat], variances[repeat], known, method="maximum_likelihood")
+        field = KnownNorm(float(np.linalg.norm(earth)), earth)
+        return solve_triaxial(means[repeat], attitudes[repeat], variances[repeat], field, method="maximum_likelihood")
 
-    held = bias_by_repeat(means, variances, np.einsum("rnji,j->rni", attitudes, earth))
-    return _drift(repeats, held, np.zeros(3), solve, earth_rate_known=site.earth_rate_rad_s is not None)
+    by_repeat = bias_by_repeat(means, variances, np.einsum("rnji,j->rni", attitudes, earth))
+    return _combine(repeats, by_repeat, np.zeros(3), solve, earth_rate_known=site.earth_rate_rad_s is not None)
 
 
-def _drift(
-    repeats: Sequence[Sequence[Stand]],
-    held: BiasByRepeat,
+def _combine(
+    repeats: Sequence[Sequence[DwellMean]],
+    by_repeat: BiasByRepeat,
     common_std: Array,
     solve: Callable[[int], TriaxialSolution],
     *,
     earth_rate_known: bool,
 ) -> BiasDrift:
-    times = np.array([np.mean([each.time_s for each in repeat]) for repeat in repeats])
-    temperatures = np.array([np.mean([each.temperature_c for each in repeat]) for repeat in repeats])
+    times = np.array([np.mean([mean.time_s for mean in repeat]) for repeat in repeats])
+    temperatures = np.array([np.mean([mean.temperature_c for mean in repeat]) for repeat in repeats])
     faults = dict[str, Fault]()
-    slope = attempt(faults, SLOPE, partial(bias_over_temperature, held.bias, held.std, temperatures, times))
-    freedom = np.minimum(held.freedom, np.min([_noise_freedom(repeat) for repeat in repeats], axis=0))
+    slope = attempt(faults, SLOPE, partial(bias_over_temperature, by_repeat.bias, by_repeat.std, temperatures, times))
+    freedom = np.minimum(by_repeat.freedom, np.min([_repeat_dof(repeat) for repeat in repeats], axis=0))
     return BiasDrift(
-        held=held,
+        scale_fixed=by_repeat,
         common_std=common_std,
-        anew=attempt_each({repeat: partial(_anew, solve, repeat) for repeat in range(len(repeats))}),
+        scale_free=attempt_each({repeat: partial(_solve_repeat, solve, repeat) for repeat in range(len(repeats))}),
         time_s=times - times[0],
         temperature_c=temperatures,
         over_temperature=slope,
@@ -222,20 +225,20 @@ def _drift(
     )
 
 
-def _noise_freedom(repeat: Sequence[Stand]) -> Array:
-    """(3,) degrees of freedom of a repeat's mean over its attitudes."""
-    return effective_freedom([each.variance for each in repeat], by_axis(each.freedom for each in repeat))
+def _repeat_dof(repeat: Sequence[DwellMean]) -> Array:
+    """Return the degrees of freedom (3,) of a repeat's mean over its attitudes."""
+    return effective_freedom([mean.variance for mean in repeat], by_axis(mean.freedom for mean in repeat))
 
 
-def _anew(solve: Callable[[int], TriaxialSolution], repeat: int) -> Anew:
-    found = solve(repeat)
-    return Anew(found.bias, np.sqrt(np.diag(found.covariance)[BIAS]))
+def _solve_repeat(solve: Callable[[int], TriaxialSolution], repeat: int) -> ScaleFreeBias:
+    solution = solve(repeat)
+    return ScaleFreeBias(solution.bias, np.sqrt(np.diag(solution.covariance)[BIAS]))
 
 
-def _stacked(repeats: Sequence[Sequence[Stand]]) -> tuple[Array, Array, Array]:
-    """Means and variances (R, N, 3), attitudes (R, N, 3, 3) from the sensor into the base."""
+def _stack(repeats: Sequence[Sequence[DwellMean]]) -> tuple[Array, Array, Array]:
+    """Return means and variances (R, N, 3), and attitudes (R, N, 3, 3) from the sensor into the base."""
     return (
-        np.array([[each.mean for each in repeat] for repeat in repeats]),
-        np.array([[each.variance for each in repeat] for repeat in repeats]),
-        np.array([[each.attitude.T for each in repeat] for repeat in repeats]),
+        np.array([[dwell.mean for dwell in repeat] for repeat in repeats]),
+        np.array([[dwell.variance for dwell in repeat] for repeat in repeats]),
+        np.array([[dwell.attitude.T for dwell in repeat] for repeat in repeats]),
     )

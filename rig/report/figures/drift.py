@@ -46,11 +46,11 @@ def _draw_all(figure: "Figure", drifts: Mapping[Quantity, BiasDrift]) -> None:
 def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
     """Draw the bias by repeat: dots with scale and axes fixed, crosses with all solved, lines at its changes."""
     size = quantity.drift.size
-    repeat = np.arange(1, len(drift.held.bias) + 1)
-    free_solutions = [(index + 1, solution) for index, solution in drift.anew.results.items()]
+    repeat = np.arange(1, len(drift.scale_fixed.bias) + 1)
+    free_solutions = [(index + 1, solution) for index, solution in drift.scale_free.results.items()]
     factors = expanded((1.0, 1.0, 1.0), counted(drift.freedom)).factors
     for i, axis in enumerate("xyz"):
-        bias, std = drift.held.bias[:, i] / size, drift.held.std[:, i] / size
+        bias, std = drift.scale_fixed.bias[:, i] / size, drift.scale_fixed.std[:, i] / size
         axes.errorbar(repeat, bias, factors[i] * std, fmt="o-", ms=3, lw=0.8, color=f"C{i}", label=axis)
         if free_solutions:
             biases, stds = (
@@ -66,7 +66,7 @@ def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
                 alpha=0.6,
                 color=f"C{i}",
             )
-    for move in drift.held.moves:
+    for move in drift.scale_fixed.moves:
         axes.axvline(move.repeat + 0.5, color="0.5", ls=":", lw=0.8)
     axes.locator_params("x", integer=True)
     axes.set(

@@ -27,7 +27,7 @@ from rig.report.words.expanded import expanded, factor_words
 from rig.station.plain_text import plain
 
 if TYPE_CHECKING:
-    from rig.analysis.temperature.bias_drift import Anew, BiasDrift
+    from rig.analysis.temperature.bias_drift import BiasDrift, ScaleFreeBias
 
 
 def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
@@ -45,8 +45,8 @@ def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: RecordedSensor) 
     from rig.analysis.temperature.bias_drift import SLOPE
     from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM
 
-    scale_fixed, slope = drift.held, drift.over_temperature
-    scale_free = drift.anew.by_key(_bias_entry, error_entry)
+    scale_fixed, slope = drift.scale_fixed, drift.over_temperature
+    scale_free = drift.scale_free.by_key(_bias_entry, error_entry)
     return DriftEntry(
         unit=quantity.unit,
         repeats=tuple(
@@ -90,7 +90,7 @@ def _nan_to_none(temperature_c: float) -> float | None:
     return None if np.isnan(temperature_c) else temperature_c
 
 
-def _bias_entry(free: "Anew") -> BiasEntry:
+def _bias_entry(free: "ScaleFreeBias") -> BiasEntry:
     return BiasEntry(bias=_vector(free.bias), std=_vector(free.std))
 
 

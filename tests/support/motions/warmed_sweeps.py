@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.external.elsewhere import budget_of, solve_swept
-from rig.analysis.temperature.over_temperature import files_to_reference
+from rig.analysis.temperature.over_temperature import correct_files
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.temperature.over_temperature import (
@@ -170,8 +170,8 @@ def external(means: Array, of: Session, noise: float) -> ExternalData:
 
 
 def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemperature:
-    """Return polynomials with the full uncertainty that sweeps of files have."""
-    moved, found = files_to_reference(external(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C)
+    """Polynomials with all of the uncertainty that sweeps of files have."""
+    moved, found = correct_files(external(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C)
     solution = solve_swept(moved, "vector")
     sign = np.diag(RATE.parameter_signs)
     lines = tuple(
