@@ -1,7 +1,7 @@
 """The analyses that procedures name: from recordings to the outcome of a run.
 
-Whoever plans a procedure reads this: so what solves is loaded when there is something to solve. Where NumPy or SciPy
-gives up, each raises Fault `not_solvable`.
+Whoever plans a procedure imports this, so the solvers are imported when they are needed. If NumPy or SciPy has no
+solution, each raises Fault `not_solvable`.
 """
 
 from collections.abc import Sequence
@@ -17,35 +17,34 @@ if TYPE_CHECKING:
 
 @solvable()
 def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
-    """Solve and judge the recordings of a calibration, at least one: the same for a run that just ended and from files.
+    """Solve and judge the recordings of a calibration, at least one, of a run that just ended or from files.
 
-    Where biases may be `drifting`, that they do contradicts nothing. Raises Fault or Refused by name when the
-    recordings do not hold what they should.
+    If `drifting`, a bias drift is no contradiction. Raise Fault or Refused if the recordings lack something.
     """
     from rig.analysis import judging
     from rig.analysis.external import judging as external_judging
 
     if (external := runs[0].elsewhere) is not None:
         return external_judging.calibrate_external(runs, external, estimator)
-    return judging.calibrated(runs, estimator, drifting=drifting)
+    return judging.calibrate(runs, estimator, drifting=drifting)
 
 
 @solvable()
 def estimate_bias_drift(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
-    """The outcome, as of `calibrate`, of attitudes gone through again and again: the bias by repeat too, and judged.
+    """Return the outcome as `calibrate` does, with the bias by repeat of attitudes that were visited several times.
 
-    Raises Fault as `calibrate` and `estimate_bias_drifts` do.
+    Raise Fault as `calibrate` and `estimate_bias_drifts` do.
     """
     from rig.analysis import judging
 
-    return judging.drifted(runs, estimator)
+    return judging.estimate_bias_drift(runs, estimator)
 
 
 @solvable()
 def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
     """Solve and judge the recordings of a session by hand, at least one.
 
-    Raises Fault as `rig.estimation.by_hand.solve_by_hand` does, `no_crystal` where the board's clock has none.
+    Raise Fault as `rig.estimation.by_hand.solve_by_hand` does, `no_crystal` if the board's clock has none.
     """
     from rig.analysis.by_hand import judging as hand_judging
 
@@ -54,21 +53,21 @@ def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
 
 @solvable()
 def verify_calibration(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
-    """The outcome with what `repeated`, the calibration's movement with calibrated readings, says of it.
+    """Return the outcome with the verification by `repeated`: the same movement with calibrated readings.
 
-    Without such a recording the checks of the verification fail. Raises Fault as `observe_runs` and `verify` do.
+    Without such a recording the checks of the verification fail. Raise Fault as `observe_runs` and `verify` do.
     """
     from rig.analysis import judging
 
-    return judging.verified(outcome, repeated)
+    return judging.verify_calibration(outcome, repeated)
 
 
 @solvable()
 def verify_stored_calibrations(repeated: "Sequence[RunData]") -> Outcome:
-    """What recordings of calibrated readings, at least one, say of the calibrations the board had stored before.
+    """Verify the calibrations that the board had stored before, by recordings of calibrated readings, at least one.
 
-    Raises Fault as `verify_calibration` does.
+    Raise Fault as `verify_calibration` does.
     """
     from rig.analysis import judging
 
-    return judging.verified_alone(repeated)
+    return judging.verify_stored(repeated)

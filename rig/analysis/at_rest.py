@@ -1,4 +1,4 @@
-"""How sensors behave at rest, by the Allan deviation of every rest and dwell, or of a log made elsewhere. Pure."""
+"""The noise of sensors at rest: the Allan deviation of every rest and dwell, or of a log of another program. Pure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,10 +25,10 @@ FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 
 @dataclass(frozen=True, slots=True)
 class AtRest:
-    """One quantity of a sensor at rest: its Allan deviation in rad/s or m/s², what each axis tells, what it rests on.
+    """The Allan deviation of one quantity at rest in rad/s or m/s², and the noise parameters of its axes.
 
-    `longest_s` is the longest stretch without a gap, `total_s` that of all; `temperature_c` the least and the largest,
-    None where no thermometer was recorded.
+    `longest_s` is the longest interval without a gap, `total_s` the sum of all; `temperature_c` the lowest and the
+    highest, None without a thermometer.
     """
 
     curve: AllanCurve
@@ -41,45 +41,49 @@ class AtRest:
 
 @dataclass(frozen=True, slots=True)
 class SensorAtRest:
-    """A sensor, None where the readings do not say which, and each quantity it sends, or the Fault it ends in."""
+    """A sensor, None if the readings do not name it, and every quantity it measures, or the Fault it ends in."""
 
     sensor: RecordedSensor | None
     quantities: Attempts[Quantity, AtRest]
 
 
 def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
-    """Every sensor with rates, by name, over all recordings of a run; readings the board corrected are left out.
+    """Return every sensor with rates, by name, over all recordings of a run, without readings that the board corrected.
 
-    Raises Fault as `motion_of` and `synchronize_stream` do.
+    Raise Fault as `motion_of` and `synchronize_stream` do.
     """
     motions = [motion_of(run) for run in runs]
-    found = {}
+    results = {}
     for name, sensor in runs[0].measuring(RATE).items():
-        pieces = []
+        intervals = []
         for run, motion in zip(runs, motions, strict=True):
             stream = synchronize_stream(run.samples[name], sensor, motion)
-            pieces += [(stream, inside) for inside in still_samples(run, stream, motion)]
+            intervals += [(stream, inside) for inside in still_samples(run, stream, motion)]
         quantities = [RATE, ACCELERATION] if sensor.measures(ACCELERATION) else [RATE]
-        found[name] = SensorAtRest(
-            sensor, attempt_each({quantity: partial(_of, pieces, quantity) for quantity in quantities})
+        results[name] = SensorAtRest(
+            sensor,
+            attempt_each({quantity: partial(_summarise_streams, intervals, quantity) for quantity in quantities}),
         )
-    return found
+    return results
 
 
 def log_at_rest(samples: Samples) -> SensorAtRest:
-    """What a log of readings says that was made elsewhere, with the sensor at rest all the time.
+    """Return the noise of a sensor that was at rest during a whole log of another program.
 
-    Raises Fault `not_at_rest`.
+    Raise Fault `not_at_rest`.
     """
     for quantity, readings in samples.readings.items():
         check_at_rest(samples.time_s, readings, quantity)
-    pieces = [inside for inside in contiguous_slices(samples.time_s) if inside.stop - inside.start > 2]
+    intervals = [inside for inside in contiguous_slices(samples.time_s) if inside.stop - inside.start > 2]
     return SensorAtRest(
         None,
         attempt_each(
             {
                 quantity: partial(
-                    _told, [samples.time_s[piece] for piece in pieces], [readings[piece] for piece in pieces], quantity
+                    _summarise,
+                    [samples.time_s[interval] for interval in intervals],
+                    [readings[interval] for interval in intervals],
+                    quantity,
                 )
                 for quantity, readings in samples.readings.items()
             }
@@ -87,16 +91,16 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
     )
 
 
-def _of(pieces: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:
-    long = [(stream, inside) for stream, inside in pieces if inside.stop - inside.start > 2]
+def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:
+    long = [(stream, inside) for stream, inside in intervals if inside.stop - inside.start > 2]
     readings = [_readings(stream, inside, quantity) for stream, inside in long]
-    told = _told([stream.time_s[inside] for stream, inside in long], readings, quantity)
+    summary = _summarise([stream.time_s[inside] for stream, inside in long], readings, quantity)
     temperatures = [_temperatures(stream, inside) for stream, inside in long]
-    return replace(told, temperature_c=(min(low for low, _ in temperatures), max(high for _, high in temperatures)))
+    return replace(summary, temperature_c=(min(low for low, _ in temperatures), max(high for _, high in temperatures)))
 
 
-def _told(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
-    """What stretches at rest tell of the noise, each of (nᵢ,) times and (nᵢ, 3) readings."""
+def _summarise(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
+    """Return the noise by intervals at rest, (nᵢ,) times and (nᵢ, 3) readings."""
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")
     if any(not np.ptp(reading, axis=0).all() for reading in readings if len(reading) > FEWEST_TO_JUDGE):

@@ -1,4 +1,4 @@
-"""One check of the verdict: what was measured beside its limit, and how it is called. Pure."""
+"""One check of the verdict: a measured value and its limit, and the check's name. Pure."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -15,12 +15,12 @@ ONLY_RECORDED = ("no_attitudes", "field_strength_unknown")  # why a sensor was n
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One limit: it passes when `value` is a number not above `limit` less `guard`. `unit` belongs to all of them.
+    """One limit: it passes if `value` is a number not above `limit` less `guard`, all in `unit`.
 
-    What it `means` is said by whoever makes it: `name` is for people, and nothing is read out of how it is spelt.
-    `value` is None where nothing was measured, `limit` where none was set, `uncertainty` where the value has none. It
-    is the expanded one, by `coverage_factor` and so many degrees of `freedom`. The `guard` is that uncertainty where
-    the decision rule is the guard band (ILAC-G8, 4.2).
+    - `name`: for people; programs read `means`.
+    - `value`, `limit`: None if nothing was measured, or no limit was set.
+    - `uncertainty`: the expanded one by `coverage_factor` and `freedom` degrees of freedom, None without one.
+    - `guard`: that uncertainty if the decision rule is the guard band (ILAC-G8, 4.2).
     """
 
     name: str
@@ -35,14 +35,14 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """False for a measurement that is missing or not a number, and without a limit."""
+        """Whether it passes: not without a number or a limit."""
         if self.value is None or self.limit is None:
             return False
         return math.isfinite(self.value) and self.value <= self.limit - self.guard
 
     @property
     def false_acceptance(self) -> float | None:
-        """The probability that what passed is beyond the limit all the same; None where nothing passed."""
+        """The probability that a value which passed is beyond the limit; None if it did not pass."""
         if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
             return None
         return float(beyond((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.freedom))
@@ -60,27 +60,27 @@ def fitness(
     sweep: int | None = None,
     dwell: int | None = None,
 ) -> Check:
-    """A check whether the measurement of a sensor's quantity is fit for use, by a `limit` without a row of its own.
+    """Return a check whether a sensor's quantity is measured well enough, by a `limit` without a row of its own.
 
-    The `sweep` or `dwell` of the plan that it is told of, by index, is part of its name.
+    The index of the plan's `sweep` or `dwell` that it is about is part of its name.
     """
-    means, piece = Meaning("fitness", sensor, quantity, parameter, sweep, what), dwell if sweep is None else sweep
-    name = check_name(sensor, quantity, what)
-    return Check(name if piece is None else f"{name}.{piece}", value, limit, unit, means)
+    means, index = Meaning("fitness", sensor, quantity, parameter, sweep, what), dwell if sweep is None else sweep
+    name = name_check(sensor, quantity, what)
+    return Check(name if index is None else f"{name}.{index}", value, limit, unit, means)
 
 
-def unsolved_checks(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
-    """Yield the checks that fail: of a sensor, its quantity and the Fault for which this has no solution.
+def list_unsolved(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
+    """Yield the failing checks of sensors without a solution, by name, quantity and Fault.
 
-    Of what was only recorded there is none: sweeps do not calibrate a magnetometer, and the size of the field is what
-    asks for that.
+    Sensors that were only recorded have none: sweeps do not calibrate a magnetometer, for which the size of the field
+    is stated.
     """
     for sensor, quantity, fault in faults:
         if fault.name not in ONLY_RECORDED:
             yield fitness(sensor, quantity, "unsolved", 1.0, 0.0)
 
 
-def check_name(sensor: str, quantity: str, what: str) -> str:
-    """What a check of a sensor is called: that a gyroscope reads rates goes without saying."""
-    known = quantities().get(quantity)
-    return f"{sensor}.{f'{quantity}_' if known is None else known.prefix}{what}"
+def name_check(sensor: str, quantity: str, what: str) -> str:
+    """Return the name of a check of a sensor, without the quantity if that is a gyroscope's rate."""
+    described = quantities().get(quantity)
+    return f"{sensor}.{f'{quantity}_' if described is None else described.prefix}{what}"

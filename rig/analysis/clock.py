@@ -1,7 +1,7 @@
-"""The controller's clock, the only standard of size: held against this computer's and the board's crystal.
+"""The controller's clock, the only standard of size, compared with this computer's clock and the board's crystal.
 
-Both stand in every recording. A speed is 2π over a time of the controller's, so every scale factor errs by what that
-clock errs by. No clock is left out for being far off: what two differ by is held against what is stated of both.
+Every recording has both. A speed is 2π over a time of the controller's clock, so every scale factor has that clock's
+error. No clock is left out for a large error: the differences are compared with what is stated of both clocks.
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,7 +18,7 @@ from rig.observation.timebase import NOMINAL_DRIFT
 
 # A simulated controller goes as fast as it can: a computer that is farther off counts no seconds of it.
 ONE_PACE = 1e-2
-CERTAIN = 4.0  # standard deviations of what is found beside what is stated
+CERTAIN = 4.0  # standard deviations of the measured part of a difference
 PPM = 1e-6
 
 BY_COMPUTER, BY_CRYSTAL = "the computer's clock", "the board's crystal"
@@ -27,10 +27,10 @@ SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
 
 @dataclass(frozen=True, slots=True)
 class ClockComparison:
-    """How much too fast the controller's clock runs by another one, and the standard uncertainty of that: fractions.
+    """The relative error of the controller's clock by another one, and its standard uncertainty.
 
-    `half_width` is what is stated of the other clock, `noise_std` what the recording leaves uncertain, with so much
-    `freedom`; `std` is both.
+    `half_width` is stated of the other clock, `noise_std` the uncertainty by the recording with `freedom` degrees of
+    freedom; `std` combines both.
     """
 
     by: str
@@ -41,29 +41,29 @@ class ClockComparison:
 
     @property
     def std(self) -> float:
-        """Standard uncertainty of the comparison, as a fraction."""
+        """The relative standard uncertainty of the comparison."""
         return float(np.hypot(self.noise_std, self.half_width / np.sqrt(3)))
 
 
 @dataclass(frozen=True, slots=True)
 class ClockDifference:
-    """What two clocks, by name, differ by, and the most that is stated of them and found allows: fractions."""
+    """The relative difference of two clocks, by name, and its limit by what is stated and measured."""
 
     clocks: tuple[str, str]
     size: float
     limit: float
 
     @property
-    def share(self) -> float:
-        """Share of the limit that the difference takes; beyond one the clocks contradict each other."""
+    def limit_fraction(self) -> float:
+        """The difference over its limit; above one the clocks contradict each other."""
         return self.size / self.limit
 
 
 @dataclass(frozen=True, slots=True)
 class ClockCheck:
-    """What is known of the controller's clock: `error` is how much too fast it runs, `std` its standard uncertainty.
+    """The relative `error` of the controller's clock (positive if it is fast) and its standard uncertainty `std`.
 
-    Made of all `comparisons` and of what such a clock may be off at all, `half_width`, weighted by their variances.
+    They are means of all `comparisons` and of the stated `half_width` about zero, weighted by inverse variance.
     """
 
     error: float
@@ -72,58 +72,58 @@ class ClockCheck:
     half_width: float
 
     def differences(self) -> Iterator[ClockDifference]:
-        """Every two clocks that are compared; of two half-widths the sum, for all values within are alike likely."""
-        known = [("controller", 0.0, self.half_width, 0.0)]
-        known += [
+        """Yield the difference of every two clocks; half-widths add up: all values within are equally likely."""
+        clocks = [("controller", 0.0, self.half_width, 0.0)]
+        clocks += [
             (SHORT[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)
             for comparison in self.comparisons
         ]
-        for (one, error, width, noise), (other, its_error, its_width, its_noise) in combinations(known, 2):
+        for (one, error, width, noise), (other, its_error, its_width, its_noise) in combinations(clocks, 2):
             limit = width + its_width + CERTAIN * float(np.hypot(noise, its_noise))
             yield ClockDifference((one, other), abs(error - its_error), limit)
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom of `std`, infinite where nothing was found from readings."""
-        found = [
+        """The degrees of freedom of `std` by Welch and Satterthwaite, infinite without readings."""
+        terms = [
             (comparison.noise_std * (self.std / comparison.std) ** 2) ** 4 / comparison.freedom
             for comparison in self.comparisons
         ]
-        return self.std**4 / sum(found) if any(found) else np.inf
+        return self.std**4 / sum(terms) if any(terms) else np.inf
 
 
-def check_clock(recording: ObservedRun, known: Uncertainty) -> ClockCheck:
-    """Return what is known of the clock of one recording's controller, compared with every other clock."""
-    compared = (_by_computer(recording, known), _by_crystal(recording, known))
+def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
+    """Return the error of the clock of one recording's controller, by every other clock."""
+    compared = (_compare_to_computer(recording, uncertainty), _compare_to_crystal(recording, uncertainty))
     pace = ONE_PACE if calls_itself_simulated(recording.run.provenance.arm_software) else np.inf
     far = {BY_COMPUTER: pace, BY_CRYSTAL: np.inf}
-    found = [each for each in compared if each is not None and abs(each.error) < far[each.by]]
-    half_width = known.controller_clock_ppm * PPM
-    weights = np.array([3 / half_width**2, *(1 / each.std**2 for each in found)])
-    errors = np.array([0.0, *(each.error for each in found)])
+    used = [other for other in compared if other is not None and abs(other.error) < far[other.by]]
+    half_width = uncertainty.controller_clock_ppm * PPM
+    weights = np.array([3 / half_width**2, *(1 / other.std**2 for other in used)])
+    errors = np.array([0.0, *(other.error for other in used)])
     error, std = float(weights @ errors / weights.sum()), float(weights.sum() ** -0.5)
-    return ClockCheck(error, std, tuple(found), half_width)
+    return ClockCheck(error, std, tuple(used), half_width)
 
 
 def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
-    """The difference of every two clocks that are compared, in the recording in which they agree least."""
+    """Return the difference of every two compared clocks, in the recording in which they agree least."""
     worst: dict[tuple[str, str], ClockDifference] = {}
-    for found in (difference for check in clocks for difference in check.differences()):
-        worst[found.clocks] = max(worst.get(found.clocks, found), found, key=lambda each: each.share)
+    for one in (difference for check in clocks for difference in check.differences()):
+        worst[one.clocks] = max(worst.get(one.clocks, one), one, key=lambda difference: difference.limit_fraction)
     return list(worst.values())
 
 
-def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison:
-    """The controller's clock by the computer's, from the times at which the states came."""
+def _compare_to_computer(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison:
+    """Compare the controller's clock with the computer's, by the times at which the states came."""
     rate = compare_with_computer(recording.motion)
-    return ClockComparison(BY_COMPUTER, rate.error, known.computer_clock_ppm * PPM, rate.std, rate.freedom)
+    return ClockComparison(BY_COMPUTER, rate.error, uncertainty.computer_clock_ppm * PPM, rate.std, rate.freedom)
 
 
-def _by_crystal(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
-    """The controller's clock by the board's counter; None where no board was, or by its word no crystal holds it."""
+def _compare_to_crystal(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison | None:
+    """Compare the controller's clock with the board's counter; None without a board, or if no crystal drives it."""
     bases = [sensor.time_base for name, sensor in recording.sensors.items() if recording.run.sensors[name].on_board]
     if not bases or recording.run.provenance.board_follows_crystal is False:
         return None
     best = min(bases, key=lambda base: base.drift_std)
     error = (1 + best.drift) / (1 + NOMINAL_DRIFT) - 1
-    return ClockComparison(BY_CRYSTAL, error, known.crystal_ppm * PPM, best.drift_std)
+    return ClockComparison(BY_CRYSTAL, error, uncertainty.crystal_ppm * PPM, best.drift_std)

@@ -13,13 +13,13 @@ Choice = TypeVar("Choice", bound=str)
 
 
 def find_estimator(name: str) -> Estimator:
-    """The estimator of that name. Raises Refused `unknown_estimator`."""
+    """Return the estimator of that name. Raise Refused `unknown_estimator`."""
     return choose_estimator(ESTIMATORS, name)
 
 
 def choose_estimator(choices: Sequence[Choice], name: str) -> Choice:
-    """The one of that name. Raises Refused `unknown_estimator`."""
-    for known in choices:
-        if known == name:
-            return known
+    """Return the choice of that name. Raise Refused `unknown_estimator`."""
+    for choice in choices:
+        if choice == name:
+            return choice
     raise Refused("unknown_estimator", f"there is no estimator {name!r} here", f"Choose one of {', '.join(choices)}")

@@ -1,7 +1,7 @@
-"""Degrees of freedom of what is found beside scale and bias and has no budget of its own: angles, gravity's share.
+"""The degrees of freedom of estimates without a budget of their own: angles, sensitivity to gravity.
 
-Its variance is split into what the budget's own lines of type A make of it, and each part has the freedom of its line
-(Welch and Satterthwaite's, JCGM 100, G.4); what is left, errors of the arm of a stated size, is known.
+Their variance is divided among the budget's contributors of type A, each with its degrees of freedom (Welch and
+Satterthwaite, JCGM 100, G.4); the rest, errors of the arm of a stated size, counts as known.
 """
 
 import numpy as np
@@ -22,19 +22,19 @@ from rig.estimation.statistics.coverage import effective_freedom
 
 
 def of_angles(result: SensorResult) -> Array | None:
-    """(6,) degrees of freedom of a gyroscope's non-orthogonality, then of its mounting; None without a budget."""
+    """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then mounting; None without budget."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
         return None
     solution = explained.solution
-    turned = _to_angles(solution.matrix)
-    readings = np.einsum("aij,ijkl,akl->a", turned, _of_matrix(solution), turned)
-    walk = np.einsum("aij,ijl,ail->a", turned, _walk(explained)[:, :3, :3], turned)
+    derivative = _to_angles(solution.matrix)
+    readings = np.einsum("aij,ijkl,akl->a", derivative, _of_matrix(solution), derivative)
+    walk = np.einsum("aij,ijl,ail->a", derivative, _walk(explained)[:, :3, :3], derivative)
     return _split(np.diag(solution.angles_covariance_rad2), _of_readings(readings - walk, walk, explained), budget)
 
 
 def of_sensitivity(result: SensorResult) -> Array | None:
-    """(3, 3) degrees of freedom of a gyroscope's sensitivity to gravity; None without it or a budget."""
+    """Return the degrees of freedom (3, 3) of a gyroscope's sensitivity to gravity; None without it or a budget."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
         return None
@@ -47,12 +47,12 @@ def of_sensitivity(result: SensorResult) -> Array | None:
 
 
 def of_acceleration_angles(result: AccelerometerResult) -> Array:
-    """Return the (3,) degrees of freedom of an accelerometer's non-orthogonality."""
+    """Return the degrees of freedom (3,) of an accelerometer's non-orthogonality."""
     return _of_axes(result, result.solution.response, result.movement.noise())
 
 
 def of_second_order(result: AccelerometerResult) -> Array | None:
-    """(3,) degrees of freedom of an accelerometer's φ; None where it was not looked for."""
+    """Return the degrees of freedom (3,) of an accelerometer's φ; None if it was not estimated."""
     if result.solution.second_order_s2_m is None:
         return None
     std = np.sqrt(np.diag(result.solution.covariance)[SECOND])
@@ -60,7 +60,7 @@ def of_second_order(result: AccelerometerResult) -> Array | None:
 
 
 def of_field_angles(result: MagnetometerResult) -> Array:
-    """Return the (3,) degrees of freedom of a magnetometer's non-orthogonality."""
+    """Return the degrees of freedom (3,) of a magnetometer's non-orthogonality."""
     response = response_in_attitudes(result.solution, result.measurements)
     return _of_axes(result, response, np.diag(result.measurements.variances_m2_s4.ravel()))
 
@@ -68,7 +68,7 @@ def of_field_angles(result: MagnetometerResult) -> Array:
 def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
-    Of the latter the fewest of any run's bias: a sum of independent parts never has fewer than its scarcest.
+    The latter are the fewest of any run's bias: a sum of independent parts never has fewer.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # (Σ u_i²)² / ν of each run is Σ u_i⁴ / ν_i: what the runs share is known, and adds nothing to it.
@@ -79,49 +79,49 @@ def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:
 
 
 def _of_axes(result: AccelerometerResult | MagnetometerResult, response: Array, noise: Array) -> Array:
-    """Degrees of freedom of the angles between the axes, from the `response` (p, n) of all that was found."""
-    turned = _to_angles(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
-    return _in_attitudes(result.budget, turned, noise, result.triad.non_orthogonality_std_rad)
+    """Return the degrees of freedom of the angles between the axes, from the `response` (p, n) of all parameters."""
+    derivative = _to_angles(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
+    return _in_attitudes(result.budget, derivative, noise, result.triad.non_orthogonality_std_rad)
 
 
 def _in_attitudes(budget: Budget, response: Array, noise: Array, std: Array) -> Array:
-    """Degrees of freedom of `std` (q,), from the `response` (q, n) to readings with that `noise` (n, n)."""
+    """Return the degrees of freedom of `std` (q,), from the `response` (q, n) to readings with that `noise` (n, n)."""
     by_noise = np.einsum("qn,nm,qm->q", response, noise, response)
     return _split(std**2, {NOISE: by_noise, ATTITUDES: std**2 - by_noise}, budget)
 
 
 def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
-    """The parts of a gyroscope's variances by the lines they have the freedom of.
+    """Return the parts of a gyroscope's variances by the contributors whose degrees of freedom they have.
 
-    Where the readings tell no wandering, there is no line of it: the walk is the flicker of the data sheet, and known.
+    If the readings show no bias drift, it is the flicker of the data sheet, and counts as known.
     """
     return {NOISE: noise, **({WANDERING: walk} if explained.bias.is_drifting else {})}
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
-    """Freedom (…) of variances (…) from their `parts`, by the name of the budget's lines; the rest is known.
+    """Return the degrees of freedom (…) of variances (…) from their `parts` by contributor; the rest counts as known.
 
-    Raises KeyError where the budget has no such line.
+    Raise KeyError if the budget has no such contributor.
     """
-    made = [np.clip(part, 0.0, whole) for part in parts.values()]
-    rest = np.clip(whole - np.sum(made, axis=0), 0.0, None)
+    clipped = [np.clip(part, 0.0, whole) for part in parts.values()]
+    rest = np.clip(whole - np.sum(clipped, axis=0), 0.0, None)
     freedom = [budget.line(name).freedom for name in parts]
     shape = (-1, *np.ones(np.ndim(whole), dtype=np.intp))
-    return effective_freedom(np.array([*made, rest]), np.reshape([*freedom, np.inf], shape))
+    return effective_freedom(np.array([*clipped, rest]), np.reshape([*freedom, np.inf], shape))
 
 
 def _to_angles(matrix: Array) -> Array:
-    """(6, 3, 3) derivative of angles between the axes and of their mounting with respect to F."""
+    """Return the derivative (6, 3, 3) of angles between the axes and of their mounting with respect to F."""
     return SensorAxes.of(matrix).to_angles.reshape(6, 3, 3)
 
 
 def _of_matrix(solution: VectorSolution) -> Array:
-    """(3, 3, 3, 3) covariance of F by the readings."""
+    """Return the covariance (3, 3, 3, 3) of F by the readings."""
     return solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)
 
 
 def _walk(explained: Explained) -> Array:
-    """(3, p, p) what the wandering bias adds to the covariance of each axis' coefficients F, c (and G)."""
+    """Return the bias drift's part (3, p, p) in the covariance of each axis' coefficients F, c (and G)."""
     seen = explained.inputs
     gravity = None if explained.solution.g_sensitivity is None else seen.pull_m_s2
     design = design_matrix(seen.rates_rad_s, gravity)

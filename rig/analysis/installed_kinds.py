@@ -1,4 +1,4 @@
-"""Kinds of sensors that packages add, by their own solvers: from an arm's dwells or a file's attitudes. Pure."""
+"""The kinds of sensors that packages add, with their own solvers, on an arm or from attitudes of a file. Pure."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from rig.observation.placed_on_arm import placements_on_arm
 
 @dataclass(frozen=True, slots=True)
 class OfKind:
-    """What the solver of an installed kind of sensor found, and the checks that say whether it is fit for use."""
+    """The solution by an installed kind's solver, and its checks of fitness."""
 
     found: object
     checks: tuple[Check, ...] = ()
@@ -26,7 +26,7 @@ class OfKind:
 
 @dataclass(frozen=True, slots=True)
 class KindFound:
-    """What was `found` of a `sensor` by its name, None where nothing was: the `fault` says why."""
+    """The solution of a `sensor` by its name, None if there is none: the `fault` says why."""
 
     name: str
     sensor: RecordedSensor | Item
@@ -36,12 +36,12 @@ class KindFound:
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """The solver's checks; none where nothing was found."""
+        """The solver's checks; none without a solution."""
         return () if self.found is None else self.found.checks
 
 
 def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[KindFound, ...]:
-    """Every sensor of an installed kind that was recorded, in the order of the kinds."""
+    """Return every sensor of an installed kind that was recorded, in the order of the kinds."""
     return tuple(_on_arm(recordings, settings))
 
 

@@ -1,4 +1,4 @@
-"""What recordings amount to: they are solved, verified and judged here for `rig.analysis.analyses`."""
+"""The analyses behind `rig.analysis.analyses`: recordings are solved, verified and judged."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.analysis.check import Check, unsolved_checks
+from rig.analysis.check import Check, list_unsolved
 from rig.analysis.clock import ClockCheck
 from rig.analysis.consistency.contradictions import check_references, contradictions
 from rig.analysis.consistency.detection_limits import DetectionLimit
@@ -46,8 +46,8 @@ from rig.observation.observed_run import ObservedRun, observe_runs
 ResultT = TypeVar("ResultT")
 
 
-def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Outcome:
-    """Solve and judge the recordings of a calibration, as `rig.analysis.analyses.calibrate` says."""
+def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Outcome:
+    """Solve and judge the recordings of a calibration, as in `rig.analysis.analyses.calibrate`."""
     settings = runs[0].settings
     chosen = find_estimator(estimator)
     recordings, mounts = observe_as_mounted(runs, settings)
@@ -58,13 +58,15 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
             "no finished sweep is recorded, and a calibration needs sweeps in six directions, or dwells in attitudes",
             "Record the movement; resume the run if it was interrupted",
         )
-    found: Polynomials = {}
+    polynomials: Polynomials = {}
     if settings.reference_c is not None:
-        taken = correct_recordings(recordings, settings, settings.reference_c)
-        recordings, found = taken.recordings, taken.polynomials
-    swept = _swept(runs, recordings, settings, chosen, found) if settings.planned_sweeps else _Swept(polynomials=found)
+        corrected = correct_recordings(recordings, settings, settings.reference_c)
+        recordings, polynomials = corrected.recordings, corrected.polynomials
+    swept = _GyroscopeOutcome(polynomials=polynomials)
+    if settings.planned_sweeps:
+        swept = _judge_gyroscopes(runs, recordings, settings, chosen, polynomials)
     accelerometers = calibrate_accelerometers(recordings, settings, swept.results)
-    accelerometers, found = _over_temperature(
+    accelerometers, polynomials = _add_polynomials(
         accelerometers, ACCELERATION, add_acceleration_polynomials, swept.polynomials
     )
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
@@ -81,7 +83,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
             *_acceleration_checks(accelerometers, settings),
             *among_dwells.checks,
             *(check for kind in of_kinds for check in kind.checks),
-            *_unsolved(magnetometers, of_kinds),
+            *_check_unsolved(magnetometers, of_kinds),
         ),
         of_kinds=of_kinds,
         mounts=mounts,
@@ -91,19 +93,19 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         magnetometers=magnetometers,
         told_from=swept.told_from,
         told_from_in_reference=among_dwells.detection_limits,
-        polynomials=found,
+        polynomials=polynomials,
     )
 
 
-def _unsolved(magnetometers: Attempts[str, MagnetometerResult], of_kinds: Sequence[KindFound]) -> Iterator[Check]:
-    """The checks of what was to be calibrated and is not."""
-    yield from unsolved_checks((name, FIELD.name, fault) for name, fault in magnetometers.faults.items())
-    yield from unsolved_checks((kind.name, kind.quantity.name, kind.fault) for kind in of_kinds if kind.fault)
+def _check_unsolved(magnetometers: Attempts[str, MagnetometerResult], of_kinds: Sequence[KindFound]) -> Iterator[Check]:
+    """Yield the checks of sensors that were to be calibrated and have no solution."""
+    yield from list_unsolved((name, FIELD.name, fault) for name, fault in magnetometers.faults.items())
+    yield from list_unsolved((kind.name, kind.quantity.name, kind.fault) for kind in of_kinds if kind.fault)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Swept:
-    """What sweeps tell of gyroscopes; nothing where none was planned."""
+class _GyroscopeOutcome:
+    """The gyroscopes' part of an outcome, from sweeps; empty if none was planned."""
 
     polynomials: Polynomials
     results: Mapping[str, SensorResult] = field(default_factory=dict)
@@ -113,16 +115,16 @@ class _Swept:
     told_from: Mapping[str, tuple[DetectionLimit, ...]] = field(default_factory=dict)
 
 
-def _swept(
+def _judge_gyroscopes(
     runs: Sequence[RunData],
     recordings: tuple[ObservedRun, ...],
     settings: RunSettings,
     estimator: Estimator,
     polynomials: Polynomials,
-) -> _Swept:
+) -> _GyroscopeOutcome:
     surroundings = surroundings_of(recordings, settings)
     results = solve_observed(runs[0].measuring(RATE), recordings, surroundings, estimator, settings.matrix_corrected)
-    results, polynomials = _over_temperature(results, RATE, add_rate_polynomials, polynomials)
+    results, polynomials = _add_polynomials(results, RATE, add_rate_polynomials, polynomials)
     among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings, settings)
     onboard = {name: check_arithmetic(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
@@ -131,7 +133,7 @@ def _swept(
         {name: result.uncertainty for name, result in results.items() if result.uncertainty is not None},
         _decision_rule(settings),
     )
-    return _Swept(
+    return _GyroscopeOutcome(
         polynomials=polynomials,
         results=results,
         onboard=onboard,
@@ -146,26 +148,26 @@ def _swept(
     )
 
 
-def _over_temperature(
+def _add_polynomials(
     results: Mapping[str, ResultT],
     quantity: Quantity,
-    together: Callable[[ResultT, OverTemperature], tuple[ResultT, OverTemperature]],
+    add: Callable[[ResultT, OverTemperature], tuple[ResultT, OverTemperature]],
     polynomials: Polynomials,
 ) -> tuple[dict[str, ResultT], Polynomials]:
-    """Results of a quantity with what polynomials over temperature add to them, and these settled by them."""
-    settled = {name: together(results[name], of[quantity]) for name, of in polynomials.items() if quantity in of}
+    """Return a quantity's results with the polynomials over temperature in their uncertainty, and these."""
+    settled = {name: add(results[name], fits[quantity]) for name, fits in polynomials.items() if quantity in fits}
     added = {name: result for name, (result, _) in settled.items()}
-    known = {name: {**polynomials[name], quantity: found} for name, (_, found) in settled.items()}
-    return {**results, **added}, {**polynomials, **known}
+    combined = {name: {**polynomials[name], quantity: fit} for name, (_, fit) in settled.items()}
+    return {**results, **added}, {**polynomials, **combined}
 
 
-def drifted(runs: Sequence[RunData], estimator: str) -> Outcome:
-    """Solve and judge attitudes gone through again and again, as `rig.analysis.analyses.estimate_bias_drift` says."""
-    outcome = calibrated(runs, estimator, drifting=True)
+def estimate_bias_drift(runs: Sequence[RunData], estimator: str) -> Outcome:
+    """Solve and judge attitudes visited several times, as in `rig.analysis.analyses.estimate_bias_drift`."""
+    outcome = calibrate(runs, estimator, drifting=True)
     settings = outcome.settings
-    found, rule = estimate_bias_drifts(outcome.recordings, settings), _decision_rule(settings)
-    checks = [check for name, each in found.items() for check in drift_checks(name, each, settings.limits, rule)]
-    return replace(outcome, drifts=found, checks=(*outcome.checks, *checks))
+    drifts, rule = estimate_bias_drifts(outcome.recordings, settings), _decision_rule(settings)
+    checks = [check for name, drift in drifts.items() for check in drift_checks(name, drift, settings.limits, rule)]
+    return replace(outcome, drifts=drifts, checks=(*outcome.checks, *checks))
 
 
 def _acceleration_checks(results: Mapping[str, AccelerometerResult], settings: RunSettings) -> tuple[Check, ...]:
@@ -179,29 +181,29 @@ def _decision_rule(settings: RunSettings) -> DecisionRule:
     return settings.stated_uncertainty.decision_rule
 
 
-def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
-    """Verify a calibration by `repeated`, as `rig.analysis.analyses.verify_calibration` says."""
+def verify_calibration(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
+    """Verify a calibration by `repeated`, as in `rig.analysis.analyses.verify_calibration`."""
     settings = outcome.settings
-    known = settings.reference
-    found: dict[str, Verification | None] = dict.fromkeys(settings.to_calibrate)
-    if repeated and known is not None:
+    reference = settings.reference
+    verifications: dict[str, Verification | None] = dict.fromkeys(settings.to_calibrate)
+    if repeated and reference is not None:
         after = observe_runs(repeated)
-        reference = Reference(known.name, np.array(known.scale), np.array(known.bias_rad_s))
-        found = {
+        standard = Reference(reference.name, np.array(reference.scale), np.array(reference.bias_rad_s))
+        verifications = {
             name: verify(
                 name,
-                reference,
+                standard,
                 after,
                 outcome.recordings,
                 outcome.results.get(name),
-                gravity_rad_s=_gravity_left(outcome.results, (name, reference), after, settings),
+                gravity_rad_s=_gravity_effects(outcome.results, (name, standard), after, settings),
             )
             for name in settings.to_calibrate
         }
-    checks = [check for name, each in found.items() for check in verification_checks(name, each, settings.limits)]
+    checks = [check for name, one in verifications.items() for check in verification_checks(name, one, settings.limits)]
     return replace(
         outcome,
-        verifications={name: each for name, each in found.items() if each is not None},
+        verifications={name: one for name, one in verifications.items() if one is not None},
         checks=(*outcome.checks, *checks),
         provenance=replace(
             outcome.provenance,
@@ -211,36 +213,36 @@ def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
     )
 
 
-def _gravity_left(
+def _gravity_effects(
     results: Mapping[str, SensorResult],
     pair: tuple[str, Reference],
     after: Sequence[ObservedRun],
     settings: RunSettings,
 ) -> tuple[Array, Array] | None:
-    """(N, 3) what gravity adds to the corrected readings of sensor and reference, neither of which knows where down is.
+    """Return gravity's effect (N, 3) on the corrected readings of sensor and reference, whose corrections omit it.
 
-    With what their circling adds, which is felt as gravity is. None where the calibration did not find it.
+    The centripetal acceleration acts as gravity does. None if the calibration has no g-sensitivity.
     """
     name, reference = pair
     corrections = {name: results[name].correction_matrix} if name in results else {}
     corrections[reference.name] = reference.correction_matrix
-    left = []
-    for each, matrix in corrections.items():
-        solution = results[each].vector_model if each in results else None
+    effects = []
+    for sensor, matrix in corrections.items():
+        solution = results[sensor].vector_model if sensor in results else None
         if not isinstance(solution, VectorSolution) or solution.g_sensitivity is None:
             return None
-        turns = list_revolutions(each, after)
+        turns = list_revolutions(sensor, after)
         attitudes = np.array([turn.average.attitude for turn in turns], dtype=np.float64)
-        turned = np.array([turn.speed_rad_s * turn.axis_flange for turn in turns])
-        pull = attitudes @ settings.site.down_m_s2 - centripetal_m_s2(
-            turned, lever_arms_m(turns, np.array(settings.extension_m))
+        rates_rad_s = np.array([turn.speed_rad_s * turn.axis_flange for turn in turns])
+        gravity = attitudes @ settings.site.down_m_s2 - centripetal_m_s2(
+            rates_rad_s, lever_arms_m(turns, np.array(settings.extension_m))
         )
-        left.append(pull @ (matrix @ solution.g_sensitivity).T)
-    of_sensor, of_reference = left
-    return of_sensor, of_reference
+        effects.append(gravity @ (matrix @ solution.g_sensitivity).T)
+    on_sensor, on_reference = effects
+    return on_sensor, on_reference
 
 
-def verified_alone(repeated: Sequence[RunData]) -> Outcome:
-    """Verify what the board had stored before, as `rig.analysis.analyses.verify_stored_calibrations` says."""
+def verify_stored(repeated: Sequence[RunData]) -> Outcome:
+    """Verify the board's stored calibrations, as in `rig.analysis.analyses.verify_stored_calibrations`."""
     nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=origin_of(repeated[:1]))
-    return verified(nothing_calibrated, repeated)
+    return verify_calibration(nothing_calibrated, repeated)

@@ -1,4 +1,4 @@
-"""The outcome of a run: solved, verified, judged. The documents made of it are `rig.report`'s."""
+"""The outcome of a run: solved, verified, judged. `rig.report` makes documents of it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What was measured with what, and when: `recorded` is that of the run's first recording."""
+    """The equipment and times of the measurements; `recorded` is that of the run's first recording."""
 
     recorded: "Provenance"
     stored_calibrations: "Mapping[str, StoredCalibrationEntry]"
@@ -41,9 +41,9 @@ class Origin:
 
 
 def origin_of(runs: "Sequence[RunData]") -> Origin:
-    """Return where and when the recordings of a run were made, at least one; they are solved now.
+    """Return the origin of a run's recordings, at least one, which are solved now.
 
-    A recording of another stage does not resume the one before it: the item was mounted anew between them.
+    A recording of another stage does not resume the previous one: the item was mounted anew between them.
     """
     return Origin(
         recorded=runs[0].provenance,
@@ -58,18 +58,18 @@ def origin_of(runs: "Sequence[RunData]") -> Origin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a run's recordings amount to, by sensor name.
+    """The results of a run's recordings, by sensor name.
 
-    `recordings` are those of the calibration with a finished sweep. `results` hold every recorded sensor's calibration
-    and `onboard` the board's own of the sensors on it to calibrate; all three are empty where stored calibrations were
-    verified. `verifications` hold those that could be made. `clock` is the controller's, None where recordings of
-    before say nothing of its uncertainty. Where no sweep was planned there are `accelerometers` alone, and beside them
-    the `magnetometers`, which no limit of scale and bias judges.
-    `drifts` are there where attitudes were repeated to watch the bias. `told_from` says of gyroscopes what may happen
-    in the run and from what size on the checks tell it, `told_from_in_reference` of accelerometers and magnetometers.
-    `elsewhere` is what readings gave whose motion is a file: gyroscopes are in `results` too. `of_kinds` is what the
-    solvers of installed kinds of sensors found. `mounts` say how the item sat in the stages after the first.
-    `polynomials` are there of a calibration over temperature: then all else is of readings taken to the reference.
+    - `recordings`: those of the calibration with a finished sweep.
+    - `results`: the calibrations of gyroscopes; `onboard`: the board's own of its sensors. Both are empty, with
+      `recordings`, if stored calibrations were verified; `verifications`: those that could be made.
+    - `clock`: the controller's, None if a recording does not state its uncertainty.
+    - `accelerometers`, `magnetometers`: no limit of scale and bias judges the latter.
+    - `drifts`: if attitudes were repeated to watch the bias.
+    - `told_from`, `told_from_in_reference`: detection limits of the checks of gyroscopes, and of the others.
+    - `elsewhere`: the results of external recordings; gyroscopes are in `results` too.
+    - `of_kinds`: by the solvers of installed kinds of sensors; `mounts`: of the item in the stages after the first.
+    - `polynomials`: of a calibration over temperature; all else is at the reference temperature then.
     """
 
     settings: "RunSettings"
@@ -92,7 +92,7 @@ class Outcome:
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
-        """ "pass" when there are checks and all of them passed."""
+        """The verdict: "pass" if there are checks and all of them passed."""
         from rig.analysis.verdict import verdict
 
         return verdict(self.checks)

@@ -1,7 +1,7 @@
-"""What the recordings of a run that goes on amount to so far: observations, refusals, parameters once they are known.
+"""The partial results of a run in progress: observations, refusals, and parameters when they are identifiable.
 
-Whoever looks on is told this. The result comes from `rig.analysis.outcome` when all is recorded, and may say more and
-otherwise: of uncertainty there is the noise alone here.
+They are for display. The final result comes from `rig.analysis.outcome` and may differ; here the uncertainty is that of
+the noise alone.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,11 +31,11 @@ NO_SWEEP_YET = Fault("too_few_observations", "no sweep is averaged yet", "Wait f
 
 
 @dataclass(frozen=True, slots=True)
-class Turned:
-    """What a run tells of a gyroscope yet: its finished sweeps by index, observed or refused.
+class PartialGyroscope:
+    """A gyroscope's partial result: its finished sweeps by index, observed or refused.
 
-    The `solution` is the vector model's, None as long as the fault `missing` says what it lacks. `bias_rad_s` (3,) is
-    that of the rests alone, with its standard deviation, None without rests.
+    The `solution` is the vector model's; None while the fault `missing` names what it lacks. `bias_rad_s` (3,) is that
+    of the rests alone, with its standard deviation, None without rests.
     """
 
     sweeps: Attempts[int, Observation]
@@ -46,15 +46,15 @@ class Turned:
 
 @dataclass(frozen=True, slots=True)
 class SoFar:
-    """What a run tells yet: of each gyroscope, and what others read in each finished dwell."""
+    """The partial results of a run: of every gyroscope, and of other sensors in finished dwells."""
 
-    gyroscopes: Mapping[str, Turned]
+    gyroscopes: Mapping[str, PartialGyroscope]
     at_rest: Attempts[QuantityInDwell, ReadAtRest]
 
 
 @dataclass(frozen=True, slots=True)
 class _Recorded:
-    """What one recording holds of a gyroscope, and of the accelerometer in it; no `clock` where none is found."""
+    """One recording's part of a gyroscope, and of its accelerometer; no `clock` if none could be determined."""
 
     clock: TimeBase | None
     sweeps: Attempts[int, Observation]
@@ -63,7 +63,7 @@ class _Recorded:
 
 
 def so_far(runs: Sequence[RunData]) -> SoFar:
-    """Return what recordings of raw readings hold; a sweep or dwell that several hold counts in the last one."""
+    """Return the partial results of raw readings; a sweep or dwell in several recordings counts in the last one."""
     sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
     at_rest: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
@@ -79,14 +79,14 @@ def so_far(runs: Sequence[RunData]) -> SoFar:
         at_rest = at_rest.updated(_accelerations(run, recorded)).updated(_fields(run, recorded))
     return SoFar(
         {
-            name: _turned(attempts, rests[name], np.array(runs[-1].sensors[name].mounting))
+            name: _solve_gyroscope(attempts, rests[name], np.array(runs[-1].sensors[name].mounting))
             for name, attempts in sweeps.items()
         },
         at_rest,
     )
 
 
-def _turned(sweeps: Attempts[int, Observation], rests: Sequence[Average], mounting: Array) -> Turned:
+def _solve_gyroscope(sweeps: Attempts[int, Observation], rests: Sequence[Average], mounting: Array) -> PartialGyroscope:
     observations = [observation for _, observation in sorted(sweeps.results.items())]
     solution, missing = None, NO_SWEEP_YET if not observations else None
     if observations:
@@ -94,7 +94,7 @@ def _turned(sweeps: Attempts[int, Observation], rests: Sequence[Average], mounti
             solution = solve_vector(observations, rests, mounting)
         except Fault as fault:
             missing = fault
-    return Turned(sweeps, solution, missing, _bias(rests))
+    return PartialGyroscope(sweeps, solution, missing, _bias(rests))
 
 
 def _observe(run: RunData, name: str, motion: ArmMotion) -> _Recorded:
@@ -114,17 +114,17 @@ def _accelerations(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[
     for name, sensor in recorded.items():
         faults |= {QuantityInDwell(name, ACCELERATION, i, ""): fault for i, fault in sensor.dwells.faults.items()}
         for index, dwell in sensor.dwells.results.items():
-            of = QuantityInDwell(name, ACCELERATION, index, dwell.name)
-            results[of] = ReadAtRest(of, dwell.reading, gravity_m_s2)
+            key = QuantityInDwell(name, ACCELERATION, index, dwell.name)
+            results[key] = ReadAtRest(key, dwell.reading, gravity_m_s2)
     return Attempts(results, faults)
 
 
 def _fields(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[QuantityInDwell, ReadAtRest]:
-    """Return what magnetometers read in the dwells of an accelerometer whose samples the same clock stamps."""
+    """Return the means of magnetometers in the dwells of an accelerometer on the same clock."""
     expected_t = run.settings.site.magnetic_field_t
     fields: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
     for name in run.measuring(FIELD):
-        dwelling = (sensor for sensor, each in recorded.items() if each.dwells.results or each.dwells.faults)
+        dwelling = (sensor for sensor, part in recorded.items() if part.dwells.results or part.dwells.faults)
         other = find_dwelling_companion(run, name, dwelling)
         if other is None:
             continue
@@ -132,16 +132,16 @@ def _fields(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[Quantit
         time_s = np.empty(0) if clock is None else times_s(run, name, {other: clock}, other)
         read = partial(_read_field, run, time_s, expected_t)
         by_dwell = {QuantityInDwell(name, FIELD, i, dwell.name): dwell for i, dwell in dwells.results.items()}
-        fields = fields.updated(attempt_each({of: partial(read, of, dwell) for of, dwell in by_dwell.items()}))
+        fields = fields.updated(attempt_each({key: partial(read, key, dwell) for key, dwell in by_dwell.items()}))
         refused = {QuantityInDwell(name, FIELD, i, ""): fault for i, fault in dwells.faults.items()}
         fields = fields.updated(Attempts({}, refused))
     return fields
 
 
 def _read_field(
-    run: RunData, time_s: Array, expected_t: float | None, of: QuantityInDwell, dwell: DwellReading
+    run: RunData, time_s: Array, expected_t: float | None, key: QuantityInDwell, dwell: DwellReading
 ) -> ReadAtRest:
-    return ReadAtRest(of, field_mean(run, of.sensor, time_s, dwell, run.settings.observation), expected_t)
+    return ReadAtRest(key, field_mean(run, key.sensor, time_s, dwell, run.settings.observation), expected_t)
 
 
 def _observe_sweeps(
@@ -158,7 +158,7 @@ def _observe_sweeps(
 
 
 def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:
-    """Mean reading at rest, its sign turned as of g = K (m + b), weighted by inverse variance."""
+    """Return the mean reading at rest, with the sign of g = K (m + b), weighted by inverse variance."""
     if not rests:
         return None
     weights = 1 / np.array([rest.variance_rad2_s2 for rest in rests])

@@ -1,7 +1,7 @@
-"""When and how warm it was while what was found of a sensor was read: no value holds at another time or temperature.
+"""The times and temperatures at which a calibration holds: those of the readings it is estimated from.
 
-A gyroscope's scale factors come from the sweeps alone, its bias from the rests between them as well: a sensor that
-warms up has them at different temperatures.
+A gyroscope's scale factors come from the sweeps alone, its bias from the rests between them too: in a sensor that warms
+up they have different temperatures.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,9 +17,9 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """When readings were taken, in UTC, and their `mean_utc`; their mean temperature and how it ranged.
+    """The times of readings in UTC with their mean, and their mean temperature with its range.
 
-    No temperatures where no thermometer tells them, and where the temperature was stated no range.
+    No temperatures without a thermometer, and no range if the temperature was stated.
     """
 
     from_utc: datetime
@@ -30,8 +30,8 @@ class When:
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
-    """When a gyroscope's scale factors hold, and when its bias does."""
+class GyroscopeConditions:
+    """The times at which a gyroscope's scale factors hold, and its bias."""
 
     scale: When
     bias: When
@@ -39,7 +39,7 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class _Read:
-    """Readings from start to end on the clock of the first recording; how many, and how warm it was, or NaN."""
+    """Readings from start to end on the clock of the first recording, their weight and temperature (or NaN)."""
 
     start_s: float
     end_s: float
@@ -47,35 +47,37 @@ class _Read:
     temperature_c: float
 
 
-def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
-    """When a gyroscope's scale and bias were read: in its sweeps, and in sweeps and rests."""
+def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeConditions:
+    """Return when a gyroscope's scale and bias were read: in its sweeps, and in sweeps and rests."""
     parts = [(recording.sensors[name], recording.clock_offset_s) for recording in recordings]
-    turns = [_averaged(turn.average, since_s) for part, since_s in parts for turn in part.revolutions]
-    rests = [_averaged(rest, since_s) for part, since_s in parts for rest in part.rests]
-    return Held(_when(recordings, name, turns), _when(recordings, name, [*turns, *rests]))
+    turns = [_read_average(turn.average, offset_s) for part, offset_s in parts for turn in part.revolutions]
+    rests = [_read_average(rest, offset_s) for part, offset_s in parts for rest in part.rests]
+    return GyroscopeConditions(
+        _average_conditions(recordings, name, turns), _average_conditions(recordings, name, [*turns, *rests])
+    )
 
 
 def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """When an accelerometer was read: in the dwells of these indices, and its sweeps."""
+    """Return when an accelerometer was read: in the dwells of these indices, and its sweeps."""
     wanted, read = frozenset(dwells), []
     for recording in recordings:
-        part, since_s = recording.sensors[name], recording.clock_offset_s
-        read += [_averaged(turn.average, since_s) for turn in part.revolutions if turn.acceleration is not None]
+        part, offset_s = recording.sensors[name], recording.clock_offset_s
+        read += [_read_average(turn.average, offset_s) for turn in part.revolutions if turn.acceleration is not None]
         read += [
             _Read(
-                dwell.window.start_s + since_s,
-                dwell.window.end_s + since_s,
+                dwell.window.start_s + offset_s,
+                dwell.window.end_s + offset_s,
                 dwell.reading.samples,
                 dwell.temperature_c,
             )
             for dwell in part.dwells
             if dwell.index in wanted
         ]
-    return _when(recordings, name, read)
+    return _average_conditions(recordings, name, read)
 
 
 def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """When a magnetometer, which has no thermometer, was read: in the last dwells of these indices."""
+    """Return when a magnetometer, which has no thermometer, was read: in the last dwells of these indices."""
     wanted = frozenset(dwells)
     times_s = {
         index: (start_s + recording.clock_offset_s, end_s + recording.clock_offset_s)
@@ -84,27 +86,27 @@ def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterab
         if index in wanted
     }
     read = [_Read(start_s, end_s, end_s - start_s, float("nan")) for start_s, end_s in times_s.values()]
-    return _when(recordings, name, read)
+    return _average_conditions(recordings, name, read)
 
 
-def _averaged(average: Average, since_s: float) -> _Read:
-    return _Read(average.start_s + since_s, average.end_s + since_s, average.samples, average.temperature_c)
+def _read_average(average: Average, offset_s: float) -> _Read:
+    return _Read(average.start_s + offset_s, average.end_s + offset_s, average.samples, average.temperature_c)
 
 
-def _when(recordings: Sequence[ObservedRun], name: str, read: Sequence[_Read]) -> When:
-    """When a sensor's readings were taken, each window by its weight; a recording began with its first state."""
+def _average_conditions(recordings: Sequence[ObservedRun], name: str, read: Sequence[_Read]) -> When:
+    """Return the times of weighted windows; a recording's clock starts with its first state."""
     began = datetime.fromisoformat(recordings[0].run.provenance.started_utc)
-    first_s, weights = float(recordings[0].motion.time_s[0]), [each.weight for each in read]
+    first_s, weights = float(recordings[0].motion.time_s[0]), [window.weight for window in read]
 
     def utc(time_s: float) -> datetime:
         return began + timedelta(seconds=time_s - first_s)
 
-    middles = [(each.start_s + each.end_s) / 2 for each in read]
+    middles = [(window.start_s + window.end_s) / 2 for window in read]
     stated = recordings[0].run.sensors[name].temperature_stated
-    warm = [each.temperature_c for each in read if np.isfinite(each.temperature_c)]
+    warm = [window.temperature_c for window in read if np.isfinite(window.temperature_c)]
     return When(
-        utc(min(each.start_s for each in read)),
-        utc(max(each.end_s for each in read)),
+        utc(min(window.start_s for window in read)),
+        utc(max(window.end_s for window in read)),
         utc(float(np.average(middles, weights=weights))),
         float(np.average(warm, weights=weights)) if warm else None,
         (min(warm), max(warm)) if warm and not stated else None,

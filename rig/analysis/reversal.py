@@ -1,4 +1,4 @@
-"""Runs of one magnetometer with the sensor turned over between them: its own bias, and the arm's field."""
+"""The separation of a magnetometer's bias from the arm's field, by runs with the sensor turned over between them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ ALIKE = "Give runs of one magnetometer on one arm, in the same attitudes and at 
 
 @dataclass(frozen=True, slots=True)
 class AsMounted:
-    """What one run found; `run` names it."""
+    """The result of one run, which `run` names."""
 
     run: str
     outcome: Outcome
@@ -26,7 +26,7 @@ class AsMounted:
 
 @dataclass(frozen=True, slots=True)
 class MagnetometerReversal:
-    """One magnetometer in several runs. `scale` (3,) and `correction_matrix` (3, 3) are the means of theirs."""
+    """One magnetometer in several runs; `scale` (3,) and `correction_matrix` (3, 3) are the means of theirs."""
 
     runs: tuple[AsMounted, ...]
     found: Reversal
@@ -36,10 +36,10 @@ class MagnetometerReversal:
 
 
 def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReversal]:
-    """Every magnetometer of the first run, from runs (at least two) with their names.
+    """Separate bias and field of every magnetometer of the first run, from at least two named runs.
 
-    Raises Refused `too_few_runs`, `no_magnetometer` where it was not recorded or not calibrated in one of them,
-    `runs_do_not_match` naming what differs, and as `separate` does.
+    Raise Refused `too_few_runs`, `no_magnetometer` if it was not recorded or not calibrated in one of them,
+    `runs_do_not_match` with the difference, and as `separate` does.
     """
     if len(runs) < 2:
         raise Refused("too_few_runs", "one run cannot separate the bias from the arm's field", ALIKE)
@@ -47,10 +47,10 @@ def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReve
     names = [*first.results, *first.faults]
     if not names:
         raise Refused("no_magnetometer", f"{runs[0][0]} has no recording of a magnetometer", "Give runs with one")
-    return {name: _reversal([_as_mounted(run, outcome, name) for run, outcome in runs]) for name in names}
+    return {name: _reversal([_require_calibrated(run, outcome, name) for run, outcome in runs]) for name in names}
 
 
-def _as_mounted(run: str, outcome: Outcome, name: str) -> AsMounted:
+def _require_calibrated(run: str, outcome: Outcome, name: str) -> AsMounted:
     magnetometers = outcome.magnetometers
     if name in magnetometers.results:
         return AsMounted(run, outcome, magnetometers.results[name])
@@ -61,13 +61,13 @@ def _as_mounted(run: str, outcome: Outcome, name: str) -> AsMounted:
 
 
 def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
-    first = _what_must_be_alike(runs[0])
+    first = _list_common(runs[0])
     for other in runs[1:]:
-        for what, value in _what_must_be_alike(other).items():
+        for what, value in _list_common(other).items():
             if value != first[what]:
                 raise Refused("runs_do_not_match", f"{runs[0].run} and {other.run} differ in {what}", ALIKE)
     results = [run.result for run in runs]
-    found = separate(
+    separated = separate(
         np.array([result.solution.bias for result in results]),
         np.array([result.budget.covariance[3:, 3:] for result in results]),
         np.array([result.solution.matrix for result in results]),
@@ -75,7 +75,7 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
     )
     return MagnetometerReversal(
         tuple(runs),
-        found,
+        separated,
         np.mean([result.triad.scale for result in results], axis=0),
         _scale_std(results),
         np.mean([result.triad.correction_matrix for result in results], axis=0),
@@ -83,14 +83,14 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
 
 
 def _scale_std(results: Sequence[MagnetometerResult]) -> Array:
-    """(3,) standard deviations of mean scale factors: runs have their own, and share how well the field is known."""
+    """Return the standard deviations (3,) of mean scale factors: the field's uncertainty is common to the runs."""
     shared = results[0].budget.of(SIZE_OF_FIELD)[:3]
-    own = [result.budget.std[:3] ** 2 - result.budget.of(SIZE_OF_FIELD)[:3] ** 2 for result in results]
-    std: Array = np.sqrt(np.sum(own, axis=0) / len(results) ** 2 + shared**2)
+    independent = [result.budget.std[:3] ** 2 - result.budget.of(SIZE_OF_FIELD)[:3] ** 2 for result in results]
+    std: Array = np.sqrt(np.sum(independent, axis=0) / len(results) ** 2 + shared**2)
     return std
 
 
-def _what_must_be_alike(run: AsMounted) -> dict[str, object]:
+def _list_common(run: AsMounted) -> dict[str, object]:
     sensor, settings = run.result.sensor, run.outcome.settings
     return {
         "the magnetometer": (sensor.part, sensor.serial_number),

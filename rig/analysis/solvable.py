@@ -1,4 +1,4 @@
-"""What the libraries of linear algebra and of fits refuse becomes an error by name, whatever reckons with them."""
+"""The translation of errors of numerical libraries into a Fault."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,11 +10,11 @@ LIBRARIES = ("numpy.", "scipy.")
 
 @contextmanager
 def solvable() -> Iterator[None]:
-    """Raises Fault `not_solvable` where NumPy or SciPy gives a solution up; a mistake of our own code stays one."""
+    """Raise Fault `not_solvable` if NumPy or SciPy raises ValueError; an error of our own code passes through."""
     try:
         yield
     except ValueError as error:  # of which NumPy's LinAlgError is one
-        if not _of_a_library(error):
+        if not _is_of_library(error):
             raise
         raise Fault(
             "not_solvable",
@@ -24,8 +24,8 @@ def solvable() -> Iterator[None]:
         ) from error
 
 
-def _of_a_library(error: ValueError) -> bool:
-    """Whether it was raised inside one of them."""
+def _is_of_library(error: ValueError) -> bool:
+    """Return whether one of the libraries raised it."""
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

@@ -1,4 +1,4 @@
-"""What a run's recordings tell of the place they were made in: the site, and the clock everything is measured by."""
+"""The surroundings of a run: the site, and the clock that all speeds are measured by."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ BETWEEN_TWO = sqrt(2 / 3)
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """The site, what no recording shows of it, the controller's clock, and its states' jitter (s).
+    """The site, the stated uncertainty, the controller's clock, and its states' jitter in s.
 
-    `extension_m` (3,) is where the sensors sit, from the flange, in its frame.
-    `clock` is the one that speeds are corrected by, `clocks` what every recording that is held against others says.
-    `finds_earth_rate` says that the site is not asked for the Earth's rate.
+    - `clock`: speeds are corrected by it; `clocks`: those of all recordings, for the checks.
+    - `extension_m` (3,): the sensors' position from the flange, in its frame.
+    - `finds_earth_rate`: the Earth's rate is estimated, not taken from the site.
     """
 
     site: Site
@@ -33,19 +33,19 @@ class Surroundings:
 
 
 def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings:
-    """Return what surrounded the sensors by a run's settings.
+    """Return the surroundings by a run's settings.
 
-    The clock is that of the longest motion, which tells it best: the controller's is one quartz in all recordings, and
-    where it was another, or its computer's time was, the others tell.
+    The clock is that of the longest motion, which determines it best: all recordings share the controller's quartz, and
+    if they do not, or the computer's time is wrong, `clocks` show it.
     """
-    known = settings.stated_uncertainty
-    longest = max(recordings, key=lambda each: float(each.motion.time_s[-1] - each.motion.time_s[0]))
-    clocks = tuple(check_clock(recording, known) for recording in recordings)
+    uncertainty = settings.stated_uncertainty
+    longest = max(recordings, key=lambda run: float(run.motion.time_s[-1] - run.motion.time_s[0]))
+    clocks = tuple(check_clock(recording, uncertainty) for recording in recordings)
     clock = next(check for recording, check in zip(recordings, clocks, strict=True) if recording is longest)
     jitter = state_jitter(recordings)
     return Surroundings(
         settings.site,
-        known,
+        uncertainty,
         clock,
         jitter.std_s * BETWEEN_TWO,
         settings.extension_m,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.analysis.partial_results import SoFar, Turned
+from rig.analysis.partial_results import PartialGyroscope, SoFar
 from rig.data.quantity import RATE, DisplayUnit
 from rig.data.result_file import ResultDocument
 from rig.errors.attempts import Attempts
@@ -105,7 +105,7 @@ def _dwell_rows(dwells: Attempts[QuantityInDwell, ReadAtRest]) -> list[Row]:
     return [rows[dwell] for dwell in sorted(rows, key=lambda dwell: (dwell.sensor, dwell.index))]
 
 
-def _parameters_so_far(name: str, partial: Turned) -> Row:
+def _parameters_so_far(name: str, partial: PartialGyroscope) -> Row:
     if (solution := partial.solution) is not None:
         u = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
         bias, scale = AxisValues(solution.bias_rad_s.tolist(), u[3:]), AxisValues(solution.scale.tolist(), u[:3])

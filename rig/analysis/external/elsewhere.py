@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from rig.analysis.by_hand.gyroscope import solve_hand_samples
-from rig.analysis.check import Check, fitness, unsolved_checks
+from rig.analysis.check import Check, fitness, list_unsolved
 from rig.analysis.estimators import ESTIMATORS, Estimator, choose_estimator
 from rig.analysis.external.attitudes import InAttitudes, Result, known_method, solve_placed
 from rig.analysis.external.increments import InIncrements
@@ -106,7 +106,7 @@ def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:
 
     And every quantity that was to be solved, and is not. No configuration states limits of anything else.
     """
-    yield from unsolved_checks((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
+    yield from list_unsolved((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
     if (gyroscope := sensor.gyroscope) is not None:
         largest = triaxial.MAX_CONDITION if sensor.rates is not None else known_turns.MAX_CONDITION
         yield fitness(name, RATE.name, "condition", gyroscope.solution.condition, largest)
