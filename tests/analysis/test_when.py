@@ -64,7 +64,7 @@ def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
     assert sensor.scale_conditions is not None and sensor.bias_conditions is not None
     assert sensor.scale_conditions.temperature_c == pytest.approx(sensor.temperature_c)
     low, high = sensor.bias_conditions.temperature_range_c or (0.0, 0.0)
-    assert f"was between {low:.2f} and {high:.2f} °C" in when_words(sensor.bias_conditions)
+    assert f"between {low:.2f} and {high:.2f} °C" in when_words(sensor.bias_conditions)
 
 
 def without_thermometer(run: RunData) -> RunData:

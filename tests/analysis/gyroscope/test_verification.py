@@ -357,7 +357,7 @@ def test_the_result_names_its_statistics_and_a_person_can_read_them() -> None:
     console.print(verification_table("gyro", entry), *verification_lines(entry))
     shown = console.export_text()
     assert f"{entry.before.movement.rms_rad_s[0]:.4f}" in shown
-    assert "lags the reference by 4.0" in shown
+    assert "the reference: 4.00 ms" in shown
     alone = verification_entry(replace(verified(), before=None, after=replace(verified().after, noise_rad_s=None)))
     console.print(verification_table("gyro", alone))
     assert "–" in console.export_text()
