@@ -37,15 +37,16 @@ class OnPage:
         """Show a change of the station."""
         self._sections.put(now=asdict(now))
 
-    def answer(self, question: Question) -> str:
-        """Return a browser's answer; if the page has ended, an empty number, and no to every other question."""
+    def answer(self, question: Question) -> str | None:
+        """Return a browser's answer; None if the page has ended."""
         with self._changed:
             self._number, self._open, self._text = self._number + 1, True, ""
-            self._sections.put(asked={"number": self._number, **asdict(question)})
+            choices = [asdict(choice) for choice in question.choices]
+            self._sections.put(asked={"number": self._number, **asdict(question), "choices": choices})
             try:
                 while self._open and not self._control.gone:
                     self._changed.wait(LOOK_S)
-                return "no" if self._open and question.kind != "number" else self._text
+                return None if self._open else self._text
             finally:
                 self._open = False
                 self._sections.put(asked=None)

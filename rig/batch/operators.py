@@ -1,9 +1,9 @@
 """The operator who names the parts and answers questions, at a terminal or elsewhere; or a list without questions."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 from rig.batch.batch import BatchPart, Doubt
@@ -14,38 +14,72 @@ from rig.station.confirm import forget_what_was_typed
 from rig.station.events import Prompt
 from rig.station.plain_text import for_file, say
 
-YES = ("yes", "y", "go")
-NO = ("no", "n")
-
-
 Kind = Literal["number", "mount", "go", "doubt", "again"]
 
 
 @dataclass(frozen=True, slots=True)
+class Choice:
+    """An answer of a question: the `words` that may be typed, its `label` on a button, whether it means yes."""
+
+    words: tuple[str, ...]
+    label: str
+    yes: bool
+
+
+# The first choice is the primary one: the safe one wherever something is in doubt. No word answers two questions with
+# yes except the plain "yes", so an answer to one question starts nothing at another.
+CHOICES: Mapping[Kind, tuple[Choice, ...]] = {
+    "number": (),
+    "mount": (Choice(("",), "It is mounted", True), Choice(("no", "n"), "Put it aside", False)),
+    "go": (Choice(("go",), "Go", True), Choice(("no", "n"), "Do not start", False)),
+    "doubt": (Choice(("no", "n"), "No", False), Choice(("yes", "y"), "Continue anyway", True)),
+    "again": (Choice(("yes", "y"), "Again", True), Choice(("no", "n"), "Put it aside", False)),
+}
+COMMAND_WORDS = frozenset(word for choices in CHOICES.values() for choice in choices for word in choice.words if word)
+
+
+@dataclass(frozen=True, slots=True)
 class Question:
-    """A question of a `kind`: the `lines` before it, and its `text`."""
+    """A question of a `kind`: the `lines` before it, its `text`, and a `hint` on the last answer if it was none."""
 
     kind: Kind
     text: str
     lines: tuple[str, ...] = ()
+    hint: str = ""
+
+    @property
+    def choices(self) -> tuple[Choice, ...]:
+        """The answers; empty if it asks for a number."""
+        return CHOICES[self.kind]
+
+    def meaning(self, answer: str) -> bool | None:
+        """Return whether the answer means yes; None if it does not answer this question."""
+        typed = answer.lower()
+        return next((choice.yes for choice in self.choices if typed in choice.words), None)
+
+    def after_no_answer(self, answer: str) -> "Question":
+        """Return the question to ask again after something that did not answer it."""
+        expected = " or ".join(choice.words[0] or "Enter" for choice in self.choices) or "a serial number"
+        return replace(self, hint=f'"{answer}" does not answer this question: {expected}')
 
 
 class Voice(Protocol):
-    """The way to ask an operator; an answer has no white space around it, and is empty if the operator has left."""
+    """The way to ask an operator; an answer has no white space around it. It is None if the operator has left."""
 
-    def answer(self, question: Question) -> str: ...
+    def answer(self, question: Question) -> str | None: ...
 
 
 class Terminal:
     """The keyboard of the terminal. A scanner is a keyboard that ends each number with Enter."""
 
-    def answer(self, question: Question) -> str:
-        """Return the text typed after the question: earlier input does not answer it."""
+    def answer(self, question: Question) -> str | None:
+        """Return the text typed after the question: earlier input does not answer it. None if the terminal has gone."""
         forget_what_was_typed()
-        for line in question.lines:
+        for line in (question.hint,) if question.hint else question.lines:
             print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
         print(printable_lines(question.text), end=" ", file=sys.stderr, flush=True)
-        return sys.stdin.readline().strip()
+        line = sys.stdin.readline()
+        return line.strip() if line else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +110,16 @@ class Operator:
         if self.numbers is not None:
             return following(self.numbers, [part.serial for part in done])
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"
-        return self._answer("number", text, *([f"{why}."] if why else [])) or None
+        question = Question("number", text, (f"{why}.",) if why else ())
+        while (answer := self._answer(question)) is not None and answer.lower() in COMMAND_WORDS:
+            question = question.after_no_answer(answer)  # an answer to another question is no part
+        return answer or None
 
     def is_mounted(self, part: BatchPart) -> bool:
         """Ask whether the part is mounted; "no" puts it aside."""
         text = f"{part.serial}: mount it, plug in its board, step back; then Enter (no: put it aside):"
         with self._asking("to mount the part"):
-            while (answer := self._answer("mount", text).lower()) not in ("", *YES, *NO):
-                pass  # a number that is scanned twice is not an answer
-        return answer not in NO
+            return self.voice is None or self._agrees("mount", text)
 
     def goes_on(self, doubt: Doubt) -> bool:
         """Ask whether to continue despite a doubt."""
@@ -115,10 +150,16 @@ class Operator:
         return nullcontext() if self.voice is None else self.asking(what)
 
     def _agrees(self, kind: Kind, text: str, *lines: str) -> bool:
-        return self._answer(kind, text, *lines).lower() in YES
+        """Ask until an answer is one of the question's own; no if the operator has left, or without a voice."""
+        question = Question(kind, text, lines)
+        while (answer := self._answer(question)) is not None:
+            if (yes := question.meaning(answer)) is not None:
+                return yes
+            question = question.after_no_answer(answer)
+        return False
 
-    def _answer(self, kind: Kind, text: str, *lines: str) -> str:
-        return "" if self.voice is None else self.voice.answer(Question(kind, text, lines))
+    def _answer(self, question: Question) -> str | None:
+        return None if self.voice is None else self.voice.answer(question)
 
 
 def refuse_without_terminal() -> None:

@@ -1,6 +1,7 @@
 """The present state of a station, from its batch and the events of its runs."""
 
 import json
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
@@ -17,6 +18,7 @@ from rig.station.events import (
     Progress,
     Prompt,
     RunEvent,
+    SamplesTaken,
     SamplingStarted,
     VerdictReached,
 )
@@ -31,6 +33,8 @@ class Now:
     """The present state of a station.
 
     - `state`, `part`, `doing` (in words), `left_s`: the present activity and its remaining time.
+    - `fraction` of the run (0 to 1), `turn_deg_s`: during a run. `sensors`: name, samples, lost ones of each.
+    - `verdict`, `why`: the last part's serial number and state, until the next part begins.
     - `operator`, `work_order`, `simulated`: of the batch.
     - `counts`: the numbers of parts by state. `parts`: the newest parts, serial number and state of each.
     - `rig`: the rig's name in a history, empty if unknown.
@@ -48,6 +52,11 @@ class Now:
     parts: tuple[tuple[str, str], ...] = ()
     rig: str = ""
     over: bool = False
+    fraction: float | None = None
+    turn_deg_s: float | None = None
+    sensors: tuple[tuple[str, int, int], ...] = ()
+    verdict: tuple[str, str] | None = None
+    why: str = ""
 
     def json(self) -> str:
         """Return the text for the history."""
@@ -89,6 +98,7 @@ class Present:
 def update_by_batch(now: Now, batch: Batch) -> Now:
     """Return the state after a change of the batch."""
     in_hand = batch.in_hand
+    newest = batch.parts[-1] if batch.parts and not in_hand else None
     counts: dict[str, int] = {}
     for part in batch.parts:
         counts[part.state] = counts.get(part.state, 0) + 1
@@ -98,6 +108,11 @@ def update_by_batch(now: Now, batch: Batch) -> Now:
         part=in_hand.serial if in_hand else "",
         doing="",
         left_s=None,
+        fraction=None,
+        turn_deg_s=None,
+        sensors=(),
+        verdict=(newest.serial, newest.state) if newest else None,
+        why=newest.ended.why if newest and newest.ended else "",
         operator=batch.begun.operator,
         work_order=batch.begun.work_order,
         counts=counts,
@@ -122,8 +137,17 @@ def after(now: Now, event: RunEvent) -> Now:
             changed = {"state": "checking" if agreed else "waiting", "doing": ""}
         case SamplingStarted():
             changed = {"state": "running", "doing": ""}
-        case Progress(step=step, remaining_s=left_s):
-            changed = {"state": "running", "doing": step.name, "left_s": round(left_s, 1)}
+        case Progress(step=step, elapsed_s=elapsed_s, remaining_s=left_s, arm_speed_rad_s=speed_rad_s):
+            whole_s = elapsed_s + left_s
+            changed = {
+                "state": "running",
+                "doing": step.name,
+                "left_s": round(left_s, 1),
+                "fraction": round(elapsed_s / whole_s, 3) if whole_s > 0 else None,
+                "turn_deg_s": round(math.degrees(speed_rad_s), 1),
+            }
+        case SamplesTaken(sensors):
+            return replace(now, sensors=tuple((one.sensor, one.samples, one.lost) for one in sensors))
         case PhaseRecorded():
             changed = {"state": "solving", "doing": ""}
         case VerdictReached(passed):
@@ -133,4 +157,4 @@ def after(now: Now, event: RunEvent) -> Now:
             changed = {"state": state, "doing": f"{error.name}: {error.what}"}
         case Interrupted(text):
             changed = {"state": "stopped", "doing": text}
-    return now if changed is None else replace(now, **{"left_s": None, **changed})
+    return now if changed is None else replace(now, **{"left_s": None, "fraction": None, "turn_deg_s": None, **changed})

@@ -9,8 +9,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from rig.batch.batch import BatchPart
 from rig.batch.on_page import OnPage
-from rig.batch.operators import Question
+from rig.batch.operators import Operator, Question
 from rig.page.server.control import Control
 from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving
@@ -21,12 +22,12 @@ Asking = Callable[..., int]
 
 
 @pytest.fixture
-def answers() -> "SimpleQueue[str]":
+def answers() -> "SimpleQueue[str | None]":
     return SimpleQueue()
 
 
 @pytest.fixture
-def ask(answers: "SimpleQueue[str]") -> Iterator[Asking]:
+def ask(answers: "SimpleQueue[str | None]") -> Iterator[Asking]:
     """Asks the page of a station that waits for a number."""
     sections, control = Sections(), Control(may_answer=False)
     voice = OnPage(sections, control)
@@ -48,7 +49,7 @@ def ask(answers: "SimpleQueue[str]") -> Iterator[Asking]:
 
 
 @pytest.mark.slow
-def test_an_answer_needs_the_token_the_page_and_the_question(ask: Asking, answers: "SimpleQueue[str]") -> None:
+def test_an_answer_needs_the_token_the_page_and_the_question(ask: Asking, answers: "SimpleQueue[str | None]") -> None:
     right = {"number": 1, "text": " G-001 "}
     assert ask("POST", "/say", right, Authorization="") == 403
     assert ask("POST", "/say", right, Origin="http://evil.example") == 403
@@ -68,6 +69,8 @@ def test_a_page_that_is_lost_mounts_nothing_and_agrees_to_nothing() -> None:
     control = Control(may_answer=False)
     voice = OnPage(Sections(), control)
     control.leave()
-    assert voice.answer(Question("number", "part 1, serial number:")) == ""
-    assert voice.answer(Question("mount", "G-001: mount it")) == "no"
-    assert voice.answer(Question("go", "Type go to start:")) == "no"
+    assert voice.answer(Question("number", "part 1, serial number:")) is None
+    operator = Operator(voice)
+    assert operator.next_part([]) is None
+    assert not operator.is_mounted(BatchPart(1, "G-001", "01-G-001", "2026-11-25T08:00:00+00:00"))
+    assert not operator.agrees(("The arm will move.",), "start")

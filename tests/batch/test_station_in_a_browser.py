@@ -11,18 +11,20 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
-from rig.batch.batch import BatchPart
+from rig.batch.batch import BatchPart, Begun, PartBegun, PartEnded, state_of
 from rig.batch.on_page import on_page
 from rig.batch.operators import Operator
 from rig.batch.status import Now, Present
+from rig.motion.steps import Rest
 from rig.page.server.control import STOPPED
 from rig.page.server.serving import PageAddress
-from rig.station.events import Interrupted
+from rig.station.events import Interrupted, Progress, SamplesTaken, SensorSamples
 from support.page.browser import legible, needs_browser, picture, screen, text, typed
 from support.processes.waiting import PATIENCE_S, wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
+AT = "2026-11-25T08:00:00+00:00"
 TRAY = (("G-001", "pass"), ("G-002", "fail"), ("<b>G-003</b>", "open"))
 NOW = Now("checking", "<b>G-003</b>", "", None, "A. Person", "W-17", True, {"pass": 1, "fail": 1}, TRAY)
 WORDS = ("The arm at 127.0.0.2 will move for 29 s.", "Nobody and nothing may be within its reach.")
@@ -66,7 +68,7 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
         wait_for(lambda: "Type go" in text(driver, "text"), "the question whether to go")
         assert all(each in text(driver, "lines") for each in WORDS)
         typed(driver, "G-005")  # scanned too early: no answer
-        wait_for(lambda: "answers nothing" in text(driver, "hint"), "that a number is no answer")
+        wait_for(lambda: "does not answer" in text(driver, "hint"), "that a number is no answer")
         assert answers.empty()
         picture(driver, "station-go")
         with screen(driver, 390, 800):
@@ -80,6 +82,30 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
         driver.find_element(By.CSS_SELECTOR, "#buttons .go").click()
         assert answers.get(timeout=PATIENCE_S) is True
         wait_for(lambda: not driver.find_element(By.ID, "ask").is_displayed(), "that nothing is asked")
+
+
+def test_a_run_shows_its_progress_and_a_verdict_stands_until_the_next_number(driver: Chrome) -> None:
+    present = Present(NOW)
+    with on_page(present, PageAddress(port=0)) as (_, url):
+        driver.get(url)
+        present.event(Progress(2, 4, Rest("rest", 10.0), 0.5, 15.0, 45.0, 1.0471975511965976))
+        present.event(SamplesTaken((SensorSamples("gyro", 200, 1, {}),)))
+        wait_for(lambda: "200 samples, 1 lost" in text(driver, "rates"), "the samples")
+        assert "25 %" in text(driver, "rates") and "60 °/s" in text(driver, "rates")
+        picture(driver, "station-running")
+        begun = PartBegun("G-003", "03-G-003", AT)
+        present.batch(state_of([Begun("", "", AT), begun, PartEnded("fail", AT, "gyro.bias is too large")]))
+        wait_for(lambda: "FAIL" in text(driver, "verdict"), "the verdict")
+        assert (text(driver, "part"), text(driver, "why")) == ("G-003", "gyro.bias is too large")
+        assert not driver.find_element(By.ID, "run").is_displayed()
+        part_px, verdict_px = (
+            float(driver.find_element(By.ID, name).value_of_css_property("font-size")[:-2])
+            for name in ("part", "verdict")
+        )
+        assert verdict_px > part_px
+        with screen(driver, 390, 800):
+            assert driver.execute_script("return document.documentElement.scrollWidth") <= 390
+        picture(driver, "station-verdict")
 
 
 def test_after_a_stop_the_page_says_that_and_not_that_there_is_no_news(driver: Chrome) -> None:

@@ -4,13 +4,6 @@ import { live, SIGNS, silent, up, WORDS } from "./live.js";
 import { act, token } from "./stream.js";
 
 const $ = (id) => document.getElementById(id);
-// What may be typed, beside the buttons that type it. A number that is scanned too early is no answer to any of these.
-const ANSWERS = {
-  mount: [["", "It is mounted"], ["no", "Put it aside"]],
-  go: [["go", "Go"], ["no", "Do not start"]],
-  doubt: [["yes", "Continue anyway"], ["no", "No"]],
-  again: [["yes", "Again"], ["no", "Put it aside"]],
-};
 let asked = null;
 let over = false; // the station has ended, and with it the page's server
 
@@ -20,7 +13,17 @@ function now(of) {
   $("present").dataset.state = of.state;
   over = of.over;
   $("halt").hidden = over || !token;
-  $("part").textContent = of.part || "–";
+  const verdict = !of.part && of.verdict; // it stands until the next part begins
+  $("present").dataset.verdict = verdict ? verdict[1] : "";
+  $("part").textContent = verdict ? verdict[0] : of.part || "–";
+  $("verdict").hidden = !verdict;
+  $("verdict").textContent = verdict ? `${SIGNS[verdict[1]] ?? "·"} ${verdict[1].toUpperCase()}` : "";
+  $("why").textContent = verdict ? of.why : "";
+  const running = typeof of.fraction === "number";
+  $("run").hidden = !running;
+  if (running) $("done").value = of.fraction;
+  $("rates").textContent = running ? [`${Math.round(of.fraction * 100)} %`, `turning at ${of.turn_deg_s} °/s`,
+    ...of.sensors.map(([name, samples, lost]) => `${name}: ${samples} samples, ${lost} lost`)].join(" · ") : "";
   $("state").textContent = WORDS[of.state] ?? of.state;
   $("doing").textContent = [of.doing, typeof of.left_s === "number" && `${Math.round(of.left_s)} s left`].filter(Boolean).join(", ");
   $("who").textContent = [of.operator, of.work_order && `order ${of.work_order}`].filter(Boolean).join(" · ");
@@ -38,16 +41,15 @@ function ask(question) {
   asked = question;
   $("ask").hidden = !question;
   if (!question) return;
-  const choices = ANSWERS[question.kind] ?? [];
   $("lines").replaceChildren(...question.lines.map((line) => element("li", line)));
   $("text").textContent = question.text;
   $("said").value = "";
-  $("hint").textContent = "";
+  $("hint").textContent = question.hint;
   $("clear").checked = false;
   $("agree").hidden = question.kind !== "go";
-  $("buttons").replaceChildren(...choices.map(([text, words], at) => {
-    const button = element("button", words, { type: "button", className: at ? "quiet" : "go" });
-    button.addEventListener("click", () => say(text));
+  $("buttons").replaceChildren(...question.choices.map(({ words, label }, at) => {
+    const button = element("button", label, { type: "button", className: at ? "quiet" : "go" });
+    button.addEventListener("click", () => say(words[0]));
     return button;
   }));
   ready();
@@ -63,12 +65,6 @@ function ready() {
 async function say(text) {
   const question = asked;
   if (!question) return;
-  const allowed = (ANSWERS[question.kind] ?? []).map(([answer]) => answer);
-  if (allowed.length && !allowed.includes(text.toLowerCase())) {
-    $("said").value = "";
-    $("hint").textContent = `"${text}" answers nothing here: ${allowed.map((answer) => answer || "Enter").join(" or ")}`;
-    return;
-  }
   const why = await act("say", { number: question.number, text });
   if (why && asked === question) $("hint").textContent = why;
 }

@@ -1,0 +1,109 @@
+"""What comes at each question of a station: its own answers decide, everything else is asked again."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from rig.batch.batch import BatchPart, Begun, Doubt, Entry, PartBegun, PartEnded, state_of
+from rig.batch.operators import CHOICES, Kind, Operator, Question
+from rig.batch.status import Now, after, update_by_batch
+from rig.errors import Fault
+from rig.motion.steps import Rest
+from rig.station.events import PhaseRecorded, Progress, SamplesTaken, SensorSamples
+
+AT = "2026-11-25T08:00:00+00:00"
+PART = BatchPart(1, "G-001", "01-G-001", AT)
+NUMBERS = ("G-001", "G-002", "17")  # the part's own number, a scan of another one, a bare number
+YES, NO, AGAIN = True, False, None
+# answer:   ""     "y"    "yes"  "go"   "n"  "no"  a number
+TABLE = {
+    "mount": (YES, AGAIN, AGAIN, AGAIN, NO, NO, AGAIN),
+    "go": (AGAIN, AGAIN, AGAIN, YES, NO, NO, AGAIN),
+    "doubt": (AGAIN, YES, YES, AGAIN, NO, NO, AGAIN),
+    "again": (AGAIN, YES, YES, AGAIN, NO, NO, AGAIN),
+}
+COMES = [("",), ("y", "Y"), ("yes", "Yes"), ("go", "GO"), ("n",), ("no", "No"), NUMBERS]
+
+
+class Typist:
+    """A voice with answers in their order, which leaves after the last one."""
+
+    def __init__(self, *answers: str) -> None:
+        self.left: Iterator[str] = iter(answers)
+        self.asked = list[Question]()
+
+    def answer(self, question: Question) -> str | None:
+        self.asked.append(question)
+        return next(self.left, None)
+
+
+def ask(kind: str, typist: Typist) -> bool:
+    operator = Operator(typist)
+    match kind:
+        case "mount":
+            return operator.is_mounted(PART)
+        case "go":
+            return operator.agrees(("The arm will move.",), "start")
+        case "doubt":
+            return operator.goes_on(Doubt("G-001 is done"))
+        case _:
+            return operator.tries_again(PART, Fault("board_link_lost", "the cable was pulled out", "Plug it in"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "comes", "meaning"),
+    [
+        (kind, text, meaning)
+        for kind, row in TABLE.items()
+        for texts, meaning in zip(COMES, row, strict=True)
+        for text in texts
+    ],
+)
+def test_an_answer_means_one_question_and_anything_else_is_asked_again(
+    kind: str, comes: str, meaning: bool | None
+) -> None:
+    own_no, own_yes = "no", {"mount": "", "go": "go"}.get(kind, "yes")
+    for then, decided in ((own_no, False), (own_yes, True)):
+        typist = Typist(comes, then)
+        assert ask(kind, typist) is (decided if meaning is None else meaning)
+        assert {question.kind for question in typist.asked} == {kind}
+        assert len(typist.asked) == (2 if meaning is None else 1)
+        assert all(comes in question.hint for question in typist.asked[1:])
+    assert ask(kind, Typist()) is False  # the operator has left
+
+
+@pytest.mark.parametrize("comes", ["y", "Yes", "go", "n", "NO"])
+def test_an_answer_to_another_question_is_no_serial_number(comes: str) -> None:
+    typist = Typist(comes, "G-002")
+    assert Operator(typist).next_part([]) == "G-002"
+    assert comes in typist.asked[1].hint
+
+
+def test_a_number_is_taken_an_empty_line_ends_the_batch_and_so_does_an_operator_who_leaves() -> None:
+    assert [Operator(Typist(text)).next_part([]) for text in (*NUMBERS, "")] == [*NUMBERS, None]
+    assert Operator(Typist()).next_part([]) is None
+
+
+def test_in_doubt_the_first_choice_does_not_go_on() -> None:
+    primary: dict[Kind, bool] = {kind: choices[0].yes for kind, choices in CHOICES.items() if choices}
+    assert primary["doubt"] is False
+
+
+def test_a_verdict_stands_until_the_next_part_begins() -> None:
+    ended: list[Entry] = [
+        Begun("", "", AT),
+        PartBegun("G-001", "01-G-001", AT),
+        PartEnded("fail", AT, "gyro.bias is too large"),
+    ]
+    now = update_by_batch(Now(), state_of(ended))
+    assert (now.verdict, now.why) == (("G-001", "fail"), "gyro.bias is too large")
+    now = update_by_batch(now, state_of([*ended, PartBegun("G-002", "02-G-002", AT)]))
+    assert (now.verdict, now.why, now.part) == (None, "", "G-002")
+
+
+def test_during_a_run_progress_rates_and_samples_are_shown_and_afterwards_no_rate() -> None:
+    now = after(Now(), Progress(2, 4, Rest("rest", 10.0), 0.5, 15.0, 45.0, 1.0471975511965976))
+    now = after(now, SamplesTaken((SensorSamples("gyro", 200, 1, {}),)))
+    assert (now.fraction, now.turn_deg_s, now.left_s, now.sensors) == (0.25, 60.0, 45.0, (("gyro", 200, 1),))
+    now = after(now, PhaseRecorded((), 0))
+    assert (now.fraction, now.turn_deg_s) == (None, None)
