@@ -123,7 +123,7 @@ def _of_matrix(solution: VectorSolution) -> Array:
 def _walk(explained: Explained) -> Array:
     """Return the bias drift's part (3, p, p) in the covariance of each axis' coefficients F, c (and G)."""
     seen = explained.inputs
-    gravity = None if explained.solution.g_sensitivity is None else seen.pull_m_s2
+    gravity = None if explained.solution.g_sensitivity is None else seen.apparent_gravity_m_s2
     design = design_matrix(seen.rates_rad_s, gravity)
     if explained.bias.steady:
         return np.zeros((3, design.shape[1], design.shape[1]))

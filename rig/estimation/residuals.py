@@ -18,10 +18,10 @@ from rig.estimation.reference.triaxial import TriaxialSolution
 def residual_std_rad_s(explained: Explained) -> Array:
     """Return the standard deviations (N, 3) of the vector model's residuals: (1 − H) V (1 − H)ᵀ, hat matrix H."""
     inputs, solution = explained.inputs, explained.solution
-    rates, pull = inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.pull_m_s2
+    rates, gravity = inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.apparent_gravity_m_s2
     variances = inputs.variances_rad2_s2 + propagate_speed_std(rates, inputs.speed_std_rad_s, solution.matrix) ** 2
     shared = explained.bias.covariance(inputs.windows_s)
-    design = design_matrix(rates, pull)
+    design = design_matrix(rates, gravity)
     _, inverse = regress(design, inputs.means_rad_s, variances, shared)
     residual_maker = np.eye(len(variances)) - design @ inverse  # (3, N, N)
     noise = np.array([np.diag(of_axis) for of_axis in variances.T]) + shared

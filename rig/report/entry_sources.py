@@ -217,9 +217,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
         _row(
             EarthRate,
             same="rate_rad_s covariance_rad2_s2 norm_rad_s norm_std_rad_s latitude_rad latitude_std_rad heading_rad "
-            "heading_std_rad up",
-            vertical_fixed="vertical_held",
-            birge_ratio="scatter",
+            "heading_std_rad up vertical_fixed birge_ratio",
             degrees_of_freedom="freedom",
         ),
     ),

@@ -62,16 +62,16 @@ class EarthRatePrior:
 class EarthRate:
     """The estimated Earth's rate: `rate_rad_s` (3,) in the frame of the arm's base, `covariance_rad2_s2` (3, 3).
 
-    `up` (3,) is upwards there; `vertical_held` is True if the vertical component was fixed by the latitude. `scatter`
-    is the RMS ratio of residuals to their expected standard deviation, with `freedom` degrees of freedom; above 1 it
-    multiplies the standard deviations (Birge ratio).
+    `up` (3,) is upwards there; `vertical_fixed` is True if the vertical component was fixed by the latitude.
+    `birge_ratio` is the RMS ratio of residuals to their expected standard deviation, with `freedom` degrees of freedom;
+    above 1 it multiplies the standard deviations.
     """
 
     rate_rad_s: Array
     covariance_rad2_s2: Array
     up: Array
-    vertical_held: bool
-    scatter: float
+    vertical_fixed: bool
+    birge_ratio: float
     freedom: float = np.inf
 
     @property
@@ -137,21 +137,21 @@ def find_earth_rate(inputs: VectorInputs, nominal_mounting: Array, prior: EarthR
         directions = perpendicular_unit_vectors(prior.up)
     gravity = inputs.gravity_m_s2 if prior.g_sensitivity else None
     _check_identifiable(inputs, directions, gravity)
-    sensed_gravity = None if gravity is None else inputs.pull_m_s2
+    sensed_gravity = None if gravity is None else inputs.apparent_gravity_m_s2
     fit = _fit(replace(inputs, earth_rate_rad_s=fixed), nominal_mounting, directions, sensed_gravity, prior)
     free, covariance = _extract_earth_rate(fit, len(directions))
     freedom = 3 * (fit.solution.observations - (4 if gravity is None else 7)) - len(directions)
-    scatter = _find_scatter(fit, freedom)
+    birge_ratio = _find_birge_ratio(fit, freedom)
     earth = EarthRate(
         rate_rad_s=fixed + free @ directions,
-        covariance_rad2_s2=directions.T @ covariance @ directions * max(1.0, scatter) ** 2,
+        covariance_rad2_s2=directions.T @ covariance @ directions * max(1.0, birge_ratio) ** 2,
         up=prior.up,
-        vertical_held=len(directions) < 3,
-        scatter=scatter,
+        vertical_fixed=len(directions) < 3,
+        birge_ratio=birge_ratio,
         freedom=max(freedom, 1),
     )
     expected = float(np.sqrt(EARTH_RATE_RAD_S**2 - fixed @ fixed))
-    component = "its level part" if earth.vertical_held else "it"
+    component = "its level part" if earth.vertical_fixed else "it"
     check_earth_seen(earth.rate_rad_s - fixed, earth.covariance_rad2_s2, expected, component)
     return earth
 
@@ -201,7 +201,7 @@ def _extract_earth_rate(fit: _Fit, directions: int) -> tuple[Array, Array]:
     return PRIOR_STD_RAD_S * sizes, PRIOR_STD_RAD_S**2 * covariance
 
 
-def _find_scatter(fit: _Fit, freedom: int) -> float:
+def _find_birge_ratio(fit: _Fit, freedom: int) -> float:
     """Return the RMS of residuals over their expected standard deviations, without the dof that the arm's errors
     absorb.
     """

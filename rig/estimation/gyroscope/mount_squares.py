@@ -50,7 +50,7 @@ def _find_curvatures(explained: Explained, turns_rad: Array) -> Array:
 def _find_regression(explained: Explained) -> Array:
     """Return the map (3, 4, N) from mean readings to F, row by row, and the offsets, for the given mounts."""
     inputs, solution, bias = explained.inputs, explained.solution, explained.bias
-    design = design_matrix(inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.pull_m_s2)
+    design = design_matrix(inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.apparent_gravity_m_s2)
     of_speed = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, solution.matrix)
     shared = None if bias.steady else bias.covariance(inputs.windows_s)
     _, inverse = regress(design, inputs.means_rad_s, inputs.variances_rad2_s2 + of_speed**2, shared)

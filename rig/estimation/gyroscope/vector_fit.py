@@ -82,10 +82,10 @@ class VectorInputs:
         return np.zeros(self.turns_rad_s.shape) if self.arms_m is None else self.centripetal_m_s2(self.arms_m)
 
     @property
-    def pull_m_s2(self) -> Array:
+    def apparent_gravity_m_s2(self) -> Array:
         """The apparent gravity (N, 3) in the flange's frame: gravity less the acceleration."""
-        pull: Array = self.gravity_m_s2 - self.acceleration_m_s2
-        return pull
+        apparent: Array = self.gravity_m_s2 - self.acceleration_m_s2
+        return apparent
 
     @property
     def instability_rad_s(self) -> float:
@@ -167,7 +167,7 @@ def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess 
     The bias drift is estimated from the means unless a `process` is given. Raise Fault as the vector model does.
     """
     try:
-        fit = _explain(inputs, nominal_mounting, inputs.pull_m_s2, process)
+        fit = _explain(inputs, nominal_mounting, inputs.apparent_gravity_m_s2, process)
         # By attitudes alone: centripetal accelerations, a fiftieth of gravity, are worse than the data sheet.
         check_identifiable(inputs.rates_rad_s, inputs.gravity_m_s2)
         return fit

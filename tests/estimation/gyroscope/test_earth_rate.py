@@ -73,7 +73,7 @@ def test_the_earths_rate_and_a_sensitivity_to_gravity_are_not_both_found_without
 
 def test_with_a_latitude_they_are() -> None:
     earth, truth = found(FELT, 1, "at latitude")
-    assert earth.vertical_held
+    assert earth.vertical_fixed
     assert earth.latitude_rad == pytest.approx(LATITUDE_RAD, abs=np.radians(0.5))
     assert UP @ earth.rate_rad_s == pytest.approx(EARTH_RATE_RAD_S * np.sin(LATITUDE_RAD))
     level = np.sqrt(np.diag(earth.covariance_rad2_s2)[:2])
