@@ -1,4 +1,4 @@
-"""From readings in known attitudes to calibrations: gyroscope, accelerometer and magnetometer, as TRIAX has them."""
+"""The calibration of gyroscope, accelerometer and magnetometer from readings in known attitudes (TRIAX)."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -34,18 +34,20 @@ Chosen = Method | Literal["increments"]
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
 CHOICES: tuple[Chosen, ...] = ("increments", *METHODS)
 TOO_LITTLE = ("too_few_observations", "rank_deficient", "ill_conditioned")
-NOT_SEEN = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
+NOT_IDENTIFIABLE = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
 ROUNDING = 1e-9  # of a mean: all readings of it were the same
 
 
 @dataclass(frozen=True, slots=True)
 class InAttitudes:
-    """One quantity's calibration by the chosen method, and by each of the others, or the Fault that it ends in.
+    """One quantity's calibration by the chosen method.
 
-    `reference_fault` says why what was found as the reference, a gyroscope's Earth's rate, is not it. Of a body that
-    was laid down, `laid` is how its placements differ, told by `elsewhere` rests without an attitude too, and `moving`
-    how many rows were left out for its movement; `dwells` are the placements. `seen` is what was read in attitudes.
-    `budget` is what the uncertainty of the chosen method is made of, the `triad` its scale and axes.
+    - `triad`: scale and axes; `budget`: the contributors to the uncertainty.
+    - `other_methods`: the solutions by the other methods, or the Fault each ends in.
+    - `measurements`: the means in attitudes; `dwells`: the placements.
+    - `reference_fault`: why the estimated reference of a gyroscope is not the Earth's rate.
+    - `laid`: the differences of the placements; `elsewhere` rests without an attitude contributed to it.
+    - `moving`: the number of rows that were left out for the body's motion.
     """
 
     solution: TriaxialSolution
@@ -64,48 +66,48 @@ Result = InAttitudes | InIncrements
 
 
 def solve_placed(
-    name: str, placed: PlacedReadings, site: Site, asked: Elsewhere, method: Chosen | None, *, second_order: bool
+    name: str, placed: PlacedReadings, site: Site, options: Elsewhere, method: Chosen | None, *, second_order: bool
 ) -> Attempts[Quantity, Result | OfKind]:
-    """Every quantity that was recorded of a sensor of that name, by `method`; None chooses the one that suits it.
+    """Calibrate every quantity that was recorded of a sensor, by `method`; None chooses one.
 
-    That is "attitude_weighted", and for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
+    The choice is "attitude_weighted", for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
     "maximum_likelihood".
     """
-    any_mounting, exact_rates = asked.any_mounting, asked.exact_rates
+    any_mounting, exact_rates = options.any_mounting, options.exact_rates
 
-    def of_rate(turning: Turning) -> Result:
+    def solve_rate(turning: Turning) -> Result:
         check_reads(turning.readings_rad_s, RATE)
         chosen = method or ("maximum_likelihood" if exact_rates else "increments")
         if chosen != "increments":
-            return _of_rows(Equations.of_rows(placed, exact_rates=exact_rates), chosen, any_mounting=any_mounting)
-        return solve_turning(turning, asked.window_s, any_mounting=any_mounting)
+            return _solve_rows(Equations.from_rows(placed, exact_rates=exact_rates), chosen, any_mounting=any_mounting)
+        return solve_turning(turning, options.window_s, any_mounting=any_mounting)
 
     solvers = {kind.quantity: kind.solve for kind in installed_kinds()}
 
-    def of_reference(quantity: Quantity, placements: Placements | Fault) -> Result | OfKind:
+    def solve_reference(quantity: Quantity, placements: Placements | Fault) -> Result | OfKind:
         if not isinstance(placements, Fault):
             _check_noisy(placements, quantity)
         if quantity in solvers and not isinstance(placements, Fault):
             of_kind: OfKind = solvers[quantity](name, placements, site)
             return of_kind
-        known = gravity_reference(site) if quantity == ACCELERATION else field_reference(site, "--field-t, in tesla")
+        norm = gravity_reference(site) if quantity == ACCELERATION else field_reference(site, "--field-t, in tesla")
         if isinstance(placements, Fault):
             raise placements
         chosen = "attitude_weighted" if method is None or method == "increments" else method
-        equations = Equations.of_placements(placements, quantity, known, second_order=second_order)
-        return _of_placements(placements, quantity, equations, chosen, any_mounting=any_mounting)
+        equations = Equations.from_placements(placements, quantity, norm, second_order=second_order)
+        return _solve_placements(placements, quantity, equations, chosen, any_mounting=any_mounting)
 
     solves = dict[Quantity, Callable[[], Result | OfKind]]()
-    for quantity in (each for each in placed.quantities if not asked.only or each.sensor in asked.only):
+    for quantity in (one for one in placed.quantities if not options.only or one.sensor in options.only):
         if quantity == RATE and placed.turning is not None:
-            solves[quantity] = partial(of_rate, placed.turning)
+            solves[quantity] = partial(solve_rate, placed.turning)
         elif placed.placements is not None:
-            solves[quantity] = partial(of_reference, quantity, placed.placements)
+            solves[quantity] = partial(solve_reference, quantity, placed.placements)
     return attempt_each(solves)
 
 
 def _check_noisy(placements: Placements, quantity: Quantity) -> None:
-    """Raises Fault `stuck_sensor` where a placement's readings of an axis are all the same."""
+    """Raise Fault `stuck_sensor` if a placement's readings of an axis are all the same."""
     read = placements.read
     nothing = read.variances[quantity] <= (ROUNDING * read.means[quantity]) ** 2
     for row, axis in np.argwhere(nothing)[:1]:
@@ -118,28 +120,33 @@ def _check_noisy(placements: Placements, quantity: Quantity) -> None:
         )
 
 
-def known_method(name: str | None) -> Chosen | None:
-    """Raises Refused `unknown_estimator`."""
+def find_method(name: str | None) -> Chosen | None:
+    """Return the method of that name. Raise Refused `unknown_estimator`."""
     return None if name is None else choose_estimator(CHOICES, name)
 
 
-def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:
+def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:
     solution = equations.solve(method)
     if not any_mounting:
         check_mounted(solution.matrix)
     budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance}, float(equations.freedom.min()))
-    other_methods = equations.beside(method, *get_args(EqualWeights))
+    other_methods = equations.solve_others(method, *get_args(EqualWeights))
     return InAttitudes(
-        solution, Triad.from_solution(solution), other_methods, budget, equations.measurements, _not_the_earth(solution)
+        solution,
+        Triad.from_solution(solution),
+        other_methods,
+        budget,
+        equations.measurements,
+        _check_earth_rate(solution),
     )
 
 
-def _of_placements(
+def _solve_placements(
     placements: Placements, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
 ) -> InAttitudes:
-    """The calibration from placements; what these do beside counts too, if the method allows for wrong attitudes."""
+    """Return the calibration from placements, with their differences if the method models wrong attitudes."""
     elsewhere, moving = placements.elsewhere, placements.left_out
-    solution, laid = _solved(equations, method, placements), None
+    solution, laid = _solve(equations, method, placements), None
     if method == "attitude_weighted":
         laid = laid_down(
             solution.theta,
@@ -147,9 +154,9 @@ def _of_placements(
             elsewhere.means[quantity],
             elsewhere.variances[quantity],
         )
-        solution = _as_laid_down(solution, laid)
+        solution = _replace_parameters(solution, laid)
     if solution.second_order is not None:
-        check_identifiable(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
+        check_identifiable(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_IDENTIFIABLE)
     if not any_mounting:
         check_mounted(solution.matrix)
     causes = {NOISE: solution.covariance} if laid is None else laid.causes
@@ -157,7 +164,7 @@ def _of_placements(
     return InAttitudes(
         solution,
         Triad.from_solution(solution),
-        equations.beside(method, *METHODS),
+        equations.solve_others(method, *METHODS),
         budget,
         equations.measurements,
         laid=laid,
@@ -173,8 +180,8 @@ def _dwells(placements: Placements, quantity: Quantity) -> Iterator[StaticReadin
         yield StaticReading(number, f"placement {number + 1}", read.mean(quantity, number), attitude.T, window)
 
 
-def _solved(equations: Equations, method: Method, placements: Placements) -> TriaxialSolution:
-    """The solution; where the rests are not enough, it is said that rows were left out."""
+def _solve(equations: Equations, method: Method, placements: Placements) -> TriaxialSolution:
+    """Return the solution; if the rests are too few, the Fault says that rows were left out."""
     try:
         return equations.solve(method)
     except Fault as fault:
@@ -182,12 +189,12 @@ def _solved(equations: Equations, method: Method, placements: Placements) -> Tri
             raise
         what = (
             f"{fault.what}; {placements.left_out} rows in which the body moves are left out, for only rests tell a "
-            f"reference{''.join(f'; {each}' for each in placements.omitted)}"
+            f"reference{''.join(f'; {omitted}' for omitted in placements.omitted)}"
         )
         raise Fault(fault.name, what, fault.remedy) from None
 
 
-def _as_laid_down(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolution:
+def _replace_parameters(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolution:
     theta = laid.theta
     return replace(
         solution,
@@ -200,6 +207,6 @@ def _as_laid_down(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolutio
     )
 
 
-def _not_the_earth(solution: TriaxialSolution) -> Fault | None:
-    """Why what a gyroscope's rates leave over is not the Earth's rate: as in a run, it must be seen to a tenth."""
+def _check_earth_rate(solution: TriaxialSolution) -> Fault | None:
+    """Return why a gyroscope's estimated reference is not the Earth's rate: it needs a tenth of it, as in a run."""
     return or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE]))

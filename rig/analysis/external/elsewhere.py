@@ -1,4 +1,4 @@
-"""Readings recorded elsewhere, whose motion a file tells: what they give, and by what that is judged. Pure."""
+"""The solution and checks of external readings, whose motion a file describes. Pure."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,10 +9,10 @@ import numpy as np
 from rig.analysis.by_hand.gyroscope import solve_hand_samples
 from rig.analysis.check import Check, fitness, list_unsolved
 from rig.analysis.estimators import ESTIMATORS, Estimator, choose_estimator
-from rig.analysis.external.attitudes import InAttitudes, Result, known_method, solve_placed
+from rig.analysis.external.attitudes import InAttitudes, Result, find_method, solve_placed
 from rig.analysis.external.increments import InIncrements
-from rig.analysis.external.left_out import notes_on_reading, notes_on_turns, omitted_in_attitudes
-from rig.analysis.external.sweeps_agree import check_agree, counted, noise_freedom, sweep_errors
+from rig.analysis.external.left_out import list_omitted, notes_on_reading, notes_on_turns
+from rig.analysis.external.sweeps_agree import add_errors, check_agree, noise_freedom, sweep_errors
 from rig.analysis.gyroscope.calibration import (
     ALGORITHM_1,
     NEWTON,
@@ -59,12 +59,12 @@ NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweep
 
 @dataclass(frozen=True, slots=True)
 class OfSensor:
-    """What the readings of an `item` gave: its `gyroscope`, what `rates` in attitudes told, what was found `at_rest`.
+    """The solution of the readings of an `item`.
 
-    `unsolved` says why of other quantities that were recorded; `turned` are the turns it was solved by, from rest to
-    rest; `of_kinds` is what solvers of installed kinds of sensors found; `polynomials` are there of a calibration over
-    temperature. `omitted` is what was left out of the recording, by the quantity that it is missing from, None of all;
-    `notes` say how it was read and solved, where that is not as a matter of course.
+    - `gyroscope`: its calibration; `rates`: its solution in attitudes; `at_rest`: the other quantities'.
+    - `unsolved`: why other recorded quantities have no solution; `of_kinds`: those of installed kinds.
+    - `turned`: the turns from rest to rest that it was solved by; `polynomials`: of a calibration over temperature.
+    - `omitted`: what was left out, by the quantity that lacks it, None of all; `notes`: remarkable steps.
     """
 
     item: Item
@@ -79,29 +79,29 @@ class OfSensor:
     notes: tuple[str, ...] = ()
 
 
-def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
-    """What readings gave of whose motion a file tells; `estimator` None takes what suits.
+def solve_external(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
+    """Return the solution of readings whose motion a file describes; `estimator` None chooses one.
 
-    Raises Refused `unknown_estimator`; Fault as the observers do, and where no quantity has a solution what the
-    estimator does, or of several `nothing_solved` with every reason.
+    Raise Refused `unknown_estimator`; Fault as the observers do, and if no quantity has a solution, as the estimator
+    does, or for several `nothing_solved` with every reason.
     """
     if read.tells == "turns":
-        return _with_notes(_by_hand(read, estimator), read)
-    found = (
-        _by_sweeps(read, estimator, settings.reference_c)
+        return _add_notes(_solve_turns(read, estimator), read)
+    solved = (
+        _solve_sweeps(read, estimator, settings.reference_c)
         if read.tells == "sweeps"
-        else _by_attitudes(read, settings, estimator)
+        else _solve_attitudes(read, settings, estimator)
     )
-    if found.gyroscope is None and not found.at_rest and not found.of_kinds:
-        raise _nothing_solved(found.unsolved)
-    return _with_notes(found, read)
+    if solved.gyroscope is None and not solved.at_rest and not solved.of_kinds:
+        raise _nothing_solved(solved.unsolved)
+    return _add_notes(solved, read)
 
 
-def _with_notes(sensor: OfSensor, read: ReadElsewhere) -> OfSensor:
+def _add_notes(sensor: OfSensor, read: ReadElsewhere) -> OfSensor:
     return replace(sensor, notes=(*notes_on_reading(read, _samples(read).sampling), *sensor.notes))
 
 
-def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:
+def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
     """What the solves refuse beyond: equations that do not tell the parameters apart, attitudes not to be believed.
 
     And every quantity that was to be solved, and is not. No configuration states limits of anything else.
@@ -117,13 +117,13 @@ def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:
             yield fitness(name, quantity.name, "attitude_error", at_least, UNTRUSTWORTHY_RAD, unit="rad")
 
 
-def _by_hand(read: ReadElsewhere, name: str | None) -> OfSensor:
+def _solve_turns(read: ReadElsewhere, name: str | None) -> OfSensor:
     if name not in (None, "by_hand"):
         choose_estimator(("by_hand",), str(name))
     return OfSensor(read.item, solve_hand_samples(read.item, _samples(read), read.motion), None, {}, {})
 
 
-def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:
+def _solve_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:
     chosen = None if name is None else choose_estimator(BY_SWEEPS, name)
     data, polynomials = average_sweeps(_samples(read), read.motion), None
     if reference_c is not None and data.turned is not None:
@@ -138,7 +138,7 @@ def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None)
     vector = (
         solution
         if isinstance(solution, VectorSolution | TurnedSolution)
-        else attempt(faults, VECTOR, lambda: counted(_vector(data), data))
+        else attempt(faults, VECTOR, lambda: add_errors(_vector(data), data))
     )
     gyroscope = SensorResult(
         sensor=read.item,
@@ -177,7 +177,9 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
     if estimator != "increments":
         found = _vector(data)
         check_agree(found, data)
-        return counted(found, data) if estimator == "vector" else solve_observations(data.sweeps, estimator, data.rests)
+        return (
+            add_errors(found, data) if estimator == "vector" else solve_observations(data.sweeps, estimator, data.rests)
+        )
     if data.turned is None:
         raise Fault(
             "no_turns",
@@ -189,7 +191,7 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
 
 
 def budget_of(solution: Estimate, data: ExternalData) -> Budget:
-    """What its covariance is made of: of means their scatter, and the errors of the motion that is stated of them."""
+    """Return the budget of its covariance: the scatter of means, and the errors of the stated motion."""
     if data.turned is None or not isinstance(solution, TurnedSolution):
         vector = solution if isinstance(solution, VectorSolution) else _vector(data)
         more, covariance = sweep_errors(vector, data), solution.covariance
@@ -202,42 +204,42 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
         return Budget(
             (noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, more.freedom, more.covariance))
         )
-    known = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
-    known |= dict.fromkeys((known_turns.ENDS, known_turns.AXES), solution.widened_freedom)
+    dof = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
+    dof |= dict.fromkeys((known_turns.ENDS, known_turns.AXES), solution.widened_freedom)
     lines = solution.budget.contributors
-    return Budget(tuple(replace(line, freedom=known.get(line.name, line.freedom)) for line in lines))
+    return Budget(tuple(replace(line, freedom=dof.get(line.name, line.freedom)) for line in lines))
 
 
 def _fewest_of_means(data: ExternalData) -> float:
-    """The fewest degrees of freedom that the noise of any mean is known with."""
-    return float(by_axis(each.freedom for each in [*(sweep.average for sweep in data.sweeps), *data.rests]).min())
+    """Return the fewest degrees of freedom of the noise of any mean."""
+    return float(by_axis(average.freedom for average in [*(sweep.average for sweep in data.sweeps), *data.rests]).min())
 
 
 def _vector(data: ExternalData) -> VectorSolution:
     return solve_vector(data.sweeps, data.rests)
 
 
-def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) -> OfSensor:
-    method, site, asked = known_method(name), settings.site, settings.elsewhere
-    assert asked is not None, "of readings of others"
-    placed = placed_by(_samples(read), read.motion, find_clock=asked.find_clock)
-    found = solve_placed(read.item.name, placed, site, asked, method, second_order=settings.second_order)
-    rates = found.results.get(RATE)
-    told = rates if isinstance(rates, InAttitudes | InIncrements) else None
+def _solve_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) -> OfSensor:
+    method, site, options = find_method(name), settings.site, settings.elsewhere
+    assert options is not None, "of readings of others"
+    placed = placed_by(_samples(read), read.motion, find_clock=options.find_clock)
+    attempts = solve_placed(read.item.name, placed, site, options, method, second_order=settings.second_order)
+    rates = attempts.results.get(RATE)
+    gyroscope = rates if isinstance(rates, InAttitudes | InIncrements) else None
     return OfSensor(
         read.item,
-        gyroscope=None if told is None else _gyroscope(read.item, told, placed.clock),
-        rates=told,
+        gyroscope=None if gyroscope is None else _gyroscope(read.item, gyroscope, placed.clock),
+        rates=gyroscope,
         at_rest={
             quantity: result
-            for quantity, result in found.results.items()
+            for quantity, result in attempts.results.items()
             if quantity != RATE and isinstance(result, InAttitudes)
         },
-        unsolved=found.faults,
-        omitted=tuple(omitted_in_attitudes(placed, found.results)),
+        unsolved=attempts.faults,
+        omitted=tuple(list_omitted(placed, attempts.results)),
         of_kinds=tuple(
-            KindFound(read.item.name, read.item, each, result)
-            for each, result in found.results.items()
+            KindFound(read.item.name, read.item, quantity, result)
+            for quantity, result in attempts.results.items()
             if isinstance(result, OfKind)
         ),
     )
@@ -248,8 +250,8 @@ def _samples(read: ReadElsewhere) -> Samples:
 
 
 def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:
-    """A gyroscope in attitudes as one that was swept is described."""
-    solution = _as_swept(result)
+    """Return the calibration of a gyroscope in attitudes, described as one of sweeps."""
+    solution = _describe_as_swept(result)
     return SensorResult(
         sensor=item,
         solution=solution,
@@ -266,7 +268,7 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
     )
 
 
-def _as_swept(result: Result) -> TurnedSolution:
+def _describe_as_swept(result: Result) -> TurnedSolution:
     """F and b of m = F ω + b as g = K (m + b) has them, with what the covariance is made of."""
     solution, matrix = result.solution, result.solution.matrix
     axes = SensorAxes.of(matrix)
@@ -304,7 +306,7 @@ def _as_swept(result: Result) -> TurnedSolution:
 
 
 def _nothing_solved(unsolved: Mapping[Quantity, Fault]) -> Fault | Refused:
-    """Every reason, each with its own remedy; the only one as it is."""
+    """Return all reasons, each with its own remedy; a single one as it is."""
     faults: Sequence[Fault] = list(unsolved.values())
     if len(faults) == 1:
         return faults[0]

@@ -1,4 +1,4 @@
-"""Attitudes that were given the wrong way round, named by trying."""
+"""The detection of inverted attitudes, by solving with their inverses."""
 
 from collections.abc import Callable, Collection
 from typing import TypeVar
@@ -11,10 +11,10 @@ from rig.estimation.arrays import Array
 Solved = TypeVar("Solved")
 
 
-def solved_in(attitudes: Array, solve: Callable[[Array], Solved], contradicting: Collection[str]) -> Solved:
-    """What `solve` makes of attitudes (N, 3, 3).
+def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], contradicting: Collection[str]) -> Solved:
+    """Return `solve` of attitudes (N, 3, 3).
 
-    Raises Fault as it does, and `inverted_attitudes` where it raises one of `contradicting` and their inverses agree.
+    Raise Fault as it does, and `inverted_attitudes` if it raises one of `contradicting` and their inverses agree.
     """
     try:
         return solve(attitudes)

@@ -1,4 +1,4 @@
-"""What was left out of readings that were made elsewhere, and how they were read where that goes not without saying."""
+"""The omissions of external readings, and notes on how they were read."""
 
 from collections.abc import Iterator, Mapping
 
@@ -16,17 +16,17 @@ from rig.observation.external.placements import Placements
 from rig.observation.sampling import Sampling
 
 
-def omitted_in_attitudes(
+def list_omitted(
     placed: PlacedReadings, results: Mapping[Quantity, Result | OfKind]
 ) -> Iterator[tuple[Quantity | None, Omitted]]:
     """Yield what was left out of readings in attitudes, by the quantity that it is missing from, None of all."""
-    yield from ((None, each) for each in placed.omitted)
+    yield from ((None, omitted) for omitted in placed.omitted)
     rates = results.get(RATE)
     if isinstance(rates, InIncrements | InAttitudes):
-        yield from ((RATE, each) for each in (rates.omitted if isinstance(rates, InIncrements) else placed.incomplete))
+        yield from ((RATE, one) for one in (rates.omitted if isinstance(rates, InIncrements) else placed.incomplete))
     solved = [quantity for quantity in results if quantity != RATE]
     if isinstance(placed.placements, Placements) and solved:
-        yield from ((solved[0], each) for each in (*placed.unsampled, *placed.placements.omitted))
+        yield from ((solved[0], omitted) for omitted in (*placed.unsampled, *placed.placements.omitted))
 
 
 def notes_on_reading(read: ReadElsewhere, sampling: Sampling | None) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The uncertainty budget of a sensor calibrated in known attitudes: scale and bias, by what makes them uncertain."""
+"""The uncertainty budget of a sensor calibrated in known attitudes: scale and bias, by contributor."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -29,18 +29,18 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
 
 
 def noise_freedom(solution: TriaxialSolution, equations: Equations) -> float:
-    """Degrees of freedom of the noise's part in scale and bias, the fewest of the six, by how the readings weigh."""
+    """Return the noise's degrees of freedom, the fewest of scale and bias, by the weights of the readings."""
     response = response_in_attitudes(solution, equations.measurements)
-    told = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
-    return fewest_freedom(told, equations.variances.ravel(), equations.freedom.ravel())
+    rows = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
+    return fewest_freedom(rows, equations.variances.ravel(), equations.freedom.ravel())
 
 
 def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: float | None = None) -> Budget:
-    """The budget by what each cause does to the covariance (p, p) of a reference model's parameters, F (3, 3) first.
+    """Return the budget by the contribution of each cause to a reference model's covariance (p, p), F (3, 3) first.
 
-    Sizes of errors that were found are uncertain themselves. Where their likelihood was integrated over, or the
-    covariance widened as Student's t is, that is in u already (JCGM 101, 6.4.9) and no freedom is left to count:
-    so it is of the noise too, where no `noise_freedom` is given.
+    Estimated variance components are uncertain themselves. If their likelihood was integrated over, or the covariance
+    inflated as Student's t is, u contains that (JCGM 101, 6.4.9) and no degrees of freedom remain to be counted: so for
+    the noise too, without a `noise_freedom`.
     """
     scale = scale_of(matrix)
     lines = []

@@ -1,11 +1,11 @@
-"""What a sensor read in known attitudes, as the equations that every method of TRIAX solves."""
+"""The readings of a sensor in known attitudes, as the equations that every method of TRIAX solves."""
 
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from rig.analysis.external.inverted import solved_in
+from rig.analysis.external.inverted import solve_unless_inverted
 from rig.data.quantity import ACCELERATION, Quantity
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each
@@ -20,9 +20,10 @@ from rig.observation.external.placements import Placements
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """Readings `means` (N, 3) with `variances` (N, 3) in `attitudes` (N, 3, 3), of which `std_rad` (N,) is stated.
+    """The readings of a sensor and the attitudes in which it read them.
 
-    `freedom` (N, 3): with how many degrees of freedom the variances are known.
+    - `means`, `variances` (N, 3), with `freedom` (N, 3) degrees of freedom of the variances.
+    - `attitudes` (N, 3, 3), `std_rad` (N,): their stated standard deviation; `known`: the reference.
     """
 
     means: Array
@@ -34,8 +35,8 @@ class Equations:
     second_order: bool = False
 
     @staticmethod
-    def of_rows(placed: PlacedReadings, *, exact_rates: bool) -> "Equations":
-        """A gyroscope's, by its reference's rates. Raises Fault `no_rates`."""
+    def from_rows(placed: PlacedReadings, *, exact_rates: bool) -> "Equations":
+        """Return a gyroscope's equations, by its reference's rates. Raise Fault `no_rates`."""
         rows = placed.rows
         if rows is None or rows.rates_rad_s is None or not exact_rates:
             raise Fault(
@@ -46,16 +47,16 @@ class Equations:
             )
         known = KnownVector(rows.rates_rad_s)
         if rows.variances is None or rows.freedom is None:
-            variances, freedom = _scatter(rows, known)
+            variances, freedom = _estimate_variances(rows, known)
         else:
             variances, freedom = rows.variances, rows.freedom
         return Equations(rows.means, variances, rows.attitudes, rows.attitude_std_rad, known, freedom)
 
     @staticmethod
-    def of_placements(
+    def from_placements(
         placements: Placements, quantity: Quantity, known: KnownNorm, *, second_order: bool
     ) -> "Equations":
-        """The equations of a sensor that feels a constant reference."""
+        """Return the equations of a sensor of a constant reference."""
         return Equations(
             placements.read.means[quantity],
             placements.read.variances[quantity],
@@ -68,19 +69,19 @@ class Equations:
 
     @property
     def measurements(self) -> Dwells:
-        """What was read in which attitude."""
+        """The means by attitude."""
         return Dwells(self.means, self.variances, self.attitudes)
 
     @property
     def placed(self) -> Placed:
-        """The readings as placed, of a sensor that feels a constant reference of known size."""
+        """The readings as placed, of a sensor of a constant reference of known size."""
         std_rad = np.zeros(len(self.means)) if self.std_rad is None else self.std_rad
         nothing = np.zeros_like(self.means)
         return Placed(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)
 
     def solve(self, method: Method) -> TriaxialSolution:
-        """Raises Fault as `solve_triaxial` does, and `inverted_attitudes`."""
-        return solved_in(self.attitudes, partial(self._solve, method), ["attitude_untrustworthy"])
+        """Return the solution. Raise Fault as `solve_triaxial` does, and `inverted_attitudes`."""
+        return solve_unless_inverted(self.attitudes, partial(self._solve, method), ["attitude_untrustworthy"])
 
     def _solve(self, method: Method, attitudes: Array) -> TriaxialSolution:
         return solve_triaxial(
@@ -93,21 +94,19 @@ class Equations:
             attitude_std_rad=self.std_rad,
         )
 
-    def beside(self, method: Method, *others: Method) -> Attempts[Method, TriaxialSolution]:
-        """The solutions by all other methods, or why there is none."""
+    def solve_others(self, method: Method, *others: Method) -> Attempts[Method, TriaxialSolution]:
+        """Return the solutions by all other methods, or why there is none."""
         return attempt_each({other: partial(self.solve, other) for other in others if other != method})
 
 
-def _scatter(rows: Rows, known: KnownVector) -> tuple[Array, Array]:
-    """(N, 3) variances of the means from how they scatter about the model, each axis' noise alike in all rows.
-
-    And with how many degrees of freedom.
+def _estimate_variances(rows: Rows, known: KnownVector) -> tuple[Array, Array]:
+    """Return the variances (N, 3) of the means from the residuals, each axis' noise alike in all rows, and their dof.
 
     Equal weights: the model that weighs attitude errors would take them for noise here.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts
-    left = solve_triaxial(rows.means, rows.attitudes, quiet, known).residuals
+    residuals = solve_triaxial(rows.means, rows.attitudes, quiet, known).residuals
     freedom = len(rows.means) - 15 / 3
     if freedom < 1:
         raise Fault(
@@ -115,5 +114,5 @@ def _scatter(rows: Rows, known: KnownVector) -> tuple[Array, Array]:
             f"{len(rows.means)} rows of few samples do not show their noise",
             "Give longer rows, or more of them",
         )
-    variances: Array = np.maximum(np.sum(left**2 * counts, axis=0) / freedom, 1e-30) / counts
+    variances: Array = np.maximum(np.sum(residuals**2 * counts, axis=0) / freedom, 1e-30) / counts
     return variances, np.full_like(variances, freedom)

@@ -1,8 +1,8 @@
-"""Whether a gyroscope's bias, as increments between attitudes tell it, is what it reads at rest.
+"""The check of a gyroscope's bias from increments between attitudes against its readings at rest.
 
-A gyroscope at rest reads its bias, and what the body turns unseen. The reference tells how fast it turned in each rest,
-and the scatter of that from rest to rest how well. How large its errors are while the body moves says little of them
-at rest: they may be those of its time stamps.
+A gyroscope at rest reads its bias, and motion of the body that the reference does not show. The reference gives the
+rate of each rest, and its scatter from rest to rest the uncertainty. The reference's errors in motion say little about
+rests: they may be those of its time stamps.
 """
 
 import numpy as np
@@ -23,10 +23,10 @@ TAIL = 0.1  # of the rests, at either end, that may be none
 
 
 def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
-    """Raises Fault `bias_contradicts_rests` where the bias is not what the gyroscope reads at rest.
+    """Raise Fault `bias_contradicts_rests` if the bias is not what the gyroscope reads at rest.
 
-    A rest is one by its readings and by the attitudes of the rows in it. Rests may differ by as much as they do, by
-    what the reference does not see the body turn, and by what gravity does to a gyroscope.
+    A rest is one by its readings and by the attitudes of the rows in it. Rests may differ by their own scatter, by
+    motion that the reference does not show, and by the effect of gravity on a gyroscope.
     """
     at_rest = means_at_rest(turning, solution.clock_s)
     if at_rest is None:
@@ -34,11 +34,11 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
     readings, turned = at_rest.readings_rad_s, at_rest.rates_rad_s @ solution.matrix.T
     bias = np.median(readings, axis=0) - turned.mean(axis=0)
     wander = np.ptp(np.quantile(readings, (TAIL, 1 - TAIL), axis=0), axis=0) / 2
-    known = G_SENSITIVITY_RAD_S**2 + EARTH_RATE_RAD_S**2
-    std = np.sqrt(np.diag(solution.covariance)[BIAS] + wander**2 + _unseen_rad_s(turned) ** 2 + known)
-    off = np.abs(solution.bias - bias) / std
-    worst = int(np.argmax(off))
-    if off[worst] <= _times_of(np.inf):
+    other = G_SENSITIVITY_RAD_S**2 + EARTH_RATE_RAD_S**2
+    std = np.sqrt(np.diag(solution.covariance)[BIAS] + wander**2 + _undetected_std_rad_s(turned) ** 2 + other)
+    normalised = np.abs(solution.bias - bias) / std
+    worst = int(np.argmax(normalised))
+    if normalised[worst] <= _critical_value(np.inf):
         return
     raise Fault(
         "bias_contradicts_rests",
@@ -48,20 +48,20 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
     )
 
 
-def _times_of(freedom: float) -> float:
-    """How many standard deviations the worst of three axes is off in `FALSE_ALARM` of sound recordings: Student's t."""
+def _critical_value(freedom: float) -> float:
+    """Return the critical value of the worst of three axes for `FALSE_ALARM` of sound recordings, by Student's t."""
     from scipy.special import ndtri, stdtrit
 
     tail = false_alarm_of_each(FALSE_ALARM, 2 * len(RATE.axes))
     return -float(ndtri(tail) if np.isinf(freedom) else stdtrit(freedom, tail))
 
 
-def _unseen_rad_s(turned_rad_s: Array) -> float:
-    """Standard deviation of how fast the body turned unseen in the mean of all rests, about any axis.
+def _undetected_std_rad_s(turned_rad_s: Array) -> float:
+    """Return the standard deviation of the body's undetected rate in the mean of all rests, about any axis.
 
-    By the scatter of what the reference says of each (k, 3), as much larger as Student's t asks for.
+    From the scatter of the reference's rates (k, 3), inflated as Student's t.
     """
     count = len(turned_rad_s)
     scatter = float(np.sqrt(np.var(turned_rad_s, axis=0, ddof=1).mean()))
-    wider = _times_of(float(3 * (count - 1))) / _times_of(np.inf)
+    wider = _critical_value(float(3 * (count - 1))) / _critical_value(np.inf)
     return wider * scatter / float(np.sqrt(count))
