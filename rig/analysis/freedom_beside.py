@@ -122,12 +122,12 @@ def _of_matrix(solution: VectorSolution) -> Array:
 
 def _walk(explained: Explained) -> Array:
     """Return the bias drift's part (3, p, p) in the covariance of each axis' coefficients F, c (and G)."""
-    seen = explained.inputs
-    gravity = None if explained.solution.g_sensitivity is None else seen.apparent_gravity_m_s2
-    design = design_matrix(seen.rates_rad_s, gravity)
+    inputs = explained.inputs
+    gravity = None if explained.solution.g_sensitivity is None else inputs.apparent_gravity_m_s2
+    design = design_matrix(inputs.rates_rad_s, gravity)
     if explained.bias.steady:
         return np.zeros((3, design.shape[1], design.shape[1]))
-    shared = explained.bias.covariance(seen.windows_s)
-    _, gain = regress(design, seen.means_rad_s, seen.variances_rad2_s2, shared)
+    shared = explained.bias.covariance(inputs.windows_s)
+    _, gain = regress(design, inputs.means_rad_s, inputs.variances_rad2_s2, shared)
     walk: Array = gain @ shared @ np.swapaxes(gain, -1, -2)
     return walk

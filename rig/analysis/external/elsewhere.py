@@ -102,9 +102,9 @@ def _add_notes(sensor: OfSensor, read: ReadElsewhere) -> OfSensor:
 
 
 def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
-    """What the solves refuse beyond: equations that do not tell the parameters apart, attitudes not to be believed.
+    """Yield the checks beyond the solvers' own: the condition of the equations, the error of attitudes.
 
-    And every quantity that was to be solved, and is not. No configuration states limits of anything else.
+    Every quantity without a solution has a failing check. No configuration states limits of anything else.
     """
     yield from list_unsolved((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
     if (gyroscope := sensor.gyroscope) is not None:
@@ -113,7 +113,7 @@ def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
     for quantity, result in sensor.at_rest.items():
         yield fitness(name, quantity.name, "condition", result.solution.condition, triaxial.MAX_CONDITION)
         if (error := result.solution.attitude_error) is not None:
-            at_least = max(error.std_rad - 2 * error.uncertainty_rad, 0.0)  # a few placements tell it badly
+            at_least = max(error.std_rad - 2 * error.uncertainty_rad, 0.0)  # a few placements determine it poorly
             yield fitness(name, quantity.name, "attitude_error", at_least, UNTRUSTWORTHY_RAD, unit="rad")
 
 
@@ -163,23 +163,23 @@ def _solve_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | No
     if polynomials is not None:
         gyroscope, polynomials = add_rate_polynomials(gyroscope, polynomials)
     notes = tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
-    omitted = tuple((RATE, each) for each in data.omitted)
+    omitted = tuple((RATE, part) for part in data.omitted)
     return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes)
 
 
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
-    """Solves by `estimator`; None takes "increments" where the body was turned from rest to rest, else "vector".
+    """Solve by `estimator`; None chooses "increments" if the body was turned from rest to rest, else "vector".
 
-    Raises Fault as the estimators do, and `no_turns`.
+    Raise Fault as the estimators do, and `no_turns`.
     """
     if estimator is None:
         estimator = "vector" if data.turned is None else "increments"
     if estimator != "increments":
-        found = _vector(data)
-        check_agree(found, data)
-        return (
-            add_errors(found, data) if estimator == "vector" else solve_observations(data.sweeps, estimator, data.rests)
-        )
+        vector = _vector(data)
+        check_agree(vector, data)
+        if estimator == "vector":
+            return add_errors(vector, data)
+        return solve_observations(data.sweeps, estimator, data.rests)
     if data.turned is None:
         raise Fault(
             "no_turns",

@@ -23,14 +23,14 @@ class Equations:
     """The readings of a sensor and the attitudes in which it read them.
 
     - `means`, `variances` (N, 3), with `freedom` (N, 3) degrees of freedom of the variances.
-    - `attitudes` (N, 3, 3), `std_rad` (N,): their stated standard deviation; `known`: the reference.
+    - `attitudes` (N, 3, 3), `std_rad` (N,): their stated standard deviation; `reference`: its size, or its vectors.
     """
 
     means: Array
     variances: Array
     attitudes: Array
     std_rad: Array | None
-    known: ReferencePrior
+    reference: ReferencePrior
     freedom: Array
     second_order: bool = False
 
@@ -45,16 +45,16 @@ class Equations:
                 "Use increments, which need no rates; or give the columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s "
                 "in body coordinates, with --exact-rates where their noise is far below the sensor's",
             )
-        known = KnownVector(rows.rates_rad_s)
+        reference = KnownVector(rows.rates_rad_s)
         if rows.variances is None or rows.freedom is None:
-            variances, freedom = _estimate_variances(rows, known)
+            variances, freedom = _estimate_variances(rows, reference)
         else:
             variances, freedom = rows.variances, rows.freedom
-        return Equations(rows.means, variances, rows.attitudes, rows.attitude_std_rad, known, freedom)
+        return Equations(rows.means, variances, rows.attitudes, rows.attitude_std_rad, reference, freedom)
 
     @staticmethod
     def from_placements(
-        placements: Placements, quantity: Quantity, known: KnownNorm, *, second_order: bool
+        placements: Placements, quantity: Quantity, reference: KnownNorm, *, second_order: bool
     ) -> "Equations":
         """Return the equations of a sensor of a constant reference."""
         return Equations(
@@ -62,7 +62,7 @@ class Equations:
             placements.read.variances[quantity],
             placements.attitudes,
             placements.attitude_std_rad,
-            known,
+            reference,
             placements.read.freedom[quantity],
             second_order and quantity == ACCELERATION,
         )
@@ -88,7 +88,7 @@ class Equations:
             self.means,
             attitudes,
             self.variances,
-            self.known,
+            self.reference,
             second_order=self.second_order,
             method=method,
             attitude_std_rad=self.std_rad,
@@ -99,14 +99,14 @@ class Equations:
         return attempt_each({other: partial(self.solve, other) for other in others if other != method})
 
 
-def _estimate_variances(rows: Rows, known: KnownVector) -> tuple[Array, Array]:
+def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Array]:
     """Return the variances (N, 3) of the means from the residuals, each axis' noise alike in all rows, and their dof.
 
     Equal weights: the model that weighs attitude errors would take them for noise here.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts
-    residuals = solve_triaxial(rows.means, rows.attitudes, quiet, known).residuals
+    residuals = solve_triaxial(rows.means, rows.attitudes, quiet, reference).residuals
     freedom = len(rows.means) - 15 / 3
     if freedom < 1:
         raise Fault(
