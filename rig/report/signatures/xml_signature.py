@@ -46,10 +46,10 @@ def inspect_xml(name: str, content: bytes, trust: Trust) -> FileInspection:
     verified = (document.signed_data, properties.signed_data, key_info.signed_data)
     if canonical(root) != canonical(rebuild_document(verified, method.value, value)):
         return FileInspection(problems=(not_as_signed(name, "it has content that its signature does not cover"),))
-    if not _is_one_certificate(document.sign_as_xades):
+    if not _is_one_certificate(document.signed_xml):
         why = "the signed document is not a digital certificate with one set of results"
         return FileInspection(problems=(not_as_signed(name, why),))
-    report, problems = _inspect(name, chain, properties.sign_as_xades, trust)
+    report, problems = _inspect(name, chain, properties.signed_xml, trust)
     return FileInspection((report,), {}, problems)
 
 
