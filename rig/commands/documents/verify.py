@@ -13,6 +13,7 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
+    from rig.history.entered_file import FileEntries
     from rig.report.signatures.findings import FileInspection, SignatureReport
 
 SIZE_MAX_BYTES = 256_000_000
@@ -101,7 +102,9 @@ def _read_content(file: Path) -> bytes:
         raise Refused("verify_file", f"{file} cannot be read: {why}", "Give the files of a certificate") from None
 
 
-def _look_up(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]") -> dict[Path, Any]:
+def _look_up(
+    named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]"
+) -> "dict[Path, FileEntries]":
     """Return the history's entry of each file. Raise Refused `history_unreachable`, and as `open_history`."""
     from rig.commands.history.waiting import await_answer
     from rig.history.entered_file import find_file_entries
@@ -113,7 +116,7 @@ def _look_up(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, F
     if not is_there(address):  # opening it would create one
         raise Refused("history_unreachable", f"there is no history {address.label}", "Name another with --history")
 
-    def ask() -> dict[Path, Any]:
+    def ask() -> "dict[Path, FileEntries]":
         with open_history(address) as history:
             anchors = {
                 file: next((seal.reason.anchor for seal in look.signatures if seal.reason.anchor), None)
@@ -127,7 +130,9 @@ def _look_up(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, F
     return await_answer(ask)
 
 
-def _judge(file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: Any) -> VerifiedFile:
+def _judge(
+    file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: "FileEntries | None"
+) -> VerifiedFile:
     """Judge one file; without a signature of its own it is vouched for by a signed file that holds it, or by the
     history.
     """
