@@ -20,7 +20,7 @@ from rig.observation.placed_on_arm import placements_on_arm
 class OfKind:
     """The solution by an installed kind's solver, and its checks of fitness."""
 
-    found: object
+    solution: object
     checks: tuple[Check, ...] = ()
 
 
@@ -31,30 +31,30 @@ class KindFound:
     name: str
     sensor: RecordedSensor | Item
     quantity: Quantity
-    found: OfKind | None
+    solved: OfKind | None
     fault: Fault | None = None
 
     @property
     def checks(self) -> tuple[Check, ...]:
         """The solver's checks; none without a solution."""
-        return () if self.found is None else self.found.checks
+        return () if self.solved is None else self.solved.checks
 
 
 def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[KindFound, ...]:
     """Return every sensor of an installed kind that was recorded, in the order of the kinds."""
-    return tuple(_on_arm(recordings, settings))
+    return tuple(_solve_kinds(recordings, settings))
 
 
-def _on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
+def _solve_kinds(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
     for kind in installed_kinds():
         faults = dict[str, Fault]()
         for name, sensor in recordings[0].run.measuring(kind.quantity).items():
-            solve = partial(_solved, kind, name, recordings, settings, settings.site)
+            solve = partial(_solve, kind, name, recordings, settings, settings.site)
             yield KindFound(name, sensor, kind.quantity, attempt(faults, name, solve), faults.get(name))
 
 
-def _solved(
+def _solve(
     kind: InstalledKind, name: str, recordings: Sequence[ObservedRun], settings: RunSettings, site: Site
 ) -> OfKind:
-    found: OfKind = kind.solve(name, placements_on_arm(recordings, name, kind.quantity, settings.observation), site)
-    return found
+    solved: OfKind = kind.solve(name, placements_on_arm(recordings, name, kind.quantity, settings.observation), site)
+    return solved

@@ -91,8 +91,8 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
         clock=swept.clock,
         accelerometers=accelerometers,
         magnetometers=magnetometers,
-        told_from=swept.told_from,
-        told_from_in_reference=among_dwells.detection_limits,
+        detection_limits=swept.detection_limits,
+        reference_detection_limits=among_dwells.detection_limits,
         polynomials=polynomials,
     )
 
@@ -112,7 +112,7 @@ class _GyroscopeOutcome:
     onboard: Mapping[str, Agreement] = field(default_factory=dict)
     checks: tuple[Check, ...] = ()
     clock: ClockCheck | None = None
-    told_from: Mapping[str, tuple[DetectionLimit, ...]] = field(default_factory=dict)
+    detection_limits: Mapping[str, tuple[DetectionLimit, ...]] = field(default_factory=dict)
 
 
 def _judge_gyroscopes(
@@ -144,7 +144,7 @@ def _judge_gyroscopes(
             *clock_checks(surroundings.clocks),
         ),
         clock=surroundings.clock,
-        told_from=among_rates.detection_limits,
+        detection_limits=among_rates.detection_limits,
     )
 
 

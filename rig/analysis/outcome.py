@@ -66,7 +66,7 @@ class Outcome:
     - `clock`: the controller's, None if a recording does not state its uncertainty.
     - `accelerometers`, `magnetometers`: no limit of scale and bias judges the latter.
     - `drifts`: if attitudes were repeated to watch the bias.
-    - `told_from`, `told_from_in_reference`: detection limits of the checks of gyroscopes, and of the others.
+    - `detection_limits`, `reference_detection_limits`: detection limits of the checks of gyroscopes, and of the others.
     - `elsewhere`: the results of external recordings; gyroscopes are in `results` too.
     - `of_kinds`: by the solvers of installed kinds of sensors; `mounts`: of the item in the stages after the first.
     - `polynomials`: of a calibration over temperature; all else is at the reference temperature then.
@@ -83,8 +83,8 @@ class Outcome:
     accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
     magnetometers: "Attempts[str, MagnetometerResult]" = field(default_factory=Attempts)
     drifts: "Drifts" = field(default_factory=dict)
-    told_from: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
-    told_from_in_reference: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
+    detection_limits: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
+    reference_detection_limits: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
     elsewhere: "Mapping[str, OfSensor]" = field(default_factory=dict)
     of_kinds: "tuple[KindFound, ...]" = ()
     mounts: "tuple[EstimatedMount, ...]" = ()

@@ -29,7 +29,7 @@ class MagnetometerReversal:
     """One magnetometer in several runs; `scale` (3,) and `correction_matrix` (3, 3) are the means of theirs."""
 
     runs: tuple[AsMounted, ...]
-    found: Reversal
+    separation: Reversal
     scale: Array
     scale_std: Array
     correction_matrix: Array
@@ -67,7 +67,7 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
             if value != first[what]:
                 raise Refused("runs_do_not_match", f"{runs[0].run} and {other.run} differ in {what}", ALIKE)
     results = [run.result for run in runs]
-    separated = separate(
+    separation = separate(
         np.array([result.solution.bias for result in results]),
         np.array([result.budget.covariance[3:, 3:] for result in results]),
         np.array([result.solution.matrix for result in results]),
@@ -75,7 +75,7 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
     )
     return MagnetometerReversal(
         tuple(runs),
-        separated,
+        separation,
         np.mean([result.triad.scale for result in results], axis=0),
         _scale_std(results),
         np.mean([result.triad.correction_matrix for result in results], axis=0),

@@ -39,7 +39,7 @@ class PlannedSegments:
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class _PlannedSegment:
     sweep: int
     position: float
     interval: MotionInterval
@@ -50,10 +50,11 @@ def plan_segments(run: PlannedRun) -> PlannedSegments:
     motion, extension_m = predict_motion(run.plan, run.arm), np.array(run.settings.extension_m)
     parts = list(_list_parts(run.plan, motion))
     with_transfers = [
-        _Part(REST - 1 - index, 0.0, transfer) for index, transfer in enumerate(_find_transfers(run.plan, motion))
+        _PlannedSegment(REST - 1 - index, 0.0, transfer)
+        for index, transfer in enumerate(_find_transfers(run.plan, motion))
     ]
 
-    def segments(parts: Sequence[_Part]) -> Segments:
+    def segments(parts: Sequence[_PlannedSegment]) -> Segments:
         intervals = tuple(part.interval for part in parts)
         nothing = np.zeros((len(parts), 3))
         return Segments(
@@ -75,7 +76,7 @@ def plan_segments(run: PlannedRun) -> PlannedSegments:
     return PlannedSegments(segments(parts), segments([*parts, *with_transfers]))
 
 
-def _list_parts(plan: Plan, motion: ArmMotion) -> Iterator[_Part]:
+def _list_parts(plan: Plan, motion: ArmMotion) -> Iterator[_PlannedSegment]:
     """Yield a plan's parts as `rig.observation.consistency.segments` divides a recording: sweeps, then rests."""
     parts, parts_of_rest = segment_counts(len(plan.sweeps))
     for index, sweep in enumerate(time_steps_of(plan, Sweep)):
@@ -85,9 +86,9 @@ def _list_parts(plan: Plan, motion: ArmMotion) -> Iterator[_Part]:
             yield from _cut_window(motion, measuring_step.window_s, REST, parts_of_rest)
 
 
-def _cut_window(motion: ArmMotion, window_s: tuple[float, float], sweep: int, parts: int) -> Iterator[_Part]:
-    for each, ends in enumerate(pairwise(np.linspace(*window_s, parts + 1).tolist())):
-        yield _Part(sweep, 2 * each / (parts - 1) - 1 if parts > 1 else 0.0, MotionInterval(motion, *ends))
+def _cut_window(motion: ArmMotion, window_s: tuple[float, float], sweep: int, parts: int) -> Iterator[_PlannedSegment]:
+    for index, ends in enumerate(pairwise(np.linspace(*window_s, parts + 1).tolist())):
+        yield _PlannedSegment(sweep, 2 * index / (parts - 1) - 1 if parts > 1 else 0.0, MotionInterval(motion, *ends))
 
 
 def _find_transfers(plan: Plan, motion: ArmMotion) -> list[MotionInterval]:

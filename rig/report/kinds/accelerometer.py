@@ -58,7 +58,7 @@ def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> Accele
         second_order_degrees_of_freedom=counted(of_second_order(result)),
         validation=None if result.held_out is None else _validation(result.held_out),
         conditions=when_entry(of_accelerometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
-        **detection_limit_field(outcome.told_from_in_reference.get(name, ())),
+        **detection_limit_field(outcome.reference_detection_limits.get(name, ())),
     )  # fmt: skip
 
 

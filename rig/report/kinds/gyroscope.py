@@ -54,7 +54,7 @@ def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
             board,
             scale_conditions=when_entry(conditions.scale),
             bias_conditions=when_entry(conditions.bias),
-            **detection_limit_field(outcome.told_from.get(name, ())),
+            **detection_limit_field(outcome.detection_limits.get(name, ())),
         )
     return entries
 

@@ -57,7 +57,7 @@ def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> Magneto
         field_base_t=result.solution.reference,
         non_orthogonality_degrees_of_freedom=counted(of_field_angles(result)),
         conditions=when_entry(of_magnetometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
-        **detection_limit_field(outcome.told_from_in_reference.get(name, ())),
+        **detection_limit_field(outcome.reference_detection_limits.get(name, ())),
     )  # fmt: skip
 
 

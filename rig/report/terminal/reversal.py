@@ -53,10 +53,10 @@ def _lines(reversal: ReversalEntry) -> Iterator[str]:
 
 
 def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
-    std = np.sqrt(np.diag(reversal.found.covariance))
+    std = np.sqrt(np.diag(reversal.separation.covariance))
     scale, both = of_reversal(reversal)
     return entry(
-        ReversalEntry, reversal.found, reversal, reversal.runs[0].result.sensor,
+        ReversalEntry, reversal.separation, reversal, reversal.runs[0].result.sensor,
         bias_std_t=std[:3],
         arm_field_std_t=std[3:],
         scale_degrees_of_freedom=counted(scale),

@@ -107,8 +107,8 @@ def _line(rise: Array, means: Array, variances: Array) -> tuple[Array, Array]:
 def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
     made = {}
     for kind in outcome.of_kinds:
-        if kind.quantity == INCLINATION and kind.found is not None and isinstance(kind.found.found, Solution):
-            found = {key: np.asarray(value).tolist() for key, value in vars(kind.found.found).items()}
+        if kind.quantity == INCLINATION and kind.solved is not None and isinstance(kind.solved.solution, Solution):
+            found = {key: np.asarray(value).tolist() for key, value in vars(kind.solved.solution).items()}
             of = kind.sensor.part, kind.sensor.serial_number
             found["covariance_combined"] = found["covariance"]
             made[kind.name] = InclinometerEntry(part=of[0], serial_number=of[1], estimator="lines", **found)
