@@ -120,7 +120,7 @@ def test_a_certificate_with_other_numbers_and_its_number_left_is_not_entered(fol
     value = re.findall(r"\d\.\d{5}", text)[0]
     page.write_text(text.replace(value, f"{float(value) + 0.1:.5f}"), encoding="utf-8")
     imported = rig_here("history", "import", folder)
-    assert imported.returncode == 0 and "is not what this version writes" in imported.stderr
+    assert imported.returncode == 0 and "is not the one this version writes" in imported.stderr
     assert "certificate.html" not in rig_here("history", "show", "1").stdout
     page.write_text(text, encoding="utf-8")
     assert rig_here("report", folder).stderr == ""
