@@ -100,7 +100,7 @@ def test_a_result_that_was_changed_in_the_database_is_named(year: str, capsys: p
 @pytest.mark.slow
 def test_trends_are_told_for_people_and_for_machines(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     printed = told(capsys, "G-1")
-    assert "drift a year" in printed and "U is that of noise alone" in printed
+    assert "drift a year" in printed and "U includes noise only" in printed
     document = json.loads(told(capsys, "G-1", "--json"))
     assert document["schema"] == "rig.history/1" and len(document["calibrations"]) == 12
     (trend,) = document["trends"]
