@@ -95,7 +95,7 @@ def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_s
     assert when_words(sensor.bias_conditions).startswith("at 22.0 °C, as stated, mean over")
     certificate = certificate_of(document, StatedFacts())
     said = " ".join(read(certificate).text.split())
-    assert "Temperature and time, as stated, for the item provided no temperature: scale factors at 22.0 °C" in said
+    assert "Temperature and time, as stated; the item measured no temperature: scale factors at 22.0 °C" in said
     assert "Temperature: as stated; not traceable" in said and "own thermometer" not in said
     conditions = digital_certificate(certificate_of(document, LABORATORY)).decode()
     assert "temperature of the item at the biases, as stated" in conditions and "own thermometer" not in conditions

@@ -205,7 +205,7 @@ def test_the_floor_says_that_its_history_is_gone_and_begins_none(file: Path) -> 
     with looking(place) as feed:
         wait_for(lambda: b'"today"' in feed.whole(), "what the history has")
         remove(file)
-        wait_for(lambda: b"is not there any more" in feed.whole(), "that it is gone")
+        wait_for(lambda: b"existed before and is gone" in feed.whole(), "that it is gone")
     assert not file.exists()
 
 

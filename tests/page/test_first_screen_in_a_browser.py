@@ -120,7 +120,7 @@ def test_a_run_that_failed_says_what_failed_and_what_to_do(driver: Chrome, tmp_p
     six(*six_judged(tmp_path, passed=False))
     wait_for(lambda: kind(driver) == "failed", "the verdict")
     assert text(driver, "failed").splitlines() == ["✗ lsm9ds1.scale_deviation 0.177, allowed 0.1"]
-    assert "the part beyond its limits" in text(driver, "next-words")
+    assert "the part is beyond its limits" in text(driver, "next-words")
     assert text(driver, "next-command") == f"rig show {SIX.folder} --all"
     first = driver.find_element(By.CSS_SELECTOR, "#checks tbody tr")
     assert "✗ failed" in (first.get_attribute("textContent") or "")

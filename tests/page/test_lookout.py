@@ -44,7 +44,7 @@ def test_a_helper_that_is_killed_is_told_of_and_harms_nothing(
     def told() -> bool:
         nonlocal said
         said += capfd.readouterr().err
-        return "The page shows no more of observations" in said and said.endswith("\n")
+        return "The page shows no new observations" in said and said.endswith("\n")
 
     with looking_out(tmp_path, Feed(PageState(About("", "")))) as lookout:
         wait_for(lambda: helper() > 0, "the helper")

@@ -101,4 +101,4 @@ def test_a_steady_drift_is_weighed_by_the_arc_s_own_attitudes() -> None:
 def test_the_dry_run_says_over_what_angle_sweeps_are_averaged() -> None:
     done = rig_here("plan", CONFIGS / "demo.yaml", "--set", "procedure.arc_deg=180", "--set", KNOWN)
     assert done.returncode == 0, done.stderr
-    assert "Sweeps are averaged over 180°, as far as the encoders show this angle" in done.stdout
+    assert "Sweeps are averaged over 180°, the angle of the encoders" in done.stdout

@@ -2,10 +2,13 @@
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rig.config.first_configuration import Answers
 from rig.errors import Refused
 from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    from rig.config.first_configuration import Answers
 
 SCHEMA = "docs/config.schema.json"
 
@@ -16,7 +19,7 @@ def refuse_existing(path: Path) -> None:
         raise _not_written(path, "it is there already")
 
 
-def write_checked(path: Path, answers: Answers) -> int:
+def write_checked(path: Path, answers: "Answers") -> int:
     """Write the configuration of the answers to a new file and check it; return 0, or 1 if values remain to be filled
     in.
 

@@ -74,21 +74,20 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
 def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
     """Return a table of changes: each parameter before and now, the difference, and E_n.
 
-    In a narrow terminal the values have no U, which E_n includes.
+    In a narrow terminal the values have no U, which E_n includes; in the narrowest the values before are omitted.
     """
 
-    def values(heading: str, parameters: Sequence[Parameter], rank: int) -> TableColumn:
+    def values(heading: str, parameters: Sequence[Parameter], rank: int, shorter_rank: int) -> TableColumn:
         texts = [value_text(parameter) for parameter in parameters]
-        short = TableColumn(heading, [text.partition(" ±")[0] for text in texts], number=True)
+        short = TableColumn(heading, [text.partition(" ±")[0] for text in texts], shorter_rank, number=True)
         return TableColumn(f"{heading} ± U", texts, rank, number=True, shorter=short)
 
+    differences = [add_sign(change.now.value - change.before.value) for change in changes]
     columns = (
         TableColumn("parameter", [_add_unit(change.name, change.unit) for change in changes]),
-        values("before", [change.before for change in changes], 2),
-        values("now", [change.now for change in changes], 1),
-        TableColumn(
-            "difference", [add_sign(change.now.value - change.before.value) for change in changes], number=True
-        ),
+        values("before", [change.before for change in changes], 3, 1),
+        values("now", [change.now for change in changes], 2, 0),
+        TableColumn("difference", differences, rank=2, number=True, shorter=TableColumn("Δ", differences, number=True)),
         TableColumn("E_n", [_normalised_error(change) for change in changes], number=True),
     )
     return FittingTable(title, columns)

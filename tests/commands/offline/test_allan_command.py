@@ -44,7 +44,7 @@ def test_people_see_random_walk_and_why_there_is_no_bias_instability(
 ) -> None:
     assert main(["allan", str(run)]) == 0
     printed = capsys.readouterr().out
-    assert "angle random walk °/√h" in printed and "6 stretches at rest" in printed
+    assert "angle random walk °/√h" in printed and "6 intervals at rest" in printed
     assert printed.count("recording_too_short") == 1, "once for all axes"
     assert "bias instability: recording_too_short" in printed and "Record at rest for 600 s or more" in printed
 
@@ -112,7 +112,7 @@ def test_a_log_with_a_gap_is_two_stretches(
     kept = np.abs(still["time_s"] - 200) > 5
     path = log(tmp_path / "desk.csv", {name: column[kept] for name, column in still.items()})
     assert main(["allan", str(path)]) == 0
-    assert "2 stretches at rest" in capsys.readouterr().out
+    assert "2 intervals at rest" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -130,7 +130,7 @@ def test_one_run_calibrates_gyroscope_and_accelerometer(imu: Finished) -> None:
     assert abs(found["delay_s"] - 3e-3) < 4 * found["delay_std_s"] < 1e-3
     # Both triads are square but for the accelerometer's own skew, of which half turns the frame nearest to its axes.
     turned = np.array(found["alignment"]["rotation_rad"])
-    assert np.abs(turned).max() < np.radians(0.3) and "turned against its gyroscope by" in printed
+    assert np.abs(turned).max() < np.radians(0.3) and "rotation against its gyroscope" in printed
 
 
 def test_solving_the_recording_equals_the_run(imu: Finished) -> None:
