@@ -112,7 +112,7 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
 
 def _to_angles(matrix: Array) -> Array:
     """Return the derivative (6, 3, 3) of angles between the axes and of their mounting with respect to F."""
-    return SensorAxes.of(matrix).to_angles.reshape(6, 3, 3)
+    return SensorAxes.from_matrix(matrix).to_angles.reshape(6, 3, 3)
 
 
 def _of_matrix(solution: VectorSolution) -> Array:

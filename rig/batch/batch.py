@@ -108,7 +108,7 @@ class Batch:
         return self.parts[-1] if self.parts and self.parts[-1].ended is None else None
 
     def count(self, *states: str) -> int:
-        """How many parts have become so."""
+        """Return the number of parts in these states."""
         return sum(part.state in states for part in self.parts)
 
     @property

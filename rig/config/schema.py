@@ -41,14 +41,17 @@ def config_schema() -> dict[str, Any]:
     whole = definitions.pop(RigConfig.__name__)
     turners = {kind: _with_kind(definitions[section.__name__]) for kind, section in STOCK_TURNERS.items()}
     procedures = {name: _section(section) for name, section in STOCK_SECTIONS.items()}
-    own = {
+    own_sections = {
         BASE: {"type": "string", "description": "file on which this one builds; this one states what differs"},
         "arm": _section(STOCK_TURNERS["ur"]),
         "turner": _chosen("kind", turners, "what turns the sensors, if it is no arm"),
         "procedure": _chosen("name", {**procedures, SHORTEST: SHORTEST_SECTION}, "what is done"),
         "world": _section(WorldSection),
     }
-    properties = {**own, **{key: value for key, value in whole["properties"].items() if key not in own}}
+    properties = {
+        **own_sections,
+        **{key: value for key, value in whole["properties"].items() if key not in own_sections},
+    }
     return {
         "$schema": DIALECT,
         "title": "Configuration of the calibration rig",

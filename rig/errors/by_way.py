@@ -4,22 +4,24 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, get_args
 
-Way = Literal["hand", "file", "arm"]
+CalibrationMethod = Literal["hand", "file", "arm"]
 TABLE = Path(__file__).with_name("by_way.txt")
 
 
-def remedies_by_way(name: str) -> Mapping[Way, str]:
+def remedies_by_way(name: str) -> Mapping[CalibrationMethod, str]:
     """Return what to do about an error by each way that has a remedy of its own; none if all ways have the same.
 
     Raise ValueError for a line of another form than `name | way | what to do`.
     """
-    found: dict[Way, str] = {}
+    remedies: dict[CalibrationMethod, str] = {}
     for number, line in enumerate(TABLE.read_text(encoding="utf-8").splitlines(), 1):
         if line.startswith("#"):
             continue
         cells = line.split(" | ")
-        if len(cells) != 3 or cells[1] not in get_args(Way):
-            raise ValueError(f"{TABLE.name}, line {number}: not `name | {' or '.join(get_args(Way))} | what to do`")
+        if len(cells) != 3 or cells[1] not in get_args(CalibrationMethod):
+            raise ValueError(
+                f"{TABLE.name}, line {number}: not `name | {' or '.join(get_args(CalibrationMethod))} | what to do`"
+            )
         if cells[0] == name:
-            found[next(way for way in get_args(Way) if way == cells[1])] = cells[2]
-    return found
+            remedies[next(method for method in get_args(CalibrationMethod) if method == cells[1])] = cells[2]
+    return remedies

@@ -40,14 +40,14 @@ class CubicSpline:
         flat = x.ravel()
         interval = np.searchsorted(self._x[1:-1], flat, side="right")
         cubic, quadratic, linear, constant = np.swapaxes(self._coefficients[interval], 0, 1)
-        away = (flat - self._x[interval])[:, None]
+        offset = (flat - self._x[interval])[:, None]
         if derivative == 0:
-            found = ((cubic * away + quadratic) * away + linear) * away + constant
+            value = ((cubic * offset + quadratic) * offset + linear) * offset + constant
         elif derivative == 1:
-            found = (3 * cubic * away + 2 * quadratic) * away + linear
+            value = (3 * cubic * offset + 2 * quadratic) * offset + linear
         else:
             raise ValueError(f"derivative {derivative} of a spline: 0 and 1 are there")
-        values: Array = found.reshape(x.shape + self._shape)
+        values: Array = value.reshape(x.shape + self._shape)
         return values
 
 
@@ -85,7 +85,7 @@ def _end(step: float, following: float, secant: Array, next_secant: Array) -> Ar
 def _solve_tridiagonal(lower: Array, upper: Array, right: Array) -> Array:
     """Return s (n, k) of lower s₋ + s + upper s₊ = right, lower and upper (n, 1): parallel cyclic reduction.
 
-    After each pass (R. W. Hockney 1965) a row knows of rows twice as far away. What it knows of them falls with the
+    After each pass (R. W. Hockney 1965) a row knows of rows twice as far offset. What it knows of them falls with the
     square, as the rows of a spline are diagonally dominant: six passes, whatever n is.
     """
     apart = 1

@@ -32,7 +32,10 @@ def residual_std_rad_s(explained: Explained) -> Array:
 
 def dwell_residual_std_m_s2(solution: ImuSolution, movement: Movement) -> Array:
     """Return the standard deviations (N, 3) of residuals of an accelerometer's dwells, solved from the `movement`."""
-    movement, theta = replace(movement, own=solution.own, own_share=solution.own_share), solution.theta
+    movement, theta = (
+        replace(movement, sensor_errors=solution.sensor_errors, own_share=solution.own_share),
+        solution.theta,
+    )
     arm = solution.attitude_error.std_rad * accelerometer_model.effects(theta, movement)
     fit_matrix = accelerometer_model.jacobian(theta, movement) @ solution.response
     return _residual_std(fit_matrix, noise(theta, movement) + arm @ arm.T)[: len(movement.dwells.readings_m_s2)]

@@ -23,7 +23,7 @@ class SensorAxes:
     mounting: Array
 
     @staticmethod
-    def of(matrix: Array) -> "SensorAxes":
+    def from_matrix(matrix: Array) -> "SensorAxes":
         """Return the axes of `matrix` F (3, 3)."""
         scale = scale_of(matrix)
         axes = scale[:, None] * matrix

@@ -55,5 +55,5 @@ def _frame(matrix: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
     require_shape("covariance", of_rows, (9, 9))
     check_finite(matrix=f, covariance=of_rows)
     check_handedness(f)
-    axes = SensorAxes.of(f)
+    axes = SensorAxes.from_matrix(f)
     return axes.mounting, axes.angles_covariance_rad2(of_rows)[3:, 3:]

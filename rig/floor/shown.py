@@ -9,7 +9,7 @@ from rig.batch.status import NEWEST, Now
 from rig.data.checked import parse_json, validate
 from rig.errors.quoting import shorten
 from rig.history.series import rig_states, subjects, trends
-from rig.history.stations import LONGEST, Told
+from rig.history.stations import LONGEST, StationState
 from rig.history.stations import MOST as MOST_RIGS
 from rig.history.store import Past
 
@@ -21,7 +21,7 @@ MOST_STATES = 12  # counted states of parts; there are six
 UNITS_OF_AGE = ((86_400, "days"), (3600, "h"), (60, "min"), (1, "s"))
 
 
-def rigs(stations: Iterable[Told], more: int = 0) -> dict[str, Any]:
+def rigs(stations: Iterable[StationState], more: int = 0) -> dict[str, Any]:
     """Return each rig's present state in a section "rig 0" to `MOST`, and in "rigs" their number and that of `more`.
 
     They are separate sections because only changed ones are sent. A section without a rig is None. A rig has its name
@@ -33,7 +33,7 @@ def rigs(stations: Iterable[Told], more: int = 0) -> dict[str, Any]:
     return {"rigs": {"count": len(cards), "more": more}, **sections}
 
 
-def _card(station: Told) -> dict[str, Any]:
+def _card(station: StationState) -> dict[str, Any]:
     fields = _read(station.state)
     state = str(fields.get("state", "unread"))
     if not fields.get("over") and (station.age_s is None or station.age_s > DEAD_S):

@@ -91,7 +91,7 @@ def _draw_values(axes: "Axes", trend: Trend) -> None:
     axes.set_title(f"{trend.name}   {trend.unit}", loc="left")
     if trend.line is not None:
         rows = np.stack([np.ones(trend.count), trend.days], axis=1)
-        value, std = trend.line.at(rows)
+        value, std = trend.line.predict(rows)
         reach = trend.line.coverage_factor * std
         axes.plot(times, value, color="C3", lw=1)
         axes.fill_between(times, value - reach, value + reach, color="C3", alpha=0.15, lw=0)

@@ -198,7 +198,7 @@ def rig_states(pasts: Sequence[Past]) -> list[RigState]:
     """Return the state of every rig with check standards; a sensor is one if it was ever marked as one."""
     # Drifts and curves are not standards, and external readings have no rig.
     by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
-    standards = {key: own for key, own in by_subject.items() if any(past.check_standard for past in own)}
+    standards = {key: series for key, series in by_subject.items() if any(past.check_standard for past in series)}
     states = []
     for rig in dict.fromkeys(past.rig for series in standards.values() for past in series):
         deviations: dict[str, list[tuple[datetime, float]]] = {}

@@ -51,7 +51,7 @@ _NOW: Mapping[str, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class StationState:
     """The last state of the station of a `rig` on a `computer`, as JSON, and its age; None if the age is unknown.
 
     Every user with write access to the history can change it.
@@ -85,7 +85,7 @@ def tell(engine: Engine, rig: str, computer: str, state: str) -> None:
             connection.execute(insert(station).values(**key, **row))
 
 
-def heard(engine: Engine) -> tuple[list[Told], int]:
+def heard(engine: Engine) -> tuple[list[StationState], int]:
     """Return the last states of stations, sorted by rig, and the number of further stations.
 
     Of more than `MOST` stations the latest are returned.
@@ -99,7 +99,9 @@ def heard(engine: Engine) -> tuple[list[Told], int]:
         question = select(*texts, age).order_by(implausible, age, *station.primary_key).limit(MOST)
         rows: list[tuple[Any, ...]] = [tuple(row) for row in connection.execute(question)]
         every = connection.scalar(select(func.count()).select_from(station)) or 0
-    states = [Told(_decode(rig), _decode(computer), _decode(text), _age_s(age)) for rig, computer, text, age in rows]
+    states = [
+        StationState(_decode(rig), _decode(computer), _decode(text), _age_s(age)) for rig, computer, text, age in rows
+    ]
     return sorted(states, key=lambda state: (state.rig, state.computer)), max(every - len(states), 0)
 
 

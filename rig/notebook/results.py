@@ -79,17 +79,15 @@ class Result(Mapping[str, Calibration]):
         The index names sensor and axis; the columns are scale and bias, their expanded uncertainties and the unit of
         the bias. Raise Refused `missing_extra`.
         """
-        found = [(name, calibration, axis) for name, calibration in self.items() for axis in range(3)]
+        rows = [(name, calibration, axis) for name, calibration in self.items() for axis in range(3)]
         columns = {
-            "scale": [calibration.scale[axis] for _, calibration, axis in found],
-            "scale_expanded": [calibration.scale_expanded[axis] for _, calibration, axis in found],
-            "bias": [calibration.bias[axis] for _, calibration, axis in found],
-            "bias_expanded": [calibration.bias_expanded[axis] for _, calibration, axis in found],
-            "unit": [calibration.quantity.unit for _, calibration, _ in found],
+            "scale": [calibration.scale[axis] for _, calibration, axis in rows],
+            "scale_expanded": [calibration.scale_expanded[axis] for _, calibration, axis in rows],
+            "bias": [calibration.bias[axis] for _, calibration, axis in rows],
+            "bias_expanded": [calibration.bias_expanded[axis] for _, calibration, axis in rows],
+            "unit": [calibration.quantity.unit for _, calibration, _ in rows],
         }
-        return frame(
-            columns, [f"{name} {calibration.quantity.axes[axis]}" for name, calibration, axis in found], "axis"
-        )
+        return frame(columns, [f"{name} {calibration.quantity.axes[axis]}" for name, calibration, axis in rows], "axis")
 
     def plot(self) -> "Plot":
         """Return a plot of the residuals of each sweep, rest, attitude and repeat, sensor by sensor.

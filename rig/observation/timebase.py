@@ -231,8 +231,8 @@ def _fast_length(least: int) -> int:
     """Return the next number without prime factors beyond 5: of such lengths a Fourier transform is fast."""
     threes = (3**power for power in range(least.bit_length()))
     odd = (three * 5**power for three in threes for power in range(least.bit_length()) if three * 5**power < 2 * least)
-    found: int = min(number << (-(-least // number) - 1).bit_length() for number in odd)
-    return found
+    length: int = min(number << (-(-least // number) - 1).bit_length() for number in odd)
+    return length
 
 
 def _explained_fractions(turning: Array, filled: NDArray[np.bool_], moving: Array, lags: NDArray[np.intp]) -> Array:

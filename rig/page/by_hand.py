@@ -38,11 +38,11 @@ def live_section(event: HandSeen) -> Section:
 
 def step(event: HandSeen) -> Section:
     """Return the progress of the list; its remaining time is unknown."""
-    count = event.taken + len(event.pairs) + len(event.turns)
+    count = event.accepted + len(event.pairs) + len(event.turns)
     return {
-        "number": event.taken,
+        "number": event.accepted,
         "count": count,
-        "name": f"{event.taken} of {count} moves accepted",
+        "name": f"{event.accepted} of {count} moves accepted",
         "kind": "by_hand",
         "fraction": 1.0,
         "elapsed_s": 0.0,

@@ -195,7 +195,7 @@ class HandSeen:
     faces: tuple[str, ...]
     pairs: tuple[tuple[str, str], ...]
     turns: tuple[tuple[str, int], ...]
-    taken: int
+    accepted: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -96,7 +96,7 @@ def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[st
     readings = model + noise * rng.normal(size=(runs, *model.shape))
     truth = np.concatenate([rt.GYRO_MATRIX.ravel(), rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S])
     gyroscope = rt.GYRO_MATRIX, rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S
-    bound = triaxial_bound(*gyroscope, attitudes, noise**2, known=rates)
+    bound = triaxial_bound(*gyroscope, attitudes, noise**2, known_references=rates)
     for method in METHODS:
         theta = solve_triaxial_batch(readings, attitudes, noise**2, KnownVector(rates), method=method)
         ratios[f"TRIAX gyroscope, {method}"] = _compare(theta - truth, bound)

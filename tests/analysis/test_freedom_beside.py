@@ -27,4 +27,4 @@ def test_a_line_that_angles_have_their_freedom_of_is_there_or_told_to_be_missing
 
 def test_a_budget_tells_that_it_has_no_such_line() -> None:
     with pytest.raises(KeyError, match=WANDERING):
-        Budget(()).of(WANDERING)
+        Budget(()).std_of(WANDERING)

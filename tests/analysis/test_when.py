@@ -108,7 +108,7 @@ def test_an_accelerometer_s_scale_and_bias_are_those_at_the_temperature_that_is_
     entry, found = document_of(result).accelerometers["gyro"], result.accelerometers["gyro"]
     assert entry.conditions is not None and entry.temperature_c is not None
     assert entry.temperature_c == pytest.approx(entry.conditions.temperature_c)
-    dwells_c, own = [dwell.temperature_c for dwell in found.dwells], found.movement.own
+    dwells_c, own = [dwell.temperature_c for dwell in found.dwells], found.movement.sensor_errors
     assert own is not None and abs(entry.temperature_c - float(np.mean(dwells_c))) > 0.1
     np.testing.assert_allclose(own.warmer_k[: len(dwells_c)], np.subtract(dwells_c, entry.temperature_c))
 

@@ -28,8 +28,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="claims are name
 
 HOLD = """
 import sys
-from rig.commands.laboratory.claims import claimed_arm
-with claimed_arm(sys.argv[1]):
+from rig.commands.laboratory.claims import claim_arm
+with claim_arm(sys.argv[1]):
     print(flush=True)
     sys.stdin.read()
 """

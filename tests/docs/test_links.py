@@ -145,6 +145,7 @@ def test_every_command_a_page_shows_is_one(
         complaint = capsys.readouterr().err.splitlines()[0]
         only_named = inline and all(re.fullmatch("[a-z]+", word) for word in arguments)
         missing = only_named and "the following arguments are required" in complaint
+        missing |= inline and complaint.endswith(f"argument {arguments[-1]}: expected one argument")
         has_no_run = "no run folder of yours is known" in complaint  # nothing ran here
         is_command = missing or has_no_run or complaint.endswith(f"unrecognized arguments: {LEFT_OUT}")
         assert is_command, f"{where}: {complaint}"

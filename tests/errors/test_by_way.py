@@ -7,7 +7,7 @@ import pytest
 
 from rig.cli import main
 from rig.data.latest_run import note_run
-from rig.errors.by_way import TABLE, Way, remedies_by_way
+from rig.errors.by_way import TABLE, CalibrationMethod, remedies_by_way
 from rig.errors.catalogue import catalogue
 
 NAMES = {
@@ -39,7 +39,7 @@ def test_the_way_of_the_latest_run_comes_first(
     note_run(tmp_path / "run")
     assert main(["explain", "rank_deficient"]) == 0
     lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("What to do")]
-    assert len(lines) == len(get_args(Way)) and lines[0].startswith(f"What to do {way}")
+    assert len(lines) == len(get_args(CalibrationMethod)) and lines[0].startswith(f"What to do {way}")
     assert "as in your latest run" in lines[0] and not any("as in" in line for line in lines[1:])
 
 

@@ -59,7 +59,7 @@ def refused(recorded: Recorded, *, level: bool = True, told: SessionConditions =
 
 def compared(found: HandSolution, recorded: Recorded) -> tuple[Array, Array]:
     """(9,) errors of scale, bias and right angles, and the same over u."""
-    angles = found.turned.non_orthogonality_rad - SensorAxes.of(recorded.matrix).non_orthogonality_rad
+    angles = found.turned.non_orthogonality_rad - SensorAxes.from_matrix(recorded.matrix).non_orthogonality_rad
     errors = np.concatenate([found.scale, found.bias_rad_s, angles]) - np.concatenate([recorded.truth, np.zeros(3)])
     known = np.concatenate([np.diag(found.covariance), np.diag(found.turned.angles_covariance_rad2)[:3]])
     return errors, errors / np.sqrt(known)

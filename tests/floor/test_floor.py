@@ -19,7 +19,7 @@ from rig.floor import shown
 from rig.floor.feed import looking
 from rig.floor.heartbeat import heartbeat
 from rig.history import stations
-from rig.history.stations import Told
+from rig.history.stations import StationState
 from rig.history.storage.address import resolve_address
 from rig.history.store import open_history
 from rig.motion.state import Report
@@ -34,11 +34,11 @@ from support.processes.waiting import PATIENCE_S, wait_for
 AT = "2026-11-25T08:00:00+00:00"
 
 
-def told(now: Now, age_s: float = 0.4) -> Told:
-    return Told("bench 1", "lab-1", now.json(), age_s)
+def told(now: Now, age_s: float = 0.4) -> StationState:
+    return StationState("bench 1", "lab-1", now.json(), age_s)
 
 
-def cards(*of: Told) -> list[dict[str, Any]]:
+def cards(*of: StationState) -> list[dict[str, Any]]:
     sections = shown.rigs(of)
     return [sections[f"rig {place}"] for place in range(sections["rigs"]["count"])]
 
@@ -73,9 +73,9 @@ def test_a_rig_has_the_name_that_the_history_gives_it(named: str, shown_as: str)
     """Without `history.rig` that is the serial number of its arm, which is known once it is connected."""
     report = cast(Report, SimpleNamespace(serial_number="20235599999"))
     connected = after(Now(rig=named), ArmConnected(report))
-    (card,) = cards(Told(named or "192.0.2.7", "lab-1", connected.json(), 0.4))
+    (card,) = cards(StationState(named or "192.0.2.7", "lab-1", connected.json(), 0.4))
     assert (card["rig"], card["at"]) == (shown_as, named or "192.0.2.7")
-    assert cards(Told("192.0.2.7", "lab-1", Now().json(), 0.4))[0]["rig"] == "192.0.2.7"
+    assert cards(StationState("192.0.2.7", "lab-1", Now().json(), 0.4))[0]["rig"] == "192.0.2.7"
 
 
 def test_a_rig_without_a_sign_of_life_is_dead_unless_it_said_its_last_word() -> None:
@@ -84,15 +84,15 @@ def test_a_rig_without_a_sign_of_life_is_dead_unless_it_said_its_last_word() -> 
     assert [state(running), state(running, 60), state(last(running), 60), state(ended, 60), state(fault, 60)] == [
         "running", "dead", "stopped", "ended", "fault",
     ]  # fmt: skip
-    assert cards(Told("bench 1", "lab-1", "no JSON", 60))[0]["state"] == "dead"
+    assert cards(StationState("bench 1", "lab-1", "no JSON", 60))[0]["state"] == "dead"
 
 
 @pytest.mark.parametrize("said", ["no JSON", '{"parts": 5}', '{"state": "flies"}', "[" * 20_000])
 def test_what_is_nothing_a_station_says_is_shown_as_that_and_hides_no_other_rig(said: str) -> None:
-    odd, running = cards(Told("bench 0", "lab-0", said, 0.4), told(Now(state="running")))
+    odd, running = cards(StationState("bench 0", "lab-0", said, 0.4), told(Now(state="running")))
     assert odd == {"rig": "bench 0", "at": "bench 0", "computer": "lab-0", "state": "unread", "age": ""}
     assert running["state"] == "running"
-    (half_a_character,) = cards(Told("bench 0", "lab-0", '{"doing": "\\ud800"}', 0.4))
+    (half_a_character,) = cards(StationState("bench 0", "lab-0", '{"doing": "\\ud800"}', 0.4))
     assert half_a_character["doing"] == "\\ud800"
 
 

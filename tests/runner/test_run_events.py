@@ -176,7 +176,7 @@ IMPORTS = """
 import sys
 from pathlib import Path
 from rig.motion.state import ArmState, RuntimeState
-from rig.commands.configured import configured
+from rig.commands.configured import load_configured
 from rig.runner.phases import Run
 from rig.station.events import PhaseRecorded, PreflightPassed
 from rig.station.station import Stations, always_yes
@@ -188,7 +188,7 @@ class Imports:
         if isinstance(event, PhaseRecorded):
             print(sorted(set(sys.modules) - self.before))
 
-found = configured(Path(sys.argv[1]))
+found = load_configured(Path(sys.argv[1]))
 Run(Path(sys.argv[2]), found.loaded, found.script, Stations((Imports(),), always_yes)).carry_out(found.phase)
 """
 

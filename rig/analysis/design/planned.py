@@ -77,14 +77,14 @@ def _gyroscope_limits(
     times_s = readings.segments.times_s.mean(axis=1)
     speeds = distinct_speeds(np.array([sweep.speed_rad_s for sweep in run.plan.sweeps]))
     known_errors = build_known_errors(
-        run.known,
+        run.uncertainty,
         name,
         full_scale_rad_s,
         finds_curve=len(speeds) > 1,
         arcs=run.settings.has_arcs,
         jitter_s=0.0,
         earth_rad_s=unknown_earth_rate(is_known=run.site.earth_rate_rad_s is not None or run.settings.finds_earth_rate),
-        sensor=describe_sensor(run.known, name, full_scale_rad_s, np.zeros(len(times_s)), 0.0),
+        sensor=describe_sensor(run.uncertainty, name, full_scale_rad_s, np.zeros(len(times_s)), 0.0),
         temperature_times_s=times_s,
     )
     limits = predict_detection_limits(

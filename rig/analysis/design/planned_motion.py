@@ -33,7 +33,7 @@ class PlannedRun:
     arm: DenavitHartenberg
     settings: RunSettings
     site: Site
-    known: Uncertainty
+    uncertainty: Uncertainty
     clock_offset_s: float = 0.0
 
 

@@ -36,7 +36,7 @@ class PlannedAccelerometer:
     @property
     def datasheet(self) -> Datasheet:
         """The errors beside the model that the data sheet allows."""
-        return read_datasheet(self.run.known, self.name, self.range_m_s2)
+        return read_datasheet(self.run.uncertainty, self.name, self.range_m_s2)
 
 
 def list_accelerometers(config: RigConfig, run: PlannedRun) -> list[PlannedAccelerometer]:
@@ -72,17 +72,17 @@ def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
             attitudes=np.array([predict_attitude(dwell, run.arm, mounting).T for dwell in dwells]),
         ),
         stack_sweeps(swept, mounting),
-        run.known.repeatability_std_rad,
+        run.uncertainty.repeatability_std_rad,
     )
     segments = [*map(_segment, dwells), *map(_segment, sweeps)]
     poses = [segment.posture for segment in segments]
     movement = replace(
         _with_predicted_readings(theta, movement),
-        own=list_sensor_errors(accelerometer.datasheet, segments, 0.0, second_order=second_order),
+        sensor_errors=list_sensor_errors(accelerometer.datasheet, segments, 0.0, second_order=second_order),
         arm_turns=list_arm_rotations(poses, run.arm, mounting),
     )
-    lag = lag_pattern(movement, 1e-3 * run.known.acceleration_lag_ms) / np.sqrt(3)
-    arm_errors = arm_patterns(theta, movement, poses, StatedArm(run.arm, run.known.axis_deg, mounting, 0.0))
+    lag = lag_pattern(movement, 1e-3 * run.uncertainty.acceleration_lag_ms) / np.sqrt(3)
+    arm_errors = arm_patterns(theta, movement, poses, StatedArm(run.arm, run.uncertainty.axis_deg, mounting, 0.0))
     middles_s = np.array([sum(segment.window_s) / 2 for segment in segments])
     return ReferenceModel(theta, movement, np.concatenate([lag, arm_errors]), middles_s, second_order=second_order)
 

@@ -63,7 +63,7 @@ def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> di
 
 
 def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: str, sensor: SensorSection) -> Budget:
-    uncertainty, mounting = run.known, mounting_matrix(sensor.mounting)
+    uncertainty, mounting = run.uncertainty, mounting_matrix(sensor.mounting)
     scatters = turner.reading_std_rad > 0
     jitter_s = 0.0 if scatters else STATE_JITTER_S  # what scatters tells no jitter beside
     surroundings = Surroundings(

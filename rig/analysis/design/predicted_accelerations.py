@@ -39,8 +39,8 @@ def predict_accelerometer_budgets(config: RigConfig, plan: Plan, arm: DenavitHar
 
 def _budget(accelerometer: PlannedAccelerometer) -> Budget:
     model, run = predict_readings(accelerometer), accelerometer.run
-    delta_rad = float(np.radians(run.known.axis_deg) / np.sqrt(3))
-    movement = replace(model.movement, own_share=_new_fraction(run.known))
+    delta_rad = float(np.radians(run.uncertainty.axis_deg) / np.sqrt(3))
+    movement = replace(model.movement, own_share=_new_fraction(run.uncertainty))
     covariance, response = covariance_bound(model.theta, movement, delta_rad, second_order=model.second_order)
     scale = scale_of(matrix(model.theta))
     to_scale_and_bias = scale_and_bias(matrix(model.theta), scale, len(model.theta))
@@ -56,7 +56,7 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
         0,
         dof,
     )
-    lag_s = 1e-3 * run.known.acceleration_lag_ms
+    lag_s = 1e-3 * run.uncertainty.acceleration_lag_ms
     return combine_errors(spread, model.theta, movement, run.site, lag_s, datasheet=accelerometer.datasheet)
 
 

@@ -271,7 +271,7 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
 def _describe_as_swept(result: Result) -> TurnedSolution:
     """F and b of m = F ω + b as g = K (m + b) has them, with what the covariance is made of."""
     solution, matrix = result.solution, result.solution.matrix
-    axes = SensorAxes.of(matrix)
+    axes = SensorAxes.from_matrix(matrix)
     of_matrix = np.r_[F, OFFSET]
     sign = np.diag(RATE.parameter_signs)
     lines = tuple(replace(line, covariance=sign @ line.covariance @ sign) for line in result.budget.contributors)

@@ -78,14 +78,14 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     if data.at_reference:
         return None
     means, variances, design = _equations(data)
-    stated = StatedMotion.of(solution.residuals_rad_s, design[:, :3], variances, solution.matrix)
+    stated = StatedMotion.from_residuals(solution.residuals_rad_s, design[:, :3], variances, solution.matrix)
     sizes = motion_errors(stated)
     gain = _derivatives(design, means, variances)
     noise = np.einsum("qni,ni->qni", gain, np.sqrt(variances)).reshape(12, -1)
     by_rate = np.einsum("qni,ni->qn", gain, stated.rate_patterns)
     by_axis = np.einsum("qni,kni->qkn", gain, stated.axis_patterns).reshape(12, -1)
     wrong = np.einsum("qni,ni->qn", gain, _contradictions(stated, sizes, design))
-    axes = SensorAxes.of(solution.matrix)
+    axes = SensorAxes.from_matrix(solution.matrix)
     to_angles = np.hstack([axes.to_angles, np.zeros((6, 3))])
     rate_variance, axis_variance = sizes.median_variances
 

@@ -164,7 +164,7 @@ def _calibrate(
     other_methods = attempt_each({method: partial(solve, method=method) for method in methods})
     if weighted := other_methods.results.get("attitude_weighted"):
         check_mounted(weighted.matrix)
-    elif movement.own is None:  # with nonlinearity `solve_imu` decides
+    elif movement.sensor_errors is None:  # with nonlinearity `solve_imu` decides
         raise other_methods.faults["attitude_weighted"]
     solution = solve_imu(
         measured,
@@ -173,7 +173,7 @@ def _calibrate(
         up=site.up,
         second_order=settings.second_order,
         repeatability_rad=movement.repeatability_rad,
-        own=movement.own,
+        sensor_errors=movement.sensor_errors,
         arm_turns=movement.arm_turns,
         own_shares=OWN_SHARES,
     )

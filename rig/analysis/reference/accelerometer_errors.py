@@ -147,7 +147,7 @@ def add_errors(
     """Return the movement with the modelled errors of the sensor and of the arm in these windows."""
     sensor_errors = list_sensor_errors(datasheet, windows, sensor.unseen_change_k, second_order=settings.second_order)
     rotations = list_arm_rotations([window.posture for window in windows], arm, np.array(sensor.mounting))
-    return replace(movement, own=sensor_errors, arm_turns=rotations)
+    return replace(movement, sensor_errors=sensor_errors, arm_turns=rotations)
 
 
 def separate_sensor_errors(
@@ -172,7 +172,7 @@ def separate_sensor_errors(
         Contributor(WANDERING, "A", "normal", None, "", f"how the readings scatter, {IN_U}", np.inf, drift),
         Contributor(FLICKER, "B", "normal", None, "", stability, np.inf, flicker),
         *(
-            Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, spread.of(patterns))
+            Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, spread.covariance_of(patterns))
             for name, (half_width, unit, source, patterns) in by_sheet.items()
         ),
     ]

@@ -57,8 +57,10 @@ def accelerometer_budget(
         (solution.chi_square, solution.freedom),
         noise_freedom=noise_freedom,
     )
-    errors = None if datasheet is None else solution.own
-    return combine_errors(spread, solution.theta, replace(movement, own=errors), site, lag_s, datasheet=datasheet)
+    errors = None if datasheet is None else solution.sensor_errors
+    return combine_errors(
+        spread, solution.theta, replace(movement, sensor_errors=errors), site, lag_s, datasheet=datasheet
+    )
 
 
 def combine_errors(
@@ -66,7 +68,7 @@ def combine_errors(
 ) -> Budget:
     """Return the budget of scale and bias from their `spread`; θ (22,) is the solution of the `movement`."""
     others = [_lag(spread, movement, lag_s)] if len(movement.sweeps.speeds_rad_s) else []
-    if movement.own is None or datasheet is None:
+    if movement.sensor_errors is None or datasheet is None:
         return reference_budget(spread, _gravity(site), others)
     bare, by_sensor = separate_sensor_errors(spread, theta, movement, datasheet)
     return reference_budget(bare, _gravity(site), [*by_sensor, *others])
@@ -151,13 +153,13 @@ def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) ->
 
 def _lag(spread: Spread, movement: Movement, lag_s: float) -> Contributor:
     source = "uncertainty.acceleration_lag_ms"
-    return assumed("filter's lag", 1e3 * lag_s, "ms", source, spread.of(lag_pattern(movement, lag_s)))
+    return assumed("filter's lag", 1e3 * lag_s, "ms", source, spread.covariance_of(lag_pattern(movement, lag_s)))
 
 
 def _drift(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
     patterns, change_t = drift_patterns(matrix, attitudes, drift)
     if drift is None:
         source = f"procedure.field_test_s {NOT_GIVEN}"
-        return assumed("drift of the field", change_t / FIELD.bias.size, "µT", source, spread.of(patterns))
-    tested = spread.of(patterns)
+        return assumed("drift of the field", change_t / FIELD.bias.size, "µT", source, spread.covariance_of(patterns))
+    tested = spread.covariance_of(patterns)
     return Contributor("drift of the field", "A", "normal", None, "", "tests at home", float(TESTED_AXES), tested)

@@ -39,7 +39,7 @@ class Triad:
     @staticmethod
     def from_solution(solution: ImuSolution | TriaxialSolution) -> "Triad":
         """Return the axes of a solution."""
-        axes = SensorAxes.of(solution.matrix)
+        axes = SensorAxes.from_matrix(solution.matrix)
         return Triad(
             axes.scale,
             scale_and_bias_covariance(solution.matrix, axes.scale, solution.covariance),
@@ -77,7 +77,7 @@ def stack_dwells(dwells: Sequence[DwellReading | StaticReading], mounting: Array
 
 def check_mounted(matrix: Array) -> None:
     """Raise Fault `swapped_axes`, `mirrored_axis`, `wrong_mounting` if F is not that of the nominal mounting."""
-    check_axes(SensorAxes.of(matrix).axes, np.eye(3))
+    check_axes(SensorAxes.from_matrix(matrix).axes, np.eye(3))
 
 
 def check_identifiable(second_order: Array, std: Array, remedy: str) -> None:

@@ -11,9 +11,13 @@ from rig.errors.quoting import shorten
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.errors.by_way import Way
+    from rig.errors.by_way import CalibrationMethod
 
-METHODS: "dict[Way, str]" = {"hand": "by hand", "file": "with readings from files", "arm": "on an arm or a servomotor"}
+METHODS: "dict[CalibrationMethod, str]" = {
+    "hand": "by hand",
+    "file": "with readings from files",
+    "arm": "on an arm or a servomotor",
+}
 
 
 def add(parser: ArgumentParser) -> None:
@@ -79,7 +83,7 @@ def _explain_remedies(name: str, usual: str) -> Iterator[str]:
         yield f"What to do {METHODS[method]}{as_now}: {remedies[method].rstrip('.')}."
 
 
-def _find_method_in_use() -> "Way | None":
+def _find_method_in_use() -> "CalibrationMethod | None":
     """Return how the latest run calibrates, by its configuration; None without a run or if it does not say so."""
     import yaml
 

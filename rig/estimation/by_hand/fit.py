@@ -193,9 +193,9 @@ def _stds_of_rows(rows: Sequence[Factor], step: Array, covariance: Array, now: H
     for name, (kind, cause) in CAUSE_OF_STD.items():
         stated = getattr(STATED, name)
         square = freedom = PRIOR_DOF
-        if own := [row for row in rows if row.kind == kind]:
-            design, residual = whiten_rows(own)
-            share = np.concatenate([np.square(row.causes[cause] / row.std) for row in own])
+        if rows_of_kind := [row for row in rows if row.kind == kind]:
+            design, residual = whiten_rows(rows_of_kind)
+            share = np.concatenate([np.square(row.causes[cause] / row.std) for row in rows_of_kind])
             free = np.clip(1 - _leverages(design, covariance), 0.0, 1.0)
             sum_squares = np.square(residual + design @ step) - free * (1 - share)
             square += float(sum_squares.sum()) * (getattr(now, name) / stated) ** 2

@@ -60,7 +60,7 @@ def assess_progress(session: HandRecording, conditions: SessionConditions) -> Se
         return SessionProgress(unknown, (), (), (), None, fault_of_last or fault, FACES)
     if fault_of_last is None and last >= FEWEST_TO_COMPARE:
         fault_of_last = find_contradiction(fitted, since=last)
-    axes, chosen = SensorAxes.of(fitted.state.matrix), parameter_columns(fitted)
+    axes, chosen = SensorAxes.from_matrix(fitted.state.matrix), parameter_columns(fitted)
     covariance = fitted.covariance[np.ix_(chosen, chosen)]
     to_parameters = parameter_jacobian(fitted.state.matrix, axes.scale)
     expanded = 2 * np.sqrt(np.diag(to_parameters @ covariance @ to_parameters.T)[:3])

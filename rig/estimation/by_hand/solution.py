@@ -136,7 +136,7 @@ def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> Hand
 def summarise_fit(fit: GraphFit, warnings: tuple[str, ...] = ()) -> HandSolution:
     """Return the solution of a converged graph, with further warnings."""
     matrix, conditions = fit.state.matrix, fit.conditions
-    axes = SensorAxes.of(matrix)
+    axes = SensorAxes.from_matrix(matrix)
     chosen = parameter_columns(fit)
     covariance = fit.covariance[np.ix_(chosen, chosen)]
     to_parameters = parameter_jacobian(matrix, axes.scale)

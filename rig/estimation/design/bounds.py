@@ -52,20 +52,21 @@ def triaxial_bound(
     attitudes: ArrayLike,
     variances: ArrayLike,
     *,
-    known: ArrayLike | None = None,
+    known_references: ArrayLike | None = None,
     second_order: ArrayLike | None = None,
 ) -> Array:
     """Return the bound (15, 15), with `second_order` φ (3,) (18, 18), for the rows of F, v_ref, b, φ: TRIAX (3), (10).
 
-    Shapes as in `solve_triaxial`, true values. `known` (N, 3) is v̄; without it the norm of `reference` is given.
+    Shapes as in `solve_triaxial`, true values. `known_references` (N, 3) are v̄; without them the norm of `reference` is
+    known.
     """
     parts = [np.ravel(matrix), np.asarray(reference), np.asarray(bias)]
     if second_order is not None:
         parts.append(np.asarray(second_order))
     theta = np.concatenate(parts).astype(np.float64)
     r, v = np.asarray(attitudes, dtype=np.float64), np.asarray(variances, dtype=np.float64)
-    v_bar = np.zeros((len(r), 3)) if known is None else np.asarray(known, dtype=np.float64)
-    return covariance_bound(theta, r, v_bar, whitening(v), norm_known=known is None)
+    v_bar = np.zeros((len(r), 3)) if known_references is None else np.asarray(known_references, dtype=np.float64)
+    return covariance_bound(theta, r, v_bar, whitening(v), norm_known=known_references is None)
 
 
 def efficiency(errors: ArrayLike, bound: Array) -> Array:

@@ -76,7 +76,7 @@ class Budget:
         """Return the contributor of that name. Raise KeyError if there is none."""
         return {contributor.name: contributor for contributor in self.contributors}[name]
 
-    def of(self, name: str) -> Array:
+    def std_of(self, name: str) -> Array:
         """Return the standard uncertainties (6,) by one contributor. Raise KeyError as `line` does."""
         return self.line(name).std
 

@@ -155,7 +155,7 @@ def solve_turned(
     state = state.after_step(step)
     refusals.check_unit(scale_of(state.matrix))
     refusals.check_handedness(state.matrix)
-    axes = SensorAxes.of(state.matrix)
+    axes = SensorAxes.from_matrix(state.matrix)
     to_parameters = parameter_jacobian(state.matrix, axes.scale)
     conditioning = _conditioning(equations)
     return TurnedSolution(

@@ -40,7 +40,9 @@ class StatedMotion:
     axis_patterns: Array
 
     @staticmethod
-    def of(residuals_rad_s: Array, rates_rad_s: Array, variances_rad2_s2: Array, matrix: Array) -> "StatedMotion":
+    def from_residuals(
+        residuals_rad_s: Array, rates_rad_s: Array, variances_rad2_s2: Array, matrix: Array
+    ) -> "StatedMotion":
         """Return the motion with the patterns of its errors in a gyroscope of that `matrix` F (3, 3)."""
         speeds = np.linalg.norm(rates_rad_s, axis=1)
         tilts = np.zeros((2, *rates_rad_s.shape))

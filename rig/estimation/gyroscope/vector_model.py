@@ -139,7 +139,7 @@ def solve_vector_model(
 
     matrix = coefficients[:3].T
     check_reads(matrix)
-    axes = SensorAxes.of(matrix)
+    axes = SensorAxes.from_matrix(matrix)
     check_unit(axes.scale)
     check_axes(axes.axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
     of_matrix, of_gravity = index_coefficients(columns)

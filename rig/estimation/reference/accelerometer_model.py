@@ -97,7 +97,7 @@ class Movement:
 
     - `repeatability_rad`: standard deviation of the independent rotations of each sweep; a station shares all other
       errors.
-    - `own`: errors of the sensor itself; None if unknown.
+    - `sensor_errors`: errors of the sensor itself; None if unknown.
     - `arm_turns` (P, 3 N + 10 M): effects of P errors of the arm by δ, in the order of `effects`; None if unknown.
     - `own_share`: the fraction of δ² that is independent in each dwell.
     """
@@ -105,7 +105,7 @@ class Movement:
     dwells: Dwells
     sweeps: Sweeps
     repeatability_rad: float = 0.0
-    own: AccelerometerErrors | None = None
+    sensor_errors: AccelerometerErrors | None = None
     arm_turns: Array | None = None
     own_share: float = OWN_SHARE
 
@@ -118,7 +118,7 @@ class Movement:
             dwells=Dwells(
                 dwells.readings_m_s2[remaining], dwells.variances_m2_s4[remaining], dwells.attitudes[remaining]
             ),
-            own=None if self.own is None else self.own.without(dwell),
+            sensor_errors=None if self.sensor_errors is None else self.sensor_errors.without(dwell),
             arm_turns=None if self.arm_turns is None else np.delete(self.arm_turns, columns, axis=1),
         )
 

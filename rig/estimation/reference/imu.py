@@ -60,7 +60,8 @@ class ImuSolution:
     - `attitude_error`: δ of the arm, about each axis.
     - `dwell_residuals_m_s2` (N, 3): reading less model; `chi_square` of these and the sweeps', with its `freedom`.
     - `rank`, `condition`: of the readings' derivatives, each column scaled to its norm.
-    - `own`: the sensor's own errors with those estimated; None if unknown. `own_share`: independent fraction of δ².
+    - `sensor_errors`: the sensor's own errors with those estimated; None if unknown.
+    - `own_share`: the independent fraction of δ².
     """
 
     matrix: Array
@@ -79,7 +80,7 @@ class ImuSolution:
     condition: float
     iterations: int
     warnings: tuple[str, ...]
-    own: AccelerometerErrors | None = None
+    sensor_errors: AccelerometerErrors | None = None
     own_share: float = OWN_SHARE
 
     @property
@@ -102,20 +103,20 @@ def solve_imu(
     up: ArrayLike = (0.0, 0.0, 1.0),
     second_order: bool = False,
     repeatability_rad: float = 0.0,
-    own: AccelerometerErrors | None = None,
+    sensor_errors: AccelerometerErrors | None = None,
     arm_turns: Array | None = None,
     own_shares: Sequence[float] = (OWN_SHARE,),
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
     `gravity_m_s2` is the size of v_ref, `up` (3,) the half-space of the base that it points to. `repeatability_rad`,
-    `own`, `arm_turns`: see `Movement`; the readings decide between `own_shares`.
+    `sensor_errors`, `arm_turns`: see `Movement`; the readings decide between `own_shares`.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
     `mirrored_axis`, `attitude_untrustworthy`; ValueError for a wrong shape, or axes that are not unit vectors.
     """
-    movement = Movement(dwells, sweeps, repeatability_rad, own, arm_turns)
+    movement = Movement(dwells, sweeps, repeatability_rad, sensor_errors, arm_turns)
     fixed = list_fixed(movement, second_order=second_order)
     parameters = PARAMETERS - 1 - len(fixed)
     _check(movement, parameters)
@@ -126,8 +127,8 @@ def solve_imu(
         parts = "some of F, bias, reference, lever arm and delay"
         refusals.check_conditioning(conditioning, parameters, MAX_CONDITION, parts, REMEDY)
         fit = most_likely(start, movement, fixed, None)
-        if own is not None:
-            movement, fit = refit_with_components(fit, movement, own, fixed, own_shares)
+        if sensor_errors is not None:
+            movement, fit = refit_with_components(fit, movement, sensor_errors, fixed, own_shares)
         covariance, response = fit.covariance(), fit.response()
         _check_attitudes(start, movement, fixed, fit)
     f = matrix(fit.theta)
@@ -152,7 +153,7 @@ def solve_imu(
         rank=conditioning.rank,
         condition=conditioning.condition,
         iterations=fit.iterations,
-        own=movement.own,
+        sensor_errors=movement.sensor_errors,
         own_share=movement.own_share,
         warnings=refusals.warn_of_residuals(whitened, np.ones_like(whitened), freedom),
     )

@@ -133,7 +133,7 @@ def refit_with_components(
     disturbed = replace(
         sensor, walk_m_s2_sqrt_s=components.walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
     )
-    movement = replace(movement, own=disturbed, own_share=components.own_share)
+    movement = replace(movement, sensor_errors=disturbed, own_share=components.own_share)
     refit = most_likely(fit.theta, movement, fixed, components.std_rad)
     readings = decorrelate(noise(refit.theta, movement), effects(refit.theta, movement))
     return movement, replace(refit, readings=readings, iterations=fit.iterations + refit.iterations)

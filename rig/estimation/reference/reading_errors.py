@@ -36,7 +36,7 @@ def noise(theta: Array, movement: Movement) -> Array:
 
 def bending(theta: Array, movement: Movement) -> Array:
     """Return the patterns (P, 3 K) of φ and χ of each axis, by one standard uncertainty."""
-    sensor = movement.own
+    sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))
     odd = project_errors(theta, movement, lambda force: force**3 - sensor.norm_m_s2**2 * force)
@@ -48,7 +48,7 @@ def bending(theta: Array, movement: Movement) -> Array:
 
 def bias_warming(movement: Movement) -> Array:
     """Return the patterns (6, 3 K) of β of each axis, by one standard uncertainty: as recorded, and hidden by steps."""
-    sensor = movement.own
+    sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))
     return sensor.bias_m_s2_k * np.concatenate(
@@ -58,7 +58,7 @@ def bias_warming(movement: Movement) -> Array:
 
 def scale_warming(theta: Array, movement: Movement) -> Array:
     """Return the patterns (6, 3 K) of κ of each axis, as those of β."""
-    sensor = movement.own
+    sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))
     forces = find_force(theta, movement) @ matrix(theta).T
@@ -74,7 +74,7 @@ def _warmer_k(sensor: AccelerometerErrors, movement: Movement) -> tuple[Array, A
 
 def flickering(movement: Movement) -> Array:
     """Return the covariance (3 K, 3 K) of the bias's stated flicker."""
-    sensor = movement.own
+    sensor = movement.sensor_errors
     if sensor is None or not sensor.instability_m_s2:
         return np.zeros((movement.readings().size,) * 2)
     return sensor.instability_m_s2**2 * _expand_bias(flicker_covariance(sensor.windows_s), movement)
@@ -82,7 +82,7 @@ def flickering(movement: Movement) -> Array:
 
 def wandering(movement: Movement) -> Array:
     """Return the covariance (3 K, 3 K) of the bias by the readings: its random walk, and disturbances."""
-    sensor, covariance = movement.own, np.zeros((movement.readings().size,) * 2)
+    sensor, covariance = movement.sensor_errors, np.zeros((movement.readings().size,) * 2)
     if sensor is not None and sensor.walk_m_s2_sqrt_s:
         covariance += sensor.walk_m_s2_sqrt_s**2 * walking(sensor, movement)
     if sensor is not None and sensor.louder is not None:

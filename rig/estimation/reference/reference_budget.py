@@ -48,7 +48,7 @@ class Spread:
         """The fewest degrees of freedom of the noise's part in scale and bias."""
         return fewest_freedom(self.response, np.diag(self.noise), self.noise_freedom)
 
-    def of(self, patterns: Array) -> Array:
+    def covariance_of(self, patterns: Array) -> Array:
         """Return the covariance (6, 6) of independent patterns (k, n) of one standard uncertainty in the readings."""
         effect = self.response @ patterns.T
         covariance: Array = effect @ effect.T

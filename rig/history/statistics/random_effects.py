@@ -39,7 +39,7 @@ class Fitted:
 
         return float(2 * stdtr(self.freedom, -abs(self.coefficients[index]) / self.std[index]))
 
-    def at(self, row: Array) -> tuple[Array, Array]:
+    def predict(self, row: Array) -> tuple[Array, Array]:
         """Return the model's value and its std at rows (…, p) of a design."""
         value: Array = row @ self.coefficients
         variance: Array = np.einsum("...i,ij,...j->...", row, self.covariance, row)

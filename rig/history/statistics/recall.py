@@ -15,7 +15,7 @@ def days_to_limit(line: Fitted, last_days: float, expanded: float, max_deviation
     uncertainty at that time, the scatter between runs, and the `expanded` uncertainty of the last result.
     """
     ahead = np.arange(HORIZON_DAYS + 1.0)
-    value, std = line.at(_line(last_days + ahead))
+    value, std = line.predict(_line(last_days + ahead))
     line_expanded = line.coverage_factor * np.hypot(std, line.between_std)
     reached = np.abs(value - nominal) + np.hypot(line_expanded, expanded) >= max_deviation
     return int(np.argmax(reached)) if reached.any() else None

@@ -60,7 +60,7 @@ class FittingTable:
         return shown
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """What rich prints of it."""
+        """Yield the table that rich prints."""
         columns = self.fitting(options.max_width)
         fits = _total_width(columns) <= options.max_width  # else it is folded, never cut
         table = Table(title=plain(self.title, "table.title"), title_justify="left")

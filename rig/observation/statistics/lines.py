@@ -16,7 +16,9 @@ AROUND = 161  # bins of the running median
 MOST_LINES = 8  # three of a servo, and vibrations in the room, each of which a turning sensor may read as two
 APART = 2.5  # cycles in all the readings: least distance from a line that was found
 SAME = 1.5  # cycles in all the readings: lines that are nearer to each other are a jerk
-BESIDE = 0.5  # cycles in all the readings: sidebands nearer to each other, of slow lines, resemble the turn's own waves
+SIDEBANDS_APART = (
+    0.5  # cycles in all the readings: sidebands nearer to each other, of slow lines, resemble the turn's own waves
+)
 PASSES = 1
 WIDE = 4  # columns of a line, and of each of its sidebands
 BEATS = 1  # sidebands of a vibration in the room for a sensor that makes a turn
@@ -78,7 +80,7 @@ def _are_too_near(cycles: Array, search: LineSearch) -> bool:
     gaps = np.diff(ordered)
     if gaps.min(initial=np.inf) < SAME or ordered[0] < 1.0:
         return True
-    return bool(ordered[0] < search.slowest and gaps.size and gaps[0] < 2 * search.beats + BESIDE)
+    return bool(ordered[0] < search.slowest and gaps.size and gaps[0] < 2 * search.beats + SIDEBANDS_APART)
 
 
 def median_power(residuals: Array) -> float:

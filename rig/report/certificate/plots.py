@@ -20,7 +20,7 @@ from rig.report.findings.unexplained import (
 from rig.report.tables.certificate import AXES
 from rig.report.words.printed_budget import printed_indices
 
-WIDTH, LEFT, RIGHT = 340.0, 42.0, 8.0
+WIDTH, LEFT_MARGIN, RIGHT_MARGIN = 340.0, 42.0, 8.0
 TOP, HEIGHT = 18.0, 104.0
 NAMES, ROW, DECADES = 106.0, 13.0, 4
 
@@ -86,21 +86,21 @@ def _draw(unexplained: Unexplained) -> Residuals:
     """Return values (n, 3) side by side, with bars of two standard deviations, in a unit that suits the largest."""
     values, bars, split = unexplained.values, 2 * unexplained.stds, unexplained.split
     reach, unit = reach_in(float((np.abs(values) + bars).max()), unexplained.quantity.residuals)
-    across = (WIDTH - LEFT - RIGHT) / len(values)
+    across = (WIDTH - LEFT_MARGIN - RIGHT_MARGIN) / len(values)
 
     def height(value: float) -> float:
         return round(TOP + HEIGHT / 2 * (1 - value / unit.size / reach), 1)
 
     def point(index: int, axis: int) -> PlotPoint:
         value, bar = values[index, axis], bars[index, axis]
-        x = LEFT + across * (index + 0.5 + 0.22 * (axis - 1))
+        x = LEFT_MARGIN + across * (index + 0.5 + 0.22 * (axis - 1))
         return PlotPoint(round(x, 1), height(value), height(value - bar), height(value + bar), axis)
 
     points = tuple(point(index, axis) for index in range(len(values)) for axis in range(3))
     ticks = tuple(
         (height(value * unit.size), f"{value:g}".replace("-", "−")) for value in (-reach / 1.1, 0.0, reach / 1.1)
     )
-    begins = None if split is None else round(LEFT + across * split, 1)
+    begins = None if split is None else round(LEFT_MARGIN + across * split, 1)
     within = int((np.abs(values) <= bars).sum())
     return Residuals(points, ticks, height(0.0), begins, unit.name, within, unexplained.shown, unexplained.expectation)
 
@@ -117,7 +117,7 @@ def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, Displ
 def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
     """Return standard uncertainties over the combined one, for the printed budget; at least 1e-4 is drawn."""
     k, b = printed_indices(budget, scale)
-    across = (WIDTH - NAMES - RIGHT) / DECADES
+    across = (WIDTH - NAMES - RIGHT_MARGIN) / DECADES
 
     def position(fraction: float) -> float:
         return round(NAMES + across * (DECADES + float(np.log10(np.clip(np.sqrt(fraction), 10.0**-DECADES, 1.0)))), 1)

@@ -8,7 +8,7 @@ import numpy as np
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.quantity import DisplayUnit, Quantity
 from rig.estimation.arrays import Array
-from rig.report.certificate.plots import HEIGHT, LEFT, RIGHT, TOP, WIDTH, reach_in
+from rig.report.certificate.plots import HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP, WIDTH, reach_in
 from rig.report.tables.certificate import Pair, pair
 from rig.report.words.temperature_words import shown_rows
 
@@ -88,7 +88,7 @@ def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Se
 
 
 def _across(temperature_c: float, low: float, high: float) -> float:
-    return round(LEFT + 12 + (WIDTH - LEFT - RIGHT - 30) * (temperature_c - low) / (high - low), 1)
+    return round(LEFT_MARGIN + 12 + (WIDTH - LEFT_MARGIN - RIGHT_MARGIN - 30) * (temperature_c - low) / (high - low), 1)
 
 
 def _height(value: float, unit: DisplayUnit, reach: float) -> float:

@@ -65,7 +65,7 @@ class Characteristic:
     elsewhere: Mapping[Outlet, str] = field(default_factory=dict)
     remark: Callable[[Any], str] = lambda _: ""
 
-    def of(self, finding: Finding[Any]) -> "Term":
+    def term_of(self, finding: Finding[Any]) -> "Term":
         """Return the term of an entry. Raise ValueError if the entry does not state it."""
         if (numbers := self.read(finding.entry)) is None:
             raise ValueError(f"{finding.sensor} has no {self.name}")
@@ -126,7 +126,7 @@ def terms(
     """Yield the characteristics that an entry states, or those of them that `outlet` takes."""
     for characteristic in characteristics:
         if outlet not in characteristic.elsewhere and characteristic.read(finding.entry) is not None:
-            yield characteristic.of(finding)
+            yield characteristic.term_of(finding)
 
 
 def read_fields(what: str, suffix: str, sign: int = 1) -> Callable[[Any], UncertainNumbers | None]:

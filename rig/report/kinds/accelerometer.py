@@ -90,7 +90,7 @@ def _lines(finding: Finding[AccelerometerEntry]) -> Iterator[str]:
     yield from detection_limit_lines(entry.detection_limits)
     yield from attitude_lines(finding)
     if entry.second_order_s2_m is not None and entry.second_order_std_s2_m is not None:
-        yield line_of(SECOND_ORDER.of(finding), "second order", "+.2e", ".1e")
+        yield line_of(SECOND_ORDER.term_of(finding), "second order", "+.2e", ".1e")
     if entry.lever_arm_m is not None and entry.lever_arm_std_m is not None:
         lever = triple(np.multiply(1e3, entry.lever_arm_m), "+.1f")
         yield f"lever arm from the wrists' axes: {lever} mm (± {2e3 * max(entry.lever_arm_std_m):.1f})"

@@ -111,7 +111,7 @@ def _render(finding: Finding[DriftEntry]) -> Iterator[Table | str]:
 
 def _build_row(finding: Finding[DriftEntry]) -> DisplayRow:
     """Return the largest change of the bias."""
-    return row_of(LARGEST_CHANGE.of(finding), finding.quantity.full_label(finding.sensor))
+    return row_of(LARGEST_CHANGE.term_of(finding), finding.quantity.full_label(finding.sensor))
 
 
 def _build_record(finding: Finding[DriftEntry], document: ResultDocument) -> HistoryRecord:
@@ -193,7 +193,7 @@ def _lines(finding: Finding[DriftEntry]) -> Iterator[str]:
     if isinstance(slope, ErrorEntry):
         yield f"over temperature: {slope.error}"
     else:
-        terms = "  ".join(f"{a:+.3g} ± {b:.1g}" for _, a, b in DRIFT_SLOPE.of(finding).printed)
+        terms = "  ".join(f"{a:+.3g} ± {b:.1g}" for _, a, b in DRIFT_SLOPE.term_of(finding).printed)
         low, high = slope.range_c
         words = factor_words(slope.degrees_of_freedom)
         yield f"over temperature: {terms} {unit} per °C ({words}), from {low:.1f} to {high:.1f} °C only"

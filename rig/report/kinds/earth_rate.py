@@ -29,7 +29,7 @@ def _rate_of(finding: Finding[GyroscopeEntry]) -> EarthRateEntry:
 
 def _build_row(finding: Finding[GyroscopeEntry]) -> DisplayRow:
     """Return the Earth's rate in the axes of the arm's base."""
-    return row_of(EARTH_RATE.of(finding))
+    return row_of(EARTH_RATE.term_of(finding))
 
 
 def _build_record(finding: Finding[GyroscopeEntry], _: object) -> HistoryRecord:

@@ -149,7 +149,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
             covariance = np.array(vector.matrix_covariance)[:9, :9]
             yield from matrix_lines(np.array(vector.matrix), covariance, max(sensor.budget.coverage_factors[:3]))
         else:
-            yield line_of(NON_ORTHOGONALITY.of(finding), "non-orthogonality yz zx xy", "+.3f")
+            yield line_of(NON_ORTHOGONALITY.term_of(finding), "non-orthogonality yz zx xy", "+.3f")
         yield from (f"warning: {warning}" for warning in vector.warnings)
 
 

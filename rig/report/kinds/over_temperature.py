@@ -62,7 +62,7 @@ def _render(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
 def _build_row(finding: Finding[OverTemperatureEntry]) -> DisplayRow:
     """Return the slopes of the bias at the reference temperature."""
     noun = f"change per kelvin at {finding.entry.reference_c:g} °C"
-    return row_of(BIAS_SLOPE_AT_REFERENCE.of(finding), finding.quantity.full_label(finding.sensor), noun)
+    return row_of(BIAS_SLOPE_AT_REFERENCE.term_of(finding), finding.quantity.full_label(finding.sensor), noun)
 
 
 def _build_record(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> HistoryRecord | None:

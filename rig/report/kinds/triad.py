@@ -90,7 +90,7 @@ def item_words(entry: Any) -> str:
 def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
     """Yield the non-orthogonality, the attitude error and, for attitudes of a file, the placement error."""
     entry, quantity = finding.entry, finding.quantity
-    yield line_of(NON_ORTHOGONALITY.of(finding), "non-orthogonality yz zx xy", "+.4f")
+    yield line_of(NON_ORTHOGONALITY.term_of(finding), "non-orthogonality yz zx xy", "+.4f")
     if entry.attitude_error_rad is not None:
         expanded = "" if entry.attitude_error_std_rad is None else f" (± {2e3 * entry.attitude_error_std_rad:.2f})"
         yield f"estimated attitude error: {1e3 * entry.attitude_error_rad:.2f} mrad about each axis{expanded}"

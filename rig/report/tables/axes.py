@@ -73,7 +73,7 @@ def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[st
     for axis, row, row_widths in zip("xyz", matrix.tolist(), widths.tolist(), strict=True):
         elements = (f"{element:+.6f} ± {width:.1e}" for element, width in zip(row, row_widths, strict=True))
         yield f"F {axis}: " + "  ".join(elements)
-    axes = SensorAxes.of(matrix)
+    axes = SensorAxes.from_matrix(matrix)
     stds = axes.non_orthogonality_std_rad(covariance)
     angles = zip(1e3 * axes.non_orthogonality_rad, 1e3 * factor * stds, strict=True)
     printed = "  ".join(f"{angle:+.3f} ± {width:.2g}" for angle, width in angles)

@@ -80,7 +80,7 @@ def _values(items: Sequence[_Item], width: int) -> Iterator[str]:
 
 
 def _items(result: ResultDocument) -> Iterator[_Item]:
-    """What has values of its own: a reference is known already."""
+    """Yield the findings with values of their own; a reference has none."""
     for kind, show, finding in outlets(result, lambda kind: kind.shown):
         if finding.is_reference:
             continue

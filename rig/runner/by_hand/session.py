@@ -267,7 +267,7 @@ class HandSession:
             faces=tuple(dict.fromkeys(self._lay)),
             pairs=remaining.pairs,
             turns=remaining.turns,
-            taken=len(self._accepted),
+            accepted=len(self._accepted),
         )
 
 

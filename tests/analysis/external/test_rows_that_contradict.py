@@ -60,7 +60,7 @@ def test_what_sweeps_contradict_each_other_by_is_in_the_uncertainty() -> None:
     assert sum(line.covariance for line in budget.contributors) == pytest.approx(contradicting.covariance)
     of_sound = budget_of(sound, swept(1, 1.0))
     assert [line.name for line in of_sound.contributors] == ["noise", "sweeps"]
-    assert (of_sound.expanded < 4 * of_sound.of("noise")).all()
+    assert (of_sound.expanded < 4 * of_sound.std_of("noise")).all()
 
 
 @pytest.mark.proof

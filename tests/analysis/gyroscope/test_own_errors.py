@@ -80,7 +80,7 @@ def test_a_bias_that_follows_the_recorded_temperature_is_that_at_the_mean_one() 
     warmed = _warmed(synthetic_run(setup), 40, bias_rad_s_per_k=2e-3)
     found = stated(calibrate([warmed]).results["gyro"])
     unseen = stated(calibrate([_thermometer_broken(warmed)]).results["gyro"])
-    assert found.of("bias instability")[3:].max() < 0.3 * unseen.of("bias instability")[3:].max()
+    assert found.std_of("bias instability")[3:].max() < 0.3 * unseen.std_of("bias instability")[3:].max()
 
 
 @pytest.mark.parametrize("steps", [0, 1, 2, 3])
@@ -110,8 +110,8 @@ def test_a_ramp_that_a_step_of_the_thermometer_hides_is_no_walk_of_the_bias() ->
         for each in said_of
     )
     assert (np.abs(found.bias_rad_s - setup.bias_rad_s) < stated(found).expanded[3:]).all()
-    assert stated(found).of("bias over temperature")[3:].max() > 0
-    instability = [stated(each).of("bias instability")[3:].max() for each in (found, without)]
+    assert stated(found).std_of("bias over temperature")[3:].max() > 0
+    instability = [stated(each).std_of("bias instability")[3:].max() for each in (found, without)]
     assert instability[0] < 0.8 * instability[1]
 
 

@@ -68,7 +68,7 @@ def test_real_faces_laid_down_again_are_within_what_was_stated(
     assert (known < 1e-3).all(), "and it says something"
     assert main(["solve", *map(str, (files[0], "--attitudes", files[1], "--only", "accelerometer", "--all"))]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "7 more rests have helped to find it" in said and "uncertainty budget" in said
+    assert "estimated with 7 more rests" in said and "uncertainty budget" in said
 
 
 def test_six_rests_and_no_more_hardly_tell_what_a_placement_does(

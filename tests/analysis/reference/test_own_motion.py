@@ -66,7 +66,7 @@ def test_where_attitudes_do_not_tell_the_sensitivity_the_circling_does_not_eithe
     explained = solved(WITHOUT_RESTS).explained
     assert explained is not None and explained.solution.g_sensitivity is None
     standing_still = replace(explained, inputs=replace(explained.inputs, arms_m=None))
-    more = [budget(each, KNOWN).of("g-sensitivity")[3:] ** 2 for each in (explained, standing_still)]
+    more = [budget(each, KNOWN).std_of("g-sensitivity")[3:] ** 2 for each in (explained, standing_still)]
     assert (more[0] > more[1]).all()
 
 

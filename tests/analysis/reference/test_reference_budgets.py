@@ -99,7 +99,7 @@ def magnetometer(seed: int, site: Site = SITE) -> Session:
 
 def own_spread(budget: Budget) -> Array:
     """(6,) by noise and attitudes alone."""
-    std: Array = np.hypot(budget.of("noise"), budget.of("arm's attitudes"))
+    std: Array = np.hypot(budget.std_of("noise"), budget.std_of("arm's attitudes"))
     return std
 
 
@@ -181,9 +181,9 @@ def test_how_far_a_sensor_bends_is_in_its_budget_where_attitudes_do_not_tell() -
     readings = {"noise", "arm's attitudes", "bias instability", "flicker of the bias", *BY_SHEET}
     parts = sum(line.covariance for line in budget.contributors if line.name in readings)
     np.testing.assert_allclose(np.diag(parts), np.diag(whole), rtol=1e-6)
-    own = session.movement.own
+    own = session.movement.sensor_errors
     assert own is not None
-    assert np.all(budget.of("nonlinearity")[3:] < 0.01 * own.even_s2_m * GRAVITY**2)  # the attitudes tell the rest
+    assert np.all(budget.std_of("nonlinearity")[3:] < 0.01 * own.even_s2_m * GRAVITY**2)  # the attitudes tell the rest
 
 
 def test_a_quiet_sensor_s_flicker_and_what_its_thermometer_hides_are_in_its_budget() -> None:
@@ -192,7 +192,7 @@ def test_a_quiet_sensor_s_flicker_and_what_its_thermometer_hides_are_in_its_budg
     (line,) = (line for line in budget.contributors if line.name == "flicker of the bias")
     assert (line.kind, line.distribution, line.source) == ("B", "normal", "least Allan deviation: 3.6 µg")
     assert np.all((line.std[3:] > 0.2 * 3.6e-6 * GRAVITY) & (line.std[3:] < 3.6e-6 * GRAVITY))
-    assert np.all(budget.of("bias over temperature")[3:] > 0)
+    assert np.all(budget.std_of("bias over temperature")[3:] > 0)
 
 
 def test_a_sheet_is_what_the_recording_says() -> None:
@@ -217,8 +217,8 @@ def test_the_size_of_the_reference_is_the_scale_s_alone(
     session: Callable[[int], Session], size: str, expanded: float
 ) -> None:
     _, budget, _ = session(0)
-    np.testing.assert_allclose(budget.of(size)[:3], expanded / 2, rtol=0.1)  # of scale factors near 1
-    np.testing.assert_array_equal(budget.of(size)[3:], 0)
+    np.testing.assert_allclose(budget.std_of(size)[:3], expanded / 2, rtol=0.1)  # of scale factors near 1
+    np.testing.assert_array_equal(budget.std_of(size)[3:], 0)
 
 
 def test_what_nobody_has_stated_is_assumed_and_said() -> None:
@@ -233,4 +233,4 @@ def test_what_nobody_has_stated_is_assumed_and_said() -> None:
 def test_without_sweeps_no_filter_lags() -> None:
     assert "filter's lag" in {line.name for line in accelerometer(0)[1].contributors}
     quick = accelerometer(0, lag_s=0.0)[1]
-    assert quick.of("filter's lag").max() == 0
+    assert quick.std_of("filter's lag").max() == 0

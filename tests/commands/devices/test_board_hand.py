@@ -107,7 +107,7 @@ def test_what_the_button_began_is_fetched_said_to_be_unchecked_and_stored(
         path = real_board(tmp_path, port)
         said = rig_here("board", "hand", path, "--fetch")
         assert said.returncode == 0, said.stderr
-        assert "the board's own answer alone" in said.stdout
+        assert "the board's own result" in said.stdout
         stored = rig_here("board", "hand", path, "--fetch", "--json", "--write", "--yes")
         assert stored.returncode == 0, stored.stderr
         found = json.loads(stored.stdout)

@@ -49,7 +49,7 @@ def drawn(axes: Array, matrix: Array, count: int) -> tuple[float, float, float]:
     rng, ratios, errors = np.random.default_rng(7), [], []
     for _ in range(count):
         error, found = solved(np.radians(MOUNT_DEG) * rng.uniform(-1, 1, (len(axes), 3)), axes, matrix)
-        ratios.append(error / found.of(MOUNTS)[:3])
+        ratios.append(error / found.std_of(MOUNTS)[:3])
         errors.append(error)
     rms, off_ppm = (float(np.sqrt(np.mean(np.square(each)))) for each in (ratios, errors))
     return rms, float(np.abs(ratios).max()), 1e6 * off_ppm
@@ -74,4 +74,4 @@ def test_of_a_sensor_askew_both_orders_count() -> None:
 
 def test_mounts_that_the_sweeps_tell_leave_no_square() -> None:
     _, found = solved(np.radians([[0.0, 0.0, 0.0], [1.0, -0.5, 0.8]]), np.tile(np.eye(3), (2, 1, 1)), np.eye(3))
-    assert found.of(MOUNTS)[:3] == pytest.approx(np.zeros(3), abs=2e-6)
+    assert found.std_of(MOUNTS)[:3] == pytest.approx(np.zeros(3), abs=2e-6)

@@ -98,8 +98,8 @@ def true_accelerometer(document: Mapping[str, Any], name: str, found: Accelerome
     """
     sensor = read_world_section(parse(yaml.safe_dump(dict(document)))).sensors[name]
     drawn = sensor.accelerometer
-    assert found.movement.own is not None
-    windows_s = found.movement.own.windows_s
+    assert found.movement.sensor_errors is not None
+    windows_s = found.movement.sensor_errors.windows_s
     warmer_k = np.average(
         [_warmer_k(sensor, each) for each in windows_s.mean(axis=1)], weights=np.ptp(windows_s, axis=1)
     )

@@ -56,8 +56,8 @@ class Session:
     @property
     def times_s(self) -> Array:
         """(N + M,) of the middles."""
-        assert self.movement.own is not None
-        return np.asarray(self.movement.own.windows_s.mean(axis=1), dtype=np.float64)
+        assert self.movement.sensor_errors is not None
+        return np.asarray(self.movement.sensor_errors.windows_s.mean(axis=1), dtype=np.float64)
 
     @property
     def late(self) -> Array:
@@ -120,7 +120,7 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
         for number, (start, length, warm, place) in enumerate(zip(start_s, length_s, warm_c, stood, strict=True))
     ]
     own = list_sensor_errors(sheet, pieces, STEPS_K[part], second_order=False)
-    movement = replace(straight, own=own, arm_turns=list_arm_rotations(stood, NOMINAL, np.eye(3)))
+    movement = replace(straight, sensor_errors=own, arm_turns=list_arm_rotations(stood, NOMINAL, np.eye(3)))
     session = Session(part, truth, movement, _parameters(truth, np.zeros(3)), arm_rad)
 
     def within(half_width: float) -> Array:
@@ -145,7 +145,7 @@ def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
         movement.dwells,
         movement.sweeps,
         gravity_m_s2=GRAVITY,
-        own=movement.own,
+        sensor_errors=movement.sensor_errors,
         arm_turns=movement.arm_turns,
         own_shares=OWN_SHARES,
     )

@@ -653,13 +653,13 @@ def test_a_speed_slider_below_full_is_refused_in_preflight(laboratory: WorldHand
 
 PARENT = """
 import sys
-from rig.motion.carried import Carried
+from rig.motion.carried import FlangeLoad
 from rig.turners.ur.driver import Arm
 from rig.motion.steps import Transfer
 
 if __name__ == "__main__":
     with Arm(sys.argv[1]) as arm:
-        arm.take_control(Carried(0.35, (0.0, 0.0, 0.025)))
+        arm.take_control(FlangeLoad(0.35, (0.0, 0.0, 0.025)))
         here = arm.latest.q_rad
         print("moving", flush=True)
         arm.move(Transfer("test move", here, (*here[:5], here[5] + 6.0), 1.0, 2.0, 6.5))
