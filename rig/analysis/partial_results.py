@@ -53,7 +53,7 @@ class SoFar:
 
 
 @dataclass(frozen=True, slots=True)
-class _Recorded:
+class _RecordedPart:
     """One recording's part of a gyroscope, and of its accelerometer; no `clock` if none could be determined."""
 
     clock: TimeBase | None
@@ -97,18 +97,18 @@ def _solve_gyroscope(sweeps: Attempts[int, Observation], rests: Sequence[Average
     return PartialGyroscope(sweeps, solution, missing, _bias(rests))
 
 
-def _observe(run: RunData, name: str, motion: ArmMotion) -> _Recorded:
+def _observe(run: RunData, name: str, motion: ArmMotion) -> _RecordedPart:
     sensor = run.sensors[name]
     try:
         stream = synchronize_stream(run.samples[name], sensor, motion)
     except Fault as fault:  # of the sensor as a whole: its clock is not found
         dwells = finished_dwells(run) if sensor.measures(ACCELERATION) else ()
-        return _Recorded(None, all_failed(finished_sweeps(run), fault), all_failed(dwells, fault), ())
+        return _RecordedPart(None, all_failed(finished_sweeps(run), fault), all_failed(dwells, fault), ())
     sweeps, rests = _observe_sweeps(run, name, stream, motion)
-    return _Recorded(stream.clock, sweeps, read_each_dwell(run, stream, motion, run.settings.observation), rests)
+    return _RecordedPart(stream.clock, sweeps, read_each_dwell(run, stream, motion, run.settings.observation), rests)
 
 
-def _accelerations(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[QuantityInDwell, ReadAtRest]:
+def _accelerations(run: RunData, recorded: Mapping[str, _RecordedPart]) -> Attempts[QuantityInDwell, ReadAtRest]:
     gravity_m_s2 = run.settings.site.gravity_m_s2
     results, faults = dict[QuantityInDwell, ReadAtRest](), dict[QuantityInDwell, Fault]()
     for name, sensor in recorded.items():
@@ -119,7 +119,7 @@ def _accelerations(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[
     return Attempts(results, faults)
 
 
-def _fields(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[QuantityInDwell, ReadAtRest]:
+def _fields(run: RunData, recorded: Mapping[str, _RecordedPart]) -> Attempts[QuantityInDwell, ReadAtRest]:
     """Return the means of magnetometers in the dwells of an accelerometer on the same clock."""
     expected_t = run.settings.site.magnetic_field_t
     fields: Attempts[QuantityInDwell, ReadAtRest] = Attempts()

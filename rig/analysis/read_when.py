@@ -38,7 +38,7 @@ class GyroscopeConditions:
 
 
 @dataclass(frozen=True, slots=True)
-class _Read:
+class _WeightedReadings:
     """Readings from start to end on the clock of the first recording, their weight and temperature (or NaN)."""
 
     start_s: float
@@ -64,7 +64,7 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
         part, offset_s = recording.sensors[name], recording.clock_offset_s
         read += [_read_average(turn.average, offset_s) for turn in part.revolutions if turn.acceleration is not None]
         read += [
-            _Read(
+            _WeightedReadings(
                 dwell.window.start_s + offset_s,
                 dwell.window.end_s + offset_s,
                 dwell.reading.samples,
@@ -85,15 +85,17 @@ def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterab
         for index, (start_s, end_s) in dwell_times_s(recording.run).items()
         if index in wanted
     }
-    read = [_Read(start_s, end_s, end_s - start_s, float("nan")) for start_s, end_s in times_s.values()]
+    read = [_WeightedReadings(start_s, end_s, end_s - start_s, float("nan")) for start_s, end_s in times_s.values()]
     return _average_conditions(recordings, name, read)
 
 
-def _read_average(average: Average, offset_s: float) -> _Read:
-    return _Read(average.start_s + offset_s, average.end_s + offset_s, average.samples, average.temperature_c)
+def _read_average(average: Average, offset_s: float) -> _WeightedReadings:
+    return _WeightedReadings(
+        average.start_s + offset_s, average.end_s + offset_s, average.samples, average.temperature_c
+    )
 
 
-def _average_conditions(recordings: Sequence[ObservedRun], name: str, read: Sequence[_Read]) -> When:
+def _average_conditions(recordings: Sequence[ObservedRun], name: str, read: Sequence[_WeightedReadings]) -> When:
     """Return the times of weighted windows; a recording's clock starts with its first state."""
     began = datetime.fromisoformat(recordings[0].run.provenance.started_utc)
     first_s, weights = float(recordings[0].motion.time_s[0]), [window.weight for window in read]

@@ -128,7 +128,7 @@ def even_times(time_s: Array, sampling: Sampling) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class _Candidate:
+class _PeriodCandidate:
     """The interval and the missing readings (n − 1,) for a `width`; `fit` is the fraction of differences that agree."""
 
     width: int
@@ -148,7 +148,7 @@ class _Candidate:
         return float(np.median(time_s[ends] - time_s[starts]))
 
 
-def _count_missing(time_s: Array, width: int, quantile: float) -> _Candidate:
+def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandidate:
     steps_s, numbers = np.diff(time_s), np.arange(len(time_s))
     interval_s, last_s = _slope(time_s, max(8, 4 * width), quantile), 0.0
     missing, fit = np.zeros(len(steps_s), dtype=np.intp), 0.0
@@ -161,7 +161,7 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _Candidate:
         if abs(interval_s - last_s) <= SETTLED * interval_s:
             break
         last_s, interval_s = interval_s, _interval_s(time_s, missing, width)
-    return _Candidate(width, interval_s, missing, fit)
+    return _PeriodCandidate(width, interval_s, missing, fit)
 
 
 def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:

@@ -67,7 +67,7 @@ def moments(run: RunData) -> Iterator[Moment]:
     modes: dict[str, str] = {name: sensor.mode for name, sensor in run.sensors.items()}
     raw = "calibrated" not in modes.values()
     yield Moment(0.0, PhaseStarted(run.settings.procedure, plan, modes))
-    samples = {name: _Samples(run, name) for name in run.sensors}
+    samples = {name: _ReplayedSamples(run, name) for name in run.sensors}
 
     def samples_until(host_time_s: float) -> tuple[SensorSamples, ...]:
         return tuple(sensor_samples.until(host_time_s) for sensor_samples in samples.values())
@@ -164,7 +164,7 @@ def _state(row: Any) -> State:
     return JointState(values["time_s"], values["host_time_s"], **joints)
 
 
-class _Samples:
+class _ReplayedSamples:
     """One sensor's samples up to a time."""
 
     def __init__(self, run: RunData, name: str) -> None:

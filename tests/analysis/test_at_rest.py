@@ -9,7 +9,7 @@ from rig.analysis.at_rest import AtRest, at_rest
 from rig.data.quantity import RATE
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
-from rig.estimation.statistics.allan import Read
+from rig.estimation.statistics.allan import AllanReading
 from support.recordings.synthetic_run import SENSITIVITY, Setup, synthetic_run
 
 NOISE_RAD_S = 0.01
@@ -32,7 +32,7 @@ def test_random_walk_is_found_in_the_rests_between_sweeps(run: RunData) -> None:
     assert found.stretches == 6 and found.total_s == pytest.approx(6 * 19.6, abs=0.1)
     assert found.longest_s == pytest.approx(19.6, abs=0.02) and found.temperature_c == (22.0, 22.0)
     for axis in found.axes:
-        assert isinstance(axis.random_walk, Read)
+        assert isinstance(axis.random_walk, AllanReading)
         assert axis.random_walk.value == pytest.approx(RANDOM_WALK, abs=4 * axis.random_walk.std)
         assert isinstance(axis.bias_instability, Fault), "seconds tell nothing of it"
 

@@ -9,7 +9,7 @@ from rig.analysis.analyses import calibrate_by_hand
 from rig.data.recording.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
 from rig.data.recording.run_file import read_run
 from rig.errors import Fault
-from rig.estimation.by_hand.session import HandRecording, Move, Rest, SessionConditions
+from rig.estimation.by_hand.session import HandRecording, HandRest, Move, SessionConditions
 from rig.estimation.by_hand.solution import solve_by_hand
 from rig.motion.by_hand import FACES
 from rig.observation.by_hand.runs import NotCounted, rotate_face
@@ -21,7 +21,7 @@ SECOND_US = 1_000_000
 def session(rests: int) -> HandRecording:
     """Rests of a second each, every three seconds; the moves between have peaks 1, 2, 3, …"""
     zero = np.zeros(3)
-    lain = tuple(Rest(3.0 * place, 3.0 * place + 1.0, 100, zero, zero) for place in range(rests))
+    lain = tuple(HandRest(3.0 * place, 3.0 * place + 1.0, 100, zero, zero) for place in range(rests))
     moves = tuple(Move(3.0 * place + 1.0, 3.0 * place + 3.0, place + 1.0) for place in range(rests - 1))
     return HandRecording(np.zeros(0), np.zeros((0, 3)), None, lain, moves)
 

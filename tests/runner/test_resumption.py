@@ -11,7 +11,7 @@ import pytest
 from firmware_host.answers import BoardObservation
 from rig.analysis.analyses import calibrate
 from rig.analysis.gyroscope.calibration import observe_recordings
-from rig.data.recording.events import BoardObserved, Recorded
+from rig.data.recording.events import BoardObserved, TimedEvent
 from rig.data.recording.run_file import RunData, read_run
 from rig.observation.windows import swept
 from rig.plans.script_file import ScriptFile, installed_script
@@ -32,7 +32,7 @@ def known_to_the_board(run: RunData) -> RunData:
     ]
     return replace(
         run,
-        events=(*run.events, *(Recorded(event, 0.0, 0.0) for event in seen)),
+        events=(*run.events, *(TimedEvent(event, 0.0, 0.0) for event in seen)),
         provenance=replace(run.provenance, script_sha256=SCRIPT.sha256),
     )
 

@@ -89,7 +89,7 @@ def _list_unobserved(run: RunData, sensor: str) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Observation:
+class _BoardObservation:
     """An observation of the board: mean reading (3,) and speed; `averaged` if the host averaged it too."""
 
     mean_rad_s: Array
@@ -97,9 +97,9 @@ class _Observation:
     averaged: bool
 
 
-def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_Observation]:
+def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObservation]:
     """Return every observation that the board solved from, by the recorded samples."""
-    observations: list[_Observation] = []
+    observations: list[_BoardObservation] = []
     for event in _events(runs[-1], sensor):
         if isinstance(event, BoardObserved):
             observations.append(_average_observation(runs[-1], event))
@@ -108,25 +108,25 @@ def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_Observatio
     return observations
 
 
-def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _Observation:
+def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _BoardObservation:
     """Return a recalled observation from the newest recording that has it; not-a-number if none has."""
     for run in reversed(earlier):
         if earlier_observations := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
             return _average_observation(run, earlier_observations[recalled.sweep])
-    return _Observation(np.full(3, np.nan), np.nan, averaged=False)
+    return _BoardObservation(np.full(3, np.nan), np.nan, averaged=False)
 
 
-def _average_observation(run: RunData, event: BoardObserved) -> _Observation:
+def _average_observation(run: RunData, event: BoardObserved) -> _BoardObservation:
     samples, observed = run.samples[event.sensor], event.observation
     times_us = samples["board_time_us"]
     used = slice(*np.searchsorted(times_us, [observed.start_us, observed.end_us]).tolist())
     missing = observed.samples - (used.stop - used.start)
     if 0 < missing <= _count_missing(samples["sequence"][max(used.start - 1, 0) : used.stop + 1]):
-        return _Observation(np.array(observed.mean_rad_s), event.speed_rad_s, averaged=False)
+        return _BoardObservation(np.array(observed.mean_rad_s), event.speed_rad_s, averaged=False)
     gyroscope = run.sensors[event.sensor].channel(RATE)
     counts = gyroscope.counts(samples)[used]
     mean = counts.mean(axis=0) if missing == 0 and len(counts) else np.full(3, np.nan)
-    return _Observation(gyroscope.convert(mean), event.speed_rad_s, averaged=True)
+    return _BoardObservation(gyroscope.convert(mean), event.speed_rad_s, averaged=True)
 
 
 def _events(run: RunData, sensor: str) -> Iterator[OfTheBoard]:
@@ -141,7 +141,7 @@ def _count_missing(sequence: NDArray[np.uint32]) -> int:
     return int(np.sum(np.diff(sequence).astype(np.int64) - 1))
 
 
-def _solve(observations: Sequence[_Observation]) -> tuple[Array, Array] | None:
+def _solve(observations: Sequence[_BoardObservation]) -> tuple[Array, Array] | None:
     """Return scale and bias by the board's method, with equal weights.
 
     None with too few observations, with other samples than the board reports, or if the host could check no mean.

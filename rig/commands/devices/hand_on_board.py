@@ -26,7 +26,7 @@ from rig.board.store import store
 from rig.commands.laboratory.claims import claim_board
 from rig.commands.laboratory.laboratory import simulated_laboratory
 from rig.commands.laboratory.own_address import load_at_own_address
-from rig.commands.laboratory.simulated_operator import SimulatedOperator
+from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.recording.hand_events import OfTheHand
@@ -63,7 +63,7 @@ def hand(options: Namespace) -> int:
         among = _select_sensors(config, options.sensor)
         operator = None
         if loaded.simulated:
-            operator = SimulatedOperator(stack.enter_context(simulated_laboratory(loaded.text)))
+            operator = OperatorListener(stack.enter_context(simulated_laboratory(loaded.text)))
         stack.enter_context(claim_board(require_board_section(config).port))
         session = (
             _fetch_session(config, among)
@@ -111,7 +111,7 @@ def _select_sensors(config: RigConfig, wanted: str | None) -> dict[str, SensorSe
 
 @contextmanager
 def _run_session(
-    config: RigConfig, name: str, options: Namespace, operator: SimulatedOperator | None
+    config: RigConfig, name: str, options: Namespace, operator: OperatorListener | None
 ) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
     """Run a session on the board now, with the operator."""
     from rig.runner.by_hand.on_board import calibrate_by_board

@@ -8,7 +8,7 @@ from rig.data.recording.hand_events import HandAsked
 from rig.station.events import RunEvent
 
 
-class SimulatedOperator:
+class OperatorListener:
     """A listener of a run that passes instructions by hand on to the laboratory's operator.
 
     The operator gets only what the line of text and the drawing show: the motion, and the side that points up.

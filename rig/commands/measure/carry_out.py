@@ -10,7 +10,7 @@ from rig.commands.history.recall import recall_sensors
 from rig.commands.history.remember import describe_changes, remember
 from rig.commands.laboratory.claims import claim_devices
 from rig.commands.laboratory.laboratory import make_mounter, simulated_laboratory
-from rig.commands.laboratory.simulated_operator import SimulatedOperator
+from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.commands.page_arguments import PageWish, serve_operators_page
 from rig.commands.standard_streams import say_where_the_result_is
 from rig.data.run_folder import CONFIG, LOG, RESULT, WORLD_LATE
@@ -53,7 +53,7 @@ def carry_out(
                 if configured.loaded.simulated:
                     control = stack.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
                     station.mount = make_mounter(control)
-                    station.listeners = (*station.listeners, SimulatedOperator(control))
+                    station.listeners = (*station.listeners, OperatorListener(control))
             outcome = run.carry_out(configured.phase)
             try:
                 entered, comparisons = remember(folder, configured.loaded.config.history)

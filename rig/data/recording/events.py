@@ -128,7 +128,7 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class TimedEvent:
     """An event and its time: on the host's monotonic clock, and on the controller's if that was received by then."""
 
     event: Event
@@ -136,7 +136,7 @@ class Recorded:
     controller_time_s: float | None
 
 
-def encode_event(recorded: Recorded) -> bytes:
+def encode_event(recorded: TimedEvent) -> bytes:
     """Return a line of a run file's events, with its end."""
     document = {
         "name": _NAMES[type(recorded.event)],
@@ -147,7 +147,7 @@ def encode_event(recorded: Recorded) -> bytes:
     return json.dumps(document).encode() + b"\n"
 
 
-def decode_events(stream: bytes) -> Iterator[Recorded]:
+def decode_events(stream: bytes) -> Iterator[TimedEvent]:
     """Yield the events of a run file. A last line without an end was cut off by a kill and is left out.
 
     Raise ValueError naming the first line that is no event, or not of the shape of its kind.
@@ -160,7 +160,7 @@ def decode_events(stream: bytes) -> Iterator[Recorded]:
                 raise ValueError(f"event {number} cannot be understood: {' '.join(str(error).split())}") from None
 
 
-def _decode_document(document: Any) -> Recorded:
+def _decode_document(document: Any) -> TimedEvent:
     if not isinstance(document, dict) or not isinstance(document.get("detail"), dict):
         raise ValueError("it has no name and no details")
     name, detail = document.get("name"), document["detail"]
@@ -174,7 +174,7 @@ def _decode_document(document: Any) -> Recorded:
     if isinstance(event, BoardObserved):
         _check_observation(event.observation)
     times = validate(_Times, document, name)
-    return Recorded(event, times.host_time_s, times.controller_time_s)
+    return TimedEvent(event, times.host_time_s, times.controller_time_s)
 
 
 def _nest_answer(name: str, detail: dict[str, Any]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from rig.data.checked import parse_json, validate
-from rig.data.recording.events import DwellFinished, DwellStarted, Recorded, SweepFinished, SweepStarted
+from rig.data.recording.events import DwellFinished, DwellStarted, SweepFinished, SweepStarted, TimedEvent
 from rig.data.recording.settings import RunSettings
 from rig.motion.geometry import MAX_JOINTS, DenavitHartenberg
 from rig.motion.state import Joints, StateField, TurnerIdentity, state_dtype
@@ -74,7 +74,7 @@ def turner_of(text: str) -> RecordedTurner:
     return parse_turner(parse_json(text))
 
 
-def check_joints(turner: RecordedTurner, settings: RunSettings, events: Iterable[Recorded]) -> None:
+def check_joints(turner: RecordedTurner, settings: RunSettings, events: Iterable[TimedEvent]) -> None:
     """Raise ValueError if a pose of a recording has another number of joints than its turner."""
     poses: list[Joints] = [settings.home_q_rad, *(dwell.q_rad for dwell in settings.planned_dwells)]
     for event in (recorded.event for recorded in events):

@@ -22,7 +22,7 @@ from rig.config.section import SensorName
 from rig.data.checked import LARGEST_NUMBER, parse_json, validate
 from rig.data.processes.reading_process import ReadingTask, UnreadableFile
 from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
-from rig.data.recording.events import Event, Recorded, decode_events, encode_event
+from rig.data.recording.events import Event, TimedEvent, decode_events, encode_event
 from rig.data.recording.extract import reason
 from rig.data.recording.layout import Contents, append, check_rows, empty, lay_out, table_of
 from rig.data.recording.motion_file import MOTIONS, ExternalHeader, ReadElsewhere, samples_header
@@ -55,7 +55,7 @@ class RunData:
     sensors: dict[str, RecordedSensor]
     samples: dict[str, NDArray[Any]]
     states: NDArray[Any]
-    events: tuple[Recorded, ...]
+    events: tuple[TimedEvent, ...]
     elsewhere: ReadElsewhere | None = None
 
     def measuring(self, quantity: Quantity | Scalar) -> dict[str, RecordedSensor]:
@@ -133,7 +133,7 @@ class RunRecorder:
         """Append an event, now; its controller time is the newest state's unless given."""
         with self._lock:
             time_s = self._controller_time_s if controller_time_s is None else controller_time_s
-            self._pending.events.append(encode_event(Recorded(event, time.monotonic(), time_s)))
+            self._pending.events.append(encode_event(TimedEvent(event, time.monotonic(), time_s)))
 
     def check(self) -> None:
         """Raise Fault `recording_failed` if the file could not be written."""

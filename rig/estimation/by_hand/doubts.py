@@ -16,7 +16,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.fit import GraphFit, estimate_stds, replace_stds, solve_step, whiten_rows
 from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
-from rig.estimation.by_hand.session import LARGEST, STATED, HandStds, Rest
+from rig.estimation.by_hand.session import LARGEST, STATED, HandRest, HandStds
 
 A_ROW = 4.0  # of chi square for each equation left out
 BY_MUCH = 16.0  # of chi square beyond that: false-alarm probability 1 in 10^5
@@ -183,7 +183,7 @@ def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
     )
 
 
-def _describe_jump(index: int, rests: Sequence[Rest]) -> Fault:
+def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
     """Return the Fault of a bias that jumped in the move `index`; at the first and last rest a creep looks the same."""
     after_s = rests[index + 1].start_s
     what = f"the gyroscope's bias was another after the move that ended at {after_s:.1f} s"

@@ -15,7 +15,7 @@ FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class HandRest:
     """A rest from `start_s` to `end_s`: mean (3,) of `samples` readings and their standard deviation (3,).
 
     With an accelerometer, also its mean reading (3,) and standard deviation (3,).
@@ -61,7 +61,7 @@ class HandRecording:
     time_s: Array
     rates: Array
     acceleration: Array | None
-    rests: tuple[Rest, ...]
+    rests: tuple[HandRest, ...]
     moves: tuple[Move, ...]
     held_in_air_s: tuple[tuple[float, float], ...] = ()
     creeping_s: tuple[tuple[float, float], ...] = ()

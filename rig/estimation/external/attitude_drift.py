@@ -50,7 +50,7 @@ class Fixes:
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class AttitudeSamples:
     """The recording, and the samples (k,) of the reference that are used."""
 
     time_s: Array
@@ -60,17 +60,17 @@ class Recorded:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class DriftState:
     """An iterate of F (3, 3), b (3,), τ."""
 
     matrix: Array
     bias: Array
     clock_s: float
 
-    def after_step(self, theta: Array) -> "State":
+    def after_step(self, theta: Array) -> "DriftState":
         """Return the state after a step θ."""
         matrix = self.matrix + theta[MATRIX].reshape(3, 3)
-        return State(matrix, self.bias + theta[BIAS], self.clock_s + float(theta[CLOCK]))
+        return DriftState(matrix, self.bias + theta[BIAS], self.clock_s + float(theta[CLOCK]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class FixedAttitudes:
     samples: Array
 
 
-def average_fixes(recorded: Recorded, state: State) -> FixedAttitudes:
+def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitudes:
     """Return the fixes by the gyroscope's integration with the parameters of a state."""
     fixes, time_s = recorded.fixes, recorded.time_s
     at_s = np.clip(fixes.at_s + state.clock_s, time_s[0], time_s[-1])
@@ -122,7 +122,7 @@ def _relative(fixes: Fixes) -> Array:
     return np.maximum(fixes.std_rad / usual, LEAST)
 
 
-def find_inliers(recorded: Recorded, fixes: FixedAttitudes) -> NDArray[np.bool_]:
+def find_inliers(recorded: AttitudeSamples, fixes: FixedAttitudes) -> NDArray[np.bool_]:
     """Return the samples (k,) near the median of their fix: a mistaken marker is an outlier."""
     fix = recorded.fixes.fix
     deviations = np.linalg.norm(rotation_vectors(np.swapaxes(fixes.attitudes[fix], -1, -2) @ fixes.samples), axis=1)

@@ -25,9 +25,9 @@ from rig.estimation.external.attitude_drift import (
     EARTH,
     EARTH_PRECISION,
     MATRIX,
+    AttitudeSamples,
+    DriftState,
     Fixes,
-    Recorded,
-    State,
     average_fixes,
     drift_model,
     find_inliers,
@@ -111,8 +111,8 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
     Raise Fault `rank_deficient`, `ill_conditioned`, `attitude_untrustworthy`, `clocks_apart`, `wrong_unit`,
     `mirrored_axis`.
     """
-    recorded = Recorded(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))
-    settled = _settle(recorded, State(start, np.zeros(3), 0.0))
+    recorded = AttitudeSamples(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))
+    settled = _settle(recorded, DriftState(start, np.zeros(3), 0.0))
     for _ in range(SETTINGS_ASIDE):
         outliers = _find_outliers(settled)
         if not outliers.any() or outliers.sum() > _limit_outliers(fixes):
@@ -129,14 +129,14 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
 class _Settled:
     """The converged fit, its model and its variance components."""
 
-    state: State
+    state: DriftState
     model: MixedModel
     sizes: VarianceComponents
     solved: MixedFit
     iterations: int
 
 
-def _settle(recorded: Recorded, state: State) -> _Settled:
+def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
     """Solve by Gauss–Newton; the variances are re-estimated in the first iterations only."""
     sizes: VarianceComponents | None = None
     for iteration in range(1, PASSES + 1):

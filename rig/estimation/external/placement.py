@@ -54,7 +54,7 @@ class _Linear:
     turned: Array
     std_rad: Array
 
-    def fits(self, delta: float, zetas: Array) -> "_Fits":
+    def fits(self, delta: float, zetas: Array) -> "_PlacementFits":
         """Return the fits for δ and all ζ (k,): steps, covariances by causes, restricted log-likelihoods."""
         tilts = self.turned * np.hypot(self.std_rad, delta)[:, None, None]
         errors = {
@@ -78,11 +78,11 @@ class _Linear:
             name: inverse @ across @ (error @ weighted).reshape(len(zetas), -1, columns) @ inverse
             for name, error in errors.items()
         }
-        return _Fits(steps, causes, -0.5 * (chi_square + log_determinants))
+        return _PlacementFits(steps, causes, -0.5 * (chi_square + log_determinants))
 
 
 @dataclass(frozen=True, slots=True)
-class _Fits:
+class _PlacementFits:
     """Steps (k, q), their covariances (k, q, q) by causes, the log-likelihoods (k,)."""
 
     steps: Array

@@ -157,7 +157,7 @@ def find_earth_rate(inputs: VectorInputs, nominal_mounting: Array, prior: EarthR
 
 
 @dataclass(frozen=True, slots=True)
-class _Fit:
+class _EarthRateFit:
     """The vector model with the Earth's rate; `expected_rad2_s2` (N, 3) are the expected variances of the residuals."""
 
     solution: VectorSolution
@@ -167,7 +167,7 @@ class _Fit:
 
 def _fit(
     inputs: VectorInputs, mounting: Array, directions: Array, gravity: Array | None, prior: EarthRatePrior
-) -> _Fit:
+) -> _EarthRateFit:
     """Fit F, c, G, the arm's errors and, last of these, the Earth's rate along `directions` (d, 3) of the base."""
     speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
     durations = np.diff(inputs.windows_s).T[0]
@@ -192,16 +192,16 @@ def _fit(
     bias = bias_process(design, means, variances, inputs.windows_s, instability_rad_s=inputs.instability_rad_s)
     shared = bias.covariance(inputs.windows_s)
     solution, errors = solve(shared)
-    return _Fit(solution, errors, variances + np.diag(shared)[:, None])
+    return _EarthRateFit(solution, errors, variances + np.diag(shared)[:, None])
 
 
-def _extract_earth_rate(fit: _Fit, directions: int) -> tuple[Array, Array]:
+def _extract_earth_rate(fit: _EarthRateFit, directions: int) -> tuple[Array, Array]:
     """Return the Earth's rate along the directions (d,), and its covariance (d, d)."""
     sizes, covariance = fit.errors.sizes[-directions:], fit.errors.covariance[-directions:, -directions:]
     return PRIOR_STD_RAD_S * sizes, PRIOR_STD_RAD_S**2 * covariance
 
 
-def _find_birge_ratio(fit: _Fit, freedom: int) -> float:
+def _find_birge_ratio(fit: _EarthRateFit, freedom: int) -> float:
     """Return the RMS of residuals over their expected standard deviations, without the dof that the arm's errors
     absorb.
     """

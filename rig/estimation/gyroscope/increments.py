@@ -155,7 +155,7 @@ def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[
 
 
 @dataclass(frozen=True, slots=True)
-class _Steps:
+class _IncrementSteps:
     """Steps from readings on: rotation vectors φ (k, 3), `turned` (k, 3) without coning, durations (k, 1)."""
 
     vectors: Array
@@ -176,15 +176,15 @@ class _Steps:
         return np.concatenate([by_matrix.reshape(-1, 3, 9), middle[..., 0] * self.lasting_s[..., None]], axis=2)
 
 
-def _whole_steps(interval: _Interval) -> _Steps:
+def _whole_steps(interval: _Interval) -> _IncrementSteps:
     """Return the steps from each reading to the next."""
     h = np.diff(interval.time_s)[:, None]
     (w0, w1), (d0, d1) = ((values[:-1], values[1:]) for values in (interval.rates, interval.slopes))
     turned = h * ((w0 + w1) / 2 + (d0 - d1) / 12)
-    return _Steps(turned + h**2 * np.cross(w0, w1) / 12, turned, h)
+    return _IncrementSteps(turned + h**2 * np.cross(w0, w1) / 12, turned, h)
 
 
-def _steps(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_Steps, Array]:
+def _steps(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_IncrementSteps, Array]:
     """Return steps from readings `start` (k,) by a `fraction` (k,) of the interval to the next, and the rates (k, 3)
     then.
     """
@@ -198,7 +198,7 @@ def _steps(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tup
         + (u**4 / 4 - u**3 / 3) * d1
     )
     rates = w0 + u**2 * (3 - 2 * u) * (w1 - w0) + u * (1 - u) * ((1 - u) * d0 - u * d1)
-    return _Steps(turned + (u * h) ** 2 * np.cross(w0, rates) / 12, turned, u * h), rates
+    return _IncrementSteps(turned + (u * h) ** 2 * np.cross(w0, rates) / 12, turned, u * h), rates
 
 
 def _matrices(vectors: Array) -> Array:

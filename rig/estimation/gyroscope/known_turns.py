@@ -51,7 +51,7 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True)
-class Mean:
+class RateMean:
     """A `reading` (3,) with its `variance` (3,) at the constant `rate` (3,), of given direction, or at rest."""
 
     reading: Array
@@ -101,7 +101,7 @@ class TurnedSolution:
 
 
 @dataclass(frozen=True, slots=True)
-class _Equations:
+class _NormalEquations:
     """`observed` (r,) = `design` (r, 12) δθ + errors; patterns (r, q) of one standard uncertainty by cause."""
 
     observed: Array
@@ -113,7 +113,7 @@ class _Equations:
         total: Array = np.sum([cause @ cause.T for cause in self.causes.values()], axis=0)
         return total
 
-    def inflate(self, ratio: float) -> "_Equations":
+    def inflate(self, ratio: float) -> "_NormalEquations":
         """Return the equations with the errors of rotations multiplied by a ratio."""
         return replace(
             self, causes={name: ratio * cause if name in (ENDS, AXES) else cause for name, cause in self.causes.items()}
@@ -121,24 +121,24 @@ class _Equations:
 
 
 @dataclass(frozen=True, slots=True)
-class _State:
+class _TurnsEstimate:
     """An iterate of the solution, m = F ω + c."""
 
     matrix: Array
     offset: Array
 
-    def after_step(self, step: Array) -> "_State":
-        return _State(self.matrix + step[:9].reshape(3, 3), self.offset + step[9:])
+    def after_step(self, step: Array) -> "_TurnsEstimate":
+        return _TurnsEstimate(self.matrix + step[:9].reshape(3, 3), self.offset + step[9:])
 
 
 def solve_turned(
-    gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[Mean], matrix: Array, bias_rad_s: Array
+    gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], matrix: Array, bias_rad_s: Array
 ) -> TurnedSolution:
     """Return F and b, of g = K (m + b), by Gauss–Newton steps from `matrix` (3, 3) and `bias_rad_s` (3,).
 
     Raise Fault `rank_deficient`, `ill_conditioned`, `turn_not_closed`, `wrong_unit`, `mirrored_axis`.
     """
-    state = _State(matrix, -bias_rad_s)
+    state = _TurnsEstimate(matrix, -bias_rad_s)
     iterations, settled = 0, False
     while not settled and iterations < PASSES:
         equations = _equate(gyroscope, turns, means, state)
@@ -178,7 +178,9 @@ def solve_turned(
     )
 
 
-def _equate(gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[Mean], state: _State) -> list[_Equations]:
+def _equate(
+    gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], state: _TurnsEstimate
+) -> list[_NormalEquations]:
     """Return the equations of the means, then of the rotations, these as mean rates."""
     windows_s = np.array([(turn.start_s, turn.end_s) for turn in turns])
     turned = increments(gyroscope.time_s, gyroscope.readings, state.matrix, state.offset, windows_s)
@@ -191,12 +193,16 @@ def _equate(gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[Mean], 
     ]
 
 
-def _equate_mean(mean: Mean, gyroscope: Gyroscope, state: _State) -> _Equations:
+def _equate_mean(mean: RateMean, gyroscope: Gyroscope, state: _TurnsEstimate) -> _NormalEquations:
     causes = {NOISE: np.diag(np.sqrt(mean.variance)), BIAS: np.diag(gyroscope.bias_std_rad_s)}
-    return _Equations(mean.reading - state.matrix @ mean.rate - state.offset, _derive(mean.rate, np.eye(3)), causes)
+    return _NormalEquations(
+        mean.reading - state.matrix @ mean.rate - state.offset, _derive(mean.rate, np.eye(3)), causes
+    )
 
 
-def _equate_rotation(turn: Turn, rotation: Array, jacobian: Array, gyroscope: Gyroscope, state: _State) -> _Equations:
+def _equate_rotation(
+    turn: Turn, rotation: Array, jacobian: Array, gyroscope: Gyroscope, state: _TurnsEstimate
+) -> _NormalEquations:
     """Return three equations of the end attitude and two of the mean reading across the axis."""
     from scipy.spatial.transform import Rotation
 
@@ -219,7 +225,7 @@ def _equate_rotation(turn: Turn, rotation: Array, jacobian: Array, gyroscope: Gy
         AXES: turn.axis_std_rad
         * np.vstack([(stated - np.eye(3)) @ tilt_axes / lasting_s, across @ state.matrix @ tilted_rate]),
     }
-    return _Equations(
+    return _NormalEquations(
         np.concatenate([missed / lasting_s, across @ (reading - state.matrix @ rate - state.offset)]),
         np.vstack([jacobian / lasting_s, _derive(rate, across)]),
         causes,
@@ -236,7 +242,7 @@ def _across(axis: Array) -> Array:
     return np.asarray(np.linalg.svd(axis[None])[2][1:].T, dtype=np.float64)
 
 
-def _solve(equations: Sequence[_Equations]) -> tuple[Array, Array]:
+def _solve(equations: Sequence[_NormalEquations]) -> tuple[Array, Array]:
     """Return the least-squares step δθ (12,) and its covariance."""
     information, gradient = np.zeros((12, 12)), np.zeros(12)
     for equation in equations:
@@ -247,7 +253,7 @@ def _solve(equations: Sequence[_Equations]) -> tuple[Array, Array]:
     return covariance @ gradient, covariance
 
 
-def _conditioning(equations: Sequence[_Equations]) -> refusals.Conditioning:
+def _conditioning(equations: Sequence[_NormalEquations]) -> refusals.Conditioning:
     """Return the conditioning of the design, rates and offsets scaled alike.
 
     Raise Fault `rank_deficient`, `ill_conditioned`.
@@ -259,7 +265,7 @@ def _conditioning(equations: Sequence[_Equations]) -> refusals.Conditioning:
     return conditioning
 
 
-def _find_birge_ratio(turns: Sequence[_Equations], covariance: Array) -> tuple[float, float]:
+def _find_birge_ratio(turns: Sequence[_NormalEquations], covariance: Array) -> tuple[float, float]:
     """Return the Birge ratio of the rotations and its degrees of freedom; 1 and infinity if χ² is not above these."""
     chi_square, freedom = 0.0, 0.0
     for turn in turns:
@@ -271,7 +277,7 @@ def _find_birge_ratio(turns: Sequence[_Equations], covariance: Array) -> tuple[f
     return float(np.sqrt(chi_square / freedom)), freedom
 
 
-def _check_closed(turns: Sequence[Turn], equations: Sequence[_Equations], ratio: float) -> None:
+def _check_closed(turns: Sequence[Turn], equations: Sequence[_NormalEquations], ratio: float) -> None:
     """Raise Fault `turn_not_closed` if the rotations contradict their stated angles by more than `FARTHEST_RAD`."""
     miss_rad = ratio * float(np.median([turn.angle_std_rad for turn in turns]))
     if miss_rad <= FARTHEST_RAD:
@@ -289,7 +295,7 @@ def _check_closed(turns: Sequence[Turn], equations: Sequence[_Equations], ratio:
     )
 
 
-def _budget(equations: Sequence[_Equations], gain: Array) -> Budget:
+def _budget(equations: Sequence[_NormalEquations], gain: Array) -> Budget:
     """Return the contribution of each cause to scale and bias; `gain` (6, 12) is their derivative by the gradient."""
     sources = {
         NOISE: "scatter of the readings",

@@ -58,7 +58,7 @@ class AllanCurve:
 
 
 @dataclass(frozen=True, slots=True)
-class Read:
+class AllanReading:
     """A value read off the curve of one axis, its standard deviation, and its τ."""
 
     value: float
@@ -70,8 +70,8 @@ class Read:
 class AllanAxis:
     """The noise of one axis: N in the readings' unit times √s, B in that unit; or the Fault that prevents it."""
 
-    random_walk: Read | Fault
-    bias_instability: Read | Fault
+    random_walk: AllanReading | Fault
+    bias_instability: AllanReading | Fault
 
 
 def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
@@ -173,7 +173,7 @@ def _bounds(deviation: Array, freedom: Array) -> tuple[Array, Array]:
     )
 
 
-def _random_walk(curve: AllanCurve, axis: int) -> Read | Fault:
+def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
     """Return N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there as that of white noise does."""
     index = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
     tau_s, relative_std = float(curve.tau_s[index]), float(curve.relative_std[index, axis])
@@ -200,10 +200,10 @@ def _random_walk(curve: AllanCurve, axis: int) -> Read | Fault:
             "moves that fast",
         )
     value = float(curve.deviation[index, axis] * np.sqrt(tau_s))
-    return Read(value, value * relative_std, tau_s)
+    return AllanReading(value, value * relative_std, tau_s)
 
 
-def _instability(curve: AllanCurve, axis: int, walk: Read | Fault) -> Read | Fault:
+def _instability(curve: AllanCurve, axis: int, walk: AllanReading | Fault) -> AllanReading | Fault:
     """Return B from the least σ, if the curve has its minimum in the well-determined part."""
     relative_std = curve.relative_std[:, axis]
     usable = np.flatnonzero(relative_std <= INSTABILITY_STD)
@@ -218,11 +218,11 @@ def _instability(curve: AllanCurve, axis: int, walk: Read | Fault) -> Read | Fau
             f"the deviation is smallest at {tau_s:.2g} s, the shortest there is, and only rises from there",
             "Look at the curve: something moves or vibrates, or the readings are filtered over that time",
         )
-    by_noise = walk.value / np.sqrt(tau_s) if isinstance(walk, Read) else 0.0
+    by_noise = walk.value / np.sqrt(tau_s) if isinstance(walk, AllanReading) else 0.0
     if least == last or deviation < by_noise * (1 + BEYOND * relative_std[least]):
         return too_short(
             f"the deviation still falls at {curve.tau_s[last]:.3g} s, the longest known to "
             f"{100 * INSTABILITY_STD:.0f} %",
             max(ENOUGH_FOR_A_FLOOR_S, 2 * curve.total_s),
         )
-    return Read(deviation / FLICKER, deviation / FLICKER * float(relative_std[least]), tau_s)
+    return AllanReading(deviation / FLICKER, deviation / FLICKER * float(relative_std[least]), tau_s)

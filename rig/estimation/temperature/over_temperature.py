@@ -168,7 +168,7 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
         )
     check_inside(range_c, reference_c)
     readings = _drop_rare_poses(readings)
-    fits = _Fits(readings, reference_c, range_c)
+    fits = _ParameterFits(readings, reference_c, range_c)
     fits.refer(readings, fits.solve((fits.highest, fits.highest)))
     every_order = range(fits.highest + 1)
     tried = {orders: fits.solve(orders) for orders in product(every_order, every_order)}
@@ -242,7 +242,7 @@ def heating_rate(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Fit:
+class _TemperatureFit:
     """Coefficients in T − reference: relative of k (3 orders, 3), of c; covariances (18, 18), with and without lag."""
 
     relative: Array
@@ -255,7 +255,7 @@ class _Fit:
     loop: tuple[Array, Array] | None
 
 
-class _Fits:
+class _ParameterFits:
     """The common part of fits of all orders: whitened readings without the poses' offsets."""
 
     def __init__(self, readings: RepeatedMeans, reference_c: float, range_c: tuple[float, float]) -> None:
@@ -281,7 +281,7 @@ class _Fits:
         ]
         self.count = 3 * (len(readings.means) - poses.shape[1])
 
-    def refer(self, readings: RepeatedMeans, fit: "_Fit") -> None:
+    def refer(self, readings: RepeatedMeans, fit: "_TemperatureFit") -> None:
         """Set the inputs to the readings at the reference, not to those in the mean of all temperatures."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
         self._take(readings, readings.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.inputs)
@@ -318,7 +318,7 @@ class _Fits:
             chosen=average_walks,
         )
 
-    def solve(self, orders: tuple[int, int]) -> _Fit:
+    def solve(self, orders: tuple[int, int]) -> _TemperatureFit:
         """Fit polynomials of these orders of k and c."""
         of_scale, of_bias = orders
         loops = 2 if self.both_ways else 0
@@ -367,7 +367,9 @@ class _Fits:
         free = self.whitening[axis]
         return free @ design, free @ (self.residuals[:, axis] - model)
 
-    def _fit(self, orders: tuple[int, int], values: Array, covariance: Array, fixed: Array, aicc: float) -> _Fit:
+    def _fit(
+        self, orders: tuple[int, int], values: Array, covariance: Array, fixed: Array, aicc: float
+    ) -> _TemperatureFit:
         of_scale, of_bias = orders
         per_axis = (len(values) - 1) // 3
         by_axis = values[:-1].reshape(3, per_axis)
@@ -387,9 +389,9 @@ class _Fits:
             loop = (by_axis[:, -2:] * [-1.0, 1.0]).T.ravel(), stds.T.ravel()
         lag_std_s = float(np.sqrt(covariance[-1, -1]))
         covariance, without_lag = take @ covariance @ take.T, take @ fixed @ take.T
-        return _Fit(relative, bias, covariance, without_lag, aicc, float(values[-1]), lag_std_s, loop)
+        return _TemperatureFit(relative, bias, covariance, without_lag, aicc, float(values[-1]), lag_std_s, loop)
 
-    def centre(self, fit: _Fit) -> Array:
+    def centre(self, fit: _TemperatureFit) -> Array:
         """Return mean powers (2, 3, 3) of T − reference, weighted as they determine k and c."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
         centre: Array = np.einsum("qan,np->qpa", self.weights, powers) / self.weights.sum(axis=2)[:, None, :]
@@ -425,7 +427,7 @@ def _constant(changes: Array, centre: Array) -> Array:
     return constant
 
 
-def _centred_coefficients(fit: _Fit, centre: Array) -> Array:
+def _centred_coefficients(fit: _TemperatureFit, centre: Array) -> Array:
     """Return the coefficients (24,), k relative, that preserve the mean over the readings."""
     parts = [(changes, centre[i]) for i, changes in enumerate((fit.relative, fit.bias))]
     return np.concatenate([np.concatenate([_constant(*part)[None], part[0]]).ravel() for part in parts])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.session import HandRecording, Move, Rest
+from rig.estimation.by_hand.session import HandRecording, HandRest, Move
 from rig.observation.by_hand.rests import ROUNDING, find_rests
 from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window
@@ -55,11 +55,11 @@ def _margin(window: Window) -> float:
     return min(MARGIN_S, (window.end_s - window.start_s) / 4)
 
 
-def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window) -> Rest:
+def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window) -> HandRest:
     start_s, end_s = window.start_s + _margin(window), window.end_s - _margin(window)
     inside = (time_s >= start_s) & (time_s <= end_s)
     forces = None if acceleration is None else acceleration[inside]
-    return Rest(
+    return HandRest(
         start_s,
         end_s,
         int(inside.sum()),
@@ -83,7 +83,7 @@ def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
     return top
 
 
-def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[Rest, ...]) -> tuple[tuple[float, float], ...]:
+def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...]) -> tuple[tuple[float, float], ...]:
     """Return the intervals in which a hand held the body: it turned too little for a move, and too much for a rest."""
     if not rests:
         return ()
@@ -128,7 +128,7 @@ class Segmenter:
         self._looked_s = -np.inf
         self._session = HandRecording(np.empty(0), np.empty((0, 3)), None, (), ())
 
-    def feed(self, time_s: Array, rates: Array, acceleration: Array | None = None) -> tuple[Rest | Move, ...]:
+    def feed(self, time_s: Array, rates: Array, acceleration: Array | None = None) -> tuple[HandRest | Move, ...]:
         """Add readings (k, 3) at times (k,) that follow; return the moves and rests that have settled since."""
         if not len(time_s):
             return ()
@@ -137,7 +137,7 @@ class Segmenter:
             return ()
         self._looked_s = float(time_s[-1])
         self._session = segment_session(*self._all(), range_rad_s=self._range_rad_s)
-        settled: list[Rest | Move] = []
+        settled: list[HandRest | Move] = []
         for row, rest in enumerate(self._session.rests):
             if rest.end_s - rest.start_s < SETTLED_S - 2 * MARGIN_S or rest.start_s < self._given_s + LOOKS_S:
                 continue

@@ -18,8 +18,8 @@ from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session import (
     HandRecording,
+    HandRest,
     Move,
-    Rest,
     SessionConditions,
     axis_of,
     merge_moves,
@@ -85,7 +85,7 @@ class NotCounted:
 
     def filter_session(self, session: HandRecording) -> HandRecording:
         """Return the session without them: a rest that does not count is a pause of the move through it."""
-        rests, moves, through = list[Rest](), list[Move](), list[Move]()
+        rests, moves, through = list[HandRest](), list[Move](), list[Move]()
         for index, rest in enumerate(session.rests):
             if _middle(rest) < self.from_s:
                 continue
@@ -104,11 +104,11 @@ class NotCounted:
         return replace(move, left_out=True) if crosses or _within(move, self.moves) else move
 
 
-def _middle(part: Rest | Move) -> float:
+def _middle(part: HandRest | Move) -> float:
     return (part.start_s + part.end_s) / 2
 
 
-def _within(part: Rest | Move, spans: Sequence[tuple[float, float]]) -> bool:
+def _within(part: HandRest | Move, spans: Sequence[tuple[float, float]]) -> bool:
     return any(start_s <= _middle(part) <= end_s for start_s, end_s in spans)
 
 

@@ -69,7 +69,7 @@ class Placements:
 
 
 @dataclass(frozen=True, slots=True)
-class _Rest:
+class _PlacedRest:
     """A rest in `windows` between knocks, and the indices of its `samples`."""
 
     number: int
@@ -95,7 +95,7 @@ def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: Att
     lying = still_windows(windows_s, rows.attitudes)
     joined = _join_rests(time_s, readings, find_rests(time_s, readings, lying=lying))
     rests = [
-        _Rest(number, windows, np.concatenate([_closed_slice(time_s, window) for window in windows]))
+        _PlacedRest(number, windows, np.concatenate([_closed_slice(time_s, window) for window in windows]))
         for number, windows in enumerate(joined)
     ]
     starts, ends = np.array([windows.start_s for windows in rests]), np.array([windows.end_s for windows in rests])
@@ -155,7 +155,7 @@ def _same_rest(time_s: Array, read: Array, quantity: Quantity, before: Window, a
     return bool(np.linalg.norm(turned_rad) <= TURNED_RAD)
 
 
-def _find_rest(time_s: Array, window: Window, rests: Sequence[_Rest]) -> tuple[int, NDArray[np.intp]]:
+def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> tuple[int, NDArray[np.intp]]:
     """Return the number of the rest that a row lies in, −1 of none, and its samples at rest.
 
     All of a row lies in it, to a block at either end; of a dwell most, if the body lies nowhere else in it.

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.known_turns import Gyroscope, Mean, Turn
+from rig.estimation.gyroscope.known_turns import Gyroscope, RateMean, Turn
 from rig.observation.arm_rests import estimate_bias_drift
 from rig.observation.average import Average
 from rig.observation.by_hand.rests import find_rests
@@ -36,7 +36,7 @@ class TurnedData:
     gyroscope: Gyroscope
     turns: tuple[Turn, ...]
     rows: tuple[int, ...]
-    means: tuple[Mean, ...]
+    means: tuple[RateMean, ...]
     noise_freedom: int
     bias_freedom: int
 
@@ -60,13 +60,13 @@ def find_turns(
     resting = rests or [average_of(readings[inside(time_s, window)], window) for window in lying]
     bias = np.median([rest.mean_rad_s for rest in resting], axis=0)
     rates = readings - bias
-    turns, rows, means = [], [], [Mean(rest.mean_rad_s, rest.variance_rad2_s2, np.zeros(3)) for rest in resting]
+    turns, rows, means = [], [], [RateMean(rest.mean_rad_s, rest.variance_rad2_s2, np.zeros(3)) for rest in resting]
     for sweep in sweeps:
         row = sweep.sweep - 1
         window = _enclosing_window(sweep, lying)
         if window is None or not _starts_and_stops(time_s, rates, sweep):
             average = sweep.average
-            means.append(Mean(average.mean_rad_s, average.variance_rad2_s2, sweep.speed_rad_s * sweep.axis_flange))
+            means.append(RateMean(average.mean_rad_s, average.variance_rad2_s2, sweep.speed_rad_s * sweep.axis_flange))
             continue
         angle_std = BY_HAND_ANGLE_RAD if declared.angle_std_rad is None else float(declared.angle_std_rad[row])
         axis_std = BY_HAND_AXIS_RAD if declared.axis_std_rad is None else float(declared.axis_std_rad[row])

@@ -12,7 +12,7 @@ from rich.table import Table
 from rig.analysis.at_rest import AtRest, SensorAtRest
 from rig.data.quantity import Quantity
 from rig.errors import Fault
-from rig.estimation.statistics.allan import FLICKER, Read
+from rig.estimation.statistics.allan import FLICKER, AllanReading
 from rig.report.figures.verification import save
 from rig.station.plain_text import plain
 from rig.study.style import use_style
@@ -84,12 +84,12 @@ def _table(title: str, quantity: Quantity, result: AtRest) -> Table:
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     for axis, figures in zip("xyz", result.axes, strict=True):
         floor = figures.bias_instability
-        tau_s = f"{floor.tau_s:.3g}" if isinstance(floor, Read) else ""
+        tau_s = f"{floor.tau_s:.3g}" if isinstance(floor, AllanReading) else ""
         table.add_row(axis, *_cells(figures.random_walk, walk.size), *_cells(floor, bias.size), tau_s)
     return table
 
 
-def _cells(figure: Read | Fault, size: float) -> tuple[str, str]:
+def _cells(figure: AllanReading | Fault, size: float) -> tuple[str, str]:
     if isinstance(figure, Fault):
         return "–", ""  # the reason is below the table
     return f"{figure.value / size:.4g}", f"{2 * figure.std / size:.1g}"
@@ -121,7 +121,7 @@ def _entry(quantity: Quantity, result: AtRest) -> dict[str, Any]:
     }
 
 
-def _read(figure: Read | Fault) -> dict[str, Any]:
+def _read(figure: AllanReading | Fault) -> dict[str, Any]:
     if isinstance(figure, Fault):
         return {"error": str(figure)}
     return {"value": figure.value, "std": figure.std, "tau_s": figure.tau_s}
@@ -134,10 +134,10 @@ def _draw(axes: "Axes", quantity: Quantity, result: AtRest) -> None:
     for i, (axis, figures) in enumerate(zip("xyz", result.axes, strict=True)):
         axes.loglog(curve.tau_s, curve.deviation[:, i] / size, "o-", ms=3, lw=1, color=f"C{i}", label=axis)
         axes.fill_between(curve.tau_s, curve.low[:, i] / size, curve.high[:, i] / size, color=f"C{i}", alpha=0.15)
-        if isinstance(figures.random_walk, Read):
+        if isinstance(figures.random_walk, AllanReading):
             line = figures.random_walk.value / np.sqrt(curve.tau_s) / size
             axes.loglog(curve.tau_s, line, ":", lw=0.8, color=f"C{i}")
-        if isinstance(figures.bias_instability, Read):
+        if isinstance(figures.bias_instability, AllanReading):
             floor = figures.bias_instability
             axes.plot(floor.tau_s, floor.value * FLICKER / size, "v", color=f"C{i}")
     axes.set(xlabel="τ s", ylabel=f"Allan deviation   {quantity.drift.name}", title=quantity.name)

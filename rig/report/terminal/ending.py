@@ -23,7 +23,7 @@ LEAST_WIDTH = 80  # columns: a narrower screen gets more lines
 
 
 @dataclass(frozen=True, slots=True)
-class _Item:
+class _SensorValues:
     """A calibrated sensor, its label, and its values."""
 
     kind: str
@@ -75,21 +75,21 @@ def ending(
     yield f"verdict: {result.verdict.upper()}"
 
 
-def _values(items: Sequence[_Item], width: int) -> Iterator[str]:
+def _values(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
     return _one(items[0], width) if len(items) == 1 else _several(items, width)
 
 
-def _items(result: ResultDocument) -> Iterator[_Item]:
+def _items(result: ResultDocument) -> Iterator[_SensorValues]:
     """Yield the findings with values of their own; a reference has none."""
     for kind, show, finding in outlets(result, lambda kind: kind.shown):
         if finding.is_reference:
             continue
         serial = getattr(finding.entry, "serial_number", None)
         label = finding.sensor if serial in (None, NOT_STATED) else f"{finding.sensor} {serial}"
-        yield _Item(kind.name, label, finding.entry, show(finding))
+        yield _SensorValues(kind.name, label, finding.entry, show(finding))
 
 
-def _one(item: _Item, width: int) -> Iterator[str]:
+def _one(item: _SensorValues, width: int) -> Iterator[str]:
     """Yield one sensor's values, one line for each axis."""
     shown, part = item.shown, getattr(item.entry, "part", None)
     columns = [[_heading(item), *_plus_minus(shown.numbers)]]
@@ -107,7 +107,7 @@ def _one(item: _Item, width: int) -> Iterator[str]:
         yield f"{INDENT}{axis:{first - len(INDENT)}}{cells}"
 
 
-def _several(items: Sequence[_Item], width: int) -> Iterator[str]:
+def _several(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
     """Yield many sensors' values, kind by kind, one line each, or two on a narrow screen."""
     blocks: dict[str, list[tuple[str, AxisValues]]] = {}
     for item in items:
@@ -138,7 +138,7 @@ def _several(items: Sequence[_Item], width: int) -> Iterator[str]:
             yield from (label, f"{'':{name}}{numbers}" if fits else f"{INDENT}{numbers}")
 
 
-def _heading(item: _Item) -> str:
+def _heading(item: _SensorValues) -> str:
     """Return what the numbers other than scale factors are, with their unit."""
     return f"{item.shown.noun}, {item.shown.unit.name}"
 
@@ -153,7 +153,7 @@ def _add_largest(three: AxisValues) -> list[str]:
     return [*(value for value, _ in cells), cells[0][1]]
 
 
-def _describe_values(items: Sequence[_Item]) -> Iterator[str]:
+def _describe_values(items: Sequence[_SensorValues]) -> Iterator[str]:
     if not items:
         return
     combined = all(item.shown.combined for item in items)

@@ -27,7 +27,7 @@ from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import HandSettings
 from rig.errors import Fault
 from rig.estimation.by_hand.progress import SessionProgress, assess_progress
-from rig.estimation.by_hand.session import Move, Rest, SessionConditions
+from rig.estimation.by_hand.session import HandRest, Move, SessionConditions
 from rig.motion.by_hand import FACES, Face, HandMove, Instruction
 from rig.observation.by_hand.handled import Segmenter
 from rig.observation.by_hand.runs import (
@@ -75,7 +75,7 @@ class HandSession:
     _begins_s: float | None = None  # start of this recording by the session's clock; None: by the board's
     _shift_s: float | None = None  # from the board's clock to the session's, once samples have come
     _move: Move | None = None  # that has ended, before the rest after it is judged
-    _rest: Rest | None = None  # that has begun, while it is shorter than required
+    _rest: HandRest | None = None  # that has begun, while it is shorter than required
     _judged_s: float = -np.inf  # when the rest ended that was judged last
     _accepted: list[HandMove] = field(default_factory=list)
     _lay: list[Face] = field(default_factory=list)  # the faces that lay up
@@ -136,7 +136,7 @@ class HandSession:
         if self._rest is not None and (lasts or live.state != "resting"):
             self._judge_rest(self._rest)
 
-    def _judge_rest(self, rest: Rest) -> None:
+    def _judge_rest(self, rest: HandRest) -> None:
         """Judge the move before a rest, and ask for the next."""
         move, self._move, self._rest = self._move, None, None
         if move is not None and self._begins_s is not None and move.start_s < self._begins_s:
@@ -161,7 +161,7 @@ class HandSession:
         self._lay.append(face)
         self._ask(self._next(now, face), wrong)
 
-    def _pauses_before(self, rest: Rest) -> None:
+    def _pauses_before(self, rest: HandRest) -> None:
         """Refuse rests too short to be judged: they are pauses in the hand."""
         for pause in self._segmenter.handled.rests:
             if self._judged_s < pause.start_s and pause.end_s < rest.start_s:
@@ -199,7 +199,7 @@ class HandSession:
         self._accepted.append(HandMove(kind, before, face, turns if kind == "turn" else 0))
         self.note(HandMoveTaken(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
-    def _wrong(self, wrong: Fault, move: Move | None, rest: Rest) -> bool:
+    def _wrong(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
         """Leave out a faulty move, a rest, or all before; return whether the rest counts.
 
         A changed bias at one rest may be a creep and costs this rest; at the next rest too it is a new bias. Raise the
@@ -249,7 +249,7 @@ class HandSession:
         """Return the face of the item that has the sensor's axis `of_sensor` upwards."""
         return rotate_face(of_sensor, np.array(self.sensor.mounting).T)
 
-    def _board_us(self, part: Rest | Move) -> tuple[int, int]:
+    def _board_us(self, part: HandRest | Move) -> tuple[int, int]:
         """Return the start and the end of a rest or a move by the board's clock, µs."""
         shift_s, microsecond_s = self._shift_s or 0.0, microsecond_of(self.sensor)
         return round((part.start_s - shift_s) / microsecond_s), round((part.end_s - shift_s) / microsecond_s)

@@ -9,7 +9,7 @@ import pytest
 from firmware_host.answers import BoardObservation
 from rig.analysis.gyroscope.board_averages import LIMIT, board_averages
 from rig.analysis.gyroscope.calibration import observe_recordings
-from rig.data.recording.events import BoardObserved, Recorded
+from rig.data.recording.events import BoardObserved, TimedEvent
 from rig.data.recording.run_file import RunData
 from rig.observation.observed_run import ObservedRun
 from support.recordings.synthetic_run import SENSITIVITY, Setup, synthetic_run
@@ -34,7 +34,7 @@ def with_averages(recording: ObservedRun, factors: Sequence[float]) -> ObservedR
         used = (board_us >= start_us) & (board_us < end_us)
         mean = (factor * counts[used].mean(axis=0) * SENSITIVITY).astype(np.float32)
         answer = BoardObservation(turn.sweep, start_us, end_us, int(used.sum()), tuple(mean.tolist()))
-        events.append(Recorded(BoardObserved("gyro", turn.sweep, turn.speed_rad_s, answer), 0.0, 0.0))
+        events.append(TimedEvent(BoardObserved("gyro", turn.sweep, turn.speed_rad_s, answer), 0.0, 0.0))
     return replace(recording, run=replace(run, events=tuple(events)))
 
 

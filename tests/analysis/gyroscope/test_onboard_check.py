@@ -9,7 +9,7 @@ from rich.console import Console
 
 from firmware_host.answers import BoardObservation, BoardSolution
 from rig.analysis.gyroscope.onboard_check import check_arithmetic, check_observed
-from rig.data.recording.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event, Recorded
+from rig.data.recording.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event, TimedEvent
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.observation.onboard_window import find_averaged_sweeps
@@ -56,7 +56,7 @@ def triple(values: np.ndarray) -> tuple[float, float, float]:
 
 
 def with_events(run: RunData, events: Sequence[Event]) -> RunData:
-    return replace(run, events=(*run.events, *(Recorded(event, 0.0, 0.0) for event in events)))
+    return replace(run, events=(*run.events, *(TimedEvent(event, 0.0, 0.0) for event in events)))
 
 
 def double_precision(run: RunData) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.statistics.allan import AllanCurve, Noise, Read, allan_curve, equivalent_freedom, read_axis
+from rig.estimation.statistics.allan import AllanCurve, AllanReading, Noise, allan_curve, equivalent_freedom, read_axis
 
 RATE_HZ = 25.0
 HOUR = round(3600 * RATE_HZ)
@@ -27,11 +27,11 @@ def wandering(seed: int, readings: int, time_constant_s: float = 20.0) -> Array:
     return bias
 
 
-def read(curve: AllanCurve) -> list[Read]:
+def read(curve: AllanCurve) -> list[AllanReading]:
     """The random walk of all three axes."""
     found = [read_axis(curve, axis).random_walk for axis in range(3)]
-    assert all(isinstance(each, Read) for each in found), found
-    return [each for each in found if isinstance(each, Read)]
+    assert all(isinstance(each, AllanReading) for each in found), found
+    return [each for each in found if isinstance(each, AllanReading)]
 
 
 @pytest.mark.slow  # allantools takes a second to import
@@ -105,7 +105,7 @@ def test_a_wandering_bias_has_a_floor() -> None:
     walked = 2 / ratio * (1 - (3 - 4 * np.exp(-ratio) + np.exp(-2 * ratio)) / (2 * ratio)) / 1.0
     truth = np.sqrt(0.25 / curve.tau_s + walked)
     found = read_axis(curve, 0).bias_instability
-    assert isinstance(found, Read)
+    assert isinstance(found, AllanReading)
     assert found.value == pytest.approx(truth.min() / 0.6643, abs=3 * found.std)
     assert 0.5 < found.tau_s / curve.tau_s[np.argmin(truth)] < 2.1
 

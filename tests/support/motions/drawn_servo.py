@@ -15,7 +15,7 @@ from rig.config.load import Loaded, parse
 from rig.config.procedures.servo_procedure import ServoSixObservationSection
 from rig.config.procedures.servo_section import ServoSection
 from rig.config.procedures.stage_section import rotation_by
-from rig.data.recording.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.recording.events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted, TimedEvent
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner
 from rig.data.recording.run_file import RunData
@@ -161,14 +161,14 @@ def _direction(rng: np.random.Generator) -> Array:
 
 def _driven(
     far: Far, plan: Plan, period_s: float, rng: np.random.Generator
-) -> tuple[np.ndarray, tuple[Recorded, ...], float]:
+) -> tuple[np.ndarray, tuple[TimedEvent, ...], float]:
     """Return the states of a stage, its events, and the time of its end."""
     time_s = BEGINS_S
     home = round(plan.home_q_rad[0] / (2 * np.pi) * 4096)
     for register, values in ((DRIVE_MODE, (4,)), (OPERATING_MODE, (4,)), (TORQUE, (1,)), (PROFILE, (500, 1500))):
         far.write(time_s - 0.9, register, *values)
     far.write(time_s - 0.8, GOAL, home)
-    rows, events = [], list[Recorded]()
+    rows, events = [], list[TimedEvent]()
     next_s = time_s
 
     def poll(until_s: float) -> None:
@@ -185,7 +185,7 @@ def _driven(
     def note(event: Event) -> None:
         newest = rows[-1][0]
         assert isinstance(newest, float)
-        events.append(Recorded(event, newest + 1e4, newest))
+        events.append(TimedEvent(event, newest + 1e4, newest))
 
     poll(time_s + 1.5)
     for step in plan.steps:

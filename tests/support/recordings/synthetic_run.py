@@ -17,7 +17,7 @@ from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.quantity import RATE
 from rig.data.recording.channel import thermometer_channel, triad_channel
-from rig.data.recording.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.recording.events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted, TimedEvent
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner
@@ -154,12 +154,12 @@ class Motion:
             qd[:, 3:] += np.sqrt(2) * self.seen_rad_s * np.cos(phase)
         return q, qd
 
-    def events(self) -> tuple[Recorded, ...]:
+    def events(self) -> tuple[TimedEvent, ...]:
         """Return the events as the procedure writes them."""
         events = []
         for step, end in zip(self.plan.steps, self.ends, strict=True):
             for event, time_s in zip(_events(step), (float(end - step.duration_s), float(end)), strict=False):
-                events.append(Recorded(event, time_s + 1e4, time_s))
+                events.append(TimedEvent(event, time_s + 1e4, time_s))
         return tuple(events)
 
 
