@@ -6,20 +6,27 @@ import sys
 from contextlib import suppress
 from typing import Any
 
+INTERRUPTED = 130  # 128 + SIGINT, as of a command that a shell has interrupted
+
 
 def main() -> int:
     """Run `rig` as `rig.cli.main` does; a Ctrl-C gives one line from the first moment on."""
     signal.signal(signal.SIGINT, _end)  # until `rig.cli.run_guarded` installs its own
     from rig.cli import main as command
 
-    return command()
+    status = command()
+    if status == INTERRUPTED and hasattr(signal, "pthread_sigmask"):
+        # CPython notes an interrupt inside `exec`, which dataclasses use while modules are loaded, although it is
+        # handled. At the end of `python -m` it then kills its own process by SIGINT in place of this status.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    return status
 
 
 def _end(*_: Any) -> None:
     """End at once: while modules are loaded nothing has begun, and an exception would print a traceback."""
     with suppress(OSError):
         os.write(2, b"rig: interrupted\n")
-    os._exit(130)
+    os._exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

@@ -227,6 +227,20 @@ def test_the_plan_of_a_verification_is_not_said_to_be_repeated() -> None:
     assert "once more" not in shell(f"{plan} --set procedure.name=verify").stdout
 
 
+@pytest.mark.slow
+def test_an_interrupt_while_modules_are_loaded_ends_with_the_status_of_an_interrupt(tmp_path: Path) -> None:
+    """Dataclasses are made by `exec`, where CPython notes an interrupt although it is handled."""
+    (tmp_path / "yaml.py").write_text("exec('raise KeyboardInterrupt')\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "rig", "check", CONFIG],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        stderr=subprocess.PIPE,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (130, b"rig: interrupted\n")
+
+
 THREADS = "import os, numpy; numpy.ones((900, 900)) @ numpy.ones((900, 900)); print(len(os.listdir('/proc/self/task')))"
 
 

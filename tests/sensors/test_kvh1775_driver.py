@@ -330,11 +330,11 @@ def test_what_happens_in_a_stream_is_named(happens: Callable[[KvhOnAWire], None]
 def test_the_microseconds_wrap_while_it_streams() -> None:
     """71.6 min after it was switched on."""
     wrap_us = 2**32
-    uptime_s = wrap_us * 1e-6 - 30.0
+    uptime_s = wrap_us * 1e-6 - 10.0
     with kvh_on_a_wire(uptime_s=uptime_s) as wire, streaming(wire, rate_hz=100) as (source, collected):
         begins_us = int(collected.wait(source)["board_time_us"][0])
         assert begins_us < wrap_us, "it had wrapped before it streamed"
-        wire.wire.clock.pace(100.0)
+        wire.wire.clock.pace(10.0)
         times_us = collected.wait(source, until_us=wrap_us + 1_000_000)["board_time_us"].astype(np.int64)
     assert np.diff(times_us).max() <= 10_001 and np.diff(times_us).min() >= 9_999
 
