@@ -1,10 +1,13 @@
 """The array type of all numeric code, and small functions of arrays."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 SMALLEST_SIZE = 1e-200  # a smaller uncertainty counts as zero: division by it would overflow
+BISECTIONS = 30
 
 
 def scale_of(matrix: Array) -> Array:
@@ -33,3 +36,13 @@ def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
     none = np.where(value == 0, 0.0, np.copysign(np.inf, value))
     ratio: Array = np.divide(value, size, out=none, where=size > SMALLEST_SIZE)
     return ratio
+
+
+def bisect(is_too_small: Callable[[Array], Array], highest: Array) -> Array:
+    """Return the values (q,) from 0 to `highest` (q,) above which `is_too_small` is false, by bisection."""
+    low, high = np.zeros_like(highest), highest
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        small = is_too_small(middle)
+        low, high = np.where(small, middle, low), np.where(small, high, middle)
+    return high

@@ -85,7 +85,7 @@ def _end(step: float, following: float, secant: Array, next_secant: Array) -> Ar
 def _solve_tridiagonal(lower: Array, upper: Array, right: Array) -> Array:
     """Return s (n, k) of lower s₋ + s + upper s₊ = right, lower and upper (n, 1): parallel cyclic reduction.
 
-    After each pass (R. W. Hockney 1965) a row knows of rows twice as far offset. What it knows of them falls with the
+    After each pass (R. W. Hockney 1965) a row knows of rows twice as far away. What it knows of them falls with the
     square, as the rows of a spline are diagonally dominant: six passes, whatever n is.
     """
     apart = 1

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.errors import Refused
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, bisect
 from rig.estimation.gyroscope.stated_motion import MotionErrors, StatedMotion, motion_errors
 from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, index_coefficients, regress
 from rig.estimation.reference.reference_budget import fewest_freedom
@@ -20,7 +20,6 @@ LEAST_REDUNDANCY = 0.05  # the least redundancy number of a row: below it nothin
 SAME_AXIS = 0.9  # cosine of two rows' axes, either way
 CHANCE = 4.0  # standard deviations that one of some dozens of means may be off by chance
 FEWEST_FREEDOM = 3  # with fewer, the next coarser whole number alone would make U half as large again
-BISECTIONS = 30
 
 
 def check_agree(solution: VectorSolution, data: ExternalData) -> None:
@@ -30,9 +29,8 @@ def check_agree(solution: VectorSolution, data: ExternalData) -> None:
     about an axis, both: their difference does not tell which is wrong.
     """
     means, variances, design = _equations(data)
-    toward = np.linalg.pinv(design)
-    redundancy = np.maximum(1 - np.einsum("ij,ji->i", design, toward), LEAST_REDUNDANCY)[:, None]
-    apart = (means - design @ (toward @ means)) / redundancy
+    redundancy = _redundancy_numbers(design)
+    apart = (means - design @ (np.linalg.pinv(design) @ means)) / redundancy
     errors = np.linalg.norm(apart @ np.linalg.inv(solution.matrix).T, axis=1)
     noise = np.linalg.norm(np.sqrt(variances) / redundancy, axis=1)
     sweeps = slice(len(data.sweeps))
@@ -155,22 +153,28 @@ def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) ->
     """
     rate_variance, axis_variance = sizes.median_variances
     spread = rate_variance * stated.rate_patterns**2 + axis_variance * np.sum(stated.axis_patterns**2, axis=0)
-    redundancy = np.maximum(1 - np.einsum("ij,ji->i", design, np.linalg.pinv(design)), LEAST_REDUNDANCY)[:, None]
+    redundancy = _redundancy_numbers(design)
     errors = np.abs(stated.residuals_rad_s) / np.sqrt(redundancy * (stated.variances_rad2_s2 + spread))
     beyond: Array = np.where(errors.max(axis=1, keepdims=True) > CHANCE, stated.residuals_rad_s / redundancy, 0.0)
     return beyond
 
 
+def _redundancy_numbers(design: Array) -> Array:
+    """Return the redundancy number (N, 1) of each row: its part of a residual that the other rows do not explain."""
+    redundancy: Array = np.maximum(1 - np.einsum("ij,ji->i", design, np.linalg.pinv(design)), LEAST_REDUNDANCY)
+    return redundancy[:, None]
+
+
 def _additional_std(noise_std: Array, expanded: Array, known_freedom: float, freedom: float) -> Array:
     """Return standard uncertainties (q,) that with those of the noise (q,) give U = k u of `expanded` (q,)."""
-    low, high = np.zeros(len(noise_std)), expanded.copy()
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        variances = np.array([noise_std**2, middle**2])
+
+    def is_too_small(std: Array) -> Array:
+        variances = np.array([noise_std**2, std**2])
         factors = coverage_factors(effective_freedom(variances, np.array([[known_freedom], [freedom]])))
-        small = factors * np.sqrt(variances.sum(axis=0)) < expanded
-        low, high = np.where(small, middle, low), np.where(small, high, middle)
-    return high
+        small: Array = factors * np.sqrt(variances.sum(axis=0)) < expanded
+        return small
+
+    return bisect(is_too_small, expanded)
 
 
 def _equations(data: ExternalData) -> tuple[Array, Array, Array]:

@@ -154,9 +154,7 @@ def _add_unplaced(theta: Array, placed: Placed, unplaced: Array, variances: Arra
 
 
 def _align(force: Array, reference: Array) -> Array:
-    """Return the smallest rotation (3, 3), body to table, that maps a force (3,) to the direction of the reference
-    (3,).
-    """
+    """Return the smallest rotation (3, 3), body to table, from a force (3,) to the direction of the reference."""
     from scipy.spatial.transform import Rotation
 
     one, other = (vector / np.linalg.norm(vector) for vector in (force, reference))

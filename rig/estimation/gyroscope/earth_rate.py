@@ -202,9 +202,7 @@ def _extract_earth_rate(fit: _EarthRateFit, directions: int) -> tuple[Array, Arr
 
 
 def _find_birge_ratio(fit: _EarthRateFit, freedom: int) -> float:
-    """Return the RMS of residuals over their expected standard deviations, without the dof that the arm's errors
-    absorb.
-    """
+    """Return the RMS of residuals over their expected stds, less the dof that the arm's errors absorb."""
     squares = float(np.sum(fit.solution.residuals_rad_s**2 / fit.expected_rad2_s2))
     return float(np.sqrt(squares / freedom)) if freedom > 0 else 1.0
 

@@ -185,9 +185,7 @@ def _whole_steps(interval: _Interval) -> _IncrementSteps:
 
 
 def _steps(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_IncrementSteps, Array]:
-    """Return steps from readings `start` (k,) by a `fraction` (k,) of the interval to the next, and the rates (k, 3)
-    then.
-    """
+    """Return steps from readings `start` (k,) by a `fraction` (k,) of their interval, and the rates (k, 3) there."""
     u = fraction[:, None]
     h = np.diff(interval.time_s)[start][:, None]
     w0, w1, d0, d1 = (values[index] for values in (interval.rates, interval.slopes) for index in (start, start + 1))

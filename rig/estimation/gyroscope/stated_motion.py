@@ -15,13 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.estimation.arrays import Array, perpendicular_unit_vectors
+from rig.estimation.arrays import Array, bisect, perpendicular_unit_vectors
 from rig.estimation.statistics.coverage import PROBABILITY
 
 SMALLEST_OF_NOISE = 0.1  # of a sweep's noise: a smaller size adds half a percent to it
 PRIOR_KNEE, LARGEST = 1e-2, 0.1  # of the rate, and rad: no table is worse
 SIZES = 20  # of each kind
-BISECTIONS = 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,16 +86,12 @@ class MotionErrors:
         weights = self.weights[likely] / self.weights[likely].sum()
         sizes = np.column_stack([np.ones(likely.sum()), self.rate[likely] ** 2, self.axis_rad[likely] ** 2])
         std = np.sqrt(sizes @ np.array([fixed, of_rate, of_axis]))
-        low, high = np.zeros(len(fixed)), 10 * std.max(axis=0)
-        for _ in range(BISECTIONS):
-            middle = (low + high) / 2
-            outside = weights @ (2 * ndtr(-middle / std))
-            low, high = (
-                np.where(outside > 1 - PROBABILITY, middle, low),
-                np.where(outside > 1 - PROBABILITY, high, middle),
-            )
-        expanded: Array = high
-        return expanded
+
+        def is_too_small(expanded: Array) -> Array:
+            outside: Array = weights @ (2 * ndtr(-expanded / std)) > 1 - PROBABILITY
+            return outside
+
+        return bisect(is_too_small, 10 * std.max(axis=0))
 
 
 def motion_errors(motion: StatedMotion) -> MotionErrors:

@@ -114,9 +114,7 @@ def too_short(what: str, enough_s: float = ENOUGH_S) -> Fault:
 
 
 def equivalent_freedom(points: int, factor: int, noise: Noise) -> float:
-    """Return the equivalent degrees of freedom of σ² from `points` phases (readings + 1) at τ = `factor` τ₀, at least
-    1.
-    """
+    """Return the equivalent dof (at least 1) of σ² from `points` phases (readings + 1) at τ = `factor` τ₀."""
     n, m = float(points), float(factor)
     if noise == "white":
         freedom = (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m**2 / (4 * m**2 + 5)
