@@ -6,13 +6,12 @@ import sys
 from contextlib import suppress
 from typing import Any
 
-INTERRUPTED = 130  # 128 + SIGINT, as of a command that a shell has interrupted
-
 
 def main() -> int:
     """Run `rig` as `rig.cli.main` does; a Ctrl-C gives one line from the first moment on."""
     signal.signal(signal.SIGINT, _end)  # until `rig.cli.run_guarded` installs its own
     from rig.cli import main as command
+    from rig.errors import INTERRUPTED
 
     status = command()
     if status == INTERRUPTED and hasattr(signal, "pthread_sigmask"):
@@ -26,7 +25,7 @@ def _end(*_: Any) -> None:
     """End at once: while modules are loaded nothing has begun, and an exception would print a traceback."""
     with suppress(OSError):
         os.write(2, b"rig: interrupted\n")
-    os._exit(INTERRUPTED)
+    os._exit(130)  # `rig.errors.INTERRUPTED`, which may not be loaded yet
 
 
 if __name__ == "__main__":

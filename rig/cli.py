@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, NoReturn
 from rig.commands.endings import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable, output_lost
 from rig.data.version import VERSION
-from rig.errors import Fault, RigError, Unprinted
+from rig.errors import INTERRUPTED, Fault, RigError, Unprinted
 from rig.errors.quoting import printable_lines
 from rig.station.plain_text import for_file, say_on_terminal
 
@@ -191,7 +191,7 @@ Calibrates inertial sensors on a robot arm, a servomotor or by hand. First steps
   rig history             every calibration so far
 
 rig --help names all commands, rig COMMAND --help what each takes. Step by step: docs/README.md."""
-FAULT, INTERRUPTED = Fault.exit_status, 130
+FAULT = Fault.exit_status
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -39,9 +39,7 @@ def ignore_endings() -> None:
 
 @contextmanager
 def ending_by_interrupt() -> Iterator[None]:
-    """Make every ending signal raise KeyboardInterrupt for the length of the block, and restore its handlers
-    afterwards.
-    """
+    """Make every ending signal raise KeyboardInterrupt within the block, and restore its handlers afterwards."""
     changed = ENDING_SIGNALS if _PRINTING_BEHIND is None else (*ENDING_SIGNALS, _PRINTING_BEHIND)
     before = {number: signal.getsignal(number) for number in changed}
     end_by_interrupt()

@@ -133,9 +133,7 @@ def _parse(command: str, add: Callable[[ArgumentParser], None], words: Sequence[
 
 
 def _set_words(changes: Changes | None) -> list[str]:
-    """Return `--set` for each change, its value in YAML on one line. Raise Refused `bad_option` for a value without
-    YAML.
-    """
+    """Return `--set` for each change, its value as one line of YAML. Raise Refused `bad_option` if it has none."""
     words = []
     for path, value in (changes or {}).items():
         try:

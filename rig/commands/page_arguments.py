@@ -29,9 +29,7 @@ LONGEST_TOKEN = 1000  # bytes of its file
 
 @dataclass(frozen=True, slots=True)
 class PageWish:
-    """The wish for a page: `host_and_port` (ADDRESS or ADDRESS:PORT), its token, and whether it may answer for the
-    operator.
-    """
+    """The wish for a page: its `host_and_port` and token, and whether it may answer for the operator."""
 
     host_and_port: str | None = None
     token: str | None = None

@@ -79,9 +79,7 @@ class Trend:
 
     @cached_property
     def line(self) -> Fitted | None:
-        """The straight line over time (value at the first result, slope per day); None with too few results or a short
-        span.
-        """
+        """The straight line over time: value at the first result, slope per day; None with few results or days."""
         if not self.enough or np.ptp(self.days) < DRIFT_DAYS:
             return None
         return fit(np.stack([np.ones(self.count), self.days], axis=1), self.values, self.std)

@@ -91,9 +91,7 @@ class Run:
         return bool(planned - self._resume(phase).done)
 
     def _resume(self, phase: Phase) -> Resumption:
-        """Return the steps of earlier recordings that count: none of corrected readings, which are compared as one
-        movement.
-        """
+        """Return the steps of earlier recordings that count: none with corrected readings, which are compared whole."""
         if phase.procedure.reads_corrected:
             return Resumption()
         with self.report_end(self._advice, moved=False):

@@ -334,9 +334,7 @@ class Rig:
         self._done.add(dwell.index)
 
     def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None]) -> bool:
-        """Stand still until `until` returns True; return False if it did not within `at_most_s` of the controller's
-        time.
-        """
+        """Stand still until `until` returns True; return False after `at_most_s` by the controller's clock."""
         turner = self.devices.turner
         began_s = turner.latest.time_s
         while not until():

@@ -266,9 +266,7 @@ def rate_errors(interval: MotionInterval, steps: int) -> Array:
 
 
 def _wave_indices(motion: ArmMotion) -> dict[int, int]:
-    """Return the first index in `ANGLES` of the waves of each joint, by the joint's index: of an arm the wrists, else
-    the last three.
-    """
+    """Return the first index in `ANGLES` of each joint's waves: of an arm the wrists, else the last three joints."""
     beyond = motion.kinematics.joints - 1 - WRIST_3
     return {joint + beyond: first for joint, first in WAVES_OF.items() if joint + beyond >= 0}
 
@@ -297,9 +295,7 @@ def _time_patterns(segments: Segments, jitter_s: float) -> Array:
 
 
 def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:
-    """Return the patterns of the duration of each transfer by its first and last sample; a steady sweep's mean is
-    unaffected.
-    """
+    """Return the patterns of each transfer's duration by its first and last sample; steady sweeps have none."""
     transfers = np.flatnonzero((segments.sweep < REST) & (stamp_s > 0))
     patterns_by_mark = np.zeros((len(transfers), *segments.means_rad_s.shape))
     lasting_s = np.diff(segments.times_s[transfers])
@@ -336,9 +332,7 @@ def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, c
 
 
 def _temperature_patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> list[Array]:
-    """Return the rate errors of all segments by one standard deviation of the slopes of bias and scale over
-    temperature.
-    """
+    """Return the rate errors of all segments by one std of the slopes of bias and scale over temperature."""
     if known_errors.sensor is None:
         return []
     inside, order = segments.times_s.mean(axis=1), np.argsort(known_errors.temperature_times_s)

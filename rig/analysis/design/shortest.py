@@ -15,9 +15,7 @@ NONE: Mapping[str, Budget] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class ReachedUncertainty:
-    """U of scale and of bias (rad/s), of the worst axis of the worst sensor, 0 without one; and of accelerometers
-    (m/s²).
-    """
+    """U of scale, bias (rad/s) and accelerometers (m/s²) of the worst axis of the worst sensor; 0 without one."""
 
     scale: float
     bias_rad_s: float

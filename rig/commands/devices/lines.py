@@ -68,9 +68,7 @@ def run(options: Namespace) -> int:
 
 
 def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
-    """Ask for values that neither lines nor options give; without a terminal they stay open. Raise Refused
-    `bad_option`.
-    """
+    """Ask for values without an option; without a terminal they stay open. Raise Refused `bad_option`."""
     from rig.commands.devices.questions import ask
     from rig.config.sensors.sensor_sections import check_serial_number
     from rig.sensors.lines.written import StatedProperties

@@ -77,6 +77,7 @@ def _explain_remedies(name: str, usual: str) -> Iterator[str]:
     remedies = remedies_by_way(name)
     if not remedies:
         yield f"What to do: {usual.rstrip('.')}."
+        return
     used = _find_method_in_use()
     for method in sorted(remedies, key=lambda method: method != used):
         as_now = ", as in your latest run" if method == used else ""

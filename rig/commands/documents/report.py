@@ -165,9 +165,7 @@ def _make_digital(
 def _make_pdf(
     page: str, attached: Mapping[str, bytes], by: "Signatory | None", reason: "Reason", options: Namespace
 ) -> bytes:
-    """Return the page as PDF, signed if there is a signatory. Raise Refused as `pdf_of`, `read_authorities` and
-    `sign_as_pades`.
-    """
+    """Return the page as PDF, signed by a signatory. Raise as `pdf_of`, `read_authorities` and `sign_as_pades`."""
     from rig.report.certificate.pdf import pdf_of
 
     document = pdf_of(page, attached)

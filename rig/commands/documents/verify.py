@@ -133,9 +133,7 @@ def _look_up(
 def _judge(
     file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: "FileEntries | None"
 ) -> VerifiedFile:
-    """Judge one file; without a signature of its own it is vouched for by a signed file that holds it, or by the
-    history.
-    """
+    """Judge one file; if it has no signature, a signed file that holds it or the history vouches for it."""
     look, attached_to = looks[file], None
     problems = look.problems
     if not look.signatures:

@@ -37,9 +37,7 @@ DISAGREE = 1
 
 
 def list_calibrations(options: Namespace) -> int:
-    """Print calibrations, and the trends of one serial number. Raise Refused `not_in_history`, and as
-    `open_named_history`.
-    """
+    """Print calibrations, and trends of one serial number. Raise `not_in_history`, and as `open_named_history`."""
     selection = _read_selection(options)
     with open_named_history(options) as history:
         pasts = _select_pasts(history, selection)

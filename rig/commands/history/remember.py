@@ -116,9 +116,7 @@ def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str
 
 
 def describe_changes(calibrations: Sequence[CalibrationComparison]) -> tuple[str, ...]:
-    """Return in words how calibrations differ from the earlier ones: first those that changed, then the others
-    together.
-    """
+    """Return in words how calibrations differ from the earlier ones: first the changed ones, then the others."""
     if not calibrations:  # with the history off its modules are not imported
         return ()
     from rig.history.terminal.change_words import change_in_short, select_changed

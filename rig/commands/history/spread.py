@@ -184,7 +184,5 @@ def _cluster_lost(what: str) -> Fault:
 
 
 def _ignore_interrupts() -> None:
-    """Ignore Ctrl-C, which reaches every process of a terminal: the recording is finished, and the parent ends the
-    work.
-    """
+    """Ignore Ctrl-C, which reaches all processes of a terminal: the recording is finished, the parent then stops."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -7,11 +7,10 @@ from argparse import ArgumentParser
 from collections.abc import Callable
 from pathlib import Path
 
-from rig.errors import Fault, RigError
+from rig.errors import INTERRUPTED, Fault, RigError
 from rig.station.plain_text import say
 
 PATIENCE_S = 60.0
-INTERRUPTED = 130
 
 
 def add_notice(parser: ArgumentParser) -> None:

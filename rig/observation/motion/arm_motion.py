@@ -106,9 +106,7 @@ class ArmMotion:
         return axes
 
     def axis_errors(self, q_rad: Array, joint: int) -> Array:
-        """Return the rotation (…, 13, 3) of a joint's axis per radian of each arm error
-        (`rig.motion.geometry.AXIS_ERRORS`).
-        """
+        """Return the rotation (…, 13, 3) of a joint's axis per radian of each error in `geometry.AXIS_ERRORS`."""
         errors: Array = axis_errors(q_rad, joint, self.kinematics) @ self.mount.T
         return errors
 
@@ -154,9 +152,7 @@ class ArmMotion:
         return float(np.abs(recorded_rad - np.array(q_rad)).max()) if len(recorded_rad) else None
 
     def angle(self, sweep: Sweep, time_s: Array | float, derivative: int = 0) -> Array:
-        """Return the angle (n,) rad of the joint that a sweep turns, at times (n,); its rate in rad/s with `derivative`
-        1.
-        """
+        """Return the angle (n,) rad of the joint that a sweep turns, at times (n,); its rate if `derivative` is 1."""
         angle: Array = self.angles(time_s, derivative)[..., sweep.joint]
         return angle
 

@@ -102,9 +102,7 @@ def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Step]:
 
 @lru_cache(maxsize=16)
 def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, ...]:
-    """Return all sweeps in the order of the file, or else in the best one: directions first, then the order of the
-    wrists.
-    """
+    """Return all sweeps in the file's order, else in the best one: by direction first, then by wrist."""
     home = find_home(arm)
 
     def harm(order: Order) -> float:

@@ -53,9 +53,7 @@ def field_rows(entry: MagnetometerEntry) -> list[AxisRow]:
 
 
 def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
-    """Return one row per magnetometer axis: scale, bias and the arm's field in µT, in axes of the first mounting, with
-    U.
-    """
+    """Return a row per magnetometer axis: scale, bias and arm's field in µT with U, in the first mounting's axes."""
     scale = expanded(entry.scale_std, entry.scale_degrees_of_freedom).widths
     bias = expanded(entry.bias_std_t, entry.bias_degrees_of_freedom).widths
     field = expanded(entry.arm_field_std_t, entry.arm_field_degrees_of_freedom).widths

@@ -187,9 +187,7 @@ class Arm:
             deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
 
             def is_late() -> bool:
-                """Return whether it is late by the controller's clock; this machine's limits the report of its
-                arrival.
-                """
+                """Return whether it is late by the controller's clock; its arrival may be reported a little later."""
                 has_arrived = self._stands_at(motion) and time.monotonic() < reported_s
                 return self.latest.time_s > deadline_s and not has_arrived
 
