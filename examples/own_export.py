@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import rig
-from rig.report.exports.calibrations import ExportedCalibrations, calibrations
+from rig.report.exports.exported_corrections import ExportedCalibrations, calibrations
 
 
 def toml_files(solved: ExportedCalibrations) -> Mapping[str, str]:

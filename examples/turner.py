@@ -13,8 +13,8 @@ from dataclasses import replace
 from pydantic import Field
 
 from rig.config.procedures.hand_sections import HandSection
-from rig.motion.state import TurnerIdentity
-from rig.turners.hand.kind import GEOMETRY, HAND
+from rig.motion.turner_state import TurnerIdentity
+from rig.turners.hand.hand_kind import GEOMETRY, HAND
 
 
 class TurntableSection(HandSection):

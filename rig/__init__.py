@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rig.history.store import open_history
     from rig.notebook.calibrations import Calibration
     from rig.notebook.comparisons import SensorComparison, compare
-    from rig.notebook.history import Calibrations, Changes, SensorChanges, calibrations, changes
+    from rig.notebook.notebook_history import Calibrations, Changes, SensorChanges, calibrations, changes
     from rig.notebook.readings import Readings, Signal
     from rig.notebook.results import Result, load_result, solve
     from rig.notebook.runs import Run, load
@@ -68,7 +68,9 @@ _PLACES = {
     "open_history": "rig.history.store",
     "Calibration": "rig.notebook.calibrations",
     **dict.fromkeys(("SensorComparison", "compare"), "rig.notebook.comparisons"),
-    **dict.fromkeys(("Calibrations", "Changes", "SensorChanges", "calibrations", "changes"), "rig.notebook.history"),
+    **dict.fromkeys(
+        ("Calibrations", "Changes", "SensorChanges", "calibrations", "changes"), "rig.notebook.notebook_history"
+    ),
     **dict.fromkeys(("Readings", "Signal"), "rig.notebook.readings"),
     **dict.fromkeys(("Result", "load_result", "solve"), "rig.notebook.results"),
     **dict.fromkeys(("Run", "load"), "rig.notebook.runs"),

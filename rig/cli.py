@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
-from rig.commands.endings import end_by_interrupt, ignore_endings
+from rig.commands.command_signals import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable, output_lost
 from rig.data.version import VERSION
 from rig.errors import INTERRUPTED, Fault, RigError, Unprinted
@@ -17,7 +17,7 @@ from rig.errors.quoting import printable_lines
 from rig.station.plain_text import for_file, say_on_terminal
 
 if TYPE_CHECKING:
-    from rig.plans.registry import AnyProcedure
+    from rig.plans.procedure_registry import AnyProcedure
 
 # The rig's linear algebra is small: threads slow it down, most of all on a busy machine. NumPy reads these variables
 # when it is loaded. Values that the user has set stay, and so does NumPy in a program that has already loaded it.
@@ -66,7 +66,7 @@ COMMANDS = {
         "reading the configuration",
     ),
     "check": Command(
-        "rig.commands.measure.check",
+        "rig.commands.measure.check_devices",
         "connect and check; nothing moves, no program is stopped",
         "how-to/start/first-calibration.md",
         "reading the configuration",

@@ -33,15 +33,15 @@ from rig.config.procedures.servo_procedure import ServoSixObservationSection
 from rig.config.procedures.servo_section import ServoSection
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault, Refused
-from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
+from rig.motion.turner_state import Joints
 from rig.plans.by_hand import plan_by_hand
-from rig.plans.motions.imu import plan_imu
 from rig.plans.motions.servo_sweeps import plan_servo_six_observation
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.plans.motions.static_attitudes import plan_static_attitudes
-from rig.plans.motions.thermal import plan_thermal
-from rig.plans.registry import Procedure
+from rig.plans.motions.sweeps_and_attitudes import plan_imu
+from rig.plans.motions.thermal_sweeps import plan_thermal
+from rig.plans.procedure_registry import Procedure
 from rig.plans.verbs import Verbs
 
 __all__ = [

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.history.entered.finished import FinishedRun, read_finished_run
+from rig.history.entered.finished_run import FinishedRun, read_finished_run
 from rig.history.store import History, Selection, open_history
 
 ROOT = Path(__file__).parents[2]

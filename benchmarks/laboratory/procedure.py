@@ -16,7 +16,7 @@ from rig.config.load import load
 from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.data.recording.run_file import read_run
 from rig.plans.motions.six_sweeps import plan_six_observation
-from rig.world.section import read_world_section
+from rig.world.world_section import read_world_section
 
 DEMO = Path(__file__).parents[2] / "configs" / "demo.yaml"
 

@@ -17,10 +17,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.commands.history.again_work import Task, solve_task
-from rig.commands.history.spread import Cluster, distribute, solve_one_by_one
-from rig.history.again.answer import Answer
-from rig.history.entered.finished import recording_of
+from rig.commands.history.recompute_worker import Task, solve_task
+from rig.commands.history.worker_pools import Cluster, distribute, solve_one_by_one
+from rig.history.entered.finished_run import recording_of
+from rig.history.recompute.result_comparison import Answer
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from goals import record

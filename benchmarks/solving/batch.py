@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.batch import algorithm_1_batch, newton_batch
+from rig.estimation.gyroscope.six_observation_batch import algorithm_1_batch, newton_batch
 from rig.study import simulation as sim
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

@@ -15,8 +15,8 @@ from imucal import FerrarisCalibration, FerrarisSignalRegions
 
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.by_hand import HandRecording, SessionConditions, solve_by_hand
-from rig.estimation.by_hand.session import FACES
-from rig.observation.by_hand.handled import segment_session
+from rig.estimation.by_hand.session_parts import FACES
+from rig.observation.by_hand.hand_segmentation import segment_session
 from rig.world.hand.habits import Action, TurnAction
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))

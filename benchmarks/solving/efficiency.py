@@ -4,7 +4,7 @@ python benchmarks/solving/efficiency.py     # 30 gyroscopes × 200 runs; `rig st
 """
 
 from rig.study.estimators import study
-from rig.study.report import Settings
+from rig.study.study_report import Settings
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
 """How long each study takes on one core: `python benchmarks/solving/studies.py [NAME …]`.
 
 Of every study the second of its pieces is timed, by the processor's clock, and taken times their number; what a study
-does beside its pieces is counted as it is. `rig study` lists these durations (rig/study/catalogue.py).
+does beside its pieces is counted as it is. `rig study` lists these durations (rig/study/study_catalogue.py).
 """
 
 import sys
@@ -10,8 +10,8 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-from rig.study.catalogue import STUDIES
-from rig.study.report import Settings
+from rig.study.study_catalogue import STUDIES
+from rig.study.study_report import Settings
 
 
 class Enough(Exception):

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.sensors.kvh1775.counting import MessageCounter
-from rig.sensors.kvh1775.messages import MESSAGE_BYTES, Format, MessageReader, encode
+from rig.sensors.kvh1775.kvh_messages import MESSAGE_BYTES, Format, MessageReader, encode
+from rig.sensors.kvh1775.message_numbering import MessageCounter
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from goals import record

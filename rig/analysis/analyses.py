@@ -7,9 +7,9 @@ solution, each raises Fault `not_solvable`.
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
+from rig.analysis.numeric_errors import solvable
 from rig.analysis.outcome import Outcome
-from rig.analysis.solvable import solvable
 
 if TYPE_CHECKING:
     from rig.data.recording.run_file import RunData
@@ -22,7 +22,7 @@ def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, 
     If `drifting`, a bias drift is no contradiction. Raise Fault or Refused if the recordings lack something.
     """
     from rig.analysis import judging
-    from rig.analysis.external import judging as external_judging
+    from rig.analysis.external import external_outcome as external_judging
 
     if (external := runs[0].elsewhere) is not None:
         return external_judging.calibrate_external(runs, external, estimator)
@@ -46,7 +46,7 @@ def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
 
     Raise Fault as `rig.estimation.by_hand.solve_by_hand` does, `no_crystal` if the board's clock has none.
     """
-    from rig.analysis.by_hand import judging as hand_judging
+    from rig.analysis.by_hand import hand_outcome as hand_judging
 
     return hand_judging.calibrate_by_hand(runs)
 

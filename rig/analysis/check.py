@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from rig.config.judging.limits import Parameter
+from rig.config.judging.verdict_limits import Parameter
 from rig.data.installed_kinds import quantities
 from rig.data.meaning import Meaning
 from rig.errors import Fault

@@ -7,10 +7,11 @@ from typing import TypeVar
 import numpy as np
 
 from rig.analysis.check import Check, list_unsolved
-from rig.analysis.clock import ClockCheck
+from rig.analysis.clock_comparison import ClockCheck
 from rig.analysis.consistency.contradictions import check_references, contradictions
 from rig.analysis.consistency.detection_limits import DetectionLimit
-from rig.analysis.estimators import Estimator, find_estimator
+from rig.analysis.environment import surroundings_of
+from rig.analysis.estimator_names import Estimator, find_estimator
 from rig.analysis.gyroscope.board_averages import board_averages
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.analysis.gyroscope.comparison import Reference, list_revolutions
@@ -18,11 +19,10 @@ from rig.analysis.gyroscope.mounts import observe_as_mounted
 from rig.analysis.gyroscope.onboard_check import Agreement, check_arithmetic
 from rig.analysis.gyroscope.vector_inputs import lever_arms_m
 from rig.analysis.gyroscope.verification import Verification, verify
-from rig.analysis.installed_kinds import KindFound, kinds_on_arm
+from rig.analysis.installed_solvers import KindFound, kinds_on_arm
 from rig.analysis.outcome import Outcome, origin_of
-from rig.analysis.reference.acceleration import AccelerometerResult, calibrate_accelerometers
-from rig.analysis.reference.magnetic_field import MagnetometerResult, calibrate_magnetometers
-from rig.analysis.surroundings import surroundings_of
+from rig.analysis.reference.accelerometer import AccelerometerResult, calibrate_accelerometers
+from rig.analysis.reference.magnetometer import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.temperature.bias_drift import estimate_bias_drifts
 from rig.analysis.temperature.over_temperature import (
     Polynomials,
@@ -31,7 +31,7 @@ from rig.analysis.temperature.over_temperature import (
     correct_recordings,
 )
 from rig.analysis.verdict import acceleration_checks, clock_checks, drift_checks, judge, verification_checks
-from rig.config.judging.judged_by import DecisionRule
+from rig.config.judging.judging_keys import DecisionRule
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import RunSettings

@@ -10,16 +10,16 @@ from rig.errors.attempts import Attempts
 
 if TYPE_CHECKING:
     from rig.analysis.check import Check
-    from rig.analysis.clock import ClockCheck
+    from rig.analysis.clock_comparison import ClockCheck
     from rig.analysis.consistency.detection_limits import DetectionLimit
-    from rig.analysis.external.elsewhere import OfSensor
+    from rig.analysis.external.external_recordings import OfSensor
     from rig.analysis.gyroscope.calibration import SensorResult
     from rig.analysis.gyroscope.mounts import EstimatedMount
     from rig.analysis.gyroscope.onboard_check import Agreement
     from rig.analysis.gyroscope.verification import Verification
-    from rig.analysis.installed_kinds import KindFound
-    from rig.analysis.reference.acceleration import AccelerometerResult
-    from rig.analysis.reference.magnetic_field import MagnetometerResult
+    from rig.analysis.installed_solvers import KindFound
+    from rig.analysis.reference.accelerometer import AccelerometerResult
+    from rig.analysis.reference.magnetometer import MagnetometerResult
     from rig.analysis.temperature.bias_drift import Drifts
     from rig.analysis.temperature.over_temperature import Polynomials
     from rig.data.recording.provenance import Provenance

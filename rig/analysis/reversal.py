@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.analysis.outcome import Outcome
-from rig.analysis.reference.magnetic_field import MagnetometerResult
+from rig.analysis.reference.magnetometer import MagnetometerResult
 from rig.analysis.reference.reference_budgets import SIZE_OF_FIELD
 from rig.errors import Refused
 from rig.estimation.arrays import Array

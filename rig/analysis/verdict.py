@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 
 from rig.analysis.check import Check, fitness, name_check
-from rig.analysis.clock import PPM, ClockCheck, worst_differences
+from rig.analysis.clock_comparison import PPM, ClockCheck, worst_differences
 from rig.analysis.gyroscope.verification import Verification
-from rig.analysis.reference.acceleration import AccelerometerResult
+from rig.analysis.reference.accelerometer import AccelerometerResult
 from rig.analysis.temperature.bias_drift import BiasDrift
-from rig.config.judging.judged_by import DecisionRule
-from rig.config.judging.limits import Limits, limit_of
+from rig.config.judging.judging_keys import DecisionRule
+from rig.config.judging.verdict_limits import Limits, limit_of
 from rig.data.meaning import Meaning
 from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array

@@ -6,8 +6,8 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
-from rig.batch.batch import BatchPart, Doubt
-from rig.batch.series import following
+from rig.batch.batch_state import BatchPart, Doubt
+from rig.batch.part_list import following
 from rig.errors import Refused, RigError
 from rig.errors.quoting import printable_lines
 from rig.station.confirm import forget_what_was_typed

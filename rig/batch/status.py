@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
-from rig.batch.batch import Batch
+from rig.batch.batch_state import Batch
 from rig.errors import Refused
 from rig.station.events import (
     Answered,

@@ -8,10 +8,10 @@ from pathlib import Path
 from rig.commands.laboratory.own_address import find_own_address
 from rig.config.load import Loaded, load, parse
 from rig.plans.phase import Phase, first_phase
-from rig.plans.registry import Procedures, installed, sections
+from rig.plans.procedure_registry import Procedures, installed, sections
 from rig.plans.script_errors import script_errors
 from rig.plans.script_file import ScriptFile, installed_script, load_script
-from rig.turners import registry as turners
+from rig.turners import turner_registry as turners
 
 
 @dataclass(frozen=True, slots=True)

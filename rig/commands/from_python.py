@@ -39,8 +39,8 @@ def check(config: str | Path, changes: Changes | None = None, *, script: str | P
 
     Return whether a run could start. `changes` and `script` are as in `plan`. Raise Refused for an error in the file.
     """
-    from rig.commands.measure.check import add
-    from rig.commands.measure.check import run as run_check
+    from rig.commands.measure.check_devices import add
+    from rig.commands.measure.check_devices import run as run_check
 
     return run_check(_parse("check", add, [*_set_words(changes), *_script_words(script)], config)) == 0
 
@@ -63,7 +63,7 @@ def run(
     agreement), Fault if the arm was stopped, KeyboardInterrupt. In a script the call must be below `if __name__ ==
     "__main__":`, as the arm's process reads the script as well.
     """
-    from rig.commands.endings import ending_by_interrupt
+    from rig.commands.command_signals import ending_by_interrupt
     from rig.commands.measure.carry_out import carry_out
     from rig.commands.measure.run import add, prepare_run
 

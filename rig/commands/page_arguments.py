@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rig.page.about import About
     from rig.page.server.serving import PageAddress
     from rig.station.events import RunEvent
-    from rig.station.station import Listener
+    from rig.station.operator_station import Listener
 
 Answer = Callable[[Sequence[str], str], bool]
 TOKEN_VARIABLE = "RIG_PAGE_TOKEN"

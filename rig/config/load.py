@@ -13,8 +13,8 @@ from urllib.parse import urlsplit
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from rig.config.files.as_written import take_text_as_written
 from rig.config.files.layers import BASE, SET, Layered, Places, merge_layers, read_layers
+from rig.config.files.verbatim_text import take_text_as_written
 from rig.config.files.yaml_text import Location, Unreadable, dotted_path
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedures.hand_sections import HandSection

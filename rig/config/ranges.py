@@ -1,6 +1,6 @@
-"""Which arms a configuration may name, and how far its values may range: as far as any arm's may.
+"""The arms that a configuration may name, and the widest ranges of its values over all arms.
 
-What the arm that is configured can do is judged where a plan is made (`rig.turners.ur.limits`, `rig.motion.model`).
+The limits of the configured arm are checked when a plan is made (`rig.turners.ur.joint_limits`, `rig.motion.model`).
 """
 
 from typing import Literal

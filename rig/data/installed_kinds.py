@@ -17,8 +17,8 @@ class InstalledKind(Protocol):
 
     - `quantity` is the measured one: its row of the table.
     - `solve` takes the sensor's name, its placements at rest and the site, and returns the solution
-      (`rig.analysis.installed_kinds`).
-    - `result` is the kind of result (`rig.report.findings.kind.ResultKind`), for every outlet.
+      (`rig.analysis.installed_solvers`).
+    - `result` is the kind of result (`rig.report.findings.result_kind.ResultKind`), for every outlet.
     """
 
     @property

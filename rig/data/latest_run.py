@@ -3,9 +3,9 @@
 from contextlib import suppress
 from pathlib import Path
 
-from rig.config.files.own_folder import own_folder
 from rig.config.files.regular_file import UnfitFile, read_regular_file
-from rig.config.files.written_file import write_new
+from rig.config.files.safe_writing import write_new
+from rig.config.files.user_folder import own_folder
 from rig.errors import Refused
 
 LATEST = "latest"

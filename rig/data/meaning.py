@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from rig.config.judging.limits import Kind, Parameter
+from rig.config.judging.verdict_limits import Kind, Parameter
 
 JUDGED_PARAMETERS: tuple[Parameter, Parameter] = ("scale", "bias")
 

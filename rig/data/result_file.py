@@ -9,14 +9,13 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, JsonValue, model_validator
 
-from rig.config.files.written_file import write_new
-from rig.config.judging.limits import Kind, Parameter
+from rig.config.files.safe_writing import write_new
+from rig.config.judging.verdict_limits import Kind, Parameter
 from rig.config.section import SensorName
-from rig.data.checked import OfJoints, read_document
 from rig.data.entries.accelerometer import AccelerometerEntry
+from rig.data.entries.bias_drift import DriftEntry
 from rig.data.entries.budget import BiasProcessEntry, BudgetEntry, ClockEntry
 from rig.data.entries.by_hand import ByHandEntry
-from rig.data.entries.drift import DriftEntry
 from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.entries.external import AnglesEntry, AttitudesEntry
 from rig.data.entries.magnetometer import MagnetometerEntry
@@ -43,6 +42,7 @@ from rig.data.installed_kinds import quantities
 from rig.data.key_meanings import meaning_of
 from rig.data.meaning import Meaning
 from rig.data.run_folder import RESULT
+from rig.data.validation import OfJoints, read_document
 from rig.errors import Refused
 
 SCHEMA: Final = "rig.result/1"

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
-from rig.data.checked import validate
 from rig.data.latest_run import note_run
+from rig.data.validation import validate
 from rig.errors import Refused
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import Chart
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Past
-from rig.report.findings.followed import Parameter
+from rig.report.findings.history_records import Parameter
 
 SCHEMA = "rig.history/1"
 FORMULA = ("=", "+", "-", "@")  # first characters of a formula in common spreadsheets, after white space too

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, Table, select
 
 from rig.errors import Refused
-from rig.history.entered.finished import compact, content_sha256
+from rig.history.entered.finished_run import compact, content_sha256
 from rig.history.storage import journal, schema
 from rig.history.storage.journal import Head
 from rig.history.store import History

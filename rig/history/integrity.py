@@ -12,10 +12,10 @@ from pydantic import ValidationError
 from rig.config.files.regular_file import UnfitFile
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import RESULT, recordings
-from rig.history.entered.finished import CERTIFICATES, DOCUMENTS, content_sha256, document_sha256, recording_of
+from rig.history.entered.finished_run import CERTIFICATES, DOCUMENTS, content_sha256, document_sha256, recording_of
 from rig.history.entered.index import run_row, unlike
 from rig.history.store import History, Kept, Past
-from rig.report.findings.followed import HistoryRecord
+from rig.report.findings.history_records import HistoryRecord
 from rig.station.words import calibrations_in_words
 
 State = Literal["ok", "changed", "missing", "elsewhere", "unknown"]

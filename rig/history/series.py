@@ -17,7 +17,7 @@ from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
 from rig.history.statistics.recall import days_to_limit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
 from rig.history.store import Past
-from rig.report.findings.followed import Parameter, is_scale, nominal
+from rig.report.findings.history_records import Parameter, is_scale, nominal
 
 YEAR_DAYS = 365.25
 # The probability that no change is reported for an unchanged sensor. The comparisons of a part's calibrations share

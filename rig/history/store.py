@@ -18,13 +18,13 @@ from rig.data.run_folder import RESULT
 from rig.errors import Refused
 from rig.history.entered import certificates
 from rig.history.entered.entering import enter_run, note_place, now_utc
-from rig.history.entered.finished import EnteredRecording, FinishedRun
-from rig.history.entered.issued import Issued
-from rig.history.storage import journal, numbers, read_back, schema, triggers
+from rig.history.entered.finished_run import EnteredRecording, FinishedRun
+from rig.history.entered.issued_certificate import Issued
+from rig.history.storage import journal, read_back, row_numbers, schema, triggers
 from rig.history.storage.address import HistoryAddress, resolve_address
 from rig.history.storage.engine import WRITES, connection_apart, engine_of
 from rig.report.findings.characteristics import every_characteristic
-from rig.report.findings.followed import BIASES, SCALES, Parameter
+from rig.report.findings.history_records import BIASES, SCALES, Parameter
 
 _MANY = 500  # keys in one query: SQLite allows a few thousand
 
@@ -239,7 +239,7 @@ class History:
         """Yield triggers, numbers and rows that are not as they were entered, as `journal.broken`."""
         with self.engine.connect() as connection:
             yield from triggers.unlike_made(connection)
-            yield from numbers.gaps(connection)
+            yield from row_numbers.gaps(connection)
             yield from journal.broken(connection)
 
     def head(self) -> journal.Head:

@@ -11,8 +11,8 @@ from rig.estimation.arrays import Array
 from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import DenavitHartenberg, distance_to_forearm, distance_to_upper_arm
 from rig.motion.model import TurnerModel
-from rig.motion.state import JointLimits, Joints
 from rig.motion.steps import Dwell, Plan, Rest, travel
+from rig.motion.turner_state import JointLimits, Joints
 
 # A plan keeps the centres of flange and payload away from the middle of a link by its radius (`Tube`) and a clearance,
 # because the payload's size is unknown. Attitudes keep `dwell_room_m`. Sweeps and the motions between them cannot:

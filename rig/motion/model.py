@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rig.config.ranges import ModelName
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import JointLimits, Joints
+from rig.motion.turner_state import JointLimits, Joints
 
 if TYPE_CHECKING:
     from rig.config.models import ArmSection

@@ -3,8 +3,8 @@
 import math
 
 from rig.errors import Problem
-from rig.motion.state import Joints
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, travel
+from rig.motion.turner_state import Joints
 
 
 def find_step_problems(plan: Plan) -> list[Problem]:

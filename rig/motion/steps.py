@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.section import Direction, Vector3
-from rig.motion.state import Joints
+from rig.motion.turner_state import Joints
 
 # Joint angles closer than this are equal: well above the encoder's step, well below anything that matters.
 SAME_PLACE_RAD = 1e-4

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from math import degrees, pi
 
-from rig.motion.state import Joints
 from rig.motion.steps import Plan
+from rig.motion.turner_state import Joints
 
 SLACK_RAD = pi / 2  # smaller travels need no warning
 OTHER_TURN_RAD = pi  # from home: beyond this a joint is in another revolution than when its cable was laid

@@ -14,7 +14,7 @@ from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.notebook.html import table
 from rig.notebook.own_readings import own_readings
 from rig.report.findings.finding import Finding
-from rig.report.findings.kind import DisplayRow
+from rig.report.findings.result_kind import DisplayRow
 from rig.report.kinds.triad import bias_of
 
 HEADINGS = ("axis", "scale factor", "± U", "bias", "± U", "unit")

@@ -17,7 +17,7 @@ from rig.notebook.runs import Run
 from rig.observation.observed_run import ObservedRun
 
 if TYPE_CHECKING:
-    from rig.notebook.plots import Plot
+    from rig.notebook.reading_plots import Plot
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class SensorComparison:
 
     def plot(self) -> "Plot":
         """Return a plot of sensor and reference over time, and of their difference."""
-        from rig.notebook.plots import plot_comparison
+        from rig.notebook.reading_plots import plot_comparison
 
         return plot_comparison(self.shown, self.sensor, self.reference)
 

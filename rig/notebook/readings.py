@@ -23,7 +23,7 @@ from rig.observation.windows import FinishedSweep, Window, swept
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from rig.notebook.plots import Plot
+    from rig.notebook.reading_plots import Plot
 
 HEADINGS = ("sensor", "part", "serial number", "measures", "Hz", "samples", "readings")
 
@@ -62,7 +62,7 @@ class Signal:
 
     def plot(self) -> "Plot":
         """Return a plot of the values over time, with the sweeps shaded. Raise Refused `missing_extra`."""
-        from rig.notebook.plots import plot_readings
+        from rig.notebook.reading_plots import plot_readings
 
         letters = getattr(self.quantity, "axes", ("",))
         by_axis = dict(zip(letters, self.columns().values(), strict=True))

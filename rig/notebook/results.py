@@ -15,15 +15,15 @@ from rig.notebook.frames import frame
 from rig.notebook.html import table
 from rig.notebook.readings import NoSuchSensor
 from rig.notebook.runs import Run
-from rig.plans.recorded import judged
+from rig.plans.recorded_run import judged
 from rig.report.document import document_of
 from rig.report.findings.finding import Finding
-from rig.report.kinds.registry import outlets, shown, terms_of
+from rig.report.kinds.kind_registry import outlets, shown, terms_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from rig.notebook.plots import Plot
+    from rig.notebook.reading_plots import Plot
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class Result(Mapping[str, Calibration]):
 
         Raise Refused `nothing_to_plot`, `missing_extra`.
         """
-        from rig.notebook.plots import plot_residuals
+        from rig.notebook.reading_plots import plot_residuals
 
         available = outlets(self.document, lambda kind: kind.unexplained)
         panels = ((f"{finding.sensor}, {kind.name}", residuals(finding)) for kind, residuals, finding in available)

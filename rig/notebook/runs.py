@@ -12,7 +12,7 @@ from rig.data.recording.settings import RunSettings
 from rig.notebook.html import table
 from rig.notebook.readings import HEADINGS, NoSuchSensor, Readings
 from rig.observation.observed_run import ObservedRun, observe_runs
-from rig.plans.recorded import RecordedRun, judged, open_run
+from rig.plans.recorded_run import RecordedRun, judged, open_run
 
 
 @dataclass(frozen=True, eq=False)

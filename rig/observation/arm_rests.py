@@ -10,8 +10,8 @@ from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.observation.average import Average, Stream, between, build_average
 from rig.observation.motion.arm_motion import ArmMotion
-from rig.observation.statistics.beside_lines import average_standstill
-from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD
+from rig.observation.oscillation import MAX_TRAVEL_AT_REST_RAD
+from rig.observation.statistics.vibration_noise import average_standstill
 from rig.observation.windows import Window, rested
 
 REST_SETTLING_S = 0.2  # cut off at either end of a rest

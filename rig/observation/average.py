@@ -13,7 +13,7 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
 from rig.estimation.temperature.over_temperature import OverTemperature
-from rig.observation.motion.known_motion import KnownMotion
+from rig.observation.motion.reference_motion import KnownMotion
 from rig.observation.statistics.mean import Mean
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window

@@ -27,9 +27,9 @@ from rig.observation.average import Average, Stream, between, build_average, syn
 from rig.observation.lost_samples import lost_samples
 from rig.observation.motion.arm_motion import ArmMotion, is_sparse
 from rig.observation.motion.revolution import Revolution, arm_states_lost, describe
-from rig.observation.reference.acceleration import DwellReading, dwell_readings
+from rig.observation.reference.dwell_acceleration import DwellReading, dwell_readings
 from rig.observation.reference.swept_acceleration import SweptAcceleration, swept_acceleration
-from rig.observation.statistics.lines import BEATS, harmonics
+from rig.observation.statistics.spectral_lines import BEATS, harmonics
 from rig.observation.stuck_check import check_dwells, check_other_direction, check_rests
 from rig.observation.timebase import TimeBase
 from rig.observation.turn_mean import SampledTurn, turn_mean

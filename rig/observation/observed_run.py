@@ -14,7 +14,7 @@ from rig.data.recording.settings import ObservationThresholds
 from rig.estimation.arrays import Array
 from rig.estimation.temperature.over_temperature import OverTemperature
 from rig.observation.average import Stream, convert_stream
-from rig.observation.finished import finished_dwells, finished_sweeps
+from rig.observation.finished_steps import finished_dwells, finished_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import TimeBase

@@ -5,14 +5,14 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from rig.data.recording.events import BoardObserved
+from rig.data.recording.recorded_events import BoardObserved
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Sweep
 from rig.observation.average import synchronize_stream
-from rig.observation.finished import finished_sweeps
+from rig.observation.finished_steps import finished_sweeps
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.windows import Window
 

@@ -11,7 +11,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.motion.steps import Sweep
 from rig.observation.average import Average
-from rig.observation.reference.acceleration import DwellReading
+from rig.observation.reference.dwell_acceleration import DwellReading
 
 OF_A_SWEEP = 0.5  # of the slowest sweep's speed: no bias changes by as much from rest to rest
 TURNED = 0.5  # of gravity: the least difference between two attitudes in a row that is judged

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.cubic_spline import CubicSpline
-from rig.observation.motion.known_motion import KnownMotion, check_span, not_finite
+from rig.observation.motion.reference_motion import KnownMotion, check_span, not_finite
 from rig.observation.statistics.coloured_noise import correlation_inflation
 
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).

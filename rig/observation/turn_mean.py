@@ -15,9 +15,9 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import mean_weights
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.beside_lines import BRIEF, FEWEST, estimate_noise
 from rig.observation.statistics.coloured_noise import MEMORIES
-from rig.observation.statistics.lines import (
+from rig.observation.statistics.mean import Mean, weighted_means, whole
+from rig.observation.statistics.spectral_lines import (
     NONE,
     LineSearch,
     column_count,
@@ -28,7 +28,7 @@ from rig.observation.statistics.lines import (
     unit_columns,
     waves,
 )
-from rig.observation.statistics.mean import Mean, weighted_means, whole
+from rig.observation.statistics.vibration_noise import BRIEF, FEWEST, estimate_noise
 
 SLOW = 8.0  # cycles in a turn: slower lines are hard to separate from what comes once and twice in it
 NOT_ENCODED = LineSearch(slowest=5.0)

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.data.recording.events import (
+from rig.data.recording.recorded_events import (
     DwellFinished,
     DwellStarted,
     Event,

@@ -5,8 +5,8 @@ from dataclasses import asdict
 from typing import Any
 
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import JOINT_NAMES, ArmState, Report, RobotMode, RuntimeState, SafetyMode, State
-from rig.page.history import round_digits
+from rig.motion.turner_state import JOINT_NAMES, ArmState, Report, RobotMode, RuntimeState, SafetyMode, State
+from rig.page.recent_readings import round_digits
 
 
 def built(chain: DenavitHartenberg) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from typing import Any
 from rig.analysis.check import Check
 from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE, DisplayUnit, Quantity, Scalar, select_displayed
-from rig.data.recording.events import BoardNotObserved, BoardObserved
 from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
@@ -16,6 +15,7 @@ from rig.data.recording.hand_events import (
     HandRested,
     HandRestRefused,
 )
+from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved
 from rig.data.result_file import read_result
 from rig.data.run_folder import CERTIFICATE, RESULT
 from rig.motion.geometry import NOMINAL
@@ -23,10 +23,10 @@ from rig.motion.steps import Dwell, Rest, Step, Sweep
 from rig.page import by_hand
 from rig.page.about import About
 from rig.page.arm import connected, geometry, stance
-from rig.page.history import PageHistory, round_digits
-from rig.page.outcome import after_fault, after_verdict, outcome_rows, since_rows
+from rig.page.outcome_screen import after_fault, after_verdict, outcome_rows, since_rows
+from rig.page.recent_readings import PageHistory, round_digits
 from rig.page.rows import Look, dwell_row, observation_row, parameter_rows, projection
-from rig.report.words.mounts import mount_lines
+from rig.report.words.mounting_words import mount_lines
 from rig.station.events import (
     Advice,
     Answered,

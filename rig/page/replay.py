@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.analysis.check import Check
 from rig.analysis.partial_results import so_far
-from rig.data.recording.events import (
+from rig.data.recording.recorded_events import (
     DwellFinished,
     DwellStarted,
     RestFinished,
@@ -18,8 +18,8 @@ from rig.data.recording.events import (
 )
 from rig.data.recording.run_file import RunData
 from rig.data.result_file import ResultDocument
-from rig.motion.state import ARM_STATE_DTYPE, ArmState, JointState, State
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep
+from rig.motion.turner_state import ARM_STATE_DTYPE, ArmState, JointState, State
 from rig.page.rows import Look, look_of
 from rig.station.events import (
     ArmSeen,

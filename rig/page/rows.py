@@ -14,9 +14,9 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.statistics.mean import QuantityInDwell, ReadAtRest
-from rig.page.history import round_digits
-from rig.report.findings.kind import AxisValues, DisplayRow
-from rig.report.kinds.registry import shown
+from rig.page.recent_readings import round_digits
+from rig.report.findings.result_kind import AxisValues, DisplayRow
+from rig.report.kinds.kind_registry import shown
 
 NOISE_ONLY, COMBINED = "noise only", "combined"
 Row = dict[str, Any]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from rig.config.procedures.hand_sections import ByHandSection, HandSection
 from rig.motion.by_hand import FACES, Face, HandMove, Instruction
-from rig.motion.state import Joints
 from rig.motion.steps import Plan
+from rig.motion.turner_state import Joints
 
 ROUND: tuple[Face, ...] = ("+z", "+x", "+y", "-z", "-x", "-y", "+z", "+y", "-x", "-z", "+x", "-y")  # and from the start
 TURNS_FROM = 8  # flips: after them the scale is known well enough for a turn to show where it ends

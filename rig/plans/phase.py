@@ -6,9 +6,9 @@ from typing import Protocol
 
 from rig.config.models import RigConfig, TurnerSection
 from rig.errors import Refused
-from rig.motion.state import Joints
 from rig.motion.steps import Plan
-from rig.plans.registry import AnyProcedure, Procedures
+from rig.motion.turner_state import Joints
+from rig.plans.procedure_registry import AnyProcedure, Procedures
 from rig.plans.script_errors import script_errors
 
 
@@ -47,7 +47,7 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
             if not isinstance(steps, Plan):
                 raise TypeError(f"its planner gives {type(steps).__name__}, no Plan")
         if not done:
-            from rig.analysis.design.attitude_account import refuse_undetermined
+            from rig.analysis.design.attitude_information import refuse_undetermined
 
             refuse_undetermined(config, steps)
         return steps

@@ -11,10 +11,10 @@ from pathlib import Path
 from types import ModuleType
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
-from rig.data.own_texts import is_own
 from rig.data.run_folder import SCRIPT, ScriptIdentity
+from rig.data.user_texts import is_own
 from rig.errors import Refused
-from rig.plans.registry import AnyProcedure, Procedure, installed, module_of
+from rig.plans.procedure_registry import AnyProcedure, Procedure, installed, module_of
 from rig.plans.script_errors import script_errors
 
 SIZE_MAX_BYTES = 1_000_000  # the longest procedure shipped has 3,000

@@ -1,4 +1,4 @@
-"""The verbs of a procedure's script. `rig.runner.procedure.Rig` carries them out."""
+"""The verbs of a procedure's script. `rig.runner.procedure_runner.Rig` carries them out."""
 
 from collections.abc import Callable
 from typing import Protocol

@@ -13,18 +13,18 @@ from pydantic import BaseModel
 
 from firmware_host.answers import BoardSolution
 from rig.analysis.check import Check
-from rig.analysis.clock import ClockCheck, ClockComparison
+from rig.analysis.clock_comparison import ClockCheck, ClockComparison
 from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.analysis.external.attitudes import InAttitudes
-from rig.analysis.external.increments import InIncrements
+from rig.analysis.external.increment_calibration import InIncrements
 from rig.analysis.gyroscope.alignment import RelativeRotation
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.comparison import Comparison, Deviation, RevolutionError
 from rig.analysis.gyroscope.onboard_check import Agreement
 from rig.analysis.gyroscope.verification import Verification
-from rig.analysis.read_when import When
-from rig.analysis.reference.acceleration import AccelerometerResult
-from rig.analysis.reference.magnetic_field import MagnetometerResult
+from rig.analysis.measurement_conditions import When
+from rig.analysis.reference.accelerometer import AccelerometerResult
+from rig.analysis.reference.magnetometer import MagnetometerResult
 from rig.analysis.reference.triad import Triad
 from rig.analysis.reversal import AsMounted, MagnetometerReversal
 from rig.data import result_file as result
@@ -33,16 +33,16 @@ from rig.data.entries import by_hand as hand
 from rig.data.entries import external as attitude
 from rig.data.entries import result_types as shared
 from rig.data.entries.earth_rate import EarthRateEntry
-from rig.data.recording.events import BoardSolved
 from rig.data.recording.motion_file import Item
+from rig.data.recording.recorded_events import BoardSolved
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.by_hand.solution import MoveSummary, RestSummary
-from rig.estimation.external.known_increments import KnownIncrements
+from rig.estimation.external.increment_solution import KnownIncrements
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.estimation.gyroscope.earth_rate import EarthRate
 from rig.estimation.gyroscope.estimate import Estimate
-from rig.estimation.gyroscope.known_turns import TurnedSolution
 from rig.estimation.gyroscope.nonlinearity import Nonlinearity
+from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.estimation.reference.imu import ImuSolution
 from rig.estimation.reference.magnetometer import FieldDrift, Uniformity
@@ -52,9 +52,9 @@ from rig.estimation.statistics.bias_process import BiasProcess
 from rig.estimation.temperature.over_temperature import OverTemperature, TemperatureLine
 from rig.estimation.triads import Alignment
 from rig.observation.average import Average
-from rig.observation.external.omitted import Omitted
+from rig.observation.external.omission import Omitted
 from rig.observation.observe import Observation
-from rig.observation.reference.acceleration import DwellReading
+from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.statistics.mean import Mean, StaticReading
 from rig.observation.timebase import TimeBase
 

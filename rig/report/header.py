@@ -6,12 +6,12 @@ from types import MappingProxyType
 
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.outcome import Outcome
-from rig.config.files.written_file import write_new
+from rig.config.files.safe_writing import write_new
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import VectorSolution
-from rig.report.findings.kind import outlet_items
-from rig.report.kinds.registry import kinds
+from rig.report.findings.result_kind import outlet_items
+from rig.report.kinds.kind_registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 
 NOTHING: Mapping[str, Array] = MappingProxyType({})

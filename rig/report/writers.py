@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Protocol
 
 from rig.analysis.outcome import Outcome
-from rig.config.files.written_file import replace_together
+from rig.config.files.safe_writing import replace_together
 from rig.data.result_file import ResultDocument, write_result
 from rig.data.run_folder import RESULT
 from rig.report.document import document_of
-from rig.report.findings.kind import NoOutlet
-from rig.report.kinds.registry import kinds
+from rig.report.findings.result_kind import NoOutlet
+from rig.report.kinds.kind_registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 
 # `module:function`, imported when a run has ended.
@@ -22,7 +22,7 @@ WRITERS: Sequence[str] = (
 
 
 class Writer(Protocol):
-    """A function that writes files of its own into the run folder, by `rig.config.files.written_file`.
+    """A function that writes files of its own into the run folder, by `rig.config.files.safe_writing`.
 
     `outcome` has everything that the analysis computed, curves too; `document` is the content of `result.json`. The
     events that it returns are passed on to the operator.

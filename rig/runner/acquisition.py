@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rig.data.quantity import RATE, Scalar
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunRecorder
-from rig.motion.state import State
+from rig.motion.turner_state import State
 from rig.runner.settling import Settling
 from rig.station.events import SensorSamples
 

@@ -3,14 +3,14 @@
 from collections.abc import Iterable
 from math import degrees
 
-from rig.motion.doubts import doubts
+from rig.motion.plan_warnings import doubts
 from rig.motion.preflight import find_travel_to_home
-from rig.motion.state import Report
 from rig.motion.steps import Plan, turn_words
+from rig.motion.turner_state import Report
 from rig.motion.winding import cable_words
 from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
-from rig.turners.kind import Wording
+from rig.turners.turner_kind import Wording
 
 NOBODY = "Nobody and nothing may be within its reach."
 

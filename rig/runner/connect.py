@@ -7,10 +7,10 @@ from functools import partial
 from pathlib import Path
 
 from firmware_host.client import Calibration
-from rig.analysis.design.shortest import target_of
+from rig.analysis.design.candidate_search import target_of
 from rig.board.crystal import follows_crystal
+from rig.board.flash_store import SensorSolution, calibration_of
 from rig.board.identify import refusing, require_board_section
-from rig.board.store import SensorSolution, calibration_of
 from rig.config.load import Loaded
 from rig.config.procedures.procedure_sections import SixObservationSection, ThermalSection
 from rig.data.recording.provenance import Provenance, calls_itself_simulated, provenance_of
@@ -21,30 +21,30 @@ from rig.data.recording.settings import RunSettings
 from rig.data.recording.thermal_events import SetMeasured
 from rig.data.run_folder import ARM_LOG, refuse_links
 from rig.errors import Refused
-from rig.motion.state import Report, TurnerIdentity
 from rig.motion.steps import Plan
-from rig.observation.by_hand.runs import collect_inputs
+from rig.motion.turner_state import Report, TurnerIdentity
+from rig.observation.by_hand.rests_and_moves import collect_inputs
 from rig.plans.motions.temperature_course import TemperatureCourse
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
-from rig.runner.ahead import Connecting
 from rig.runner.board.host_correction import HostCorrected, correct_rates
 from rig.runner.board.onboard import BoardCalibration
 from rig.runner.board.sensors import BoardSource, open_board_source
-from rig.runner.by_hand.session import HandSession
+from rig.runner.by_hand.hand_session import HandSession
+from rig.runner.early_connection import Connecting
 from rig.runner.ending_early import EndingEarly
-from rig.runner.mounted import Memory, find_mounted
-from rig.runner.procedure import Devices, Recording, Rig
+from rig.runner.mounted_sensors import Memory, find_mounted
+from rig.runner.procedure_runner import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
 from rig.runner.warming import Warming
-from rig.sensors.registry import group_by_port
-from rig.sensors.source import OnSamples, SampleSource
+from rig.sensors.sample_source import OnSamples, SampleSource
+from rig.sensors.sensor_registry import group_by_port
 from rig.station.events import ArmConnected, ArmSeen, BoardConnected, RunResumed, SensorConnected
-from rig.station.station import Station
-from rig.turners.kind import AnyTurner
-from rig.turners.registry import kind_of
+from rig.station.operator_station import Station
 from rig.turners.turner import Turner
+from rig.turners.turner_kind import AnyTurner
+from rig.turners.turner_registry import kind_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,12 +11,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.analysis.design.reached import assess_reached
-from rig.analysis.design.shortest import ReachedUncertainty, TargetUncertainty
+from rig.analysis.design.candidate_search import ReachedUncertainty, TargetUncertainty
+from rig.analysis.design.reached_uncertainty import assess_reached
 from rig.data.recording.run_file import RunData, read_run
 from rig.errors import RigError
-from rig.motion.state import Joints
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, Sweep, Transfer
+from rig.motion.turner_state import Joints
 from rig.station.events import UncertaintySoFar
 
 WRITTEN_S = 0.6  # by then the recorder has written everything

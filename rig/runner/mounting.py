@@ -15,7 +15,7 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.session import nearest_face
+from rig.estimation.by_hand.session_parts import nearest_face
 from rig.motion.steps import Stage
 
 REST_S = 1.0  # of readings to test whether the item is at rest

@@ -13,7 +13,7 @@ from pathlib import Path
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.onboard_check import check_observed
 from rig.analysis.outcome import Outcome
-from rig.board.store import store_calibrations
+from rig.board.flash_store import store_calibrations
 from rig.config.load import Loaded
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
 from rig.data.recording.run_file import RunData, make_plain, read_run
@@ -21,16 +21,16 @@ from rig.data.recording.settings import RunSettings, settings_of
 from rig.data.run_folder import next_recording, recordings, resuming
 from rig.errors import Fault, ProblemError, Refused
 from rig.motion.steps import Plan
-from rig.observation.reference.acceleration import DwellReading
+from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.statistics.mean import QuantityInDwell, ReadAtRest, StaticReading
 from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
 from rig.report.writers import write_outcome
-from rig.runner.ahead import Connecting
 from rig.runner.announcement import mounting
 from rig.runner.connect import Connector
-from rig.runner.mounted import Memory
+from rig.runner.early_connection import Connecting
+from rig.runner.mounted_sensors import Memory
 from rig.runner.resumption import Resumption, resumption
 from rig.station.events import (
     Advice,
@@ -46,8 +46,8 @@ from rig.station.events import (
     RunEvent,
     VerdictReached,
 )
-from rig.station.station import Station
-from rig.turners.registry import kind_of
+from rig.station.operator_station import Station
+from rig.turners.turner_registry import kind_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import Refused
 from rig.observation.onboard_window import find_averaged_sweeps
-from rig.observation.steps_that_count import sound_dwells, sound_sweeps
+from rig.observation.sound_steps import sound_dwells, sound_sweeps
 from rig.plans.script_file import ScriptFile
 
 REMEDY = "Undo the change in config.yaml, or start a new run with `rig run`"

@@ -15,7 +15,7 @@ from firmware_host.protocol import HEATER_LIMIT_C
 from rig.board.identify import refusing
 from rig.config.procedures.procedure_sections import ThermalSection
 from rig.data.quantity import TEMPERATURE
-from rig.data.recording.events import Event
+from rig.data.recording.recorded_events import Event
 from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
 from rig.errors import Fault, ProblemError, Refused
 from rig.plans.motions.temperature_course import Ramp, TemperatureCourse

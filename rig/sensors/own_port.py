@@ -9,7 +9,7 @@ from typing import Protocol
 
 from firmware_host.serial_port import SerialPort, explain_closed
 from rig.sensors.errors import SensorError
-from rig.sensors.silence import USUAL, Patience, PortSilence
+from rig.sensors.port_silence import USUAL, Patience, PortSilence
 
 
 class DevicePort(Protocol):

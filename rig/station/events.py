@@ -9,10 +9,10 @@ from pathlib import Path
 
 from firmware_host.client import BoardIdentity
 from rig.analysis.check import Check
-from rig.data.recording.events import Event
+from rig.data.recording.recorded_events import Event
 from rig.errors import RigError
-from rig.motion.state import Report, State
 from rig.motion.steps import Plan, Step
+from rig.motion.turner_state import Report, State
 from rig.observation.observe import Observation
 from rig.observation.statistics.mean import ReadAtRest
 

@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TextIO
 
-from rig.config.files.written_file import open_to_append
+from rig.config.files.safe_writing import open_to_append
 from rig.errors import Refused
 from rig.errors.quoting import printable_lines
 from rig.station.events import RunEvent

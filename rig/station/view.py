@@ -17,8 +17,8 @@ from rig.data.recording.hand_events import HandAsked
 from rig.errors.quoting import printable_lines
 from rig.station.by_hand_words import live_rows
 from rig.station.events import HandSeen, Progress, RunEvent, SamplesTaken, SensorSamples
+from rig.station.operator_station import Listener
 from rig.station.plain_text import for_file, plain
-from rig.station.station import Listener
 from rig.station.words import line
 
 REFRESH_S = 0.1

@@ -6,7 +6,7 @@ from traceback import format_exception
 
 from firmware_host.installation import install_command
 from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
-from rig.motion.doubts import doubts
+from rig.motion.plan_warnings import doubts
 from rig.station.by_hand_words import by_hand_line
 from rig.station.events import (
     Advice,

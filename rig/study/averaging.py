@@ -13,7 +13,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.six_observation import design
 from rig.study import simulation as sim
-from rig.study.report import Settings, StudyFinding, StudyReport, table
+from rig.study.study_report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.estimation.gyroscope.vector_fit import VectorInputs, centripetal_m_s2, explain
 from rig.estimation.gyroscope.vector_model import solve_vector_model
 from rig.estimation.statistics.bias_process import flicker_covariance
-from rig.study.report import Settings, StudyFinding, StudyReport, table
+from rig.study.study_report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.batch import algorithm_1_batch, newton_batch
+from rig.estimation.gyroscope.six_observation_batch import algorithm_1_batch, newton_batch
 from rig.study import simulation as sim
-from rig.study.report import Settings, StudyFinding, StudyReport, table
+from rig.study.study_report import Settings, StudyFinding, StudyReport, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

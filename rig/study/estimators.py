@@ -12,15 +12,15 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.design.bounds import efficiency, six_observation_bound, triaxial_bound, vector_bound
-from rig.estimation.gyroscope.batch import BatchSolution, algorithm_1_batch, newton_batch
 from rig.estimation.gyroscope.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.gyroscope.six_observation import PARAMETERS
+from rig.estimation.gyroscope.six_observation_batch import BatchSolution, algorithm_1_batch, newton_batch
 from rig.estimation.gyroscope.vector_model import VectorBatch, solve_vector_batch
 from rig.estimation.reference.reference_model import KnownNorm, KnownVector
 from rig.estimation.reference.triaxial import EqualWeights, solve_triaxial_batch
 from rig.study import rate_table as rt
 from rig.study import simulation as sim
-from rig.study.report import Settings, StudyFinding, StudyReport, table
+from rig.study.study_report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:

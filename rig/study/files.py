@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
-from rig.study.report import Columns, StudyFinding, StudyReport, table
+from rig.study.study_report import Columns, StudyFinding, StudyReport, table
 from rig.study.style import use_style
 
 Format = Literal["csv", "parquet"]

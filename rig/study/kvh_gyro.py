@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.reference_model import KnownVector
 from rig.estimation.reference.triaxial import solve_triaxial
 from rig.study import rate_table as rt
-from rig.study.report import Settings, StudyFinding, StudyReport, table
+from rig.study.study_report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.batch import BatchSolution, newton_batch
+from rig.estimation.gyroscope.six_observation_batch import BatchSolution, newton_batch
 from rig.estimation.gyroscope.vector_model import VectorBatch, solve_vector_batch
 from rig.study import simulation as sim
-from rig.study.report import Settings, StudyFinding, StudyReport, table
+from rig.study.study_report import Settings, StudyFinding, StudyReport, table
 from rig.study.work import run_parallel
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import solve_triaxial
-from rig.study.report import table
+from rig.study.study_report import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

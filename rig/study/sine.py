@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.batch import newton_batch
 from rig.estimation.gyroscope.six_observation import PARAMETERS
+from rig.estimation.gyroscope.six_observation_batch import newton_batch
 from rig.study import simulation as sim
-from rig.study.report import Columns, Settings, StudyFinding, StudyReport
+from rig.study.study_report import Columns, Settings, StudyFinding, StudyReport
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.study.report import Settings
+from rig.study.study_report import Settings
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

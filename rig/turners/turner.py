@@ -1,11 +1,11 @@
-"""The protocol of a turner as a run uses it; each kind (`rig.turners.kind`) has a driver in its own package."""
+"""The protocol of a turner as a run uses it; each kind (`rig.turners.turner_kind`) has a driver in its own package."""
 
 from collections.abc import Callable
 from typing import Protocol
 
 from rig.motion.carried import FlangeLoad
-from rig.motion.state import Report, State
 from rig.motion.steps import Motion
+from rig.motion.turner_state import Report, State
 
 
 class Turner(Protocol):

@@ -26,7 +26,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         loaded = load(options.config, sections=None)
         try:
-            from rig.world.process import serve
+            from rig.world.world_process import serve
         except ModuleNotFoundError as error:
             raise Refused(
                 "no_emulator",

@@ -42,15 +42,15 @@ from dataclasses import fields
 from functools import partial
 from typing import Any, Protocol
 
+from rig.world.arm_motion_source import OnArm
 from rig.world.arm_orders import build_arm_orders, robot_state
 from rig.world.board.heat import HeatedBody
 from rig.world.board.serial_line import SerialLine
 from rig.world.clock import WorldClock
 from rig.world.instruments import InstrumentMount
 from rig.world.laboratory import Laboratory
-from rig.world.on_arm import OnArm
-from rig.world.servo.bench import ServoBench
 from rig.world.servo.drive import ServoFaults
+from rig.world.servo.servo_bench import ServoBench
 from rig.world.servo.wire_format import WRITE, ServoPacket
 from rig.world.ur10e.faults import AtProgramStart
 

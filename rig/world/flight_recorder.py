@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from rig.config.files.written_file import open_to_append
+from rig.config.files.safe_writing import open_to_append
 
 LATE_S = 0.5  # wall time
 LOOK_S = 0.1  # between two checks of the thread

@@ -12,21 +12,21 @@ from rig.config.models import ArmSection, RigConfig
 from rig.config.procedures.servo_section import ServoSection
 from rig.config.procedures.stage_section import mount_matrix
 from rig.config.world.laboratory import SimulatedPartSection, WorldSection
-from rig.world.autopilot.mounting import build_autopilot_mounts
+from rig.world.arm_motion_source import OnArm
+from rig.world.autopilot.mounted_autopilots import build_autopilot_mounts
 from rig.world.board.flash_file import open_flash
 from rig.world.board.heat import HeatedBody
 from rig.world.board.magnetometer_truth import MountedMagnetometer
-from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_up
+from rig.world.board.mounted_board import mount_magnetometers, mount_sensors, power_up
 from rig.world.board.sensing_element import ElementFault, MotionAt, SensingElement
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.instruments import InstrumentMount
-from rig.world.kvh1775.mounting import build_kvh_mounts
-from rig.world.lines.mounting import build_printer_mounts
+from rig.world.kvh1775.mounted_instruments import build_kvh_mounts
+from rig.world.lines.mounted_printers import build_printer_mounts
 from rig.world.magnetic_field import build_magnetic_field
-from rig.world.on_arm import OnArm
+from rig.world.motion_source import MotionSource
 from rig.world.operator import SimulatedOperator
-from rig.world.servo.bench import ServoBench
-from rig.world.turning import MotionSource
+from rig.world.servo.servo_bench import ServoBench
 from rig.world.ur10e.motion.flange_motion import BodyMotion
 from rig.world.ur10e.robot import Robot
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.at_rest import AtRest, at_rest
+from rig.analysis.rest_noise import AtRest, at_rest
 from rig.data.quantity import RATE
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault

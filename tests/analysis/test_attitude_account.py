@@ -4,10 +4,10 @@ from math import sqrt
 
 import pytest
 
-from rig.analysis.design.attitude_account import AttitudeAccount, attitude_account
+from rig.analysis.design.attitude_information import AttitudeAccount, attitude_account
 from rig.config.load import load
 from rig.plans.phase import first_phase
-from rig.plans.registry import installed
+from rig.plans.procedure_registry import installed
 from support.paths import CONFIGS, DEMO
 
 

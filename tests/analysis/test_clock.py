@@ -8,7 +8,7 @@ import pytest
 
 from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
-from rig.analysis.clock import check_clock
+from rig.analysis.clock_comparison import check_clock
 from rig.analysis.verdict import clock_checks
 from rig.data.recording.run_file import RunData
 from rig.observation.consistency.arm_clock import state_jitter

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.freedom_beside import of_acceleration_angles, of_angles
+from rig.analysis.effective_dof import of_acceleration_angles, of_angles
 from rig.estimation.gyroscope.budget import NOISE, WANDERING, Budget
 from rig.estimation.reference.reference_budget import ATTITUDES
-from rig.plans.recorded import judged, open_run
+from rig.plans.recorded_run import judged, open_run
 from support.paths import RECORDINGS
 
 

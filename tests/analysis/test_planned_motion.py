@@ -15,9 +15,9 @@ from rig.config.load import load
 from rig.motion.geometry import NOMINAL
 from rig.motion.steps import Rest, Sweep
 from rig.observation.windows import Window
-from rig.plans.registry import installed, sections
-from rig.plans.shortest import plan_of
-from rig.turners import registry as turners
+from rig.plans.procedure_registry import installed, sections
+from rig.plans.shortest_run import plan_of
+from rig.turners import turner_registry as turners
 from support.paths import CONFIGS
 
 AS_THE_FLANGE = np.eye(3)

@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 import scipy.optimize
 
-from rig.analysis.solvable import solvable
+from rig.analysis.numeric_errors import solvable
 from rig.errors import Fault
 
 

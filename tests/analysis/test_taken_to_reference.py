@@ -13,7 +13,7 @@ from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import settings_from_json
 from rig.observation.observed_run import observe_runs
 from rig.observation.windows import Window
-from rig.plans.recorded import open_run
+from rig.plans.recorded_run import open_run
 from rig.report.document import document_of
 from support.paths import RECORDINGS
 from support.recordings.synthetic_run import (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.check import Check
-from rig.analysis.reference.acceleration import AccelerometerResult
+from rig.analysis.reference.accelerometer import AccelerometerResult
 from rig.analysis.temperature.bias_drift import BiasDrift
 from rig.analysis.verdict import (
     acceleration_checks,
@@ -17,8 +17,8 @@ from rig.analysis.verdict import (
     verdict,
     verification_checks,
 )
-from rig.config.judging.judged_by import DecisionRule
-from rig.config.judging.limits import Limits
+from rig.config.judging.judging_keys import DecisionRule
+from rig.config.judging.verdict_limits import Limits
 from rig.data.meaning import Meaning
 from rig.data.quantity import RATE
 from rig.estimation.gyroscope.accumulator import Solution

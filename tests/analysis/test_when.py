@@ -10,13 +10,13 @@ import pytest
 
 from rig.analysis.analyses import calibrate
 from rig.analysis.gyroscope.calibration import observe_recordings
-from rig.analysis.read_when import of_gyroscope
+from rig.analysis.measurement_conditions import of_gyroscope
 from rig.data.quantity import TEMPERATURE
 from rig.data.recording.channel import stated_temperature_channel
 from rig.data.recording.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.recording.run_file import RunData
 from rig.motion.geometry import NOMINAL
-from rig.plans.recorded import open_run
+from rig.plans.recorded_run import open_run
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import StatedFacts

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from rig.batch.batch import BatchPart, Begun, Doubt, Entry, PartBegun, PartEnded, state_of
+from rig.batch.batch_state import BatchPart, Begun, Doubt, Entry, PartBegun, PartEnded, state_of
 from rig.batch.operators import CHOICES, Kind, Operator, Question
 from rig.batch.status import Now, after, update_by_batch
 from rig.errors import Fault

@@ -9,9 +9,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from rig.batch.batch import BatchPart
-from rig.batch.on_page import OnPage
+from rig.batch.batch_state import BatchPart
 from rig.batch.operators import Operator, Question
+from rig.batch.page_operator import OnPage
 from rig.page.server.control import Control
 from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving

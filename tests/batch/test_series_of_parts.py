@@ -17,13 +17,24 @@ from weakref import ReferenceType, ref
 
 import pytest
 
-from rig.batch.batch import Batch, BatchEnded, BatchPart, Begun, Chip, Entry, PartBegun, PartEnded, doubt_of, state_of
-from rig.batch.journal import JOURNAL, open_journal, resume_journal
+from rig.batch.batch_journal import JOURNAL, open_journal, resume_journal
+from rig.batch.batch_state import (
+    Batch,
+    BatchEnded,
+    BatchPart,
+    Begun,
+    Chip,
+    Entry,
+    PartBegun,
+    PartEnded,
+    doubt_of,
+    state_of,
+)
+from rig.batch.batch_table import csv_of, page_of, summary
 from rig.batch.label import Label, files_of, zpl
 from rig.batch.operators import Operator, Question, Terminal
-from rig.batch.parts_in_turn import Bench, Desk, Work
-from rig.batch.series import following, numbers_in
-from rig.batch.table import csv_of, page_of, summary
+from rig.batch.part_list import following, numbers_in
+from rig.batch.part_sequence import Bench, Desk, Work
 from rig.commands.station import station
 from rig.config.judging.station_section import StationSection
 from rig.config.load import Loaded
@@ -31,7 +42,7 @@ from rig.errors import Refused
 from rig.plans.script_file import ScriptFile
 from rig.runner.phases import Run
 from rig.station.events import Prompt
-from rig.station.station import Stations, always_yes
+from rig.station.operator_station import Stations, always_yes
 from support.processes.full_disk import full_disk
 
 AT = "2026-11-25T08:00:00+00:00"

@@ -11,9 +11,9 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
-from rig.batch.batch import BatchPart, Begun, PartBegun, PartEnded, state_of
-from rig.batch.on_page import on_page
+from rig.batch.batch_state import BatchPart, Begun, PartBegun, PartEnded, state_of
 from rig.batch.operators import Operator
+from rig.batch.page_operator import on_page
 from rig.batch.status import Now, Present
 from rig.motion.steps import Rest
 from rig.page.server.control import STOPPED

@@ -189,10 +189,10 @@ LATER = {
     "scipy",
     "serial",
     "rig.analysis.judging",
-    "rig.analysis.design.planned",
+    "rig.analysis.design.planned_limits",
     "rig.runner.phases",
 }
-LATER |= {"rig.report.certificate.page", "rig.report.kinds.registry"}
+LATER |= {"rig.report.certificate.certificate_page", "rig.report.kinds.kind_registry"}
 
 
 @pytest.mark.thorough

@@ -13,9 +13,9 @@ from rig.data.recording.run_file import read_run
 from rig.errors import Refused
 from rig.history.storage import engine
 from rig.history.store import open_history
+from rig.report.exports.exported_recording import exported
 from rig.report.exports.formats import OF_READINGS, writer_of_readings
-from rig.report.exports.recorded import exported
-from rig.runner.readings import ReadingsFile
+from rig.runner.csv_recording import ReadingsFile
 from support.laboratories.commands import rig_here
 from support.paths import RECORDINGS, ROOT
 from support.processes.full_disk import full_disk

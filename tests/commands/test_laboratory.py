@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.laboratory.laboratory import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import simulated_laboratory
 from rig.errors import Refused
 from support.laboratories.commands import rig
 from support.laboratories.worlds import World

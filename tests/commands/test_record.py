@@ -10,12 +10,12 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from rig.cli import main
-from rig.commands.laboratory.laboratory import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import simulated_laboratory
 from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import flange_attitude, flange_rate
-from rig.motion.state import ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration, travel
-from rig.turners.ur.driver import Arm
+from rig.motion.turner_state import ArmState, Joints
+from rig.turners.ur.arm_driver import Arm
 from support.laboratories.commands import rig_here
 from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import fresh_host, hardware, merge

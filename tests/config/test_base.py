@@ -9,7 +9,7 @@ import yaml
 from rig.config.files.layers import FILES_MAX, merge
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.data.run_folder import ScriptIdentity, new_folder
-from rig.world.section import read_world_section
+from rig.world.world_section import read_world_section
 from support.paths import CONFIGS, DEMO
 
 

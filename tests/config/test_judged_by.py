@@ -2,11 +2,11 @@
 
 import json
 
-from rig.config.judging.judged_by import OF_SENSORS, ObservationKeys, UncertaintyKeys
+from rig.config.judging.judging_keys import OF_SENSORS, ObservationKeys, UncertaintyKeys
 from rig.config.load import load
 from rig.data.recording.settings import settings_from_json, settings_of
 from rig.plans.phase import first_phase
-from rig.plans.registry import installed
+from rig.plans.procedure_registry import installed
 from support.paths import CONFIGS
 
 PAIR = CONFIGS / "lsm9ds1_adis16465.yaml"

@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from rig.config.judging.limits import LIMITS, Limits, Need
+from rig.config.judging.verdict_limits import LIMITS, Limits, Need
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.data.recording.settings import setting, settings_from_json, settings_of
 from rig.plans.phase import first_phase
-from rig.plans.registry import installed
+from rig.plans.procedure_registry import installed
 from support.paths import CONFIGS
 
 PAIR = CONFIGS / "lsm9ds1_adis16465.yaml"

@@ -9,8 +9,8 @@ from rig.config import ranges
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.config.sensors.sensor_sections import SensorSection
-from rig.turners.registry import sections
-from rig.world.section import read_world_section
+from rig.turners.turner_registry import sections
+from rig.world.world_section import read_world_section
 from support.paths import CONFIGS
 
 

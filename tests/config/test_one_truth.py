@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from rig.config.load import load
-from rig.world.section import read_world_section
+from rig.world.world_section import read_world_section
 from support.paths import CONFIGS
 
 # How a part is mounted, filtered and warmed is another matter in every run.

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rig.config.files.own_folder import own_folder
-from rig.data.own_texts import is_own, note_own
+from rig.config.files.user_folder import own_folder
+from rig.data.user_texts import is_own, note_own
 from rig.errors import Refused
 from rig.history.storage.address import resolve_address
 

@@ -7,8 +7,8 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
+from rig.config.config_schema import config_schema, schema_text
 from rig.config.procedures.attitude_sets import SETS
-from rig.config.schema import config_schema, schema_text
 from support.paths import CONFIGS, DOCS
 
 PAGE = DOCS / "config.schema.json"
@@ -22,7 +22,7 @@ def read(path: Path) -> dict[str, Any]:
 
 def test_the_page_is_today_s() -> None:
     assert PAGE.read_text(encoding="utf-8") == schema_text(), (
-        "again: python -m rig.config.schema > docs/config.schema.json"
+        "again: python -m rig.config.config_schema > docs/config.schema.json"
     )
     Draft202012Validator.check_schema(config_schema())
 

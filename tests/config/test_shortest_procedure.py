@@ -7,8 +7,8 @@ from rig.config.models import ProcedureSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.data.recording.settings import settings_of
 from rig.plans.motions.six_sweeps import plan_six_observation
-from rig.plans.registry import installed, sections
-from rig.turners import registry as turners
+from rig.plans.procedure_registry import installed, sections
+from rig.turners import turner_registry as turners
 from support.paths import CONFIGS
 from support.recordings.synthetic_run import CONFIG
 

@@ -21,8 +21,8 @@ from rig.observation.observed_run import observe_run
 from rig.observation.statistics.mean import even_mean
 from rig.page.about import About
 from rig.page.page_state import PageState
+from rig.report.exports.exported_recording import WithMotion
 from rig.report.exports.formats import writer_of_readings
-from rig.report.exports.recorded import WithMotion
 from rig.runner.acquisition import Acquisition
 from rig.station.events import Progress, SamplesTaken
 from rig.station.view import LiveView

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from rig.analysis.analyses import calibrate
-from rig.data.processes.silence import crowding
+from rig.data.processes.process_silence import crowding
 from rig.data.recording.layout import Contents, lay_out
+from rig.data.recording.layout_keys import SCHEMA, TEXTS
 from rig.data.recording.run_file import read_run
-from rig.data.recording.schema import SCHEMA, TEXTS
 from rig.errors import Fault, Refused
 from support.paths import RECORDINGS
 from support.processes.as_nobody import as_nobody

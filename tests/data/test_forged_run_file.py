@@ -15,9 +15,9 @@ import h5py
 import numpy as np
 import pytest
 
-from rig.data.recording.events import decode_events
 from rig.data.recording.extract import extract, reason
 from rig.data.recording.motion_file import MOTIONS
+from rig.data.recording.recorded_events import decode_events
 from rig.data.recording.recorded_turner import turner_of
 from rig.data.recording.run_file import read_run
 from rig.data.recording.settings import settings_from_json

@@ -14,7 +14,7 @@ from rig.data.recording.recorded_turner import RecordedTurner, turner_of
 from rig.data.recording.run_file import RunRecorder, read_run
 from rig.errors import Refused
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import JointState, StateField
+from rig.motion.turner_state import JointState, StateField
 from support.recordings.synthetic_run import SENSOR, UR, Setup, synthetic_run
 
 RUN = synthetic_run(Setup(rest_s=0.5, speed_deg_s=150))

@@ -17,11 +17,11 @@ import pytest
 
 from firmware_host.answers import BoardObservation, BoardSolution
 from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
-from rig.config.judging.limits import Limits
+from rig.config.judging.verdict_limits import Limits
 from rig.config.load import load
 from rig.data.quantity import FIELD, RATE
 from rig.data.recording.channel import thermometer_channel, triad_channel
-from rig.data.recording.events import (
+from rig.data.recording.recorded_events import (
     BoardNotObserved,
     BoardObserved,
     BoardRecalled,
@@ -36,8 +36,8 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunRecorder, make_plain, read_run
 from rig.data.recording.settings import ObservationThresholds, PlannedSweep, RunSettings, Site, uncertainty_of
 from rig.errors import Fault, Refused
-from rig.motion.state import ARM_STATE_DTYPE, ArmState
 from rig.motion.steps import Sweep
+from rig.motion.turner_state import ARM_STATE_DTYPE, ArmState
 from support.documents.results import VERIFIED
 from support.paths import CONFIGS, ROOT
 from support.processes.forked import forked

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from rig.config.judging.judged_by import OF_SENSORS
+from rig.config.judging.judging_keys import OF_SENSORS
 from rig.config.load import load, parse
 from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.config.sensors.sensor_catalogue import PARTS

@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from rig.data.processes.silence import CROWDED, Silence, crowding
+from rig.data.processes.process_silence import CROWDED, Silence, crowding
 from support.processes.waiting import wait_for
 
 TICK_S = 0.05

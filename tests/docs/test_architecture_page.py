@@ -3,9 +3,9 @@
 import pytest
 
 from rig.data.recording import run_file
-from rig.turners.ur import driver
-from rig.turners.ur.child import link as child_link
-from rig.turners.ur.child import process as child
+from rig.turners.ur import arm_driver
+from rig.turners.ur.child import child_link
+from rig.turners.ur.child import client_process as child
 from rig.turners.ur.stopping import stop as stopping
 from support.house_picture import PAGE, drawn
 
@@ -19,8 +19,8 @@ SAID = [
     f"{child_link.FROZEN_TICKS} ticks of heartbeats without a new state",
     f"For a controller elsewhere {child_link.LINK_S:g} s are enough",
     f"patient for {child_link.PATIENT_TICKS * child_link.TICK_S:g} s",
-    f"at least every {1000 * driver.WATCH_S:g} ms",
-    f"more than {driver.SLOWNESS:g} times as long",
+    f"at least every {1000 * arm_driver.WATCH_S:g} ms",
+    f"more than {arm_driver.SLOWNESS:g} times as long",
     f"flushes every {run_file.FLUSH_PERIOD_S:g} s",
 ]
 

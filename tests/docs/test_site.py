@@ -11,7 +11,7 @@ import pytest
 
 import rig
 import rig.procedure
-from rig.config.judging.limits import LIMITS
+from rig.config.judging.verdict_limits import LIMITS
 from rig.report.words.check_words import check_words
 from support.paths import DOCS, ROOT
 

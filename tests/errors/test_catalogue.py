@@ -7,7 +7,7 @@ import pytest
 
 from firmware_host import protocol
 from rig.errors.catalogue import TABLE, catalogue
-from rig.errors.page import page
+from rig.errors.errors_page import page
 from support.error_names import Raised, kind_of, raised_in, raised_in_source
 from support.paths import DOCS, ROOT
 
@@ -67,7 +67,7 @@ def test_the_table_is_in_order_and_names_each_error_once() -> None:
 
 def test_the_committed_page_is_what_the_table_generates() -> None:
     committed = (DOCS / "errors.md").read_text(encoding="utf-8")
-    assert committed == page(), "again: python -m rig.errors.page > docs/errors.md"
+    assert committed == page(), "again: python -m rig.errors.errors_page > docs/errors.md"
 
 
 @pytest.mark.parametrize(

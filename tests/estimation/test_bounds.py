@@ -20,7 +20,7 @@ from rig.estimation.design.optimality import (
     maximum_prediction_variance,
     prediction_variance,
 )
-from rig.estimation.gyroscope.batch import algorithm_1_batch, newton_batch
+from rig.estimation.gyroscope.six_observation_batch import algorithm_1_batch, newton_batch
 from rig.estimation.gyroscope.vector_model import solve_vector_batch, solve_vector_model
 from rig.estimation.reference.reference_model import KnownNorm, predicted
 from rig.estimation.reference.triaxial import solve_triaxial_batch

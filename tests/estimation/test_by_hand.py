@@ -10,8 +10,8 @@ from rig.errors import RigError
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand import HandSolution, SessionConditions, assess_progress, solve_by_hand
 from rig.estimation.sensor_axes import SensorAxes
-from rig.observation.by_hand.handled import Segmenter, segment_session
-from rig.observation.by_hand.runs import NotCounted
+from rig.observation.by_hand.hand_segmentation import Segmenter, segment_session
+from rig.observation.by_hand.rests_and_moves import NotCounted
 from rig.world.hand.habits import Action, Face, FlipAction, Mistake, MistakeKind, TurnAction
 from support.external.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, creeping, handle
 

@@ -12,17 +12,17 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from rig.batch.batch import Begun, PartBegun, PartEnded, state_of
+from rig.batch.batch_state import Begun, PartBegun, PartEnded, state_of
 from rig.batch.status import Now, Present, after, last, update_by_batch
 from rig.errors import Fault, Refused
-from rig.floor import shown
-from rig.floor.feed import looking
+from rig.floor import floor_content
+from rig.floor.floor_feed import looking
 from rig.floor.heartbeat import heartbeat
 from rig.history import stations
 from rig.history.stations import StationState
 from rig.history.storage.address import resolve_address
 from rig.history.store import open_history
-from rig.motion.state import Report
+from rig.motion.turner_state import Report
 from rig.page.server.control import Control
 from rig.page.server.feed import frame_of
 from rig.page.server.sections import Sections
@@ -39,7 +39,7 @@ def told(now: Now, age_s: float = 0.4) -> StationState:
 
 
 def cards(*of: StationState) -> list[dict[str, Any]]:
-    sections = shown.rigs(of)
+    sections = floor_content.rigs(of)
     return [sections[f"rig {place}"] for place in range(sections["rigs"]["count"])]
 
 
@@ -108,14 +108,14 @@ def test_todays_parts_standards_and_recalls_are_those_of_the_history(tmp_path: P
             history.enter(finished(10 * day + 0.1, jumped, rig="bench B", serial_number="CHECK", check_standard=True))
         pasts = history.calibrations()
     last = (FIRST + timedelta(days=110)).date()
-    assert [(row["serial"], row["rig"]) for row in shown.todays(pasts, last)] == [
+    assert [(row["serial"], row["rig"]) for row in floor_content.todays(pasts, last)] == [
         ("CHECK", "bench B"), ("G-9", "bench A"),
     ]  # fmt: skip
-    (standard,) = shown.standards(pasts)
+    (standard,) = floor_content.standards(pasts)
     assert (standard["rig"], standard["control"]) == ("bench B", "out") and "kx" in standard["out"]
-    due = shown.recalls(pasts, date(2030, 1, 1))
+    due = floor_content.recalls(pasts, date(2030, 1, 1))
     assert "G-9" in {row["serial"] for row in due} and all(row["overdue"] for row in due)
-    assert shown.recalls(pasts, date(2020, 1, 1)) == []
+    assert floor_content.recalls(pasts, date(2020, 1, 1)) == []
 
 
 def states_become(feed: Sections, wanted: dict[str, str]) -> None:
@@ -166,7 +166,7 @@ def test_no_row_hides_a_rig_or_makes_the_page_heavy(tmp_path: Path, harm: str) -
             made = connection.exec_driver_sql(f"INSERT INTO station(rig, heard_s, told, computer) "
                                               f"SELECT *, 'lab-0' FROM ({HARM[harm]})").rowcount  # fmt: skip
         stations.tell(history.engine, "bench 1", "lab-1", Now("running", "G-1").json())
-        sections, again = (shown.rigs(*stations.heard(history.engine)) for _ in range(2))
+        sections, again = (floor_content.rigs(*stations.heard(history.engine)) for _ in range(2))
     running = [each for each in sections.values() if each is not None and each.get("rig") == "bench 1"]
     assert [(each["state"], each["part"]) for each in running] == [("running", "G-1")]
     assert sections["rigs"] == {"count": min(made + 1, 100), "more": max(made + 1 - 100, 0)}

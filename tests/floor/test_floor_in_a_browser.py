@@ -8,7 +8,7 @@ import pytest
 from selenium.webdriver import Chrome
 
 from rig.batch.status import Now
-from rig.floor.feed import looking
+from rig.floor.floor_feed import looking
 from rig.history import stations
 from rig.history.storage.address import resolve_address
 from rig.history.store import open_history

@@ -10,13 +10,13 @@ import pytest
 from sqlalchemy import text
 
 from rig.errors import Refused
-from rig.history.again.answer import Answer, Compared, RecomputedResult, Unsolved, compared, to_solve
-from rig.history.again.done import JOURNAL, RecomputeJournal, RecomputeQuestion
-from rig.history.again.plan import list_stated_results
-from rig.history.again.report import again_csv, again_page, counts
-from rig.history.entered.finished import FinishedRun
+from rig.history.entered.finished_run import FinishedRun
+from rig.history.recompute.recompute_journal import JOURNAL, RecomputeJournal, RecomputeQuestion
+from rig.history.recompute.recompute_report import again_csv, again_page, counts
+from rig.history.recompute.result_comparison import Answer, Compared, RecomputedResult, Unsolved, compared, to_solve
+from rig.history.recompute.selection import list_stated_results
 from rig.history.store import History, Selection, open_history
-from rig.report.kinds.registry import followed
+from rig.report.kinds.kind_registry import followed
 from support.history.kept_recordings import certified
 from support.history.past_runs import BIAS_RAD_S, SCALE, STD, finished
 

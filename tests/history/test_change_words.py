@@ -4,7 +4,7 @@ import pytest
 
 from rig.history.series import Change
 from rig.history.terminal.change_words import change_in_short, name_in_words, select_changed
-from rig.report.findings.followed import Parameter
+from rig.report.findings.history_records import Parameter
 
 
 def change(name: str, before: float, now: float, u: float, unit: str = "1") -> Change:

@@ -5,7 +5,7 @@ import pytest
 
 from rig.estimation.statistics.coverage import coverage_factors
 from rig.history.series import UNCHANGED, changes_in
-from rig.report.findings.followed import Parameter
+from rig.report.findings.history_records import Parameter
 
 ALARMS = 1 - UNCHANGED
 PAIRS = 1500

@@ -12,14 +12,14 @@ from pathlib import Path
 import pytest
 from sqlalchemy import event, text
 
-from rig.commands.history.recall import recall_sensors
 from rig.commands.history.remember import remember
+from rig.commands.history.run_serials import recall_sensors
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.load import load
 from rig.errors import Refused
-from rig.floor.feed import looking
+from rig.floor.floor_feed import looking
 from rig.history.store import open_history
-from rig.notebook.history import calibrations
+from rig.notebook.notebook_history import calibrations
 from rig.station.events import NotRemembered, Remembered
 from support.history.kept_rows import as_of_another_process, forge
 from support.history.past_runs import finished

@@ -6,7 +6,7 @@ import pytest
 
 from rig.cli import main
 from rig.data.result_file import read_result
-from rig.history.entered.recomputed import not_given
+from rig.history.entered.recomputed_result import not_given
 from support.paths import RECORDINGS
 
 DRIFT = RECORDINGS / "bias_drift"

@@ -12,16 +12,16 @@ from sqlalchemy import select, text
 from sqlalchemy.exc import DBAPIError
 
 from rig.cli import main
-from rig.history.entered.finished import content_sha256, read_finished_run
-from rig.history.entered.issued import Issued
+from rig.history.entered.finished_run import content_sha256, read_finished_run
+from rig.history.entered.issued_certificate import Issued
 from rig.history.integrity import WRONG, examine_history
 from rig.history.storage import journal, schema
 from rig.history.storage.engine import WRITES
 from rig.history.storage.journal import Head
 from rig.history.storage.triggers import create_triggers
 from rig.history.store import History, open_history
+from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import certificate_of
-from rig.report.certificate.page import certificate_page
 from rig.report.certificate.statements import stated_in
 from support.history.kept_rows import drop_triggers, forge
 from support.history.past_runs import finished

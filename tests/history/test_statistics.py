@@ -10,7 +10,7 @@ from rig.history.statistics.charts import FEWEST, Chart, chart
 from rig.history.statistics.random_effects import fit
 from rig.history.statistics.recall import days_to_limit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
-from rig.report.findings.followed import Parameter
+from rig.report.findings.history_records import Parameter
 
 RIGS, SENSORS = ("A", "B"), ("s1", "s2", "s3", "s4")
 

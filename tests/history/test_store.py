@@ -18,15 +18,15 @@ from rig.config.load import ConfigurationRefused, load
 from rig.data.result_file import read_result
 from rig.errors import Refused
 from rig.estimation.gyroscope.budget import Budget, Contributor
-from rig.history.entered.finished import FinishedRun, compact, content_sha256, read_finished_run
-from rig.history.entered.issued import Issued
+from rig.history.entered.finished_run import FinishedRun, compact, content_sha256, read_finished_run
+from rig.history.entered.issued_certificate import Issued
 from rig.history.series import Trend, changes_between, effects, rig_states, subjects, trends
 from rig.history.storage import schema
 from rig.history.storage.address import choose_history_address, resolve_address
 from rig.history.storage.engine import engine_of
 from rig.history.store import History, Selection, open_history
 from rig.report.entries.budget import budget_entry
-from rig.report.kinds.registry import followed
+from rig.report.kinds.kind_registry import followed
 from support.history.past_runs import FIRST, finished
 from support.paths import DEMO, RECORDINGS
 

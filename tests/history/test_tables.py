@@ -13,7 +13,13 @@ from rig.data.absent import NO_ARM
 from rig.history.series import Trend, changes_between, rig_states, subjects, trends
 from rig.history.store import History, Past, open_history
 from rig.history.terminal.fitting_table import FittingTable, TableColumn
-from rig.history.terminal.tables import calibrations_table, changes_table, parameters_table, trend_lines, trends_table
+from rig.history.terminal.history_tables import (
+    calibrations_table,
+    changes_table,
+    parameters_table,
+    trend_lines,
+    trends_table,
+)
 from support.history.past_runs import FIRST, SCALE, STD, finished
 
 ANGLE = "nonorth_yz rad"

@@ -1,9 +1,9 @@
 """A speed that was written in rad/s is asked about before the arm moves; it is not refused."""
 
 from rig.config.load import load
-from rig.motion.doubts import doubts
+from rig.motion.plan_warnings import doubts
 from rig.plans.phase import first_phase
-from rig.plans.registry import installed
+from rig.plans.procedure_registry import installed
 from support.paths import DEMO
 
 

@@ -15,12 +15,12 @@ from rig.motion.carried import read_load
 from rig.motion.geometry import NOMINAL, flange_axes, lengths_m
 from rig.motion.keep_out import find_clearance_problems
 from rig.motion.model import CLIENT_SPEED_RAD_S, find_home, load_turner_model, model_of
-from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Plan, Transfer
+from rig.motion.turner_state import JOINT_NAMES
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.plans.motions.static_attitudes import plan_static_attitudes
 from rig.turners.ur.plan_problems import plan_problems
-from rig.world.ur10e.motion.models import MODELS
+from rig.world.ur10e.motion.arm_models import MODELS
 
 NAMES: tuple[ModelName, ...] = get_args(ModelName)
 TWO_HOMES: tuple[ModelName, ...] = ("ur3e", "ur10e")

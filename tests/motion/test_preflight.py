@@ -14,13 +14,13 @@ from rig.errors import Problem, Refused, refuse
 from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import NOMINAL, distance_to_forearm
 from rig.motion.preflight import find_travel_to_home
-from rig.motion.state import ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.motion.steps import Dwell, Motion, Plan, Rest, Transfer
+from rig.motion.turner_state import ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.plans.motions.static_attitudes import plan_static_attitudes
+from rig.turners.ur.arm_preflight import arm_problems, kinematics_problems, make_recorded, preflight_problems
+from rig.turners.ur.arm_report import ArmReport
 from rig.turners.ur.condition import program_interruption, readiness
-from rig.turners.ur.preflight import arm_problems, kinematics_problems, make_recorded, preflight_problems
-from rig.turners.ur.report import ArmReport
 from support.wires.ur10e import plan_problems
 
 HOME_DEG = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)

@@ -4,12 +4,12 @@ from math import degrees, radians
 
 from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
-from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Plan
+from rig.motion.turner_state import JOINT_NAMES
 from rig.motion.winding import cable_words, windings_rad
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.runner.announcement import announcement
-from rig.turners.ur.kind import UR
+from rig.turners.ur.ur_kind import UR
 from support.page.told_runs import report
 
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)

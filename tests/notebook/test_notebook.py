@@ -31,7 +31,7 @@ def test_importing_it_loads_no_arm_driver_and_nothing_heavy() -> None:
     program = (
         "import sys, rig; before = set(sys.modules); rig.solve, rig.load, rig.compare\n"
         "print([name for name in before if name.split('.')[0] in ('numpy', 'scipy', 'pydantic', 'h5py')])\n"
-        "print([name for name in sys.modules if name.startswith('rtde') or name.startswith('rig.turners.ur.driver')])"
+        "print([name for name in sys.modules if name.startswith(('rtde', 'rig.turners.ur.arm_driver'))])"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE_S, check=True

@@ -79,7 +79,7 @@ def test_nothing_loads_pandas_before_a_table_is_asked_for() -> None:
         "import sys, rig\n"
         "for name in rig.__all__: assert getattr(rig, name).__doc__ or name == '__version__', name\n"
         f"result = rig.load_result({str(RECORDINGS / 'verified')!r}); result['gyro'].apply([[0.1, 0.2, 0.3]])\n"
-        "print([name for name in ('pandas', 'matplotlib', 'rtde_control', 'rig.turners.ur.driver')"
+        "print([name for name in ('pandas', 'matplotlib', 'rtde_control', 'rig.turners.ur.arm_driver')"
         " if name in sys.modules])"
     )
     done = subprocess.run(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rig.estimation.statistics.rounding import Steps, bound_rounding_variance, find_steps
-from rig.observation.statistics.beside_lines import average_rest
 from rig.observation.statistics.mean import even_mean
+from rig.observation.statistics.vibration_noise import average_rest
 from rig.observation.windows import Window
 
 

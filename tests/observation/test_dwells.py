@@ -5,8 +5,8 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.beside_lines import average_standstill
 from rig.observation.statistics.mean import Mean
+from rig.observation.statistics.vibration_noise import average_standstill
 from rig.observation.windows import Window
 
 NOISE_M_S2, SHAKEN_M_S2, LASTING_S = 0.004, 0.02, 3.0

@@ -9,10 +9,10 @@ from rig.analysis.analyses import calibrate_by_hand
 from rig.data.recording.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
 from rig.data.recording.run_file import read_run
 from rig.errors import Fault
-from rig.estimation.by_hand.session import HandRecording, HandRest, Move, SessionConditions
+from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move, SessionConditions
 from rig.estimation.by_hand.solution import solve_by_hand
 from rig.motion.by_hand import FACES
-from rig.observation.by_hand.runs import NotCounted, rotate_face
+from rig.observation.by_hand.rests_and_moves import NotCounted, rotate_face
 from support.paths import RECORDINGS
 
 SECOND_US = 1_000_000

@@ -9,12 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from rig.data.quantity import RATE
-from rig.data.recording.events import Event, SweepFinished, SweepStarted
+from rig.data.recording.recorded_events import Event, SweepFinished, SweepStarted
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.motion.state import ARM_STATE_DTYPE
+from rig.motion.turner_state import ARM_STATE_DTYPE
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run

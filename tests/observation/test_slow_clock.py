@@ -10,7 +10,7 @@ import pytest
 
 from rig.data.quantity import RATE
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import ARM_STATE_DTYPE
+from rig.motion.turner_state import ARM_STATE_DTYPE
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.timebase import estimate_time_base
 from support.paths import ROOT

@@ -8,9 +8,9 @@ import pytest
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.observation.observed_run import observe_run
-from rig.observation.reference.acceleration import DwellReading
+from rig.observation.reference.dwell_acceleration import DwellReading
+from rig.observation.sound_steps import sound_sweeps
 from rig.observation.statistics.mean import Mean
-from rig.observation.steps_that_count import sound_sweeps
 from rig.observation.stuck_check import check_dwells
 from rig.observation.windows import Window, swept
 from support.recordings.damaged_readings import readings_of

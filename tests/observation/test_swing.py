@@ -10,7 +10,7 @@ import pytest
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
-from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD, remove_oscillation
+from rig.observation.oscillation import MAX_TRAVEL_AT_REST_RAD, remove_oscillation
 from support.recordings.synthetic_run import Setup, synthetic_run
 
 TIME_S = 0.008 * np.arange(370)

@@ -7,8 +7,8 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.lines import BEATS, harmonics
 from rig.observation.statistics.mean import Mean
+from rig.observation.statistics.spectral_lines import BEATS, harmonics
 from rig.observation.turn_mean import SampledTurn, turn_mean
 from support.recordings.drawn_ripple import Ripple, drawn_ripple
 

@@ -11,12 +11,12 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
 from rig.config.load import load
-from rig.motion.state import Report
 from rig.motion.steps import Plan
+from rig.motion.turner_state import Report
 from rig.page.about import About
 from rig.page.arm import built
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, PhaseStarted, RunEvent, SamplesTaken, SensorSamples
-from rig.turners.registry import installed, kind_of, sections
+from rig.turners.turner_registry import installed, kind_of, sections
 from support.laboratories.command_with_a_page import with_a_page
 from support.laboratories.commands import configuration
 from support.laboratories.servo_runs import configured

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from rig.motion.state import REST_SPEED_RAD_S
+from rig.motion.turner_state import REST_SPEED_RAD_S
 from support.laboratories.commands import configuration, wait_for_log
 from support.laboratories.worlds import World, WorldHandle, hardware
 from support.page.flood import flooded

@@ -14,7 +14,7 @@ from rig.page.about import About
 from rig.page.arm import built
 from rig.plans.by_hand import WantedMoves, still_open
 from rig.station.events import ArmConnected, HandSeen, PhaseStarted
-from rig.turners.registry import installed
+from rig.turners.turner_registry import installed
 from support.page.browser import legible, needs_browser, picture, screen, text
 from support.page.told_page import showing
 from support.processes.waiting import wait_for

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from rig.motion.state import Report
-from rig.page.history import POINTS, STEP_S
+from rig.motion.turner_state import Report
 from rig.page.page_state import PageState
+from rig.page.recent_readings import POINTS, STEP_S
 from rig.page.server.feed import Broadcast, Feed, Mailbox
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent, SamplesTaken, SensorSamples
-from rig.turners.registry import installed
+from rig.turners.turner_registry import installed
 from support.page.told_runs import (
     ABOUT,
     before_it_moves,

@@ -13,7 +13,7 @@ import pytest
 from selenium.webdriver import Chrome
 
 from rig.errors import Fault
-from rig.motion.state import ArmState, RuntimeState
+from rig.motion.turner_state import ArmState, RuntimeState
 from rig.station.events import ArmSeen, Failed, Interrupted, PhaseRecorded, RunEvent, SensorSamples
 from support.page.browser import kind, legible, needs_browser, picture, severe, text
 from support.page.told_page import showing

@@ -16,7 +16,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 from rig.data.recording.run_file import read_run
-from rig.motion.state import REST_SPEED_RAD_S
+from rig.motion.turner_state import REST_SPEED_RAD_S
 from support.laboratories.commands import configuration, rig
 from support.laboratories.worlds import World, hardware
 from support.page.browser import kind, needs_browser, picture, text

@@ -6,7 +6,7 @@ import pytest
 
 from rig.analysis.check import Check, fitness
 from rig.data.meaning import Meaning
-from rig.page.outcome import after_fault, after_verdict, outcome_rows, since_rows
+from rig.page.outcome_screen import after_fault, after_verdict, outcome_rows, since_rows
 from rig.station.events import Since
 from support.page.told_runs import ABOUT
 from support.page.told_six import PARTS, six_found

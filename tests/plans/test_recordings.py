@@ -9,8 +9,8 @@ import pytest
 from rig.config.sensors.sensor_catalogue import has_own_port
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.result_file import ResultDocument, read_result
-from rig.plans.recorded import RecordedRun, judged, open_run
-from rig.plans.registry import installed
+from rig.plans.procedure_registry import installed
+from rig.plans.recorded_run import RecordedRun, judged, open_run
 from rig.report.document import document_of
 from support.paths import RECORDINGS
 from support.recordings.frozen import frozen

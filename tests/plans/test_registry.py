@@ -16,7 +16,7 @@ from rig.config.procedures.procedure_sections import STOCK_SECTIONS
 from rig.errors import Refused
 from rig.motion.steps import Plan
 from rig.plans.phase import first_phase
-from rig.plans.registry import installed, sections
+from rig.plans.procedure_registry import installed, sections
 from rig.plans.script_file import installed_script, load_script
 from support.paths import CONFIGS, ROOT
 from support.processes.waiting import PATIENCE_S

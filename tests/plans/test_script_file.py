@@ -9,8 +9,8 @@ import yaml
 
 from rig.cli import main, run_guarded
 from rig.commands.configured import load_configured
-from rig.data.own_texts import note_own
 from rig.data.run_folder import ScriptIdentity, script_identity
+from rig.data.user_texts import note_own
 from rig.errors import Refused
 from rig.plans.script_file import SIZE_MAX_BYTES, installed_script, kept_script, load_script
 from support.laboratories.commands import configuration

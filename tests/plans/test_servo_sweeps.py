@@ -9,7 +9,7 @@ from rig.config.procedures.servo_procedure import ServoSixObservationSection
 from rig.config.procedures.servo_section import ServoSection
 from rig.motion.steps import Plan, Rest, Transfer
 from rig.plans.motions.servo_sweeps import plan_servo_six_observation
-from rig.turners.servo.kind import SERVO
+from rig.turners.servo.servo_kind import SERVO
 from support.motions.drawn_servo import loaded
 
 

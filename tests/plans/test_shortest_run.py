@@ -10,10 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.analysis.design.candidate_search import (
+    Budgets,
+    Candidate,
+    ReachedUncertainty,
+    TargetUncertainty,
+    find_shortest,
+)
 from rig.analysis.design.predicted_accelerations import predict_accelerometer_budgets
-from rig.analysis.design.shortest import Budgets, Candidate, ReachedUncertainty, TargetUncertainty, find_shortest
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
-from rig.analysis.surroundings import surroundings_of
 from rig.cli import main
 from rig.config.load import load, parse
 from rig.config.models import RigConfig
@@ -21,13 +27,13 @@ from rig.config.sensors.sensor_catalogue import PARTS as DATA_SHEETS
 from rig.errors import Refused
 from rig.estimation.by_hand import SessionConditions, solve_by_hand
 from rig.estimation.gyroscope.budget import Budget, Contributor
-from rig.observation.by_hand.handled import segment_session
+from rig.observation.by_hand.hand_segmentation import segment_session
 from rig.plans.by_hand import WantedMoves as Asked
 from rig.plans.by_hand import simulate_session
-from rig.plans.registry import installed, sections
-from rig.plans.shortest import find_search, plan_of, shortest_run
+from rig.plans.procedure_registry import installed, sections
 from rig.plans.shortest_motions import ARCS_DEG
-from rig.turners import registry as turners
+from rig.plans.shortest_run import find_search, plan_of, shortest_run
+from rig.turners import turner_registry as turners
 from rig.world.hand.habits import Action, FlipAction, TurnAction
 from support.external.handled_body import Part, handle
 from support.motions.drawn_servo import KNOWN as OF_DRAWN

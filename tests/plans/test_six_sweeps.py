@@ -12,8 +12,8 @@ from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import flange_axes, flange_pose, flange_rate
 from rig.motion.model import find_home
 from rig.motion.steps import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
-from rig.plans.motions.drift import drift_effect
 from rig.plans.motions.six_sweeps import plan_six_observation
+from rig.plans.motions.steady_drift import drift_effect
 from support.wires.ur10e import plan_problems
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)

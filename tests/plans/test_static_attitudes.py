@@ -16,11 +16,11 @@ from rig.estimation.arrays import Array
 from rig.motion.carried import FlangeLoad
 from rig.motion.model import find_home
 from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer, trapezoid_duration
-from rig.plans.motions.imu import plan_imu
-from rig.plans.motions.shortest_way import shortest_way
+from rig.plans.motions.shortest_tour import shortest_way
 from rig.plans.motions.static_attitudes import plan_static_attitudes
+from rig.plans.motions.sweeps_and_attitudes import plan_imu
 from rig.plans.phase import first_phase
-from rig.plans.registry import installed
+from rig.plans.procedure_registry import installed
 from support.paths import CONFIGS
 from support.wires.ur10e import plan_problems
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from rig.cli import main
-from rig.data.entries.drift import DriftEntry, SlopeEntry
+from rig.data.entries.bias_drift import DriftEntry, SlopeEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.result_file import ResultDocument, write_result
 from rig.errors import Refused
-from rig.report.exports.calibrations import calibrations
+from rig.report.exports.exported_corrections import calibrations
 from rig.report.exports.temperature import at_temperature
 from support.documents.certified import accelerometer, result
 

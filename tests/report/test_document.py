@@ -17,7 +17,7 @@ from rig.data.result_file import CheckEntry
 from rig.motion.geometry import NOMINAL
 from rig.report.document import document_of
 from rig.report.entry import entry
-from rig.report.terminal.table import print_result
+from rig.report.terminal.result_table import print_result
 from support.paths import RECORDINGS
 from support.recordings.synthetic_run import Setup, synthetic_run
 

@@ -15,10 +15,10 @@ from rig.estimation.statistics.coverage import PROBABILITY, coverage_factors, co
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import StatedFacts
 from rig.report.kinds.bias_drift import drift_table
-from rig.report.kinds.registry import followed
+from rig.report.kinds.kind_registry import followed
 from rig.report.tables.certificate import DEG, pair
-from rig.report.terminal.table import print_result
-from rig.report.words.expanded import expanded, factor_words
+from rig.report.terminal.result_table import print_result
+from rig.report.words.expanded_uncertainty import expanded, factor_words
 from support.documents.certified import certificate, everything, read, result
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}

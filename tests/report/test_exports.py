@@ -21,14 +21,14 @@ from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun, observe_runs
-from rig.plans.recorded import open_run
+from rig.plans.recorded_run import open_run
 from rig.report.exports.autopilots import ardupilot_files, px4_files
-from rig.report.exports.calibrations import calibrations
+from rig.report.exports.exported_corrections import calibrations
+from rig.report.exports.exported_recording import WithMotion, exported
 from rig.report.exports.formats import FORMATS, OF_CALIBRATIONS, texts_of_calibrations, writer_of_readings
 from rig.report.exports.imucal import imucal_files
 from rig.report.exports.kalibr import kalibr_files, triangular
 from rig.report.exports.names import plain_names
-from rig.report.exports.recorded import WithMotion, exported
 from support.documents.certified import accelerometer, everything, result
 from support.paths import RECORDINGS
 

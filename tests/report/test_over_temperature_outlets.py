@@ -15,9 +15,9 @@ from rig.estimation.arrays import Array
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import StatedFacts
 from rig.report.exports.autopilots import ardupilot_files, px4_files
-from rig.report.exports.calibrations import calibrations
+from rig.report.exports.exported_corrections import calibrations
 from rig.report.header import calibration_header
-from rig.report.kinds.registry import followed
+from rig.report.kinds.kind_registry import followed
 from support.documents.certified import certificate
 from support.documents.dcc_rules import rule_faults, schema_faults
 from support.motions.warmed_sweeps import FROM_C, REFERENCE_C, TO_C, Drawn, drawn, session, write_files

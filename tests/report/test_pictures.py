@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
 from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
-from rig.plans.recorded import judged, open_run
-from rig.report.certificate.page import certificate_page
-from rig.report.certificate.plots import (
+from rig.plans.recorded_run import judged, open_run
+from rig.report.certificate.certificate_page import certificate_page
+from rig.report.certificate.svg_plots import (
     HEIGHT,
     Residuals,
     attitude_residuals,

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 from typing import cast
 from weakref import ref
 
-from rig.motion.state import State
-from rig.runner.ahead import Ahead
-from rig.turners.kind import OnState
+from rig.motion.turner_state import State
+from rig.runner.early_connection import Ahead
 from rig.turners.turner import Turner
+from rig.turners.turner_kind import OnState
 
 
 class Acquisition:

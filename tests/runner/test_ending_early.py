@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analysis.design.reached import assess_reached
-from rig.analysis.design.shortest import ReachedUncertainty, TargetUncertainty
+from rig.analysis.design.candidate_search import ReachedUncertainty, TargetUncertainty
+from rig.analysis.design.reached_uncertainty import assess_reached
 from rig.config.load import parse
 from rig.data.recording.run_file import RunData
-from rig.motion.state import Joints
 from rig.motion.steps import Motion, Plan, Sweep
+from rig.motion.turner_state import Joints
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.runner.ending_early import EndingEarly
 from rig.station.events import UncertaintySoFar

@@ -5,7 +5,7 @@ import pytest
 
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.motion.state import ArmState
+from rig.motion.turner_state import ArmState
 from rig.runner.acquisition import REACHES_BACK_S, Acquisition
 from support.recordings.synthetic_run import SENSOR
 

@@ -11,7 +11,7 @@ import pytest
 from firmware_host.answers import BoardObservation
 from rig.analysis.analyses import calibrate
 from rig.analysis.gyroscope.calibration import observe_recordings
-from rig.data.recording.events import BoardObserved, TimedEvent
+from rig.data.recording.recorded_events import BoardObserved, TimedEvent
 from rig.data.recording.run_file import RunData, read_run
 from rig.observation.windows import swept
 from rig.plans.script_file import ScriptFile, installed_script

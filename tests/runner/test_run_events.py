@@ -9,9 +9,16 @@ from pathlib import Path
 import pytest
 
 from rig.commands.configured import load_configured
-from rig.data.recording.events import BoardObserved, BoardSolved, RestFinished, RestStarted, SweepFinished, SweepStarted
-from rig.motion.state import ArmState, RuntimeState
+from rig.data.recording.recorded_events import (
+    BoardObserved,
+    BoardSolved,
+    RestFinished,
+    RestStarted,
+    SweepFinished,
+    SweepStarted,
+)
 from rig.motion.steps import Sweep
+from rig.motion.turner_state import ArmState, RuntimeState
 from rig.runner.phases import Run
 from rig.station.events import (
     Answered,
@@ -36,7 +43,7 @@ from rig.station.events import (
     StepStarted,
     VerdictReached,
 )
-from rig.station.station import Stations, always_yes
+from rig.station.operator_station import Stations, always_yes
 from support.laboratories.worlds import QUICK_EXPERIMENT, worlds
 from support.processes.waiting import PATIENCE_S
 
@@ -175,11 +182,11 @@ def test_the_hosts_own_observations_come_when_the_calibration_is_judged(events: 
 IMPORTS = """
 import sys
 from pathlib import Path
-from rig.motion.state import ArmState, RuntimeState
+from rig.motion.turner_state import ArmState, RuntimeState
 from rig.commands.configured import load_configured
 from rig.runner.phases import Run
 from rig.station.events import PhaseRecorded, PreflightPassed
-from rig.station.station import Stations, always_yes
+from rig.station.operator_station import Stations, always_yes
 
 class Imports:
     def event(self, event):

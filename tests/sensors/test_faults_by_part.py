@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from rig.sensors.errors import SensorError
-from rig.sensors.kvh1775.source import kvh1775
-from rig.sensors.lines.source import lines
-from rig.sensors.mavlink.source import mavlink
-from rig.sensors.silence import USUAL, Patience
-from rig.sensors.source import OnSamples
+from rig.sensors.kvh1775.kvh_source import kvh1775
+from rig.sensors.lines.lines_source import lines
+from rig.sensors.mavlink.autopilot_source import mavlink
+from rig.sensors.port_silence import USUAL, Patience
+from rig.sensors.sample_source import OnSamples
 from rig.world.board.serial_line import misread
 from support.processes.waiting import wait_for
 from support.wires import autopilot_on_a_wire as autopilots

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
-from rig.sensors.kvh1775.driver import Kvh1775
-from rig.sensors.kvh1775.source import Kvh1775Source, kvh1775, look
-from rig.sensors.silence import USUAL, Patience
+from rig.sensors.kvh1775.kvh_driver import Kvh1775
+from rig.sensors.kvh1775.kvh_source import Kvh1775Source, kvh1775, look
+from rig.sensors.port_silence import USUAL, Patience
 from support.processes.waiting import wait_for, wait_for_error
 from support.wires.kvh_on_a_wire import SERIAL_NUMBER, KvhOnAWire, kvh_on_a_wire, section
 

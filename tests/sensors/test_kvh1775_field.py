@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rig.sensors.kvh1775.field import MagneticFieldReader
-from rig.sensors.kvh1775.messages import MESSAGE_DTYPE, SEQUENCE_NUMBERS
+from rig.sensors.kvh1775.format_c_field import MagneticFieldReader
+from rig.sensors.kvh1775.kvh_messages import MESSAGE_DTYPE, SEQUENCE_NUMBERS
 
 COUNT_T = 1e-9
 COUNT, FIRST = 900, 57  # of messages, and the sequence number of the first: seven wraps

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.sensors.errors import SensorError
-from rig.sensors.kvh1775.counting import MessageCounter
-from rig.sensors.kvh1775.messages import (
+from rig.sensors.kvh1775.kvh_messages import (
     MESSAGE_BYTES,
     BuiltInTest,
     Format,
@@ -18,6 +17,7 @@ from rig.sensors.kvh1775.messages import (
     encode_one,
     encode_test,
 )
+from rig.sensors.kvh1775.message_numbering import MessageCounter
 
 # ICD 56-0298 Rev. B, p. 51.
 SAMPLE = bytes.fromhex("FE81FF55 37A96A6E 38586C1F B75BF862 BF803E78 BB650D28 3B0A37AC 77 3D 0028 4BFA34D8")

@@ -20,9 +20,9 @@ from rig.config.sensors.lines_section import (
 from rig.config.units import UNITS
 from rig.data.quantity import ACCELERATION, FIELD, PRESSURE, RATE, SCALARS, TEMPERATURE
 from rig.sensors.errors import SensorError
-from rig.sensors.lines.source import describe, lines, look
-from rig.sensors.silence import Patience
-from rig.sensors.source import SampleSource
+from rig.sensors.lines.lines_source import describe, lines, look
+from rig.sensors.port_silence import Patience
+from rig.sensors.sample_source import SampleSource
 from support.processes.waiting import wait_for
 from support.wires.printed_lines import SEVEN, lines_section, pty_printing, sensor_section
 

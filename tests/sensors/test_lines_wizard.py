@@ -10,9 +10,9 @@ import pytest
 import yaml
 
 from rig.config.sensors.lines_section import LinesSection
+from rig.sensors.lines.guessed_section import section
 from rig.sensors.lines.guessing import Guess, guess
 from rig.sensors.lines.shape import NoShape, Shape, TimedLine, find_shape
-from rig.sensors.lines.written import section
 from support.wires.printed_lines import summed
 
 G = 9.80665

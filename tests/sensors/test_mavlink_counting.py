@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rig.sensors.errors import SensorError
-from rig.sensors.mavlink.counting import ImuCounter, LinkCounter
 from rig.sensors.mavlink.dialect import ARDUPILOT, PX4
+from rig.sensors.mavlink.message_losses import ImuCounter, LinkCounter
 from rig.sensors.mavlink.orientations import RIGHT_ANGLES, board_rotation
-from rig.sensors.mavlink.parameters import AutopilotParameter, encode_value
-from rig.world.autopilot.imu import ORIENTATIONS, simulated_rotation
+from rig.sensors.mavlink.parameter_encoding import AutopilotParameter, encode_value
+from rig.world.autopilot.autopilot_imu import ORIENTATIONS, simulated_rotation
 
 
 def taken(sequence: list[int], counter: LinkCounter) -> list[int]:

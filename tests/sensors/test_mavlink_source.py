@@ -12,7 +12,7 @@ from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
 from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
-from rig.sensors.mavlink.source import MavlinkSource, look, mavlink
+from rig.sensors.mavlink.autopilot_source import MavlinkSource, look, mavlink
 from support.processes.waiting import wait_for, wait_for_error
 from support.wires.autopilot_on_a_wire import BIAS_RAD_S, UID, AutopilotOnAWire, autopilot_on_a_wire, section
 

@@ -5,11 +5,11 @@ import pytest
 
 from rig.data.not_provided import Absent
 from rig.sensors.errors import SensorError
-from rig.sensors.kvh1775.source import NOT_PROVIDED as KVH
+from rig.sensors.kvh1775.kvh_source import NOT_PROVIDED as KVH
 from rig.sensors.lines.fields import NOT_PROVIDED as LINES
 from rig.sensors.mavlink.dialect import dialect
-from rig.sensors.mavlink.readings import NOT_PROVIDED as MAVLINK
-from rig.sensors.mavlink.readings import decode_reading
+from rig.sensors.mavlink.imu_readings import NOT_PROVIDED as MAVLINK
+from rig.sensors.mavlink.imu_readings import decode_reading
 from rig.sensors.thermometer import LONGEST_WITHOUT_S, Thermometer
 
 SIX = (1, 2, 3, 4, 5, 6)

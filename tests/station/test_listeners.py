@@ -31,7 +31,7 @@ from rig.station.events import (
     SensorSamples,
 )
 from rig.station.log import log
-from rig.station.station import Stations, always_yes
+from rig.station.operator_station import Stations, always_yes
 from rig.station.view import LiveView
 from rig.station.words import line, reason
 from support.processes.full_disk import full_disk

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.study.budget import Effects, errors, study
-from rig.study.report import Settings
+from rig.study.study_report import Settings
 
 
 @pytest.mark.thorough

@@ -12,9 +12,9 @@ import pytest
 from firmware_host.installation import install_command
 from rig.cli import main
 from rig.study import simulation as sim
-from rig.study.catalogue import STUDIES, find
 from rig.study.files import write
-from rig.study.report import Settings, StudyReport
+from rig.study.study_catalogue import STUDIES, find
+from rig.study.study_report import Settings, StudyReport
 
 pytestmark = pytest.mark.slow
 

@@ -6,9 +6,9 @@ from rig.config.load import load
 from rig.world.board.sensing_element import ElementFault, SensingElement
 from rig.world.clock import TICK_S, WorldClock
 from rig.world.laboratory import Laboratory
-from rig.world.section import read_world_section
-from rig.world.ur10e.interfaces.primary import PrimarySession
+from rig.world.ur10e.interfaces.primary_server import PrimarySession
 from rig.world.ur10e.modes import RuntimeState, SafetyMode
+from rig.world.world_section import read_world_section
 from support.paths import DEMO
 
 LOADED = load(DEMO)

@@ -15,12 +15,12 @@ from rig.config.sensors.sensor_sections import SensorSection
 from rig.config.world.laboratory import SimulatedSensorSection, WorldSection
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.clock import TICK_S, TICKS_PER_SECOND, WorldClock
-from rig.world.section import read_world_section
 from rig.world.ur10e.controller_messages import ProgramError
-from rig.world.ur10e.interfaces.primary import PrimarySession
+from rig.world.ur10e.interfaces.primary_server import PrimarySession
 from rig.world.ur10e.interfaces.rtde import OutputRecipe
 from rig.world.ur10e.motion.flange_motion import BodyMotion
 from rig.world.ur10e.motion.forward_kinematics import flange_rate
+from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal_document
 from support.laboratories.laboratory_host import Host, host
 from support.paths import DEMO

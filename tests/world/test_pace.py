@@ -13,11 +13,11 @@ import pytest
 
 from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Transfer, trapezoid_duration
-from rig.turners.ur.driver import Arm
+from rig.turners.ur.arm_driver import Arm
 from rig.world import network
 from rig.world.clock import DIALOGUE_S, TICK_S, WorldClock
-from rig.world.process import ARM_LAG_S
 from rig.world.wire import EARNED, FIRST_PATIENCE_S, IN_PACE_S, PATIENCE_S, Wire
+from rig.world.world_process import ARM_LAG_S
 from support.laboratories.worlds import World, fresh_host
 from support.processes.waiting import wait_for
 from support.wires.arm_relay import relay

@@ -7,7 +7,7 @@ from weakref import ref
 import pytest
 
 from rig.config.load import load
-from rig.world.process import World
+from rig.world.world_process import World
 from support.laboratories.commands import configuration
 
 

@@ -19,10 +19,10 @@ from rig.config.sensors.sensor_sections import mounting_matrix
 from rig.errors import Refused
 from rig.motion.geometry import flange_rate
 from rig.world.board.flash_file import open_flash
-from rig.world.board.mounting import read_firmware
+from rig.world.board.mounted_board import read_firmware
 from rig.world.board.serial_line import misread
 from rig.world.clock import TICKS_PER_SECOND
-from rig.world.section import read_world_section
+from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal
 from support.laboratories.laboratory_host import Host, booted, host
 from support.laboratories.worlds import World, WorldHandle

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.config.world.laboratory import SimulatedSensorSection
-from rig.sensors.kvh1775.messages import MessageReader
+from rig.sensors.kvh1775.kvh_messages import MessageReader
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.instrument import SimulatedKvh1775
 from rig.world.kvh1775.memory import KvhMemory

@@ -12,13 +12,13 @@ from rig.config.load import load
 from rig.errors import Refused
 from rig.world.laboratory import Laboratory
 from rig.world.network import ClientSession
-from rig.world.process import World
-from rig.world.section import read_world_section
 from rig.world.ur10e.interfaces.dashboard_server import DashboardSession
-from rig.world.ur10e.interfaces.primary import PrimarySession
+from rig.world.ur10e.interfaces.primary_server import PrimarySession
 from rig.world.ur10e.interfaces.rtde import RtdeSession
 from rig.world.ur10e.interfaces.variables import INPUTS, OUTPUTS
 from rig.world.ur10e.robot import Robot
+from rig.world.world_process import World
+from rig.world.world_section import read_world_section
 from support.paths import DEMO
 from support.wires.damaged_messages import carry_to_world
 

@@ -7,8 +7,8 @@ from rig.data.recording.motion_file import Columns, Item
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault
 from rig.estimation.by_hand import HandSolution, SessionConditions, solve_by_hand
-from rig.estimation.by_hand.session import FACES
-from rig.observation.by_hand.handled import segment_session
+from rig.estimation.by_hand.session_parts import FACES
+from rig.observation.by_hand.hand_segmentation import segment_session
 from rig.observation.external.csv_samples import Samples
 from rig.observation.stuck_check import check_reads
 

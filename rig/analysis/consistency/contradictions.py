@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rig.analysis.check import Check, fitness
-from rig.analysis.consistency import gyroscope_checks, readings
+from rig.analysis.consistency import converter_tests, gyroscope_checks
 from rig.analysis.consistency.detection_limits import DetectionLimit, find_gyroscope_limits, find_reference_limits
 from rig.analysis.consistency.frozen_axis import find_longest_frozen
 from rig.analysis.consistency.reference_contradictions import (
@@ -19,13 +19,13 @@ from rig.analysis.consistency.reference_contradictions import (
 )
 from rig.analysis.consistency.residual_tests import Statistic
 from rig.analysis.consistency.systematic_errors import build_error_patterns, collect_known_errors
+from rig.analysis.environment import Surroundings, surroundings_of
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.analysis.gyroscope.mounts import observe_as_mounted
-from rig.analysis.gyroscope.segments import append_transfers, stack_segments
-from rig.analysis.reference.acceleration import AccelerometerResult, calibrate_accelerometers
-from rig.analysis.reference.magnetic_field import MagnetometerResult
-from rig.analysis.solvable import solvable
-from rig.analysis.surroundings import Surroundings, surroundings_of
+from rig.analysis.gyroscope.segment_table import append_transfers, stack_segments
+from rig.analysis.numeric_errors import solvable
+from rig.analysis.reference.accelerometer import AccelerometerResult, calibrate_accelerometers
+from rig.analysis.reference.magnetometer import MagnetometerResult
 from rig.analysis.temperature.over_temperature import correct_recordings
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recording.run_file import RunData
@@ -40,7 +40,7 @@ from rig.observation.observed_run import ObservedRun
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
 NON_ORTHOGONALITY = "non_orthogonality"
 # Of a gyroscope: they share the false alarms. Other kinds of readings count as many.
-CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *readings.CHECKS, NON_ORTHOGONALITY)
+CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *converter_tests.CHECKS, NON_ORTHOGONALITY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +98,11 @@ def contradictions(
         }
         sweeps = [fitness(name, "rate", DISTURBED_SWEEP, *disturbed[sweep], sweep=sweep) for sweep in sorted(disturbed)]
         checks += sweeps or [fitness(name, "rate", DISTURBED_SWEEP, *tested.worst)]
-        of_readings = readings.judge_readings(
+        of_readings = converter_tests.judge_readings(
             counts,
             segments.readings,
             false_alarm_probability,
-            digits=readings.find_digits(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
+            digits=converter_tests.find_digits(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
             frozen=max(find_longest_frozen(recording, name) for recording in recordings),
         )
         checks += [

@@ -7,9 +7,9 @@ import numpy as np
 
 from rig.analysis.consistency.alternatives import FAULT_MODES, Means
 from rig.analysis.consistency.reference_alternatives import FAULT_MODES as REFERENCE_FAULT_MODES
+from rig.analysis.environment import Surroundings
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.vector_inputs import list_uncertainties
-from rig.analysis.surroundings import Surroundings
 from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array

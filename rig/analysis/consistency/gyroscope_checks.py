@@ -44,7 +44,7 @@ from rig.analysis.consistency.whitened_segments import (
     critical_value,
     whiten_segments,
 )
-from rig.analysis.gyroscope.segments import Segments
+from rig.analysis.gyroscope.segment_table import Segments
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process, select_by_akaike
 

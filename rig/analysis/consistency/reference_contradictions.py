@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.analysis.consistency.converter_tests import COUNTS, Digits, find_digits, judge_readings
 from rig.analysis.consistency.knocked_dwells import compare_dwell_halves
-from rig.analysis.consistency.readings import COUNTS, Digits, find_digits, judge_readings
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.consistency.reference_checks import check_reference
 from rig.analysis.consistency.residual_tests import Statistic
-from rig.analysis.reference.acceleration import AccelerometerResult
-from rig.analysis.reference.accelerometer_errors import list_windows
+from rig.analysis.reference.accelerometer import AccelerometerResult
 from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns
-from rig.analysis.reference.magnetic_field import MagnetometerResult
+from rig.analysis.reference.datasheet_errors import list_windows
+from rig.analysis.reference.magnetometer import MagnetometerResult
 from rig.analysis.reference.reference_budgets import drift_patterns, lag_pattern
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.recording.settings import Uncertainty

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.consistency.gyroscope_checks import ErrorPatterns
+from rig.analysis.environment import Surroundings
 from rig.analysis.gyroscope.calibration import SensorResult
-from rig.analysis.gyroscope.segments import Segments
+from rig.analysis.gyroscope.segment_table import Segments
 from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION, list_uncertainties
-from rig.analysis.surroundings import Surroundings
-from rig.config.judging.judged_by import OfSensor
+from rig.config.judging.judging_keys import OfSensor
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S

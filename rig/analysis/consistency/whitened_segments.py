@@ -14,7 +14,7 @@ from rig.analysis.consistency.residual_tests import (
     minimal_detectable_size,
     orthonormal_basis,
 )
-from rig.analysis.gyroscope.segments import Segments
+from rig.analysis.gyroscope.segment_table import Segments
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.bias_process import BiasProcess
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from rig.analysis.design.planned_motion import PlannedRun, measuring_steps, predict_motion, time_steps_of
-from rig.analysis.gyroscope.segments import Segments
+from rig.analysis.gyroscope.segment_table import Segments
 from rig.estimation.arrays import Array
 from rig.motion.steps import Plan, Sweep
 from rig.observation.consistency.raw_readings import REST

@@ -6,9 +6,9 @@ import numpy as np
 
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.design.planned_motion import PlannedRun, Timed, predict_attitude, predict_revolution, time_steps_of
-from rig.analysis.reference.acceleration import select_held_out, stack_sweeps
-from rig.analysis.reference.accelerometer_errors import Datasheet, ReferenceWindow, list_sensor_errors, read_datasheet
+from rig.analysis.reference.accelerometer import select_held_out, stack_sweeps
 from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns, list_arm_rotations
+from rig.analysis.reference.datasheet_errors import Datasheet, ReferenceWindow, list_sensor_errors, read_datasheet
 from rig.analysis.reference.reference_budgets import lag_pattern
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_catalogue import PARTS

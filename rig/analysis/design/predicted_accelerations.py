@@ -19,7 +19,7 @@ from rig.estimation.reference.attitude_error import AttitudeError
 from rig.estimation.reference.imu_fit import covariance_bound
 from rig.estimation.reference.reference_budget import Spread, scale_and_bias
 from rig.estimation.reference.reference_model import matrix
-from rig.estimation.statistics.expected_sizes import OWN_SHARES
+from rig.estimation.statistics.expected_variances import OWN_SHARES
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Plan
 

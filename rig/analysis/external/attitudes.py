@@ -7,11 +7,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rig.analysis.estimators import choose_estimator
-from rig.analysis.external.increments import InIncrements, solve_turning
-from rig.analysis.external.placed_budget import budget_by_causes, noise_freedom
-from rig.analysis.external.placed_equations import Equations
-from rig.analysis.installed_kinds import OfKind
+from rig.analysis.estimator_names import choose_estimator
+from rig.analysis.external.attitude_budget import budget_by_causes, noise_freedom
+from rig.analysis.external.attitude_equations import Equations
+from rig.analysis.external.increment_calibration import InIncrements, solve_turning
+from rig.analysis.installed_solvers import OfKind
 from rig.analysis.reference.triad import Triad, check_identifiable, check_mounted, field_reference, gravity_reference
 from rig.data.installed_kinds import installed_kinds
 from rig.data.quantity import ACCELERATION, RATE, Quantity

@@ -11,7 +11,7 @@ from rig.data.quantity import RATE
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.external.known_increments import KnownIncrements
+from rig.estimation.external.increment_solution import KnownIncrements
 from rig.estimation.reference.reference_model import BIAS
 from rig.estimation.statistics.coverage import false_alarm_of_each
 from rig.observation.external.fixes import Turning

@@ -6,10 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, find_estimator
+from rig.analysis.environment import Surroundings
+from rig.analysis.estimator_names import DEFAULT_ESTIMATOR, Estimator, find_estimator
 from rig.analysis.gyroscope.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
 from rig.analysis.gyroscope.vector_inputs import collect_inputs, list_given, list_uncertainties
-from rig.analysis.surroundings import Surroundings
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunData
@@ -21,14 +21,14 @@ from rig.estimation.gyroscope.accumulator import Accumulator, SixObservationEsti
 from rig.estimation.gyroscope.budget import Budget, Unknown, budget
 from rig.estimation.gyroscope.earth_rate import EarthRate, find_earth_rate
 from rig.estimation.gyroscope.estimate import Estimate
-from rig.estimation.gyroscope.known_turns import TurnedSolution
 from rig.estimation.gyroscope.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
+from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.gyroscope.six_observation_budget import six_observation_budget
 from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs, explain
 from rig.estimation.gyroscope.vector_model import VectorSolution, solve_vector_model
 from rig.estimation.refusals import check_duplicates
 from rig.observation.average import Average
-from rig.observation.finished import finished_sweeps
+from rig.observation.finished_steps import finished_sweeps
 from rig.observation.observe import Observation
 from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.known_turns import TurnedSolution
+from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.gyroscope.vector_model import VectorSolution
 
 CorrectionKind = Literal["matrix", "diagonal"]

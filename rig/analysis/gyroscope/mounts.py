@@ -10,9 +10,9 @@ from functools import partial
 
 import numpy as np
 
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.analysis.gyroscope.vector_inputs import collect_inputs
-from rig.analysis.surroundings import surroundings_of
 from rig.config.procedures.stage_section import rotation_by
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import RunSettings

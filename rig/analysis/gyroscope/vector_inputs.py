@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.analysis.clock import PPM
-from rig.analysis.surroundings import Surroundings
+from rig.analysis.clock_comparison import PPM
+from rig.analysis.environment import Surroundings
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array

@@ -15,7 +15,7 @@ from rig.analysis.gyroscope.comparison import Comparison, Reference, compare, li
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.finished import finished_sweeps
+from rig.observation.finished_steps import finished_sweeps
 from rig.observation.observed_run import ObservedRun
 
 

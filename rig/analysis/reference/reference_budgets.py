@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from rig.analysis.reference.accelerometer_errors import Datasheet, separate_sensor_errors
+from rig.analysis.reference.datasheet_errors import Datasheet, separate_sensor_errors
 from rig.data.quantity import FIELD
 from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array, scale_of

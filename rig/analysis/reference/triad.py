@@ -15,7 +15,7 @@ from rig.estimation.reference.reference_model import F, KnownNorm
 from rig.estimation.reference.triaxial import Method, TriaxialSolution
 from rig.estimation.refusals import check_axes
 from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
-from rig.observation.reference.acceleration import DwellReading
+from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.statistics.mean import StaticReading
 
 COMPARED: tuple[Method, ...] = ("maximum_likelihood", "as_published")  # reported with the chosen one

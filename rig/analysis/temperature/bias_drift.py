@@ -22,7 +22,7 @@ from rig.estimation.sensor_axes import nearest_rotation
 from rig.estimation.statistics.coverage import effective_freedom
 from rig.estimation.temperature.bias_by_repeat import BiasByRepeat, bias_by_repeat
 from rig.estimation.temperature.bias_over_temperature import BiasOverTemperature, bias_over_temperature
-from rig.observation.finished import dwell_times_s
+from rig.observation.finished_steps import dwell_times_s
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.mean import by_axis
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.analysis.environment import Surroundings, surroundings_of
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.vector_inputs import collect_inputs
-from rig.analysis.reference.acceleration import AccelerometerResult
-from rig.analysis.surroundings import Surroundings, surroundings_of
+from rig.analysis.reference.accelerometer import AccelerometerResult
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
 from rig.data.recording.settings import RunSettings
 from rig.errors import Fault
@@ -30,7 +30,7 @@ from rig.observation.average import Average
 from rig.observation.external.csv_import import ExternalData
 from rig.observation.observe import Observation, SensorObservations
 from rig.observation.observed_run import ObservedRun
-from rig.observation.reference.acceleration import DwellReading
+from rig.observation.reference.dwell_acceleration import DwellReading
 
 CONTRIBUTOR = "polynomials over temperature"
 ASSUMED_GRADIENT_K = 0.1  # a half-width, if no configuration states it

@@ -15,8 +15,8 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.config.sensors.sensor_sections import SensorSection
     from rig.data.result_file import ResultDocument
-    from rig.sensors.mavlink.journal import ParameterChange
-    from rig.sensors.mavlink.link import AutopilotLink
+    from rig.sensors.mavlink.autopilot_link import AutopilotLink
+    from rig.sensors.mavlink.parameter_journal import ParameterChange
 
 BEYOND = {
     "gyroscope": "scale factors and axes of gyroscopes: no parameter holds them",
@@ -49,8 +49,8 @@ def run(options: Namespace) -> int:
 
 def _store(options: Namespace) -> int:
     from rig.data.result_file import read_passed_result
-    from rig.sensors.mavlink.journal import ParameterChange
-    from rig.sensors.mavlink.parameters import AutopilotParameter, encode_value
+    from rig.sensors.mavlink.parameter_encoding import AutopilotParameter, encode_value
+    from rig.sensors.mavlink.parameter_journal import ParameterChange
     from rig.sensors.mavlink.writing import autopilot_id, find_unfinished_change
     from rig.station.confirm import agreed_or_refused
 
@@ -81,7 +81,7 @@ def _store(options: Namespace) -> int:
 
 
 def _restore(options: Namespace) -> int:
-    from rig.sensors.mavlink.journal import read_change
+    from rig.sensors.mavlink.parameter_journal import read_change
     from rig.sensors.mavlink.writing import autopilot_id
     from rig.station.confirm import agreed_or_refused
 
@@ -129,9 +129,9 @@ def _read_values(
     from rig.data.quantity import RATE
     from rig.report.exports.autopilots import ARDUPILOT as ARDUPILOTS
     from rig.report.exports.autopilots import IMU, PX4
-    from rig.report.exports.calibrations import calibrations
+    from rig.report.exports.exported_corrections import calibrations
+    from rig.sensors.mavlink.autopilot_source import mavlink_section
     from rig.sensors.mavlink.dialect import ARDUPILOT
-    from rig.sensors.mavlink.source import mavlink_section
 
     parameters_of = ARDUPILOTS if firmware == ARDUPILOT else PX4
     values: dict[str, float] = {}
@@ -165,12 +165,12 @@ def _backup_path(options: Namespace) -> Path:
 def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
     """Connect to the only autopilot of a configuration, in its simulated laboratory if it has one, with its IMUs."""
     from rig.commands.laboratory.claims import claim_sensor
-    from rig.commands.laboratory.laboratory import simulated_laboratory
+    from rig.commands.laboratory.laboratory_process import simulated_laboratory
     from rig.commands.laboratory.own_address import load_at_own_address
     from rig.errors import raised_as
-    from rig.sensors.mavlink.link import AutopilotLink
-    from rig.sensors.mavlink.source import mavlink_section
-    from rig.sensors.registry import group_by_port
+    from rig.sensors.mavlink.autopilot_link import AutopilotLink
+    from rig.sensors.mavlink.autopilot_source import mavlink_section
+    from rig.sensors.sensor_registry import group_by_port
 
     with ExitStack() as stack:
         loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))

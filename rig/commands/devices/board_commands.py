@@ -10,6 +10,7 @@ from pathlib import Path
 
 from firmware_host.client import Board, Calibration, StoredCalibration
 from rig.board.crystal import follows_crystal
+from rig.board.flash_store import calibration_of, store
 from rig.board.identify import (
     changing,
     find_sensor,
@@ -20,9 +21,8 @@ from rig.board.identify import (
     sensor_entry,
     spell_part,
 )
-from rig.board.store import calibration_of, store
 from rig.commands.laboratory.claims import claim_board
-from rig.commands.laboratory.laboratory import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import simulated_laboratory
 from rig.commands.laboratory.own_address import load_at_own_address
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_sections import SensorSection

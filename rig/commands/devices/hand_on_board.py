@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from firmware_host.client import Board, Calibration
+from rig.board.flash_store import store
 from rig.board.identify import (
     changing,
     find_sensor,
@@ -22,9 +23,8 @@ from rig.board.identify import (
     require_board_section,
     spell_part,
 )
-from rig.board.store import store
 from rig.commands.laboratory.claims import claim_board
-from rig.commands.laboratory.laboratory import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import simulated_laboratory
 from rig.commands.laboratory.own_address import load_at_own_address
 from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.config.models import RigConfig

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from rig.commands.config_arguments import add_json, add_set
-from rig.commands.laboratory.laboratory import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import simulated_laboratory
 from rig.errors import Refused, raised_as
 from rig.station.plain_text import say
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.report.terminal.kvh_info import KvhInfo
-    from rig.sensors.kvh1775.messages import Format
+    from rig.sensors.kvh1775.kvh_messages import Format
 
 LOOK_S = 1.0
 LEAST_MESSAGES = 3
@@ -69,8 +69,8 @@ def _look(name: str, port: str, baud: int) -> "KvhInfo":
     from rig.commands.laboratory.claims import claim_sensor
     from rig.report.terminal.kvh_info import KvhInfo
     from rig.sensors.errors import SensorError
-    from rig.sensors.kvh1775.driver import Kvh1775
-    from rig.sensors.kvh1775.settings import Kvh1775Settings
+    from rig.sensors.kvh1775.kvh_driver import Kvh1775
+    from rig.sensors.kvh1775.kvh_settings import Kvh1775Settings
 
     batches: list[NDArray[Any]] = []
     with (

@@ -10,7 +10,7 @@ from rig.errors.quoting import printable_lines
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.sensors.lines.written import StatedProperties
+    from rig.sensors.lines.guessed_section import StatedProperties
 
 SECONDS = (4.0, 6.0)
 
@@ -51,14 +51,14 @@ def run(options: Namespace) -> int:
     if not all(0.5 <= duration_s <= 600 for duration_s in options.seconds):
         raise Refused("bad_option", "--seconds are two times from 0.5 to 600", "Give for example --seconds 4 6")
     if options.write is None:
-        from rig.sensors.lines.written import StatedProperties
+        from rig.sensors.lines.guessed_section import StatedProperties
 
         given_values = StatedProperties(options.serial_number, options.range_deg_s, options.range_g)
         section = look_at_device(options.port, options.baud, options.name, tuple(options.seconds), given_values)
         _tell('write what is known in place of "?"; rig check refuses the section until then')
         sys.stdout.write(section)
         return 0
-    from rig.commands.devices.written import refuse_existing, write_checked
+    from rig.commands.devices.configuration_writing import refuse_existing, write_checked
     from rig.config.first_configuration import Answers
 
     refuse_existing(options.write)
@@ -69,9 +69,9 @@ def run(options: Namespace) -> int:
 
 def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
     """Ask for values without an option; without a terminal they stay open. Raise Refused `bad_option`."""
-    from rig.commands.devices.questions import ask
+    from rig.commands.devices.terminal_questions import ask
     from rig.config.sensors.sensor_sections import check_serial_number
-    from rig.sensors.lines.written import StatedProperties
+    from rig.sensors.lines.guessed_section import StatedProperties
 
     questions = {
         "serial_number": ("serial number of this specimen", "--serial-number", check_serial_number),
@@ -106,10 +106,10 @@ def look_at_device(
     Raise Refused as `listen`, and `lines_no_pattern` if its lines have nothing in common.
     """
     from rig.commands.laboratory.claims import claim_sensor
+    from rig.sensors.lines.guessed_section import section
     from rig.sensors.lines.guessing import guess
     from rig.sensors.lines.listening import listen
     from rig.sensors.lines.shape import NoShape, find_shape
-    from rig.sensors.lines.written import section
 
     with raised_as(Refused), claim_sensor(name, port):
         baud, lines, still_s = listen(port, baud, _tell, seconds)

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.commands.devices.configuration_writing import refuse_existing, write_checked
 from rig.commands.devices.lines import SECONDS, add_stated, ask_stated, look_at_device, positive_number
-from rig.commands.devices.questions import ask, ask_choice
-from rig.commands.devices.written import refuse_existing, write_checked
+from rig.commands.devices.terminal_questions import ask, ask_choice
 from rig.errors import RigError
 from rig.station.plain_text import say
 

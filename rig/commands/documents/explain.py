@@ -11,7 +11,7 @@ from rig.errors.quoting import shorten
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.errors.by_way import CalibrationMethod
+    from rig.errors.remedies_by_method import CalibrationMethod
 
 METHODS: "dict[CalibrationMethod, str]" = {
     "hand": "by hand",
@@ -49,7 +49,7 @@ def _explain_check(name: str) -> Iterator[str]:
 
 
 def _explain_limit(name: str) -> Iterator[str]:
-    from rig.config.judging.limits import LIMITS, Limits
+    from rig.config.judging.verdict_limits import LIMITS, Limits
 
     key = name.removeprefix("limits.")
     if key in LIMITS:
@@ -72,9 +72,9 @@ def _explain_error(name: str) -> Iterator[str]:
 
 def _explain_remedies(name: str, usual: str) -> Iterator[str]:
     """Yield the remedies, one line for each method if they differ, that of the latest run first."""
-    from rig.errors.by_way import remedies_by_way
+    from rig.errors.remedies_by_method import remedies_by_method
 
-    remedies = remedies_by_way(name)
+    remedies = remedies_by_method(name)
     if not remedies:
         yield f"What to do: {usual.rstrip('.')}."
         return
@@ -114,7 +114,7 @@ def _explain_word(name: str) -> Iterator[str]:
 
 
 def _list_names() -> list[str]:
-    from rig.config.judging.limits import LIMITS
+    from rig.config.judging.verdict_limits import LIMITS
     from rig.errors.catalogue import catalogue
     from rig.report.words.check_words import check_words
     from rig.report.words.glossary import glossary

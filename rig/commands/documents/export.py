@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_run
-from rig.config.files.written_file import replace_together, write_new
+from rig.config.files.safe_writing import replace_together, write_new
 from rig.errors import Refused
 from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibrations, writer_of_readings
 from rig.station.plain_text import say, say_on_terminal
 
 if TYPE_CHECKING:
-    from rig.report.exports.calibrations import ExportedCalibrations
+    from rig.report.exports.exported_corrections import ExportedCalibrations
 
 
 def add(parser: ArgumentParser) -> None:
@@ -47,8 +47,8 @@ def export_files(options: Namespace) -> list[Path]:
     Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links`; for readings as `open_run` and
     `exported`; for calibrations as `read_passed_result`, `at_temperature` and the format.
     """
-    from rig.plans.recorded import open_run
-    from rig.report.exports.recorded import exported
+    from rig.plans.recorded_run import open_run
+    from rig.report.exports.exported_recording import exported
 
     run, name, out = options.run, options.format, options.out
     moved: tuple[str, str] | None = options.at_temperature
@@ -91,7 +91,7 @@ def _make_folder(folder: Path, *, named_by_user: bool) -> None:
 
 def _read_calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCalibrations":
     from rig.data.result_file import read_passed_result, read_result
-    from rig.report.exports.calibrations import calibrations
+    from rig.report.exports.exported_corrections import calibrations
     from rig.report.exports.temperature import at_temperature
 
     run_calibrations = calibrations(read_passed_result(run))

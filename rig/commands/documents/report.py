@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_run, add_set
 from rig.commands.history.named_history import add_history, read_history_name
-from rig.config.files.written_file import replace_together, write_new
+from rig.config.files.safe_writing import replace_together, write_new
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
 
@@ -91,9 +91,9 @@ def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path
     from rig.data.entries.magnetometer import read_reversal
     from rig.data.result_file import read_result
     from rig.data.run_folder import CERTIFICATE, RESULT, refuse_links
-    from rig.history.entered.issued import issue_certificate
+    from rig.history.entered.issued_certificate import issue_certificate
+    from rig.report.certificate.certificate_page import certificate_page
     from rig.report.certificate.content import certificate_of
-    from rig.report.certificate.page import certificate_page
     from rig.report.certificate.pdf import PDF
     from rig.report.certificate.statements import stated_in
     from rig.report.signatures.reason import reason_of

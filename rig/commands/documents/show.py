@@ -29,7 +29,7 @@ def run(options: Namespace) -> int:
     from rich.console import Console
 
     from rig.data.result_file import read_result
-    from rig.report.terminal.table import print_checks, print_kept, print_values, print_verdict
+    from rig.report.terminal.result_table import print_checks, print_kept, print_values, print_verdict
     from rig.station.plain_text import say
 
     result, sensor = read_result(options.run), options.sensor
@@ -53,7 +53,7 @@ def run(options: Namespace) -> int:
 
 
 def _list_sensors(result: "ResultDocument") -> list[str]:
-    from rig.report.kinds.registry import kinds
+    from rig.report.kinds.kind_registry import kinds
 
     return [*dict.fromkeys(entry.sensor for kind in kinds() for entry in kind.find(result))]
 

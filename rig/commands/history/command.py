@@ -122,10 +122,10 @@ def _day(text: str) -> date:
 def run(options: argparse.Namespace) -> int:
     """Carry out the chosen command. Ctrl-C ends it at once, even while its database does not answer."""
     if options.of_history == RECOMPUTE:
-        from rig.commands.history.again import recompute_history
+        from rig.commands.history.recompute import recompute_history
 
         return recompute_history(options)
-    from rig.commands.history import questions as history
+    from rig.commands.history import history_queries as history
 
     commands: dict[str, Callable[[argparse.Namespace], int]] = {
         LIST: history.list_calibrations,

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.history.answer import TO_ENTER, ask_history, explain_failure
+from rig.commands.history.history_answer import TO_ENTER, ask_history, explain_failure
 from rig.errors import RigError
 from rig.station.events import NotRemembered, Remembered, RunEvent, Since
 
 if TYPE_CHECKING:
     from rig.config.judging.judging_sections import HistorySection
-    from rig.history.entered.finished import FinishedRun
-    from rig.history.entered.issued import Issued
+    from rig.history.entered.finished_run import FinishedRun
+    from rig.history.entered.issued_certificate import Issued
     from rig.history.series import Change
     from rig.history.storage.address import HistoryAddress
     from rig.history.store import History, Past
@@ -49,7 +49,7 @@ def _enter_run(
 ) -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
     label = "the history"
     try:
-        from rig.history.entered.finished import read_finished_run
+        from rig.history.entered.finished_run import read_finished_run
 
         address = choose_address()
         if address is None:
@@ -80,7 +80,7 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
     as the folder may come from anywhere.
     """
     try:
-        from rig.history.entered.finished import content_sha256, read_configuration
+        from rig.history.entered.finished_run import content_sha256, read_configuration
         from rig.history.storage.address import own_history_address
 
         loaded = read_configuration(folder)
@@ -103,7 +103,7 @@ def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str
     None if there is no history, if it does not answer, or if it is empty.
     """
     try:
-        from rig.history.entered.finished import read_configuration
+        from rig.history.entered.finished_run import read_configuration
         from rig.history.storage.address import own_history_address
 
         loaded = read_configuration(folder)

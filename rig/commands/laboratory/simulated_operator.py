@@ -3,7 +3,7 @@
 import json
 import socket
 
-from rig.commands.laboratory.laboratory import MOUNT_TIMEOUT_S
+from rig.commands.laboratory.laboratory_process import MOUNT_TIMEOUT_S
 from rig.data.recording.hand_events import HandAsked
 from rig.station.events import RunEvent
 

@@ -5,7 +5,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from rig.commands.config_arguments import add_config
-from rig.commands.laboratory.laboratory import write_temporary
+from rig.commands.laboratory.laboratory_process import write_temporary
 from rig.commands.laboratory.only_on_linux import refuse_unless_linux
 
 

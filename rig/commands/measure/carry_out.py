@@ -6,21 +6,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.configured import Configured
-from rig.commands.history.recall import recall_sensors
 from rig.commands.history.remember import describe_changes, remember
+from rig.commands.history.run_serials import recall_sensors
 from rig.commands.laboratory.claims import claim_devices
-from rig.commands.laboratory.laboratory import make_mounter, simulated_laboratory
+from rig.commands.laboratory.laboratory_process import make_mounter, simulated_laboratory
 from rig.commands.laboratory.simulated_operator import OperatorListener
 from rig.commands.page_arguments import PageWish, serve_operators_page
 from rig.commands.standard_streams import say_where_the_result_is
 from rig.data.run_folder import CONFIG, LOG, RESULT, WORLD_LATE
 from rig.report.document import document_of
-from rig.report.terminal.table import print_kept
+from rig.report.terminal.result_table import print_kept
 from rig.runner.phases import Run
 from rig.station.confirm import ask_operator
 from rig.station.events import NotRemembered, RunFolderWritten
 from rig.station.log import log
-from rig.station.station import Stations, always_yes
+from rig.station.operator_station import Stations, always_yes
 from rig.station.view import view
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def carry_out(
 def _about(folder: Path, configured: Configured, page: PageWish | None) -> "About":
     from rig.page.about import About
     from rig.page.arm import built
-    from rig.turners.registry import kind_of
+    from rig.turners.turner_registry import kind_of
 
     config = configured.loaded.config
     return About(

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.load import Loaded
-from rig.data.own_texts import is_own
 from rig.data.run_folder import CONFIG, resuming
+from rig.data.user_texts import is_own
 from rig.errors import Refused
 from rig.history.storage.address import ENVIRONMENT
 

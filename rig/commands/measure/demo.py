@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.commands.config_arguments import add_json
 from rig.commands.page_arguments import add_page
-from rig.config.files.supplied import NAMES, supplied
+from rig.config.files.supplied_files import NAMES, supplied
 from rig.errors import Refused
 from rig.station.plain_text import say
 

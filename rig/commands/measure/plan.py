@@ -5,7 +5,7 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
-from rig.commands.measure.wanted import add_target, print_shortest_run
+from rig.commands.measure.target_uncertainty import add_target, print_shortest_run
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def make_plan(options: Namespace) -> "DryRun":
     from rig.commands.configured import load_configured
     from rig.errors import refuse
     from rig.report.terminal.plan_table import DryRun
-    from rig.turners.registry import kind_of
+    from rig.turners.turner_registry import kind_of
 
     configured = load_configured(options.config, options.overrides, options.script)
     steps = configured.phase.plan()

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rig.commands.config_arguments import add_config
-from rig.commands.laboratory.laboratory import simulated_laboratory
+from rig.commands.laboratory.laboratory_process import simulated_laboratory
 from rig.errors import Refused
 from rig.station.plain_text import say
 
@@ -35,7 +35,7 @@ def run(options: Namespace) -> int:
         raise Refused("bad_option", f"--duration-s is {options.duration_s:g}", "Give a time above 0, in seconds")
     from rig.commands.laboratory.own_address import find_own_address
     from rig.config.load import load_sensors
-    from rig.runner.readings import record_readings
+    from rig.runner.csv_recording import record_readings
 
     config, simulated = load_sensors(options.config, options.overrides)
     with ExitStack() as stack:

@@ -43,7 +43,7 @@ def run(options: Namespace) -> int:
     from rig.data.result_file import read_result
     from rig.data.run_folder import CONFIG, RESULT, SCRIPT, refuse_links, script_identity
     from rig.plans.script_file import kept_script, load_script
-    from rig.turners.registry import sections
+    from rig.turners.turner_registry import sections
 
     folder: Path = options.run_folder
     if not (folder / CONFIG).exists():

@@ -64,8 +64,8 @@ def prepare_run(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
     `load_configured` and `new_folder`.
     """
     from rig.commands.configured import open_configured
-    from rig.data.own_texts import note_own
     from rig.data.run_folder import discard, new_folder
+    from rig.data.user_texts import note_own
     from rig.errors import Refused
 
     with open_configured(options.config, options.overrides, options.script) as configured:

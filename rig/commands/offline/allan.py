@@ -11,7 +11,7 @@ from rig.errors import Refused, raised_as
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.analysis.at_rest import SensorAtRest
+    from rig.analysis.rest_noise import SensorAtRest
 
 CSV = (".csv", ".csv.gz")
 
@@ -53,16 +53,16 @@ def _is_log(path: Path) -> bool:
 
 
 def _analyse_logs(paths: Sequence[Path]) -> "dict[str, SensorAtRest]":
-    from rig.analysis.at_rest import log_at_rest
+    from rig.analysis.rest_noise import log_at_rest
     from rig.observation.external.csv_samples import read_samples
 
     return {path.stem: log_at_rest(read_samples(path)) for path in paths}
 
 
 def _analyse_run(path: Path) -> "dict[str, SensorAtRest]":
-    from rig.analysis.at_rest import at_rest, log_at_rest
+    from rig.analysis.rest_noise import at_rest, log_at_rest
     from rig.observation.external.csv_samples import samples_in
-    from rig.plans.recorded import open_run
+    from rig.plans.recorded_run import open_run
 
     recorded = open_run(path).raw
     if not recorded:

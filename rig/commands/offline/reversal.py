@@ -20,9 +20,9 @@ def run(options: Namespace) -> int:
     Raise Refused `report_folder`, and Refused and Fault as `open_run`, `turner_of`, `judged` and `reversals`.
     """
     from rig.analysis.reversal import reversals
-    from rig.config.files.written_file import write_new
+    from rig.config.files.safe_writing import write_new
     from rig.observation.motion.arm_motion import turner_of
-    from rig.plans.recorded import judged, open_run
+    from rig.plans.recorded_run import judged, open_run
     from rig.report.terminal.reversal import print_reversal, reversal_document
 
     opened = [(str(path), open_run(path)) for path in options.runs]

@@ -5,7 +5,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from rig.commands.config_arguments import add_json, add_run, add_set
-from rig.commands.offline import solve_elsewhere
+from rig.commands.offline import solve_external
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
 
@@ -41,7 +41,7 @@ def add(solve: ArgumentParser) -> None:
     shown = solve.add_mutually_exclusive_group()
     add_json(shown)
     shown.add_argument("--all", action="store_true", help="every table: values, budgets, checks")
-    solve_elsewhere.add(solve)
+    solve_external.add(solve)
 
 
 def run(options: Namespace) -> int:
@@ -57,7 +57,7 @@ def run(options: Namespace) -> int:
         return _solve_recording(options)
     if options.overrides:
         raise Refused("unknown_setting", "samples as CSV have no settings", "Leave out --set")
-    return solve_elsewhere.run(options)
+    return solve_external.run(options)
 
 
 def _solve_recording(options: Namespace) -> int:
@@ -69,9 +69,9 @@ def _solve_recording(options: Namespace) -> int:
     from rig.data.recording.run_reading import reading_ahead
 
     with reading_ahead(options.run) as begun:
-        from rig.plans.recorded import judged, left_out, open_run
+        from rig.plans.recorded_run import judged, left_out, open_run
         from rig.report.document import document_of
-        from rig.report.terminal.table import print_outcome
+        from rig.report.terminal.result_table import print_outcome
 
         run = open_run(options.run, options.script, begun=begun).judged_by(options.overrides)
     say_on_terminal("solving")

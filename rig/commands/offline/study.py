@@ -13,8 +13,8 @@ from rig.errors import Refused
 from rig.station.plain_text import duration_words, say
 
 if TYPE_CHECKING:
-    from rig.study.catalogue import StudyEntry
-    from rig.study.report import StudyFinding
+    from rig.study.study_catalogue import StudyEntry
+    from rig.study.study_report import StudyFinding
 
 SHOWN_FROM_S = 5.0
 
@@ -44,7 +44,7 @@ def _list_studies() -> int:
     from rich.console import Console
     from rich.table import Table
 
-    from rig.study.catalogue import STUDIES
+    from rig.study.study_catalogue import STUDIES
 
     table = Table(box=None, show_header=False)
     for name, entry in STUDIES.items():
@@ -62,9 +62,9 @@ def _run_study(options: Namespace) -> int:
     """
     from rig.data.run_folder import refuse_links
     from rig.errors.extras import missing_extra
-    from rig.study.catalogue import find
     from rig.study.files import write
-    from rig.study.report import Settings
+    from rig.study.study_catalogue import find
+    from rig.study.study_report import Settings
 
     entry = find(options.name)
     for option, least in (("seed", 0), ("runs", 10), ("jobs", 1)):

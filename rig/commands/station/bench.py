@@ -14,28 +14,28 @@ from functools import partial
 from pathlib import Path
 
 from rig.analysis.outcome import Outcome
-from rig.batch.batch import BatchPart, Chip, PartEnded
-from rig.batch.parts_in_turn import Desk, now_utc
+from rig.batch.batch_state import BatchPart, Chip, PartEnded
+from rig.batch.part_sequence import Desk, now_utc
 from rig.commands.configured import Configured, change_configured
-from rig.commands.history.recall import find_other_board, recall_sensors
 from rig.commands.history.remember import remember
+from rig.commands.history.run_serials import find_other_board, recall_sensors
 from rig.commands.laboratory.claims import claim_devices
-from rig.commands.laboratory.laboratory import make_fitter, make_mounter, simulated_laboratory
+from rig.commands.laboratory.laboratory_process import make_fitter, make_mounter, simulated_laboratory
 from rig.commands.page_arguments import Answer
 from rig.config.models import RigConfig
-from rig.data.own_texts import note_own
 from rig.data.result_file import read_result
 from rig.data.run_folder import ARM_LOG, CONFIG, LOG, RESULT, WORLD_LATE, discard, new_folder
+from rig.data.user_texts import note_own
 from rig.errors import Fault, Refused
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.statements import of_configuration
-from rig.runner.ahead import Ahead
+from rig.runner.early_connection import Ahead
 from rig.runner.phases import Run
 from rig.station.events import Advice, BoardConnected, RunEvent, RunFolderWritten, SamplingStarted
 from rig.station.log import log
-from rig.station.station import Listener, Stations
+from rig.station.operator_station import Listener, Stations
 from rig.station.view import view
-from rig.turners.registry import kind_of
+from rig.turners.turner_registry import kind_of
 
 
 @dataclass(slots=True)

@@ -20,7 +20,7 @@ def run(options: Namespace) -> int:
 
     Raise Refused `page_address`, `no_history`, and as `open_history`.
     """
-    from rig.floor.feed import looking
+    from rig.floor.floor_feed import looking
     from rig.history.storage.address import own_history_address
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history

@@ -54,7 +54,7 @@ def run(options: Namespace) -> int:
     """
     from rig.batch.label import refuse_without_library
     from rig.batch.operators import Operator, Terminal, refuse_without_terminal
-    from rig.batch.series import numbers_in
+    from rig.batch.part_list import numbers_in
     from rig.batch.status import Now, Present
     from rig.commands.configured import open_configured
     from rig.commands.station.one_arena import keep_to_one_arena
@@ -76,10 +76,10 @@ def run(options: Namespace) -> int:
 
 
 def _carry_out_batch(options: Namespace, configured: "Configured", operator: "Operator", present: "Present") -> int:
-    from rig.batch.batch import Begun
-    from rig.batch.journal import open_journal
-    from rig.batch.parts_in_turn import Work, now_utc
-    from rig.batch.table import CSV, summary
+    from rig.batch.batch_journal import open_journal
+    from rig.batch.batch_state import Begun
+    from rig.batch.batch_table import CSV, summary
+    from rig.batch.part_sequence import Work, now_utc
     from rig.commands.station.bench import BatchSettings, open_bench
     from rig.station.events import Interrupted
 
@@ -131,7 +131,7 @@ def _send_heartbeats(config: "RigConfig", present: "Present") -> Iterator[None]:
 @contextmanager
 def _serve_page(wanted: "PageWish", present: "Present") -> "Iterator[Voice]":
     """Serve the station's page, which asks the operator."""
-    from rig.batch.on_page import on_page
+    from rig.batch.page_operator import on_page
 
     with on_page(present, wanted.address()) as (voice, url):
         say(f"page: {url}", sys.stderr)

@@ -15,8 +15,8 @@ from rig.config.section import RATIO, Section, SensorName, Vector3
 from rig.config.world.autopilot import SimulatedAutopilotSection
 from rig.config.world.by_hand import SimulatedHandSection
 from rig.config.world.faulty import SimulatedFaultySection
-from rig.config.world.lines import SimulatedLinesSection
 from rig.config.world.magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
+from rig.config.world.printing_device import SimulatedLinesSection
 from rig.config.world.servo import SimulatedServoSection
 from rig.config.world.thermal import SimulatedThermalSection
 

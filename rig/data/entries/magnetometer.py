@@ -6,7 +6,6 @@ from typing import Final, Literal
 
 from pydantic import Field
 
-from rig.data.checked import read_document
 from rig.data.entries.budget import BudgetEntry
 from rig.data.entries.result_types import (
     ConditionsEntry,
@@ -22,6 +21,7 @@ from rig.data.entries.result_types import (
     Utc,
     Vector3,
 )
+from rig.data.validation import read_document
 
 REVERSAL_MAX_BYTES: Final = 4_000_000  # of two runs it has 4,000
 

@@ -21,7 +21,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, BinaryIO, Self, TypeAlias
 
 from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
-from rig.data.processes.silence import Silence
+from rig.data.processes.process_silence import Silence
 from rig.errors import Refused
 from rig.errors.quoting import printable
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from firmware_host.samples import STAMPS
-from rig.data.checked import Finite, Positive
 from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE, Quantity, Scalar
+from rig.data.validation import Finite, Positive
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps, cut_steps, find_steps
 

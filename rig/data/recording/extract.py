@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.processes.reading_process import MAX_UNPACKED, size_without_holes
+from rig.data.recording.layout_keys import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS
 from rig.data.recording.run_reading import MAX_UNWRITTEN_BYTES
-from rig.data.recording.schema import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 MAX_SENSORS = 64

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.files.written_file import write_new
-from rig.data.checked import parse_json, sanitize
+from rig.config.files.safe_writing import write_new
+from rig.data.recording.layout_keys import EVENTS_DTYPE, SCHEMA
 from rig.data.recording.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.recording.recorded_turner import RecordedTurner, turner_of
-from rig.data.recording.schema import EVENTS_DTYPE, SCHEMA
-from rig.motion.state import ARM_STATE_DTYPE
+from rig.data.validation import parse_json, sanitize
+from rig.motion.turner_state import ARM_STATE_DTYPE
 
 CHUNK_ROWS = 1024
 CHUNK_BYTES = 65536

@@ -12,14 +12,14 @@ from pydantic import Field
 
 from firmware_host.answers import BoardIdentity, StoredCalibration
 from rig.data.absent import NO_ARM, NO_BOARD
-from rig.data.checked import Finite, validate
 from rig.data.entries.result_types import Utc
 from rig.data.recording.motion_file import Item
 from rig.data.result_file import FileEntry, StoredCalibrationEntry
 from rig.data.run_folder import ScriptIdentity
+from rig.data.validation import Finite, validate
 from rig.data.version import VERSION
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import Report, TurnerIdentity
+from rig.motion.turner_state import Report, TurnerIdentity
 
 if TYPE_CHECKING:
     from rig.config.load import Loaded

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.sensors.sensor_sections import AccelerationSection, ConfiguredSensor, mounting_matrix
-from rig.data.checked import Finite, Positive, validate
 from rig.data.installed_kinds import measured
 from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar
 from rig.data.recording.channel import MAX_CHANNELS, Channel, sample_dtype
+from rig.data.validation import Finite, Positive, validate
 from rig.errors.quoting import quote
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 

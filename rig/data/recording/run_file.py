@@ -19,22 +19,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.section import SensorName
-from rig.data.checked import LARGEST_NUMBER, parse_json, validate
 from rig.data.processes.reading_process import ReadingTask, UnreadableFile
 from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
-from rig.data.recording.events import Event, TimedEvent, decode_events, encode_event
 from rig.data.recording.extract import reason
 from rig.data.recording.layout import Contents, append, check_rows, empty, lay_out, table_of
+from rig.data.recording.layout_keys import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES
 from rig.data.recording.motion_file import MOTIONS, ExternalHeader, ReadElsewhere, samples_header
 from rig.data.recording.provenance import Provenance
+from rig.data.recording.recorded_events import Event, TimedEvent, decode_events, encode_event
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner, check_joints
 from rig.data.recording.run_reading import begin_reading
-from rig.data.recording.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES
 from rig.data.recording.settings import RunSettings, settings_from_json
+from rig.data.validation import LARGEST_NUMBER, parse_json, validate
 from rig.errors import Fault, Refused
 from rig.errors.quoting import quote
-from rig.motion.state import State
+from rig.motion.turner_state import State
 
 FLUSH_PERIOD_S = 0.25  # half of the promised time, so that a slow flush still keeps the promise
 LARGEST_STATE = 1e12  # of a turner's states, in SI units; times are among them

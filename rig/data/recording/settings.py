@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from rig.config.judging.judged_by import (
+from rig.config.judging.judging_keys import (
     OF_SENSORS,
     NonNegative,
     ObservationKeys,
@@ -22,10 +22,10 @@ from rig.config.judging.judged_by import (
     UncertaintyKeys,
     refuse_missing_keys,
 )
-from rig.config.judging.limits import LIMITS, Limits
+from rig.config.judging.verdict_limits import LIMITS, Limits
 from rig.config.sensors.sensor_catalogue import PARTS
-from rig.data.checked import Finite, OfJoints, Positive, parse_json, validate
 from rig.data.recording.recorded_sensor import AS_THE_FLANGE, Mounting, check_rotation
+from rig.data.validation import Finite, OfJoints, Positive, parse_json, validate
 from rig.errors import Refused
 from rig.errors.quoting import quote
 from rig.estimation.earth import EARTH_RATE_RAD_S

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from rig.data.checked import Finite
+from rig.data.validation import Finite
 
 Index = Annotated[int, Field(ge=0)]
 Celsius = dict[str, Finite]

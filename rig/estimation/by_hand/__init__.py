@@ -1,7 +1,7 @@
 """A gyroscope calibrated by hand: a body that is turned on a table and lies still in between, as a graph."""
 
 from rig.estimation.by_hand.progress import SessionProgress, assess_progress
-from rig.estimation.by_hand.session import HandRecording, HandRest, Move, SessionConditions
+from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move, SessionConditions
 from rig.estimation.by_hand.solution import HandSolution, solve_by_hand
 
 __all__ = [

@@ -11,7 +11,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.fit import GraphFit, estimate_stds, solve_step
 from rig.estimation.by_hand.graph import REST, RESTS, Factor
-from rig.estimation.by_hand.session import STATED
+from rig.estimation.by_hand.session_parts import STATED
 
 RATIO = 3.0  # of the bias' random walk with and without them, if it is their effect
 MOST = 0.125  # of the rests: if more stand out, the bias itself jumps

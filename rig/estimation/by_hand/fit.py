@@ -24,8 +24,8 @@ from rig.estimation.by_hand.graph import (
     GraphState,
     linearise,
 )  # fmt: skip
-from rig.estimation.by_hand.moves import GyroscopeModel, MoveIntegrals, integrate_moves
-from rig.estimation.by_hand.session import LARGEST, STATED, HandRecording, HandStds, RestFaces, SessionConditions
+from rig.estimation.by_hand.move_rotations import GyroscopeModel, MoveIntegrals, integrate_moves
+from rig.estimation.by_hand.session_parts import LARGEST, STATED, HandRecording, HandStds, RestFaces, SessionConditions
 
 PASSES, SIZED = 30, 4  # iterations of the fit, many with few moves; of the variance components in each but the first
 SETTLED = 1e-2  # of the standard uncertainty

@@ -6,10 +6,10 @@ import numpy as np
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.axes import check_axes
-from rig.estimation.by_hand.doubts import find_contradiction
 from rig.estimation.by_hand.fit import fit_session
-from rig.estimation.by_hand.session import FACES, HandRecording, Move, SessionConditions
+from rig.estimation.by_hand.flip_axes import check_axes
+from rig.estimation.by_hand.session_outliers import find_contradiction
+from rig.estimation.by_hand.session_parts import FACES, HandRecording, Move, SessionConditions
 from rig.estimation.by_hand.solution import (
     HandSolution,
     MoveSummary,

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
-from rig.estimation.by_hand.axes import check_axes
 from rig.estimation.by_hand.creep import find_creeping_rests
-from rig.estimation.by_hand.doubts import find_contradiction, find_masked_fault
 from rig.estimation.by_hand.fit import PRIOR_DOF, GraphFit, fit_session, whiten_rows
+from rig.estimation.by_hand.flip_axes import check_axes
 from rig.estimation.by_hand.graph import CLOSURE, MOVE, Factor
-from rig.estimation.by_hand.session import FACES, LARGEST, STATED, HandRecording, SessionConditions, drop_rests
+from rig.estimation.by_hand.session_outliers import find_contradiction, find_masked_fault
+from rig.estimation.by_hand.session_parts import FACES, LARGEST, STATED, HandRecording, SessionConditions, drop_rests
 from rig.estimation.gyroscope.budget import Budget, Contributor
-from rig.estimation.gyroscope.known_turns import TurnedSolution
+from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
 LOOSE = 3.0  # times the stated value: faces that repeat no better may be other faces

@@ -24,7 +24,7 @@ from rig.estimation.reference.attitude_error import PASSES, SETTLED
 from rig.estimation.reference.reading_errors import noise, select_sweeps, walking
 from rig.estimation.reference.reference_model import REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions
 from rig.estimation.reference.shared_errors import Decorrelation, decorrelate, estimate_common_error
-from rig.estimation.statistics.expected_sizes import ResidualInputs, expected_disturbances, expected_sizes
+from rig.estimation.statistics.expected_variances import ResidualInputs, expected_disturbances, expected_sizes
 
 # Prior odds of one disturbed dwell or sweep in a run against none, and of another bias in all sweeps.
 ODDS = 1 / 19

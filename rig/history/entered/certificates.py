@@ -2,9 +2,9 @@
 
 from sqlalchemy import Connection, insert, select
 
-from rig.history.entered.issued import Issued
+from rig.history.entered.issued_certificate import Issued
 from rig.history.storage import journal
-from rig.history.storage.numbers import next_number
+from rig.history.storage.row_numbers import next_number
 from rig.history.storage.schema import certificate, certificate_file
 
 

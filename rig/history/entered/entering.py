@@ -5,18 +5,18 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy import Connection, insert, select
 
-from rig.history.entered.finished import FinishedRun
+from rig.history.entered.finished_run import FinishedRun
 from rig.history.storage import journal, schema
-from rig.history.storage.numbers import next_number
+from rig.history.storage.row_numbers import next_number
 
 if TYPE_CHECKING:
-    from rig.report.findings.followed import HistoryRecord
+    from rig.report.findings.history_records import HistoryRecord
 
 
 def enter_run(connection: Connection, finished: FinishedRun, content_sha256: str) -> int:
     """Add a run with all that belongs to it; return its number."""
     from rig.history.entered.index import run_row
-    from rig.report.kinds.registry import followed
+    from rig.report.kinds.kind_registry import followed
 
     run_id = next_number(connection, schema.run)
     row = {

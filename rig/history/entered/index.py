@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 
 from rig.data.result_file import ResultDocument
-from rig.report.findings.followed import HistoryRecord, Parameter
-from rig.report.kinds.registry import followed
+from rig.report.findings.history_records import HistoryRecord, Parameter
+from rig.report.kinds.kind_registry import followed
 
 SAME = 1e-6  # of the standard uncertainty: more than the rounding of another processor
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.config.files.own_folder import own_folder
+from rig.config.files.user_folder import own_folder
 from rig.config.judging.history_address import history_url
 from rig.errors import Refused
 

@@ -6,8 +6,8 @@ from math import pi
 from rig.data.installed_kinds import quantities
 from rig.history.series import Change
 from rig.report.findings.characteristics import every_characteristic
-from rig.report.findings.followed import BIASES, SCALES, is_scale
-from rig.report.words.rounding import figures
+from rig.report.findings.history_records import BIASES, SCALES, is_scale
+from rig.report.words.printed_values import figures
 
 PERCENT, PPM = 1e-2, 1e-6
 DEGREE_RAD = pi / 180

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.data.recording.events import BoardObserved
+from rig.data.recording.recorded_events import BoardObserved
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.lines import fit_columns, harmonics, waves
+from rig.observation.statistics.spectral_lines import fit_columns, harmonics, waves
 from rig.observation.turn_mean import lag_columns
 
 NEXT_S = 1e-7  # rounding of a sample's time

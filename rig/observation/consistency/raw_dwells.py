@@ -10,9 +10,9 @@ from rig.data.quantity import ACCELERATION
 from rig.estimation.arrays import Array
 from rig.observation.average import between
 from rig.observation.consistency.raw_readings import REST, RawReadings, counts_of
-from rig.observation.field import read_field_in_dwells
+from rig.observation.field_means import read_field_in_dwells
 from rig.observation.observed_run import ObservedRun
-from rig.observation.reference.acceleration import DwellReading, gravity_difference
+from rig.observation.reference.dwell_acceleration import DwellReading, gravity_difference
 from rig.observation.windows import Window
 
 

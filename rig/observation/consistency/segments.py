@@ -20,8 +20,8 @@ from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import Observation, fit_response
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.coloured_noise import correlation_inflation
-from rig.observation.statistics.lines import LineSearch, find_lines, fit_columns, line_swing, waves
 from rig.observation.statistics.mean import Mean, MeanNoise, weighted_means
+from rig.observation.statistics.spectral_lines import LineSearch, find_lines, fit_columns, line_swing, waves
 from rig.observation.statistics.tapered_weights import noise_at_zero
 
 # Not four: at the ends of quarters one of an encoder's waves that come twice a turn is zero, and no segment shows it.

@@ -24,9 +24,9 @@ from rig.motion.geometry import flange_attitude, flange_pose
 from rig.observation.average import Stream, between
 from rig.observation.consistency.segments import MotionInterval
 from rig.observation.motion.arm_motion import ArmMotion
-from rig.observation.motion.known_motion import MIN_RATE_RAD_S
+from rig.observation.motion.reference_motion import MIN_RATE_RAD_S
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.lines import unit_columns
+from rig.observation.statistics.spectral_lines import unit_columns
 from rig.observation.statistics.tapered_weights import noise_at_zero
 from rig.observation.windows import rested, swept
 

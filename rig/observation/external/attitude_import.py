@@ -39,7 +39,7 @@ from rig.observation.external.csv_windows import (
     scatter_of,
 )
 from rig.observation.external.fixes import Turning
-from rig.observation.external.omitted import Omitted
+from rig.observation.external.omission import Omitted
 from rig.observation.external.placement_account import AttitudeRows
 from rig.observation.external.placements import MOSTLY, Placements, find_placements
 from rig.observation.external.table_motion import TableMotion

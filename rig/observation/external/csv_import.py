@@ -9,7 +9,7 @@ turn: over that its mean speed is 2π/T in any case. Standard deviations may be 
 reached, and `axis_std_rad` of the direction of the axis.
 
 A row with an angle and with the body at rest at both ends is solved by the angle that the gyroscope measured
-(`rig.estimation.gyroscope.known_turns`): that is how a hand turns, or a servo that starts and stops.
+(`rig.estimation.gyroscope.rotations_by_angle`): that is how a hand turns, or a servo that starts and stops.
 
 Columns may have any order; the first row holds their names.
 """
@@ -35,7 +35,7 @@ from rig.observation.external.csv_windows import (
     check_times,
     find_overlap,
 )
-from rig.observation.external.omitted import Omitted
+from rig.observation.external.omission import Omitted
 from rig.observation.external.turns import DeclaredTurns, TurnedData, find_turns
 from rig.observation.formats.csv_table import Mapped, read_columns
 from rig.observation.observe import Observation, nearest_axis

@@ -15,7 +15,7 @@ from rig.data.recording.provenance import provenance_of_files
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import Elsewhere, ObservationThresholds, RunSettings, Site
 from rig.errors import Refused
-from rig.motion.state import ARM_STATE_DTYPE
+from rig.motion.turner_state import ARM_STATE_DTYPE
 from rig.observation.external.attitude_import import read_attitudes
 from rig.observation.external.csv_import import read_sweeps
 from rig.observation.external.csv_samples import read_sample_table, samples_in

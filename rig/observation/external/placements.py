@@ -21,7 +21,7 @@ from rig.observation.by_hand.knocks import mask_knocks
 from rig.observation.by_hand.rests import BLOCK_S, COUNTS, find_rests
 from rig.observation.by_hand.steadiness import BEYOND
 from rig.observation.external.csv_windows import MIN_SAMPLES, scatter_of
-from rig.observation.external.omitted import Omitted
+from rig.observation.external.omission import Omitted
 from rig.observation.external.placement_account import Account, AttitudeRows
 from rig.observation.external.still_attitudes import DWELL_S, still_windows
 from rig.observation.statistics.mean import Mean

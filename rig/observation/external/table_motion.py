@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.cubic_spline import CubicSpline
-from rig.observation.motion.known_motion import MIN_RATE_RAD_S, closely_followed
+from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, closely_followed
 
 MAX_STEP_S = 0.05  # between rows that still show how the table turned
 MIN_ROWS = 20

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.known_turns import Gyroscope, RateMean, Turn
+from rig.estimation.gyroscope.rotations_by_angle import Gyroscope, RateMean, Turn
 from rig.observation.arm_rests import estimate_bias_drift
 from rig.observation.average import Average
 from rig.observation.by_hand.rests import find_rests

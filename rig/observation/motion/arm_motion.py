@@ -21,12 +21,12 @@ from rig.motion.geometry import (
     flange_axes,
     flange_rate,
 )
-from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Sweep
+from rig.motion.turner_state import JOINT_NAMES
 from rig.observation.motion.even_turn import SMOOTHED_S, find_even_turn, fit_lines, well_timed
-from rig.observation.motion.known_motion import MIN_RATE_RAD_S, check_span, closely_followed, not_finite
+from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, check_span, closely_followed, not_finite
 from rig.observation.motion.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
-from rig.observation.swing import FEWEST_OF_SWING, MAX_TRAVEL_AT_REST_RAD, remove_oscillation
+from rig.observation.oscillation import FEWEST_OF_SWING, MAX_TRAVEL_AT_REST_RAD, remove_oscillation
 from rig.observation.windows import Window
 
 RATE_STEP_S = 0.008  # the difference of joint angles closer in time shows their encoders' noise more than a rate

@@ -10,7 +10,7 @@ from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.motion.steps import TURN_RAD, Sweep, closes, turn_words
-from rig.observation.statistics.lines import BEATS
+from rig.observation.statistics.spectral_lines import BEATS
 
 MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
 SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not

@@ -12,8 +12,8 @@ from rig.motion.steps import Sweep
 from rig.observation.average import Stream, between
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.motion.revolution import Revolution, describe
-from rig.observation.reference.acceleration import accelerations, check_acceleration, gravity_difference
-from rig.observation.statistics.beside_lines import fit_inflation, line_columns
+from rig.observation.reference.dwell_acceleration import accelerations, check_acceleration, gravity_difference
+from rig.observation.statistics.vibration_noise import fit_inflation, line_columns
 
 
 @dataclass(frozen=True, slots=True)

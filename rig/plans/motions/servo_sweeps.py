@@ -5,10 +5,10 @@ from collections.abc import Collection, Iterator, Sequence
 
 from rig.config.procedures.servo_procedure import ServoSixObservationSection
 from rig.config.procedures.servo_section import ServoSection
-from rig.motion.state import Joints
 from rig.motion.steps import TURN_RAD, Plan, Rest, Step, Sweep
+from rig.motion.turner_state import Joints
 from rig.plans.motions.sweeps import Profile, SweepPose, build_stages, connect_sweeps, sweep_about, trial
-from rig.plans.motions.ways import approach, pace_of
+from rig.plans.motions.transfer_steps import approach, pace_of
 
 MARGIN_RAD = math.radians(3)  # of constant speed at either end, for a shaft that lags
 # Of the mounting: far enough to stand out from any gyroscope's noise and a gear's play.

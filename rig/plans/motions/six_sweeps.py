@@ -19,11 +19,11 @@ from rig.motion.carried import read_load
 from rig.motion.geometry import flange_axes
 from rig.motion.keep_out import keeps_clear
 from rig.motion.model import find_home, model_of
-from rig.motion.state import JOINT_NAMES, Joints
 from rig.motion.steps import Plan, Step, Sweep
-from rig.plans.motions.drift import drift_effect
+from rig.motion.turner_state import JOINT_NAMES, Joints
+from rig.plans.motions.steady_drift import drift_effect
 from rig.plans.motions.sweeps import Mounted, Profile, SweepPose, build_stages, connect_sweeps, sweep_about, trial
-from rig.plans.motions.ways import append_steps, approach, pace_of
+from rig.plans.motions.transfer_steps import append_steps, approach, pace_of
 
 USUAL_ORDER: tuple[Wrist, ...] = ("wrist_3", "wrist_1", "wrist_2")  # that of the paper
 BOTH_WAYS: tuple[Direction, Direction] = ("cw", "ccw")

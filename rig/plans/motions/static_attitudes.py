@@ -8,10 +8,10 @@ import numpy as np
 from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import AttitudesSection
 from rig.motion.model import find_home
-from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, trapezoid_duration
-from rig.plans.motions.shortest_way import shortest_way
-from rig.plans.motions.ways import append_steps, approach, convert_to_radians, pace_of, transfer
+from rig.motion.turner_state import Joints
+from rig.plans.motions.shortest_tour import shortest_way
+from rig.plans.motions.transfer_steps import append_steps, approach, convert_to_radians, pace_of, transfer
 
 
 def plan_static_attitudes(
@@ -24,7 +24,7 @@ def plan_static_attitudes(
 
     `start_q_rad` is the arm's pose (home if None); from there the plan goes home first, slowly. `done` holds the
     indices of dwells to leave out: those an interrupted run has finished. Limits and clearances are checked by the
-    turner's `problems`, the rank of the attitudes by `rig.analysis.design.attitude_account`.
+    turner's `problems`, the rank of the attitudes by `rig.analysis.design.attitude_information`.
     """
     before = approach(start_q_rad, find_home(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
     return append_steps(before, dwells(arm, procedure, procedure.repeats, done))

@@ -7,9 +7,9 @@ from itertools import count
 from rig.config.procedures.servo_procedure import ServoStageSection
 from rig.config.procedures.stage_section import StageSection, mount_matrix
 from rig.config.section import Direction, Vector3
-from rig.motion.state import Joints
 from rig.motion.steps import Plan, Rest, Stage, Step, Sweep, Transfer, trapezoid_duration
-from rig.plans.motions.ways import Pace, transfer
+from rig.motion.turner_state import Joints
+from rig.plans.motions.transfer_steps import Pace, transfer
 
 Mounted = tuple[StageSection | ServoStageSection, Sequence[Sweep]]  # a stage of the file, and its sweeps
 

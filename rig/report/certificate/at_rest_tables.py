@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.entries.accelerometer import AccelerometerEntry
-from rig.data.entries.drift import DriftEntry
+from rig.data.entries.bias_drift import DriftEntry
 from rig.data.entries.magnetometer import MagnetometerEntry, ReversalEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.estimation.temperature.bias_by_repeat import largest_change_std
 from rig.report.tables.certificate import AXES, AxisRow, Pair, pair, rows_of
-from rig.report.words.expanded import expanded
+from rig.report.words.expanded_uncertainty import expanded
 
 MICRO = 1e6
 

@@ -7,7 +7,7 @@ from datetime import date, datetime
 from types import MappingProxyType
 from typing import Any
 
-from rig.analysis.clock import BY_COMPUTER
+from rig.analysis.clock_comparison import BY_COMPUTER
 from rig.data.absent import NO_ARM
 from rig.data.entries.budget import BudgetEntry
 from rig.data.entries.magnetometer import MagnetometerEntry, ReversalEntry
@@ -25,14 +25,14 @@ from rig.data.result_file import (
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
 from rig.report.certificate.statements import StatedFacts
-from rig.report.entries.omitted import omitted_lines
+from rig.report.entries.omission_entries import omitted_lines
 from rig.report.findings.characteristic import Term, terms
 from rig.report.findings.finding import Finding
-from rig.report.findings.kind import NoOutlet, Standard
-from rig.report.kinds.registry import kinds, outlets, shown
-from rig.report.words.mounts import mount_lines
-from rig.turners.kind import Wording
-from rig.turners.registry import words_of
+from rig.report.findings.result_kind import NoOutlet, Standard
+from rig.report.kinds.kind_registry import kinds, outlets, shown
+from rig.report.words.mounting_words import mount_lines
+from rig.turners.turner_kind import Wording
+from rig.turners.turner_registry import words_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from rig.errors import Refused
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.method_words import method_in_short
 from rig.report.findings.characteristic import terms
-from rig.report.findings.kind import CertifiedItem
-from rig.report.kinds.registry import outlets
+from rig.report.findings.result_kind import CertifiedItem
+from rig.report.kinds.kind_registry import outlets
 from rig.report.tables.certificate import kind as kind_of_part
 from rig.report.tables.dcc_results import further_results
 from rig.report.tables.xml_parts import DCC as NAMESPACE

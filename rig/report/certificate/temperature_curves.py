@@ -8,7 +8,7 @@ import numpy as np
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.quantity import DisplayUnit, Quantity
 from rig.estimation.arrays import Array
-from rig.report.certificate.plots import HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP, WIDTH, reach_in
+from rig.report.certificate.svg_plots import HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP, WIDTH, reach_in
 from rig.report.tables.certificate import Pair, pair
 from rig.report.words.temperature_words import shown_rows
 

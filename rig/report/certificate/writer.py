@@ -3,11 +3,11 @@
 from pathlib import Path
 
 from rig.analysis.outcome import Outcome
-from rig.config.files.written_file import write_new
+from rig.config.files.safe_writing import write_new
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import CERTIFICATE
+from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import certificate_of
-from rig.report.certificate.page import certificate_page
 from rig.report.certificate.statements import stated_in
 from rig.station.events import DocumentWritten, RunEvent
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rig.analysis.clock import ClockCheck
+from rig.analysis.clock_comparison import ClockCheck
 from rig.data.entries.budget import (
     BiasProcessEntry,
     BudgetEntry,

@@ -9,7 +9,7 @@ from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
 from rig.report.entry import entry
-from rig.report.words.expanded import expanded, factor_words
+from rig.report.words.expanded_uncertainty import expanded, factor_words
 
 if TYPE_CHECKING:
     from rig.estimation.gyroscope.earth_rate import EarthRate

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from rig.analysis.external.attitudes import InAttitudes, Result
-from rig.analysis.external.elsewhere import OfSensor
-from rig.analysis.external.increments import InIncrements
+from rig.analysis.external.external_recordings import OfSensor
+from rig.analysis.external.increment_calibration import InIncrements
 from rig.analysis.outcome import Outcome
 from rig.data.entries.accelerometer import AccelerometerEntry
 from rig.data.entries.external import (
@@ -23,7 +23,7 @@ from rig.data.recording.motion_file import Item
 from rig.data.recording.settings import Site
 from rig.errors import Fault
 from rig.estimation.arrays import scale_of
-from rig.estimation.external.known_increments import EarthSeen
+from rig.estimation.external.increment_solution import EarthSeen
 from rig.estimation.reference import accelerometer, magnetometer
 from rig.estimation.reference.reference_model import REFERENCE, SECOND
 from rig.estimation.reference.triaxial import TriaxialSolution

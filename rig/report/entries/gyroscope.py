@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.analysis.freedom_beside import of_angles, of_sensitivity
+from rig.analysis.effective_dof import of_angles, of_sensitivity
 from rig.analysis.gyroscope.calibration import ALGORITHM_1, EARTH_RATE, NEWTON, VECTOR, SensorResult
 from rig.analysis.gyroscope.onboard_check import Agreement
 from rig.data.entries.result_types import ErrorEntry, Role
@@ -23,7 +23,7 @@ from rig.data.result_file import (
 from rig.errors import Fault
 from rig.estimation.gyroscope import vector_model
 from rig.estimation.gyroscope.estimate import Estimate
-from rig.estimation.gyroscope.known_turns import TurnedSolution
+from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.gyroscope.six_observation import MODEL, PARAMETERS
 from rig.estimation.residuals import residual_std_rad_s
 from rig.observation.average import Average

@@ -7,8 +7,8 @@ from typing import Any, Generic
 import numpy as np
 
 from rig.analysis.external.attitudes import InAttitudes
-from rig.analysis.reference.acceleration import AccelerometerResult
-from rig.analysis.reference.magnetic_field import MagnetometerResult
+from rig.analysis.reference.accelerometer import AccelerometerResult
+from rig.analysis.reference.magnetometer import MagnetometerResult
 from rig.data.entries.accelerometer import AccelerationSolutionEntry, AccelerometerEntry, DwellEntry
 from rig.data.entries.magnetometer import FieldDwellEntry, FieldSolutionEntry, MagnetometerEntry
 from rig.data.entries.result_types import Entry
@@ -20,7 +20,7 @@ from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.estimation.reference.attitude_error import AttitudeError
 from rig.estimation.reference.triaxial import TriaxialSolution
 from rig.estimation.residuals import attitude_residual_std
-from rig.observation.reference.acceleration import DwellReading
+from rig.observation.reference.dwell_acceleration import DwellReading
 from rig.observation.statistics.mean import StaticReading
 from rig.report.entries.budget import budget_entry
 from rig.report.entries.error import error_entry

@@ -14,10 +14,10 @@ from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
-from rig.report.exports.calibrations import ExportedCalibrations
+from rig.report.exports.exported_corrections import ExportedCalibrations
 from rig.report.exports.over_temperature import ardupilot_parameters, px4_parameters
-from rig.report.findings.corrected import Corrected
-from rig.report.kinds.registry import kinds
+from rig.report.findings.linear_corrections import Corrected
+from rig.report.kinds.kind_registry import kinds
 
 GAUSS_T, MILLIGAUSS_T = 1e-4, 1e-7
 PX4_FLOAT, PX4_INT = 9, 6  # MAV_PARAM_TYPE_REAL32, _INT32

@@ -8,17 +8,17 @@ if TYPE_CHECKING:  # the command line asks for the names alone
     from collections.abc import Sequence
     from pathlib import Path
 
-    from rig.report.exports.calibrations import ExportedCalibrations
-    from rig.report.exports.recorded import Exported
+    from rig.report.exports.exported_corrections import ExportedCalibrations
+    from rig.report.exports.exported_recording import Exported
 
     ReadingsWriter = Callable[[Sequence[Exported], Path], list[Path]]
     CalibrationTexts = Callable[[ExportedCalibrations], Mapping[str, str]]
 
 # `module:function`. Of readings: (recordings, folder) → the files written.
 OF_READINGS: Final[Mapping[str, str]] = {
-    "csv": "rig.report.exports.tables:write_csv",
-    "parquet": "rig.report.exports.tables:write_parquet",
-    "mat": "rig.report.exports.tables:write_mat",
+    "csv": "rig.report.exports.reading_tables:write_csv",
+    "parquet": "rig.report.exports.reading_tables:write_parquet",
+    "mat": "rig.report.exports.reading_tables:write_mat",
     "ros2": "rig.report.exports.ros2:write_bag",
 }
 # Of calibrations: (those of a run) → texts by name of the file.

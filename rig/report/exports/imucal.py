@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rig.report.exports.calibrations import ExportedCalibrations, Imu
+from rig.report.exports.exported_corrections import ExportedCalibrations, Imu
 
 FORMAT_VERSION = "2.0.0"
 

@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 
 from rig.estimation.arrays import Array
-from rig.report.exports.calibrations import ExportedCalibrations, Imu
+from rig.report.exports.exported_corrections import ExportedCalibrations, Imu
 from rig.report.exports.names import plain_names
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from rig.data.quantity import ACCELERATION, RATE
 from rig.errors import Refused
 from rig.estimation.arrays import Array
+from rig.report.exports.exported_recording import Exported
 from rig.report.exports.names import plain_names
-from rig.report.exports.recorded import Exported
 
 BAG = "bag"
 FORMAT: Final = 9  # of ROS 2 Jazzy and later

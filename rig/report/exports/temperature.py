@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.data.entries.drift import SlopeEntry
+from rig.data.entries.bias_drift import SlopeEntry
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.result_file import ResultDocument
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.report.exports.calibrations import ExportedCalibrations
-from rig.report.findings.corrected import Corrected
+from rig.report.exports.exported_corrections import ExportedCalibrations
+from rig.report.findings.linear_corrections import Corrected
 
 WATCHED = (RATE, ACCELERATION)  # a run of `bias_drift` measures their biases
 

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.at_rest import AtRest, SensorAtRest
+from rig.analysis.rest_noise import AtRest, SensorAtRest
 from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.statistics.allan import FLICKER, AllanReading

@@ -11,7 +11,7 @@ import numpy as np
 from rig.analysis.gyroscope.comparison import Comparison
 from rig.analysis.gyroscope.verification import Verification
 from rig.analysis.outcome import Outcome
-from rig.config.files.written_file import new_file
+from rig.config.files.safe_writing import new_file
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.station.events import NotPlotted, Plotted, RunEvent

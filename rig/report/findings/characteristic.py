@@ -9,7 +9,7 @@ import numpy as np
 from rig.data.entries.result_types import Freedom
 from rig.data.quantity import DisplayUnit, Quantity
 from rig.report.findings.finding import Finding
-from rig.report.words.expanded import Expanded, expanded
+from rig.report.words.expanded_uncertainty import Expanded, expanded
 
 Outlet = Literal["terminal", "certificate", "digital certificate", "page", "history", "exports"]
 OUTLETS: Final[tuple[Outlet, ...]] = get_args(Outlet)

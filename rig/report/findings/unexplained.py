@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.data.entries.drift import DriftEntry
+from rig.data.entries.bias_drift import DriftEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.result_file import AverageEntry, GyroscopeEntry, ObservationEntry

@@ -13,16 +13,16 @@ from rig.report.c_code.c_functions import accelerometer_lines
 from rig.report.entry import counted, entry
 from rig.report.findings.characteristics import ACCELEROMETERS, SECOND_ORDER
 from rig.report.findings.finding import Finding
-from rig.report.findings.kind import Standard
+from rig.report.findings.result_kind import Standard
 from rig.report.kinds.triad import Words, attitude_lines, method_lines, triad_kind
 from rig.report.tables import dcc_results
-from rig.report.tables.axes import line_of, triple
+from rig.report.tables.axis_tables import line_of, triple
 from rig.report.tables.budget import list_assumptions
 from rig.report.words.detection_limit_words import detection_limit_field, detection_limit_lines
 from rig.report.words.validity_words import warmth, when_words
 
 if TYPE_CHECKING:
-    from rig.analysis.reference.acceleration import AccelerometerResult, HeldOut
+    from rig.analysis.reference.accelerometer import AccelerometerResult, HeldOut
     from rig.estimation.triads import Alignment
 
 
@@ -34,13 +34,13 @@ def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
 
 
 def _entry(outcome: Outcome, name: str, result: "AccelerometerResult") -> AccelerometerEntry:
-    from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
-    from rig.analysis.read_when import of_accelerometer
+    from rig.analysis.effective_dof import of_acceleration_angles, of_second_order
+    from rig.analysis.measurement_conditions import of_accelerometer
     from rig.estimation.reference.accelerometer_model import DELAY, SECOND
     from rig.estimation.reference.imu import MODEL
     from rig.estimation.residuals import dwell_residual_std_m_s2
+    from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.triad import OF_ACCELEROMETERS, triad_entry
-    from rig.report.entries.when import when_entry
 
     solution = result.solution
     std = np.sqrt(np.diag(solution.covariance))

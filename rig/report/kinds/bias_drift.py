@@ -7,7 +7,7 @@ import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
-from rig.data.entries.drift import BiasEntry, BiasStepEntry, DriftEntry, RepeatEntry, SlopeEntry
+from rig.data.entries.bias_drift import BiasEntry, BiasStepEntry, DriftEntry, RepeatEntry, SlopeEntry
 from rig.data.entries.result_types import ErrorEntry, Vector3
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import RATE, Quantity
@@ -18,12 +18,12 @@ from rig.report.entries.error import error_entry
 from rig.report.entry import counted
 from rig.report.findings.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import HistoryRecord
-from rig.report.findings.kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
+from rig.report.findings.history_records import HistoryRecord
+from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
 from rig.report.findings.unexplained import find_repeat_residuals
 from rig.report.tables import dcc_results
 from rig.report.tables.budget import heading_of
-from rig.report.words.expanded import expanded, factor_words
+from rig.report.words.expanded_uncertainty import expanded, factor_words
 from rig.station.plain_text import plain
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ BIAS_DRIFT = ResultKind(
     shown=_build_row,
     followed=_build_record,
     header=NoOutlet("firmware corrects by one bias; `rig export` computes it for a temperature"),
-    figures="rig.report.figures.drift:write_drift_figures",
+    figures="rig.report.figures.bias_drift:write_drift_figures",
     block="at_rest.html.j2:drift",
     measured=_describe_item,
     standard=NoOutlet("it has the standard of its sensor"),

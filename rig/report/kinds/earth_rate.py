@@ -7,8 +7,8 @@ from rig.data.quantity import RATE
 from rig.data.result_file import GyroscopeEntry, ResultDocument
 from rig.report.findings.characteristics import EARTH_RATE, EARTHS_RATES
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import HistoryRecord
-from rig.report.findings.kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
+from rig.report.findings.history_records import HistoryRecord
+from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
 from rig.report.kinds.gyroscope import temperatures_c
 from rig.report.tables import dcc_results
 

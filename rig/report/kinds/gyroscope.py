@@ -18,23 +18,23 @@ from rig.report.c_code.c_functions import gyroscope_lines
 from rig.report.entries.by_hand import by_hand_lines
 from rig.report.entries.earth_rate import earth_rate_lines
 from rig.report.findings.characteristics import GYROSCOPES, NON_ORTHOGONALITY
-from rig.report.findings.corrected import Corrected, noise_of
 from rig.report.findings.finding import Finding
-from rig.report.findings.kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind
+from rig.report.findings.linear_corrections import Corrected, noise_of
+from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind
 from rig.report.findings.unexplained import find_sweep_residuals
 from rig.report.kinds.triad import followed_of, item_words, shown_of, tables, unsolved_lines
 from rig.report.tables import dcc_results
-from rig.report.tables.axes import decimals, line_of, matrix_lines, triple
+from rig.report.tables.axis_tables import decimals, line_of, matrix_lines, triple
 from rig.report.words.detection_limit_words import detection_limit_field, detection_limit_lines
 from rig.report.words.validity_words import load_words, speed_words, warmth, when_words
 
 
 def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
     """Return the entries of all gyroscopes; the key is in every result, even without sweeps."""
-    from rig.analysis.read_when import of_gyroscope
+    from rig.analysis.measurement_conditions import of_gyroscope
+    from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.external import angles_entry, rates_in_attitudes
     from rig.report.entries.gyroscope import sensor_entry
-    from rig.report.entries.when import when_entry
 
     entries = {}
     for name, result in outcome.results.items():

@@ -14,16 +14,16 @@ from rig.report.entries.error import error_entry
 from rig.report.entry import counted, entry
 from rig.report.findings.characteristics import MAGNETOMETERS
 from rig.report.findings.finding import Finding
-from rig.report.findings.kind import Standard
+from rig.report.findings.result_kind import Standard
 from rig.report.kinds.triad import Words, attitude_lines, method_lines, triad_kind
 from rig.report.tables import dcc_results
-from rig.report.tables.axes import triple
+from rig.report.tables.axis_tables import triple
 from rig.report.tables.budget import list_assumptions
 from rig.report.words.detection_limit_words import detection_limit_field, detection_limit_lines
 from rig.report.words.validity_words import when_words
 
 if TYPE_CHECKING:
-    from rig.analysis.reference.magnetic_field import MagnetometerResult
+    from rig.analysis.reference.magnetometer import MagnetometerResult
 
 FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
 
@@ -40,11 +40,11 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
 
 
 def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> MagnetometerEntry:
-    from rig.analysis.freedom_beside import of_field_angles
-    from rig.analysis.read_when import of_magnetometer
+    from rig.analysis.effective_dof import of_field_angles
+    from rig.analysis.measurement_conditions import of_magnetometer
     from rig.estimation.reference.magnetometer import MODEL, hard_iron
+    from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.triad import OF_MAGNETOMETERS, attitudes_entry
-    from rig.report.entries.when import when_entry
 
     return attitudes_entry(
         OF_MAGNETOMETERS, result, result.sensor,

@@ -13,10 +13,10 @@ from rig.data.result_file import ResultDocument
 from rig.report.c_code.temperature import temperature_lines
 from rig.report.findings.characteristics import BIAS_SLOPE_AT_REFERENCE, POLYNOMIALS
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import HistoryRecord
-from rig.report.findings.kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
+from rig.report.findings.history_records import HistoryRecord
+from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, row_of
 from rig.report.tables import dcc_results
-from rig.report.words.rounding import plus_minus
+from rig.report.words.printed_values import plus_minus
 from rig.report.words.temperature_words import about_lines, shown_rows
 from rig.station.plain_text import plain
 

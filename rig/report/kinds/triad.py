@@ -18,12 +18,12 @@ from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.report.findings.characteristic import Characteristic
 from rig.report.findings.characteristics import NON_ORTHOGONALITY
-from rig.report.findings.corrected import Corrected, noise_of
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import Calibrated, HistoryRecord, scale_and_bias, select_uncertain
-from rig.report.findings.kind import AxisValues, CertifiedItem, DisplayRow, ResultKind, Standard
+from rig.report.findings.history_records import Calibrated, HistoryRecord, scale_and_bias, select_uncertain
+from rig.report.findings.linear_corrections import Corrected, noise_of
+from rig.report.findings.result_kind import AxisValues, CertifiedItem, DisplayRow, ResultKind, Standard
 from rig.report.findings.unexplained import find_attitude_residuals
-from rig.report.tables.axes import line_of, scale_and_bias_table, triple
+from rig.report.tables.axis_tables import line_of, scale_and_bias_table, triple
 from rig.report.tables.budget import budget_table, heading_for
 
 

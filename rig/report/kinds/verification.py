@@ -18,7 +18,7 @@ from rig.data.result_file import (
 )
 from rig.report.entry import entry
 from rig.report.findings.finding import Finding
-from rig.report.findings.kind import CertifiedItem, NoOutlet, ResultKind
+from rig.report.findings.result_kind import CertifiedItem, NoOutlet, ResultKind
 from rig.report.tables import dcc_results
 from rig.station.plain_text import plain
 

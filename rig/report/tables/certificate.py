@@ -10,8 +10,8 @@ from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.recording.motion_file import NOT_STATED
 from rig.data.result_file import CheckEntry, GyroscopeEntry, VerificationEntry
 from rig.report.findings.characteristic import Term
-from rig.report.words.expanded import expanded
-from rig.report.words.rounding import percent, rounded
+from rig.report.words.expanded_uncertainty import expanded
+from rig.report.words.printed_values import percent, rounded
 
 AXES = ("x", "y", "z")
 JOINT_FACTOR = 3.548  # of six values at once: √χ² of six degrees of freedom at 95 %

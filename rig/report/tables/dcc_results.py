@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from xml.etree.ElementTree import Element
 
 from rig.data.entries.accelerometer import AccelerometerEntry
+from rig.data.entries.bias_drift import DriftEntry
 from rig.data.entries.budget import BudgetEntry
-from rig.data.entries.drift import DriftEntry
 from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.entries.magnetometer import MagnetometerEntry, ReversalEntry
 from rig.data.entries.result_types import ConditionsEntry, DetectionLimitEntry, Freedom, Matrix6
@@ -17,10 +17,10 @@ from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR, PROBABILITY
 from rig.report.findings.characteristic import Term
 from rig.report.tables.certificate import AXES, JOINT_FACTOR
-from rig.report.tables.coverage import coverage_sentence
+from rig.report.tables.coverage_statements import coverage_sentence
 from rig.report.tables.xml_parts import dcc, real_list, text
 from rig.report.words.detection_limit_words import list_limits
-from rig.report.words.expanded import Expanded, expanded, factor_words
+from rig.report.words.expanded_uncertainty import Expanded, expanded, factor_words
 from rig.report.words.validity_words import load_words, speed_words, when_words
 
 ONE, ANGLE = r"\one", r"\radian"

@@ -5,7 +5,7 @@ from datetime import date
 from xml.etree.ElementTree import Element, register_namespace
 
 from rig.errors.quoting import printable
-from rig.report.words.expanded import Expanded
+from rig.report.words.expanded_uncertainty import Expanded
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"

@@ -11,19 +11,19 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.design.shortest import target_of
+from rig.analysis.design.candidate_search import target_of
 from rig.config.models import RigConfig
 from rig.config.procedures.procedure_sections import SixObservationSection
-from rig.motion.doubts import doubts
-from rig.motion.state import JOINT_NAMES, Joints
+from rig.motion.plan_warnings import doubts
 from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep, Transfer, closes, turn_words
+from rig.motion.turner_state import JOINT_NAMES, Joints
 from rig.report.terminal.shortest_words import wish_words
 from rig.station.plain_text import LONG_S, duration_words, plain
 
 if TYPE_CHECKING:
     from rig.analysis.consistency.detection_limits import DetectionLimit
-    from rig.analysis.design.attitude_account import AttitudeAccount
-    from rig.analysis.design.planned import DetectionLimits
+    from rig.analysis.design.attitude_information import AttitudeAccount
+    from rig.analysis.design.planned_limits import DetectionLimits
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,15 +41,15 @@ class DryRun:
     @cached_property
     def account(self) -> "AttitudeAccount | None":
         """The expected accuracy by attitudes, None without any. Raise the errors of `attitude_account`."""
-        from rig.analysis.design.attitude_account import attitude_account
+        from rig.analysis.design.attitude_information import attitude_account
 
         return attitude_account(self.config, self.plan)
 
     @cached_property
     def detection_limits(self) -> "DetectionLimits":
         """The smallest faults that the checks detect."""
-        from rig.analysis.design.planned import predict_limits
-        from rig.turners.registry import kind_of
+        from rig.analysis.design.planned_limits import predict_limits
+        from rig.turners.turner_registry import kind_of
 
         turner = self.config.turner
         return predict_limits(self.config, self.plan, kind_of(turner).describe_configured(turner).kinematics)
@@ -74,7 +74,7 @@ class DryRun:
 
 def plan_document(planned: DryRun) -> dict[str, Any]:
     """Return the plan for machines: SI units, every field of every step."""
-    from rig.report.terminal.attitude_account import account_document
+    from rig.report.terminal.attitude_accuracy import account_document
     from rig.report.words.detection_limit_words import detection_limit_entries
 
     plan, account, predicted = planned.plan, planned.account, planned.detection_limits
@@ -152,7 +152,7 @@ def _print_steps(planned: DryRun, console: Console) -> None:
 
 def _print_predictions(planned: DryRun, console: Console) -> None:
     """Print the accuracy by attitudes of accelerometers, and the detection limits of the checks."""
-    from rig.report.terminal.attitude_account import print_account
+    from rig.report.terminal.attitude_accuracy import print_account
 
     account, detection_limits = planned.account, planned.detection_limits
     if account is not None:

@@ -5,14 +5,14 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from rich.console import Console
 
-from rig.analysis.freedom_beside import of_reversal
+from rig.analysis.effective_dof import of_reversal
 from rig.analysis.reversal import AsMounted, MagnetometerReversal
 from rig.data.entries.magnetometer import AsMountedEntry, ReversalDocument, ReversalEntry
 from rig.data.quantity import FIELD
 from rig.report.entry import counted, entry
-from rig.report.tables.axes import scale_and_bias_table, triple
+from rig.report.tables.axis_tables import scale_and_bias_table, triple
 from rig.report.tables.budget import heading_of
-from rig.report.words.expanded import expanded
+from rig.report.words.expanded_uncertainty import expanded
 from rig.station.plain_text import plain
 
 

@@ -10,7 +10,14 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.design.shortest import SIZES, Budgets, Planned, ReachedUncertainty, Shortest, TargetUncertainty
+from rig.analysis.design.candidate_search import (
+    SIZES,
+    Budgets,
+    Planned,
+    ReachedUncertainty,
+    Shortest,
+    TargetUncertainty,
+)
 from rig.config.models import ProcedureSection
 from rig.config.procedures.attitude_sets import SETS
 from rig.config.procedures.procedure_sections import AttitudesSection

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from shlex import quote
 
-from rig.config.judging.limits import key_of
+from rig.config.judging.verdict_limits import key_of
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import OF_THE_RIG
 from rig.data.result_file import CheckEntry

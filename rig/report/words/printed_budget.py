@@ -12,7 +12,7 @@ import numpy as np
 from rig.data.entries.budget import IN_U, BudgetEntry, ContributorEntry
 from rig.data.quantity import DisplayUnit
 from rig.estimation.arrays import SMALLEST_SIZE, divide_or_infinity
-from rig.report.words.rounding import figures, percent, power_of_ten, small
+from rig.report.words.printed_values import figures, percent, power_of_ten, small
 
 NEGLIGIBLE = 0.001  # of both variances: smaller lines are combined in one
 DIGITS = 3  # of a combined standard uncertainty: its parts are printed to the same decimal

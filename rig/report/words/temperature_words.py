@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from rig.data.entries.temperature import AtTemperatureEntry, OverTemperatureEntry, TemperatureContributorEntry
 from rig.data.quantity import Quantity
 from rig.estimation.temperature.over_temperature import GRADIENT, HYSTERESIS, LAG, NOISE, ORDER
-from rig.report.words.rounding import plus_minus
+from rig.report.words.printed_values import plus_minus
 
 STEP = 4  # every fourth row of the table is shown
 

@@ -14,7 +14,7 @@ from firmware_host.client import Calibration
 from rig.data.quantity import RATE
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.runner.board.sensors import describe_corrected
-from rig.sensors.source import OnSamples, SampleSource
+from rig.sensors.sample_source import OnSamples, SampleSource
 
 
 @dataclass(frozen=True, slots=True)

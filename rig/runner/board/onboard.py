@@ -16,7 +16,7 @@ import numpy as np
 from firmware_host.client import Board, BoardObservation
 from firmware_host.errors import BoardError
 from firmware_host.protocol import METHODS
-from rig.data.recording.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event
+from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner
 from rig.data.recording.run_file import RunData

@@ -15,7 +15,7 @@ from rig.config.sensors.sensor_sections import MagnetometerSection, SensorSectio
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
 from rig.data.recording.channel import thermometer_channel, triad_channel
 from rig.data.recording.recorded_sensor import RecordedSensor, build_sensor
-from rig.sensors.source import OnSamples
+from rig.sensors.sample_source import OnSamples
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,10 +24,10 @@ from rig.data.recording.hand_events import HandAsked, HandMoveRefused, HandMoveT
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove
-from rig.observation.by_hand.runs import MICROSECOND_S, rotate_face
+from rig.observation.by_hand.rests_and_moves import MICROSECOND_S, rotate_face
 from rig.plans.by_hand import ROUND, WantedMoves, next_instruction, still_open
 from rig.runner.board.sensors import BoardSource, open_board_source
-from rig.runner.by_hand.session import drain
+from rig.runner.by_hand.hand_session import drain
 
 LOOK_S = 0.05
 AGAIN = {  # the board's term: the error's name, what, what to do

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rig.config.sensors.lines_section import SEPARATORS, LinesSection
 from rig.estimation.arrays import Array
+from rig.sensors.lines.decimal_numbers import parse_numbers
 from rig.sensors.lines.fields import TextFieldReader
-from rig.sensors.lines.numbers import parse_numbers
 
 LONGEST_LINE = 2000  # bytes; longer input without a line end is no line
 KEPT_TEXT = 120  # characters of a rejected line for the message about it

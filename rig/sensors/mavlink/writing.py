@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping
 
 from rig.sensors.errors import SensorError
-from rig.sensors.mavlink.journal import ParameterChange, find_change
-from rig.sensors.mavlink.link import AutopilotLink
-from rig.sensors.mavlink.parameters import AutopilotParameter
+from rig.sensors.mavlink.autopilot_link import AutopilotLink
+from rig.sensors.mavlink.parameter_encoding import AutopilotParameter
+from rig.sensors.mavlink.parameter_journal import ParameterChange, find_change
 
 
 def autopilot_id(link: AutopilotLink) -> str:

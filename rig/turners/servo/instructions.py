@@ -1,9 +1,9 @@
 """The instructions to the servo, each a few writes: prepare, move, brake, disarm."""
 
 from rig.errors import Problem, Refused
-from rig.turners.servo.bus import Bus
-from rig.turners.servo.moves import ProfileMove
-from rig.turners.servo.registers import (
+from rig.turners.servo.goal_profiles import ProfileMove
+from rig.turners.servo.packet_handler import Bus
+from rig.turners.servo.servo_registers import (
     DRIVE_MODE,
     EXTENDED_POSITION,
     GOAL,

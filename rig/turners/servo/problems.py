@@ -2,7 +2,7 @@
 
 from rig.errors import Problem
 from rig.motion.steps import Motion
-from rig.turners.servo.bus import BusError, InstructionDenied, PortGone
+from rig.turners.servo.packet_handler import BusError, InstructionDenied, PortGone
 
 
 def port_lost(error: PortGone) -> Problem:

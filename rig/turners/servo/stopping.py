@@ -13,11 +13,11 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from rig.turners.servo.bus import Bus, BusError, InstructionDenied
-from rig.turners.servo.clock import Clock
+from rig.turners.servo.driver_clock import Clock
 from rig.turners.servo.instructions import brake
-from rig.turners.servo.link import ServoLink
-from rig.turners.servo.registers import TRIPPED, WATCHDOG
+from rig.turners.servo.packet_handler import Bus, BusError, InstructionDenied
+from rig.turners.servo.servo_link import ServoLink
+from rig.turners.servo.servo_registers import TRIPPED, WATCHDOG
 from rig.turners.stop_once import StopOutcome
 
 STOP_S = 0.95  # a stop is confirmed within this, or not at all

@@ -2,7 +2,7 @@
 
 from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
-from rig.motion.state import ArmState, RobotMode, RuntimeState, SafetyMode
+from rig.motion.turner_state import ArmState, RobotMode, RuntimeState, SafetyMode
 
 # The slider is reported as a fraction; anything below 99.9 % stretches a sweep measurably.
 FULL_SPEED_FRACTION = 0.999

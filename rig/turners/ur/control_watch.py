@@ -17,7 +17,7 @@ from rig.errors import Problem
 from rig.turners.ur.condition import local_control_during_run
 from rig.turners.ur.controller.controller_words import ProgramException, ProgramStopped, decode_message
 from rig.turners.ur.controller.dashboard import Dashboard
-from rig.turners.ur.controller.primary import PORT, ROBOT_MESSAGE, packages
+from rig.turners.ur.controller.primary_interface import PORT, ROBOT_MESSAGE, packages
 from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import is_polyscope_x
 

@@ -8,16 +8,16 @@ from contextlib import closing
 from dataclasses import replace
 
 from rig.errors import Problem, Refused
-from rig.motion.state import ArmState, RuntimeState
+from rig.motion.turner_state import ArmState, RuntimeState
+from rig.turners.ur.arm_report import ArmReport
+from rig.turners.ur.child_messages import Connected
 from rig.turners.ur.condition import MAKERS_SIMULATOR
 from rig.turners.ur.controller.dashboard import Dashboard
-from rig.turners.ur.controller.primary import ArmDescription, read_description
+from rig.turners.ur.controller.free_registers import find_free_half
+from rig.turners.ur.controller.primary_interface import ArmDescription, read_description
 from rig.turners.ur.controller.primary_stop import PrimaryStop
-from rig.turners.ur.controller.registers import find_free_half
 from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import identify_model, is_polyscope_x, series_problem
-from rig.turners.ur.messages import Connected
-from rig.turners.ur.report import ArmReport
 
 LOOK_S = 1.0  # time-out of a port that may be closed
 ANSWER_S = 5.0  # time-out of an open port while nothing moves

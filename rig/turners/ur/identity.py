@@ -14,7 +14,7 @@ from rig.config.ranges import ModelName
 from rig.errors import Problem
 from rig.motion.geometry import LENGTHS, DenavitHartenberg, lengths_m
 from rig.motion.model import TurnerModel, load_turner_model, model_of
-from rig.turners.ur.report import ArmReport
+from rig.turners.ur.arm_report import ArmReport
 
 if TYPE_CHECKING:
     from rig.config.models import ArmSection

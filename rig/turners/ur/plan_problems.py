@@ -6,9 +6,9 @@ from rig.motion.geometry import DenavitHartenberg
 from rig.motion.keep_out import find_clearance_problems
 from rig.motion.model import TurnerModel
 from rig.motion.preflight import find_step_problems, travels
-from rig.motion.state import JointLimits
 from rig.motion.steps import Plan
-from rig.turners.ur.limits import motion_problems
+from rig.motion.turner_state import JointLimits
+from rig.turners.ur.joint_limits import motion_problems
 
 
 def plan_problems(

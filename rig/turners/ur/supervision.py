@@ -3,7 +3,7 @@
 from enum import Enum, auto
 
 from rig.errors import Problem
-from rig.motion.state import ArmState, RuntimeState
+from rig.motion.turner_state import ArmState, RuntimeState
 from rig.turners.ur.condition import FULL_SPEED_FRACTION, program_interruption, readiness, speed_limited
 
 INTERRUPTION_S = 0.05  # wait after a stopped program for the safety bits that explain it

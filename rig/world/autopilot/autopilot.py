@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rig.errors.extras import missing_extra
-from rig.world.autopilot.imu import RATE_HZ, SimulatedImu
+from rig.world.autopilot.autopilot_imu import RATE_HZ, SimulatedImu
 from rig.world.autopilot.parameters import Parameters
 
 STANDARD_GRAVITY_M_S2 = 9.80665

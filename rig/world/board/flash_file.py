@@ -10,9 +10,9 @@ from pathlib import Path
 
 from firmware_host.emulator.chip.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory
 from rig.config.files.regular_file import UnfitFile, read_regular_file
-from rig.config.files.written_file import write_new
+from rig.config.files.safe_writing import write_new
 from rig.errors import Refused
-from rig.world.board.mounting import read_firmware
+from rig.world.board.mounted_board import read_firmware
 
 LARGEST_BYTES = 2 * FLASH_BYTES  # with an offset for every doubleword
 # The chip's memories (RM0394, section 2.2). A program's first word points to the end of the RAM, its second into the

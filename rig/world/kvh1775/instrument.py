@@ -15,7 +15,14 @@ from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2, Ac
 from firmware_host.emulator.parts.gyroscope import Gyroscope
 from firmware_host.emulator.parts.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
 from rig.config.world.faulty import SimulatedFaultySection
-from rig.sensors.kvh1775.messages import ALL_VALID, GOOD_TEST_BYTE, SEQUENCE_NUMBERS, Format, encode_one, encode_test
+from rig.sensors.kvh1775.kvh_messages import (
+    ALL_VALID,
+    GOOD_TEST_BYTE,
+    SEQUENCE_NUMBERS,
+    Format,
+    encode_one,
+    encode_test,
+)
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 from rig.world.kvh1775.memory import KvhMemory

@@ -16,7 +16,7 @@ from firmware_host.emulator.parts.gyroscope import Gyroscope
 from firmware_host.emulator.parts.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
 from rig.config.sensors.lines_section import LineAccelerationSection, LineFieldSection, LineRateSection, LinesSection
 from rig.config.world.faulty import SimulatedFaultySection
-from rig.config.world.lines import SimulatedLinesSection
+from rig.config.world.printing_device import SimulatedLinesSection
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 

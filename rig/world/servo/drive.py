@@ -9,8 +9,8 @@ from math import floor, inf, isclose, pi, radians
 
 import numpy as np
 
+from rig.world.servo.control_tables import EXTENDED, POSITION, REVERSE, TIME_BASED, TRIPPED, Model, ServoMemory
 from rig.world.servo.profile import ProfileSegment, plan_limited, plan_timed
-from rig.world.servo.registers import EXTENDED, POSITION, REVERSE, TIME_BASED, TRIPPED, Model, ServoMemory
 from rig.world.servo.shaft import Shaft, whole_turns
 from rig.world.servo.truth import ServoTruth
 

@@ -6,8 +6,8 @@ bulk instructions, backup.
 
 from collections.abc import Callable
 
+from rig.world.servo.control_tables import MODELS, ServoMemory, Write, build_control_table, find_write_error
 from rig.world.servo.drive import Drive, ServoFaults
-from rig.world.servo.registers import MODELS, ServoMemory, Write, build_control_table, find_write_error
 from rig.world.servo.shaft import Shaft
 from rig.world.servo.truth import ServoTruth
 from rig.world.servo.wire_format import (

@@ -19,10 +19,10 @@ from rig.world.ur10e.controller_messages import (
 )
 from rig.world.ur10e.faults import ArmFaults
 from rig.world.ur10e.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
+from rig.world.ur10e.motion.arm_models import MODELS, ArmModel
 from rig.world.ur10e.motion.forward_kinematics import Vector, flange_pose, rotate_pose, rotation_from_vector
 from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.links import NOMINAL, Links
-from rig.world.ur10e.motion.models import MODELS, ArmModel
 from rig.world.ur10e.motion.tcp_motion import TcpMotion, find_tcp_motion
 
 ROUNDING_RAD = 1e-6  # a target on a joint's limit is within it

@@ -8,9 +8,9 @@ import pytest
 from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
 from rig.analysis.consistency.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps
-from rig.analysis.consistency.readings import judge_readings
+from rig.analysis.consistency.converter_tests import judge_readings
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
-from rig.analysis.surroundings import surroundings_of
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array

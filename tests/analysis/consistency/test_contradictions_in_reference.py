@@ -7,7 +7,7 @@ import yaml
 from rig.analysis.analyses import calibrate
 from rig.analysis.consistency.contradictions import disturbed_sweeps
 from rig.analysis.gyroscope.calibration import observe_recordings
-from rig.analysis.reference.acceleration import calibrate_accelerometers
+from rig.analysis.reference.accelerometer import calibrate_accelerometers
 from rig.errors import Fault
 from support.paths import RECORDINGS
 from support.recordings.damaged_accelerations import (

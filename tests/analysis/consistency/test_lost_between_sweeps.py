@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.analyses import calibrate
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
 from rig.data.recording.run_file import read_run
 from rig.observation.windows import swept
 from support.paths import RECORDINGS

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
-from rig.analysis.gyroscope.segments import Segments, stack_segments
-from rig.analysis.surroundings import surroundings_of
+from rig.analysis.gyroscope.segment_table import Segments, stack_segments
 from rig.data.recording.run_file import RunData
 from rig.observation.consistency.segments import segment_recordings
 from rig.observation.windows import swept

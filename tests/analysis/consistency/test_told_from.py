@@ -7,9 +7,9 @@ import pytest
 
 from rig.analysis.consistency.contradictions import ConsistencyChecks, contradictions
 from rig.analysis.consistency.detection_limits import DetectionLimit
-from rig.analysis.design.planned import predict_limits
+from rig.analysis.design.planned_limits import predict_limits
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
-from rig.analysis.surroundings import surroundings_of
 from rig.config.load import parse
 from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array

@@ -8,7 +8,7 @@ import pytest
 from rig.data.quantity import RATE
 from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
-from rig.observation.statistics.lines import LineSearch, find_lines, line_swing, waves
+from rig.observation.statistics.spectral_lines import LineSearch, find_lines, line_swing, waves
 from support.recordings.checked_runs import checked, failed
 from support.recordings.drawn_recording import ADIS16465, KINDS, drawn
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.analysis.external.increments import InIncrements, solve_turning
+from rig.analysis.external.increment_calibration import InIncrements, solve_turning
 from rig.cli import main
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.external.known_increments import KnownIncrements
+from rig.estimation.external.increment_solution import KnownIncrements
 from rig.estimation.reference.reference_budget import scale_and_bias_covariance
 from rig.observation.external.fixes import Turning
 from support.external.followed_body import EARTH_RAD_S, Followed, World, follow, turning, write

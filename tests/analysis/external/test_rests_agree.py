@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.external.increments import solve_turning
+from rig.analysis.external.increment_calibration import solve_turning
 from rig.analysis.external.rests_agree import check_rests_agree
 from rig.errors import Fault
 from support.external.followed_body import World, follow, turning

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.external.attitudes import solve_placed
-from rig.analysis.external.elsewhere import budget_of, solve_swept
+from rig.analysis.external.external_recordings import budget_of, solve_swept
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Fault, Refused

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analysis.external.elsewhere import solve_swept
+from rig.analysis.external.external_recordings import solve_swept
 from rig.cli import main
 from rig.errors import Fault
 from rig.estimation.arrays import Array

@@ -6,8 +6,8 @@ from math import pi
 import numpy as np
 import pytest
 
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
-from rig.analysis.surroundings import surroundings_of
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.motion.geometry import NOMINAL

@@ -13,7 +13,7 @@ from rig.estimation.earth import DEG_H
 from rig.estimation.gyroscope.earth_rate import EarthRate
 from rig.report.entries.earth_rate import earth_rate_entry, earth_rate_lines
 from rig.report.entries.gyroscope import sensor_entry
-from rig.report.tables.axes import decimals
+from rig.report.tables.axis_tables import decimals
 from support.paths import CONFIGS
 from support.recordings.synthetic_run import Setup, synthetic_run
 

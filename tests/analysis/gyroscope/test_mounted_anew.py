@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import solve_observed
 from rig.analysis.gyroscope.mounts import EstimatedMount, observe_as_mounted
-from rig.analysis.surroundings import surroundings_of
 from rig.data.recording.settings import settings_from_json
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget

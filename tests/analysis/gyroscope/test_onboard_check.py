@@ -9,13 +9,20 @@ from rich.console import Console
 
 from firmware_host.answers import BoardObservation, BoardSolution
 from rig.analysis.gyroscope.onboard_check import check_arithmetic, check_observed
-from rig.data.recording.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event, TimedEvent
+from rig.data.recording.recorded_events import (
+    BoardNotObserved,
+    BoardObserved,
+    BoardRecalled,
+    BoardSolved,
+    Event,
+    TimedEvent,
+)
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.observation.onboard_window import find_averaged_sweeps
 from rig.observation.windows import swept
 from rig.report.entries.gyroscope import sensor_entry
-from rig.report.terminal.table import print_result
+from rig.report.terminal.result_table import print_result
 from support.documents.results import result_document
 from support.recordings.solving import solve_runs
 from support.recordings.synthetic_run import SENSITIVITY, Setup, synthetic_run

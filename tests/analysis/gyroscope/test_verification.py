@@ -15,8 +15,8 @@ from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.comparison import Reference
 from rig.analysis.gyroscope.verification import Verification, verify
 from rig.analysis.verdict import verdict, verification_checks
-from rig.config.judging.limits import Limits
-from rig.data.recording.events import SweepStarted
+from rig.config.judging.verdict_limits import Limits
+from rig.data.recording.recorded_events import SweepStarted
 from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array

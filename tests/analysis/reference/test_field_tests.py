@@ -7,8 +7,8 @@ import pytest
 
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.estimation.reference.magnetometer import FieldDrift
-from rig.observation.field import field_tests
-from rig.plans.recorded import RecordedRun, judged, open_run
+from rig.observation.field_means import field_tests
+from rig.plans.recorded_run import RecordedRun, judged, open_run
 from support.paths import RECORDINGS
 
 

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
-from rig.analysis.surroundings import surroundings_of
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Unknown, budget
 from rig.observation.observed_run import observe_runs

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.analysis.reference.accelerometer_errors import Datasheet, read_datasheet
+from rig.analysis.reference.datasheet_errors import Datasheet, read_datasheet
 from rig.analysis.reference.reference_budgets import accelerometer_budget, magnetometer_budget
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.data.quantity import ACCELERATION
@@ -20,7 +20,7 @@ from rig.estimation.reference.magnetometer import field_drift, uniformity
 from rig.estimation.reference.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import solve_triaxial
-from rig.plans.recorded import open_run
+from rig.plans.recorded_run import open_run
 from support.motions.arm_attitudes import attitudes_of, crooked, crooked_arm, joints_rad
 from support.motions.arm_sweeps import Truth, planned, recorded_dwells, recorded_sweeps
 from support.paths import RECORDINGS

@@ -15,8 +15,8 @@ import yaml
 
 from rig.config.load import load
 from rig.sensors.errors import SensorError
-from rig.sensors.mavlink.link import AutopilotLink
-from rig.sensors.mavlink.source import look
+from rig.sensors.mavlink.autopilot_link import AutopilotLink
+from rig.sensors.mavlink.autopilot_source import look
 from rig.sensors.mavlink.writing import find_unfinished_change
 from support.laboratories.commands import rig_here
 from support.paths import CONFIGS, ROOT

@@ -18,8 +18,8 @@ import yaml
 from firmware_host.client import Board, BoardIdentity, SensorInfo
 from firmware_host.parts import BOARD_PARTS, GYROSCOPES, MAGNETOMETERS
 from firmware_host.protocol import FIRMWARE_VERSION
+from rig.board.flash_store import calibration_of, store
 from rig.board.identify import find_sensor, read_stored_calibration, refuse_other_firmware
-from rig.board.store import calibration_of, store
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.result_file import read_passed_result, read_result, write_result
 from rig.errors import Refused

@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 from rig.cli import main
-from rig.commands.devices.written import write_checked
+from rig.commands.devices.configuration_writing import write_checked
+from rig.config.config_schema import config_schema
 from rig.config.first_configuration import Answers
 from rig.config.load import load
-from rig.config.schema import config_schema
 from support.processes.waiting import PATIENCE_S
 
 ON_BOARD = ("--sensor", "board", "--part", "lsm9ds1", "--port", "/dev/ttyACM0", "--serial-number", "G-1")

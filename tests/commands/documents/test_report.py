@@ -11,7 +11,7 @@ from rig.data.entries.magnetometer import ReversalDocument
 from rig.data.result_file import write_result
 from rig.errors import Refused
 from rig.report.certificate import pdf
-from rig.report.words.rounding import rounded
+from rig.report.words.printed_values import rounded
 from support.documents.certified import everything, result, reversal
 from support.laboratories.commands import rig
 from support.paths import CONFIGS, RECORDINGS

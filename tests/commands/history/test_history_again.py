@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from rig.commands.history import command as history_command
-from rig.commands.history.again import recompute_history
-from rig.commands.history.again_work import Task
+from rig.commands.history.recompute import recompute_history
+from rig.commands.history.recompute_worker import Task
 from rig.data.result_file import ResultDocument
-from rig.history.again.answer import Answer, RecomputedResult
+from rig.history.recompute.result_comparison import Answer, RecomputedResult
 from rig.history.store import History, open_history
-from rig.report.kinds.registry import followed
+from rig.report.kinds.kind_registry import followed
 from support.history.kept_recordings import certified, keep
 from support.history.past_runs import finished
 from support.laboratories.commands import rig_here

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
 from rig.data.result_file import ResultDocument, read_result
-from rig.history.entered.recomputed import not_given
+from rig.history.entered.recomputed_result import not_given
 from rig.history.store import open_history
-from rig.plans.recorded import judged, open_run
+from rig.plans.recorded_run import judged, open_run
 from rig.report.document import document_of
 from support.laboratories.commands import rig_here
 from support.paths import RECORDINGS

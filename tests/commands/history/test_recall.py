@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.history.recall import recall_sensors
+from rig.commands.history.run_serials import recall_sensors
 from rig.config.load import load
 from rig.history.store import open_history
 from support.history.past_runs import finished

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from rig.commands.history.cluster import connect_client
-from rig.commands.history.spread import Cluster, Processes, distribute, solve_one_by_one
+from rig.commands.history.worker_pools import Cluster, Processes, distribute, solve_one_by_one
 from rig.data.run_folder import RESULT
 from rig.errors import Fault
-from rig.history.again.answer import RecomputedResult, Unsolved
+from rig.history.recompute.result_comparison import RecomputedResult, Unsolved
 from support.history.again_stand_ins import DEADLY, WAITING, deadly, failing, task, told, waiting
 from support.processes.clusters import local_cluster
 
@@ -58,7 +58,7 @@ def test_workers_of_a_cluster_work_in_processes_of_their_own_and_one_that_dies_c
 
 @pytest.mark.slow
 def test_a_cluster_without_workers_is_waited_for_and_then_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rig.commands.history.spread.WITHOUT_WORKERS_S", 0.5)
+    monkeypatch.setattr("rig.commands.history.worker_pools.WITHOUT_WORKERS_S", 0.5)
     with (
         local_cluster(n_workers=0, processes=False) as cluster,
         connect_client(cluster.scheduler_address) as client,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rig.cli import main
-from rig.observation.by_hand.handled import segment_session
+from rig.observation.by_hand.hand_segmentation import segment_session
 from support.external.handled_body import TWELVE, creeping, handle, write
 from support.external.real import unpacked
 

@@ -7,8 +7,8 @@ from scipy.optimize import least_squares
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Accumulator, Solution
-from rig.estimation.gyroscope.batch import algorithm_1_batch, newton_batch
 from rig.estimation.gyroscope.levenberg_marquardt import solve_levenberg_marquardt, squared_rate, squared_rate_jacobian
+from rig.estimation.gyroscope.six_observation_batch import algorithm_1_batch, newton_batch
 
 SPEED = np.pi / 3
 DIRECTIONS = np.kron(np.eye(3), [[1.0], [-1.0]])

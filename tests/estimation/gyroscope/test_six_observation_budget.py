@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_six_observation
 from rig.analysis.gyroscope.vector_inputs import collect_inputs
-from rig.analysis.surroundings import surroundings_of
 from rig.estimation.gyroscope.accumulator import Solution
 from rig.estimation.gyroscope.six_observation_budget import response_of
 from rig.estimation.gyroscope.vector_fit import VectorInputs

@@ -13,7 +13,7 @@ from rig.estimation.reference.imu import solve_imu
 from rig.estimation.reference.imu_fit import covariance_bound
 from rig.estimation.reference.reference_model import BIAS, REFERENCE
 from rig.estimation.reference.sweep_harmonics import FirstHarmonic, first_harmonic
-from rig.observation.statistics.beside_lines import fit_inflation, line_columns
+from rig.observation.statistics.vibration_noise import fit_inflation, line_columns
 from support.motions.arm_attitudes import crooked_arm
 from support.motions.arm_sweeps import (
     MICRO_G,

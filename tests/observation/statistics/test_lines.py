@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.observation.statistics.lines import LineSearch, find_lines, fit_columns, waves
+from rig.observation.statistics.spectral_lines import LineSearch, find_lines, fit_columns, waves
 
 COUNT, RATE_HZ, NOISE = 1200, 200.0, 4.5e-4
 STRICT = LineSearch(stands_out=30.0)

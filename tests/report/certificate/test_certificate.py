@@ -17,13 +17,13 @@ from rig.data.entries.result_types import DetectionLimitEntry, ErrorEntry
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.errors import Refused
 from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import is_simulated
-from rig.report.certificate.page import certificate_page
 from rig.report.certificate.statements import StatedFacts, of_configuration, stated_in
 from rig.report.certificate.validity import list_omitted_rates
 from rig.report.entries.budget import budget_entry
-from rig.report.tables.coverage import coverage_sentence
-from rig.report.words.rounding import rounded
+from rig.report.tables.coverage_statements import coverage_sentence
+from rig.report.words.printed_values import rounded
 from support.documents.certified import (
     LABORATORY,
     certificate,

@@ -10,10 +10,10 @@ from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.result_file import ResultDocument
 from rig.page.rows import parameter_rows
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.findings.kind import NoOutlet, ResultKind
+from rig.report.findings.result_kind import NoOutlet, ResultKind
 from rig.report.header import calibration_header
-from rig.report.kinds.registry import followed, kinds
-from rig.report.terminal.table import print_result
+from rig.report.kinds.kind_registry import followed, kinds
+from rig.report.terminal.result_table import print_result
 from support.documents.certified import LABORATORY, certificate, everything, over_temperature, read
 
 NAMES = [kind.name for kind in kinds()]

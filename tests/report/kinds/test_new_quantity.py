@@ -16,25 +16,25 @@ from rig.cli import main
 from rig.data.entries.result_types import Freedom3, Vector3
 from rig.data.quantity import Quantity
 from rig.data.result_file import GyroscopeEntry, ResultDocument
-from rig.history.entered.finished import FinishedRun, compact
-from rig.history.entered.recomputed import not_given
-from rig.history.plots import draw_trends
+from rig.history.entered.finished_run import FinishedRun, compact
+from rig.history.entered.recomputed_result import not_given
 from rig.history.series import subjects, trends
+from rig.history.series_plots import draw_trends
 from rig.history.store import Selection, open_history
 from rig.history.terminal.change_words import name_in_words
 from rig.notebook.results import Result
-from rig.page.outcome import outcome_rows
+from rig.page.outcome_screen import outcome_rows
 from rig.page.rows import parameter_rows
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.exports.calibrations import calibrations
+from rig.report.exports.exported_corrections import calibrations
 from rig.report.exports.formats import OF_CALIBRATIONS, texts_of_calibrations
 from rig.report.findings import characteristics
 from rig.report.findings.characteristic import OUTLETS, Characteristic, Series, Units, read_fields
-from rig.report.findings.followed import BIASES, SCALES
-from rig.report.findings.kind import NoOutlet, ResultKind
-from rig.report.kinds import registry
-from rig.report.kinds.registry import followed, kinds
-from rig.report.terminal.table import print_result
+from rig.report.findings.history_records import BIASES, SCALES
+from rig.report.findings.result_kind import NoOutlet, ResultKind
+from rig.report.kinds import kind_registry
+from rig.report.kinds.kind_registry import followed, kinds
+from rig.report.terminal.result_table import print_result
 from support.documents.certified import LABORATORY, certificate, everything, over_temperature, read
 from support.documents.dcc_rules import schema_faults
 
@@ -76,10 +76,10 @@ def plain() -> ResultDocument:
 @pytest.fixture
 def document(monkeypatch: pytest.MonkeyPatch) -> Iterator[ResultDocument]:
     """A result that states it, while the table of characteristics has its row."""
-    gyroscope = next(kind for kind in registry.OF_THE_RIG if kind.name == "gyroscope")
+    gyroscope = next(kind for kind in kind_registry.OF_THE_RIG if kind.name == "gyroscope")
     with_it = replace(gyroscope, characteristics=(*gyroscope.characteristics, DENSITY))
-    others = [kind for kind in registry.OF_THE_RIG if kind is not gyroscope]
-    monkeypatch.setattr(registry, "OF_THE_RIG", (with_it, *others))
+    others = [kind for kind in kind_registry.OF_THE_RIG if kind is not gyroscope]
+    monkeypatch.setattr(kind_registry, "OF_THE_RIG", (with_it, *others))
     monkeypatch.setattr(characteristics, "OF_THE_RIG", (*characteristics.OF_THE_RIG, DENSITY))
     kinds.cache_clear()
     said = plain().model_dump(mode="json", by_alias=True, exclude_unset=True)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from lxml import html
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
 from rig.cli import main
 from rig.config.judging.judging_sections import SiteSection
 from rig.data.entries.accelerometer import AccelerometerEntry
@@ -22,15 +22,15 @@ from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.result_file import GyroscopeEntry, ResultDocument, read_result
 from rig.estimation.statistics.coverage import coverage_factors
-from rig.plans.recorded import judged, open_run
+from rig.plans.recorded_run import judged, open_run
+from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.certificate.page import certificate_page
 from rig.report.certificate.statements import StatedFacts
 from rig.report.document import document_of
-from rig.report.tables.coverage import coverage_sentence
-from rig.report.terminal.table import print_outcome
+from rig.report.tables.coverage_statements import coverage_sentence
+from rig.report.terminal.result_table import print_outcome
 from rig.report.words.printed_budget import freedom_text
-from rig.report.words.rounding import figures
+from rig.report.words.printed_values import figures
 from support.documents.certified import certificate, everything, result
 from support.documents.dcc_rules import schema_faults
 from support.paths import DOCS, RECORDINGS

@@ -10,7 +10,7 @@ from rig.analysis.check import Check, fitness
 from rig.cli import main
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.report.entry import entry
-from rig.report.terminal.ending import ending
+from rig.report.terminal.run_summary import ending
 from rig.report.words.check_words import check_words, what_failed, words_of
 from rig.report.words.checks_page import page_text
 from rig.report.words.glossary_page import page_text as glossary_text

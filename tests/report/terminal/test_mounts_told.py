@@ -9,9 +9,9 @@ from rich.console import Console
 from rig.data.result_file import MountEntry, ResultDocument, write_result
 from rig.page.page_state import PageState
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.terminal.ending import ending
-from rig.report.terminal.table import print_values
-from rig.report.words.mounts import farthest_off, mount_lines
+from rig.report.terminal.result_table import print_values
+from rig.report.terminal.run_summary import ending
+from rig.report.words.mounting_words import farthest_off, mount_lines
 from rig.station.events import DocumentWritten
 from support.documents.certified import certificate, compared, read, result
 from support.documents.dcc_rules import schema_faults

@@ -13,7 +13,7 @@ from rig.cli import main
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.kinds.verification import verification_table
 from rig.report.terminal.board_info import print_stored
-from rig.report.terminal.table import print_outcome, print_result
+from rig.report.terminal.result_table import print_outcome, print_result
 from support.documents.results import SENSOR, VERIFIED, result_document
 from support.paths import DOCS
 

@@ -13,7 +13,7 @@ from rig.cli import run_guarded
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import resuming
 from rig.errors import Fault, Problem, refuse
-from rig.report.terminal.table import print_kept
+from rig.report.terminal.result_table import print_kept
 from rig.station.events import Advice
 from rig.station.view import PlainView
 from support.documents.ended_runs import ONE, failed, of_three_parts

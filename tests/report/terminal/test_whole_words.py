@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from rig.data.result_file import read_result
-from rig.report.terminal.table import print_result
+from rig.report.terminal.result_table import print_result
 from support.paths import ROOT
 
 FRAME = re.compile("[┏━┳┓┃┡╇┩│└─┴┘├┼┤]")

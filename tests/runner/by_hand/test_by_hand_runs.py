@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from rig.config.load import load
-from rig.turners.registry import sections
+from rig.turners.turner_registry import sections
 from support.laboratories.commands import rig, rig_here
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS

@@ -17,8 +17,8 @@ from scipy.stats import norm
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.data.recording.hand_events import HandRested
 from rig.data.recording.run_file import read_run
-from rig.turners.registry import sections
-from rig.world.section import read_world_section
+from rig.turners.turner_registry import sections
+from rig.world.world_section import read_world_section
 from support.external.handled_body import FAST_RAD_S, LSM9DS1
 from support.laboratories.commands import rig_here, wait_for_log
 from support.laboratories.drawn_laboratory import truth

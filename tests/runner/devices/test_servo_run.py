@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.data.processes.silence import crowding
+from rig.data.processes.process_silence import crowding
 from rig.data.recording.run_file import read_run
-from rig.turners.servo.link import SILENCE_S
+from rig.turners.servo.servo_link import SILENCE_S
 from support.laboratories.commands import rig, rig_here
 from support.laboratories.servo_runs import Act, Seen, carried_out, configured
 

@@ -10,7 +10,7 @@ from rig.motion.steps import Rest
 from rig.plans.verbs import Verbs
 from rig.runner.phases import Run
 from rig.station.events import ListenerDropped, Progress, RunEvent, VerdictReached
-from rig.station.station import Stations, always_yes
+from rig.station.operator_station import Stations, always_yes
 from support.laboratories.worlds import World
 
 pytestmark = pytest.mark.slow

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rig.data.recording.run_file import RunRecorder, read_run
-from rig.motion.state import ArmState
+from rig.motion.turner_state import ArmState
 from rig.runner.acquisition import STANDING_S, WHOLE_S, Acquisition
 from support.recordings.synthetic_run import PROVENANCE, SENSOR, UR, Setup, synthetic_run
 

@@ -8,8 +8,8 @@ from rig.data.quantity import FIELD
 from rig.data.recording.channel import triad_channel
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Refused
-from rig.runner.mounted import CalibratedBefore, Memory, Mounted, ask_of_other_boards, find_mounted
-from rig.station.station import Stations, always_yes
+from rig.runner.mounted_sensors import CalibratedBefore, Memory, Mounted, ask_of_other_boards, find_mounted
+from rig.station.operator_station import Stations, always_yes
 
 HERE, THERE = "0123456789abcdef01234567", "f" * 24
 

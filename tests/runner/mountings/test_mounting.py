@@ -15,7 +15,7 @@ from rig.motion.steps import Stage
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.runner.announcement import mounting
 from rig.runner.mounting import GyroscopeReadings, refuse_hanging_otherwise, refuse_turning_otherwise, refuse_unsteady
-from rig.turners.registry import words_of
+from rig.turners.turner_registry import words_of
 from support.recordings.synthetic_run import SENSITIVITY, SENSOR
 
 COUNT = 476  # two seconds

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from rig.data.recording.run_file import read_run
-from rig.observation.finished import finished_dwells
+from rig.observation.finished_steps import finished_dwells
 from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 
 SIX = [[0, -90, 0], [-90, -90, 0], [-90, -90, 90], [-180, -90, 45], [90, -90, -45], [45, -90, 90]]

@@ -13,7 +13,7 @@ from rig.data.quantity import TEMPERATURE
 from rig.data.recording.run_file import RunData, read_run
 from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
 from rig.data.result_file import read_result
-from rig.observation.finished import finished_sweeps
+from rig.observation.finished_steps import finished_sweeps
 from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 from support.laboratories.worlds import World, hardware, merge, world
 from support.processes.waiting import PATIENCE_S, alive, wait_for

@@ -9,7 +9,7 @@ import pytest
 from rig.config.procedures.procedure_sections import ThermalSection
 from rig.data.quantity import RATE
 from rig.data.recording.channel import thermometer_channel, triad_channel
-from rig.data.recording.events import Event
+from rig.data.recording.recorded_events import Event
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault
 from rig.plans.motions.temperature_course import TemperatureCourse

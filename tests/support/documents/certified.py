@@ -13,8 +13,8 @@ import numpy as np
 from rig.analysis.analyses import calibrate
 from rig.config.judging.judging_sections import CertificateSection, SiteSection
 from rig.data.entries.accelerometer import AccelerometerEntry
+from rig.data.entries.bias_drift import DriftEntry
 from rig.data.entries.budget import ClockComparisonEntry
-from rig.data.entries.drift import DriftEntry
 from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.entries.magnetometer import MagnetometerEntry, ReversalEntry
 from rig.data.entries.result_types import Matrix3, Vector3
@@ -23,8 +23,8 @@ from rig.data.result_file import ResultDocument, VectorEntry
 from rig.estimation.reference.attitude_error import AttitudeError
 from rig.estimation.reference.reference_budget import KnownSize, Spread, reference_budget
 from rig.motion.geometry import NOMINAL
+from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import Certificate, certificate_of
-from rig.report.certificate.page import certificate_page
 from rig.report.certificate.statements import StatedFacts
 from rig.report.document import document_of
 from rig.report.entries.budget import budget_entry

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rig.data.result_file import write_result
-from rig.history.entered.finished import read_finished_run
+from rig.history.entered.finished_run import read_finished_run
 from rig.history.store import open_history
 from support.documents.certified import result
 from support.documents.signing import PASSPHRASE, Holder, holder, stamping, time_server

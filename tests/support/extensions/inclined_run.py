@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from rig.data.recording.channel import Channel
-from rig.data.recording.events import encode_event
 from rig.data.recording.layout import Contents, lay_out
+from rig.data.recording.layout_keys import EVENTS_DTYPE, SCHEMA
+from rig.data.recording.recorded_events import encode_event
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.schema import EVENTS_DTYPE, SCHEMA
 from rig.observation.observed_run import observe_run
 from rig.observation.windows import dwelt
-from rig.plans.recorded import open_run
+from rig.plans.recorded_run import open_run
 from support.extensions.inclinometer import INCLINATION
 from support.paths import RECORDINGS
 

@@ -15,7 +15,7 @@ import numpy as np
 from rich.table import Table
 
 from rig.analysis.check import fitness
-from rig.analysis.installed_kinds import OfKind
+from rig.analysis.installed_solvers import OfKind
 from rig.analysis.outcome import Outcome
 from rig.data.entries.result_types import Entry
 from rig.data.quantity import DisplayUnit, Quantity
@@ -25,12 +25,12 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.external.placements import Placements
 from rig.report.findings.finding import Finding
-from rig.report.findings.followed import HistoryRecord, scale_and_bias, select_uncertain
-from rig.report.findings.kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, Standard
+from rig.report.findings.history_records import HistoryRecord, scale_and_bias, select_uncertain
+from rig.report.findings.result_kind import CertifiedItem, DisplayRow, NoOutlet, ResultKind, Standard
 from rig.report.findings.unexplained import Unexplained
 from rig.report.kinds.triad import shown_of, tables
 from rig.report.tables.xml_parts import dcc, real_list, text
-from rig.report.words.expanded import expanded
+from rig.report.words.expanded_uncertainty import expanded
 
 KEY, FEWEST = "inclinometers", 4
 DEGREE = np.pi / 180

@@ -7,15 +7,15 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rig.commands.configured import load_configured
-from rig.data.recording.events import RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.recording.provenance import provenance_of
+from rig.data.recording.recorded_events import RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.recording.recorded_turner import RecordedTurner
 from rig.data.recording.run_file import RunRecorder
 from rig.data.recording.settings import settings_of
 from rig.data.run_folder import CONFIG
-from rig.motion.state import State
 from rig.motion.steps import Dwell, Rest, Sweep
-from rig.turners.registry import kind_of
+from rig.motion.turner_state import State
+from rig.turners.turner_registry import kind_of
 from support.recordings.synthetic_run import SENSITIVITY, SENSOR
 
 TEXT = """

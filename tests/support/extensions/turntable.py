@@ -20,8 +20,8 @@ from rig.data.meaning import Meaning
 from rig.errors import Problem
 from rig.motion.carried import FlangeLoad
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import Joints, Row, StateField, TurnerIdentity
 from rig.motion.steps import Motion, progress, travel
+from rig.motion.turner_state import Joints, Row, StateField, TurnerIdentity
 from rig.observation.observed_run import observe_runs
 from rig.procedure import (
     Outcome,
@@ -37,7 +37,7 @@ from rig.procedure import (
     Verbs,
     trapezoid_duration,
 )
-from rig.turners.kind import OnState, TurnerKind, Wording
+from rig.turners.turner_kind import OnState, TurnerKind, Wording
 
 JOINTS = ("table",)
 GEOMETRY = DenavitHartenberg(theta_rad=(0.0,), a_m=(0.0,), d_m=(0.2,), alpha_rad=(0.0,))

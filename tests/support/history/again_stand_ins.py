@@ -5,9 +5,9 @@ import signal
 import time
 from pathlib import Path
 
-from rig.commands.history.again_work import Task
+from rig.commands.history.recompute_worker import Task
 from rig.data.run_folder import RESULT
-from rig.history.again.answer import Answer, RecomputedResult
+from rig.history.recompute.result_comparison import Answer, RecomputedResult
 
 DEADLY, WAITING = "deadly", "waiting"
 

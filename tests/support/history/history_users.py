@@ -41,8 +41,8 @@ def run_folder(folder: Path, serial_number: str, second: int) -> Path:
 def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
     """Enter parts."""
     from rig.batch.status import Now
-    from rig.commands.history.recall import recall_sensors
     from rig.commands.history.remember import remember
+    from rig.commands.history.run_serials import recall_sensors
     from rig.config.load import load
     from rig.floor.heartbeat import heartbeat
     from rig.history.storage.address import resolve_address
@@ -77,7 +77,7 @@ def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
 def notebook(seconds: float) -> None:
     """Keep the history open so long, and look at it all the time."""
     import rig
-    from rig.notebook.history import calibrations
+    from rig.notebook.notebook_history import calibrations
 
     place = os.environ["RIG_HISTORY"]
     with rig.open_history(place) as history:

@@ -8,8 +8,8 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from rig.data.result_file import ResultDocument
-from rig.history.entered.finished import FinishedRun, compact, read_finished_run
-from rig.history.entered.issued import Issued
+from rig.history.entered.finished_run import FinishedRun, compact, read_finished_run
+from rig.history.entered.issued_certificate import Issued
 from rig.history.store import History
 from support.paths import RECORDINGS
 

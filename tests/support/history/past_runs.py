@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from rig.data.result_file import ResultDocument, VectorEntry
-from rig.history.entered.finished import EnteredRecording, FinishedRun, compact
+from rig.history.entered.finished_run import EnteredRecording, FinishedRun, compact
 from rig.history.store import open_history
 from support.documents.results import SENSOR, VERIFIED
 

@@ -20,12 +20,12 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import HandSettings
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.by_hand import HandSolution, SessionConditions, solve_by_hand
-from rig.estimation.by_hand.session import HandRecording
-from rig.observation.by_hand.handled import Segmenter
-from rig.observation.by_hand.runs import NotCounted, range_of, readings_of
+from rig.estimation.by_hand.session_parts import HandRecording
+from rig.observation.by_hand.hand_segmentation import Segmenter
+from rig.observation.by_hand.rests_and_moves import NotCounted, range_of, readings_of
 from rig.observation.timebase import NOMINAL_DRIFT
 from rig.runner.acquisition import Acquisition
-from rig.runner.by_hand.session import HandSession
+from rig.runner.by_hand.hand_session import HandSession
 from rig.world.operator import SimulatedOperator
 
 RATE_HZ, LOOK_S, LONGEST_S = 119.0, 0.2, 400.0

@@ -12,7 +12,7 @@ from firmware_host.emulator.parts.gyroscope import readings
 from rig.config.load import parse
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.world.board.sensor_truth import SensorTruth
-from rig.world.section import read_world_section
+from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import merge
 from support.paths import CONFIGS

@@ -9,16 +9,16 @@ import numpy as np
 import yaml
 
 from rig.analysis.check import Check
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.estimator_names import DEFAULT_ESTIMATOR
 from rig.analysis.outcome import Outcome
-from rig.analysis.reference.acceleration import AccelerometerResult
+from rig.analysis.reference.accelerometer import AccelerometerResult
 from rig.config.load import parse
 from rig.config.world.laboratory import SimulatedSensorSection
 from rig.errors import RigError
 from rig.estimation.gyroscope.budget import Budget
 from rig.observation.observed_run import ObservedRun
-from rig.plans.recorded import judged, open_run
-from rig.world.section import read_world_section
+from rig.plans.recorded_run import judged, open_run
+from rig.world.world_section import read_world_section
 from support.laboratories.drawn_laboratory import bias_at_0_g, truth
 
 SCALE, BIAS = "gyroscope scale", "gyroscope bias"

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from rig.config.judging.judged_by import UncertaintySection
+from rig.config.judging.judging_keys import UncertaintySection
 from rig.config.load import load
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2

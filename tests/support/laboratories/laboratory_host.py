@@ -10,7 +10,7 @@ from firmware_host.parts import GYROSCOPES
 from rig.config.load import Loaded
 from rig.world.board.serial_line import SerialLine
 from rig.world.laboratory import Laboratory
-from rig.world.section import read_world_section
+from rig.world.world_section import read_world_section
 
 SENSORS = tuple(GYROSCOPES)  # the board's table
 

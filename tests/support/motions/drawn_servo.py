@@ -10,12 +10,12 @@ from functools import partial
 import numpy as np
 
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.config.judging.judged_by import UncertaintySection
+from rig.config.judging.judging_keys import UncertaintySection
 from rig.config.load import Loaded, parse
 from rig.config.procedures.servo_procedure import ServoSixObservationSection
 from rig.config.procedures.servo_section import ServoSection
 from rig.config.procedures.stage_section import rotation_by
-from rig.data.recording.events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted, TimedEvent
+from rig.data.recording.recorded_events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted, TimedEvent
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner
 from rig.data.recording.run_file import RunData
@@ -23,11 +23,11 @@ from rig.data.recording.settings import settings_of
 from rig.estimation.arrays import Array
 from rig.motion.steps import Plan, Rest, Sweep, Transfer
 from rig.plans.motions.servo_sweeps import plan_servo_six_observation
-from rig.turners.servo.kind import SERVO
-from rig.turners.servo.models import find_model
-from rig.turners.servo.moves import move_of
-from rig.turners.servo.registers import DRIVE_MODE, GOAL, OPERATING_MODE, PROFILE, STATE, TORQUE, Register
-from rig.turners.servo.state import JOINTS, SERVO_STATE_DTYPE, decode
+from rig.turners.servo.goal_profiles import move_of
+from rig.turners.servo.servo_kind import SERVO
+from rig.turners.servo.servo_models import find_model
+from rig.turners.servo.servo_registers import DRIVE_MODE, GOAL, OPERATING_MODE, PROFILE, STATE, TORQUE, Register
+from rig.turners.servo.servo_state import JOINTS, SERVO_STATE_DTYPE, decode
 from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.shaft import Shaft
 from rig.world.servo.truth import ServoTruth

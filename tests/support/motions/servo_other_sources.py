@@ -8,12 +8,12 @@ import numpy as np
 
 from firmware_host.emulator.parts.magnetometer import MagnetometerTruth
 from rig.config.world.laboratory import SimulatedSensorSection
-from rig.config.world.lines import SimulatedLinesSection
+from rig.config.world.printing_device import SimulatedLinesSection
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
-from rig.sensors.lines.source import lines
-from rig.sensors.mavlink.source import mavlink
-from rig.sensors.source import SampleSource
+from rig.sensors.lines.lines_source import lines
+from rig.sensors.mavlink.autopilot_source import mavlink
+from rig.sensors.sample_source import SampleSource
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.lines.printer import Printer
 from rig.world.servo.servo import SimulatedServo

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.external.elsewhere import budget_of, solve_swept
+from rig.analysis.external.external_recordings import budget_of, solve_swept
 from rig.analysis.temperature.over_temperature import correct_files
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array

@@ -13,7 +13,7 @@ from typing import Any
 
 from selenium.webdriver import Chrome
 
-from rig.motion.state import ArmState, RuntimeState
+from rig.motion.turner_state import ArmState, RuntimeState
 from rig.page.about import About
 from rig.page.page_state import PageState
 from rig.page.rows import Look

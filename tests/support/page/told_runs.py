@@ -8,9 +8,9 @@ from firmware_host.answers import BoardObservation
 from rig.analysis.check import Check, fitness
 from rig.commands.configured import load_configured
 from rig.data.meaning import Meaning
-from rig.data.recording.events import BoardNotObserved, BoardObserved
-from rig.motion.state import ArmState, Joints, RobotMode, RuntimeState, SafetyMode
+from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved
 from rig.motion.steps import Plan, Sweep, Transfer, travel
+from rig.motion.turner_state import ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.page.about import About
 from rig.page.rows import Look
 from rig.station.events import (
@@ -29,9 +29,9 @@ from rig.station.events import (
     StepStarted,
     VerdictReached,
 )
-from rig.turners.servo.models import MODELS
-from rig.turners.servo.state import ServoReport, ServoState
-from rig.turners.ur.report import ArmReport
+from rig.turners.servo.servo_models import MODELS
+from rig.turners.servo.servo_state import ServoReport, ServoState
+from rig.turners.ur.arm_report import ArmReport
 from support.paths import DEMO
 
 STEP_S = 0.1

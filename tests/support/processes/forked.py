@@ -7,9 +7,9 @@ from multiprocessing.context import ForkServerContext
 # what is installed, not what lies beside the tests, and it does not say what it has not found.
 IMPORTED = (
     *("pytest", "h5py", "rig.data.recording.run_file", "rig.data.result_file"),
-    *("rig.history.store", "rig.report.kinds.registry"),
+    *("rig.history.store", "rig.report.kinds.kind_registry"),
     *("sqlalchemy.dialects.sqlite", "sqlalchemy.dialects.postgresql", "psycopg"),
-    *("rig.turners.servo.driver", "rig.world.servo.bus"),
+    *("rig.turners.servo.servo_driver", "rig.world.servo.bus"),
 )
 
 

@@ -29,12 +29,12 @@ IMPORTED = (
         "rig.commands.configured",
         "rig.commands.offline.solve",
     ),
-    *("rig.procedure", "rig.runner.phases", "rig.report.document", "rig.history.store", "rig.world.process"),
-    *("rig.turners.ur.kind", "rig.turners.servo.kind", "rig.turners.hand.kind"),
+    *("rig.procedure", "rig.runner.phases", "rig.report.document", "rig.history.store", "rig.world.world_process"),
+    *("rig.turners.ur.ur_kind", "rig.turners.servo.servo_kind", "rig.turners.hand.hand_kind"),
     *("h5py", "jinja2", "scipy.interpolate", "scipy.ndimage"),
 )
 # What reads a file of others is allowed little memory, and imports little.
-READS = ("h5py", "rig.data.recording.schema", "rig.data.processes.reading_process")
+READS = ("h5py", "rig.data.recording.layout_keys", "rig.data.processes.reading_process")
 LABORATORY, READER = "rig.world", "rig.data.processes.reading_child"
 
 Order = dict[str, Any]

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from rig.analysis.check import Check
 from rig.analysis.consistency.contradictions import CHECKS, FALSE_ALARMS, contradictions
+from rig.analysis.environment import Surroundings, surroundings_of
 from rig.analysis.gyroscope.calibration import SensorResult, observe_recordings, solve_observed
-from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.data.recording.run_file import RunData
 from rig.observation.observed_run import ObservedRun
 

@@ -7,8 +7,8 @@ from types import MappingProxyType
 import numpy as np
 
 from rig.analysis.consistency.contradictions import contradictions
+from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
-from rig.analysis.surroundings import surroundings_of
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.quantity import RATE
 from rig.data.recording.channel import Channel, thermometer_channel, triad_channel

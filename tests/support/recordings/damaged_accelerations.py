@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 from rig.analysis.check import Check
 from rig.analysis.consistency.contradictions import check_references
 from rig.analysis.gyroscope.calibration import observe_recordings
-from rig.analysis.reference.acceleration import calibrate_accelerometers
-from rig.analysis.reference.magnetic_field import calibrate_magnetometers
+from rig.analysis.reference.accelerometer import calibrate_accelerometers
+from rig.analysis.reference.magnetometer import calibrate_magnetometers
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.observation.windows import Window, dwelt, swept
-from rig.plans.recorded import open_run
+from rig.plans.recorded_run import open_run
 from support.paths import RECORDINGS
 
 ASKEW = np.array([1.0, -0.7, 0.5])

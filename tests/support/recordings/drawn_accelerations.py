@@ -7,14 +7,14 @@ import numpy as np
 
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.consistency.reference_checks import check_reference
-from rig.analysis.reference.accelerometer_errors import (
+from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns, list_arm_rotations
+from rig.analysis.reference.datasheet_errors import (
     MILLI_G,
     STANDARD,
     Datasheet,
     ReferenceWindow,
     list_sensor_errors,
 )
-from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns, list_arm_rotations
 from rig.analysis.reference.reference_budgets import accelerometer_budget
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.config.sensors.sensor_catalogue import PARTS
@@ -26,7 +26,7 @@ from rig.estimation.reference.accelerometer_model import Movement, find_force
 from rig.estimation.reference.imu import ImuSolution, solve_imu
 from rig.estimation.reference.reading_errors import per_axis, project_errors, repeat_by_segment
 from rig.estimation.statistics.bias_process import flicker_covariance
-from rig.estimation.statistics.expected_sizes import OWN_SHARES
+from rig.estimation.statistics.expected_variances import OWN_SHARES
 from rig.motion.geometry import NOMINAL, WRIST_1
 from support.motions.arm_attitudes import crooked_arm, joints_rad
 from support.motions.arm_sweeps import DWELL_S, Truth, joints_at, planned, recorded_dwells, recorded_sweeps

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR, find_estimator
+from rig.analysis.environment import surroundings_of
+from rig.analysis.estimator_names import DEFAULT_ESTIMATOR, find_estimator
 from rig.analysis.gyroscope.calibration import SensorResult, observe_recordings, solve_observed
-from rig.analysis.surroundings import surroundings_of
 from rig.data.recording.run_file import RunData
 
 

@@ -16,8 +16,8 @@ from rig.data.result_file import (
     ResultDocument,
     read_result,
 )
-from rig.report.findings.followed import Parameter
-from rig.report.kinds.registry import followed
+from rig.report.findings.history_records import Parameter
+from rig.report.kinds.kind_registry import followed
 
 SHARE = 1e-6
 Number = tuple[str, float, float]  # its name, its value, and of what it may move by that share

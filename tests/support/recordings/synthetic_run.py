@@ -11,22 +11,22 @@ import numpy as np
 
 from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.config.judging.judged_by import OF_SENSORS
+from rig.config.judging.judging_keys import OF_SENSORS
 from rig.config.load import parse
 from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.quantity import RATE
 from rig.data.recording.channel import thermometer_channel, triad_channel
-from rig.data.recording.events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted, TimedEvent
 from rig.data.recording.provenance import Provenance
+from rig.data.recording.recorded_events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted, TimedEvent
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import settings_of
 from rig.estimation.arrays import Array
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_rate
-from rig.motion.state import ARM_FIELDS, ARM_STATE_DTYPE, JOINT_NAMES
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer
+from rig.motion.turner_state import ARM_FIELDS, ARM_STATE_DTYPE, JOINT_NAMES
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.world.site import SiteTruth
 from rig.world.ur10e.motion.flange_motion import find_motion, transfer_force

@@ -10,7 +10,7 @@ import numpy as np
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.config.world.laboratory import SimulatedAccelerometerSection, SimulatedSensorSection
 from rig.world.autopilot.autopilot import SimulatedAutopilot
-from rig.world.autopilot.imu import SimulatedImu
+from rig.world.autopilot.autopilot_imu import SimulatedImu
 from rig.world.autopilot.parameters import Parameters
 from rig.world.board.sensor_truth import SensorTruth
 from support.wires.device_on_a_wire import DeviceOnAWire

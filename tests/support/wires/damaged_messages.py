@@ -13,17 +13,17 @@ from contextlib import suppress
 from dataclasses import dataclass
 from random import Random
 
-from rig.turners.ur.controller import dashboard, primary, rtde_packages, state_stream
+from rig.turners.ur.controller import dashboard, primary_interface, rtde_packages, state_stream
 from rig.world.laboratory import Laboratory
 from rig.world.network import ClientSession
-from rig.world.section import read_world_section
 from rig.world.ur10e.interfaces.dashboard_server import DashboardSession
-from rig.world.ur10e.interfaces.primary import CONFIGURATION, STATE, PrimarySession
-from rig.world.ur10e.interfaces.primary import build_package as primary_package
+from rig.world.ur10e.interfaces.primary_server import CONFIGURATION, STATE, PrimarySession
+from rig.world.ur10e.interfaces.primary_server import build_package as primary_package
 from rig.world.ur10e.interfaces.rtde import RtdeSession
 from rig.world.ur10e.interfaces.rtde import build_package as rtde_package
 from rig.world.ur10e.modes import SafetyMode
 from rig.world.ur10e.robot import Robot
+from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal
 from support.paths import DEMO
 from support.wires.damage import HANG_S, damaged, ending_by_name
@@ -118,7 +118,7 @@ def _ask_dashboard(host: str) -> str:
 
 
 def _read_account(host: str) -> str:
-    account = primary.read_description(host, PATIENCE_S)
+    account = primary_interface.read_description(host, PATIENCE_S)
     return "told" if account.complete else "not all told"
 
 
@@ -144,7 +144,7 @@ def readers() -> dict[str, Reader]:
     return {
         "RTDE": Reader(rtde_packages.PORT, RTDE_ANSWERS, _read_states),
         "dashboard": Reader(dashboard.DASHBOARD_PORT, DASHBOARD_ANSWERS, _ask_dashboard),
-        "primary": Reader(primary.PORT, _primary_states(), _read_account),
+        "primary": Reader(primary_interface.PORT, _primary_states(), _read_account),
     }
 
 

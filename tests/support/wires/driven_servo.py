@@ -7,7 +7,7 @@ from typing import Any
 
 from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Transfer, trapezoid_duration
-from rig.turners.servo.driver import Servo
+from rig.turners.servo.servo_driver import Servo
 from support.processes.yoked_clock import YokedClock
 from support.wires.servo_on_a_wire import ServoOnAWire
 

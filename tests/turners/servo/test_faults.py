@@ -9,8 +9,8 @@ from contextlib import suppress
 import pytest
 
 from rig.errors import Fault
-from rig.turners.servo.registers import TRIPPED
-from rig.turners.servo.state import ServoState
+from rig.turners.servo.servo_registers import TRIPPED
+from rig.turners.servo.servo_state import ServoState
 from rig.world.servo.truth import ServoTruth
 from support.processes.forked import forked
 from support.processes.waiting import wait_for

@@ -9,8 +9,8 @@ import pytest
 
 from rig.errors import Fault, Refused
 from rig.observation.motion.turn_speed import turn_speed
-from rig.turners.servo.driver import Servo
-from rig.turners.servo.state import SERVO_STATE_DTYPE, ServoState
+from rig.turners.servo.servo_driver import Servo
+from rig.turners.servo.servo_state import SERVO_STATE_DTYPE, ServoState
 from rig.world.servo.truth import ServoTruth
 from support.wires.driven_servo import BOARD, MODEL, STANDS_RAD_S, at_speed, held, turn
 from support.wires.servo_on_a_wire import SET_UP, servo_on_a_wire

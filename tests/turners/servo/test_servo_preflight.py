@@ -10,10 +10,10 @@ from rig.config.procedures.servo_section import ServoSection
 from rig.errors import Refused
 from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Plan, Transfer
-from rig.turners.servo.driver import Servo
-from rig.turners.servo.kind import SERVO
 from rig.turners.servo.latency import lower_latency
-from rig.turners.servo.preflight import servo_problems
+from rig.turners.servo.servo_driver import Servo
+from rig.turners.servo.servo_kind import SERVO
+from rig.turners.servo.servo_preflight import servo_problems
 from rig.world.servo.truth import LineTruth, ServoTruth
 from support.wires.driven_servo import BOARD, MODEL
 from support.wires.servo_on_a_wire import PLAIN, SET_UP, servo_on_a_wire

@@ -3,9 +3,9 @@
 import math
 from dataclasses import replace
 
-from rig.turners.servo.models import MODELS, PULSE_RAD
-from rig.turners.servo.registers import STATE
-from rig.turners.servo.state import ServoState, decode, stands
+from rig.turners.servo.servo_models import MODELS, PULSE_RAD
+from rig.turners.servo.servo_registers import STATE
+from rig.turners.servo.servo_state import ServoState, decode, stands
 
 DATA = STATE.pack(100, 0, 1, 0, -5, -44, -1, 0, -1, 121, 33)
 

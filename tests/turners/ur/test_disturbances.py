@@ -15,9 +15,9 @@ import pytest
 
 from rig.errors import Fault, Refused
 from rig.motion.carried import FlangeLoad
-from rig.motion.state import ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration
-from rig.turners.ur.driver import Arm, look
+from rig.motion.turner_state import ArmState, Joints
+from rig.turners.ur.arm_driver import Arm, look
 from support.laboratories.worlds import World, WorldHandle, merge
 from support.processes.waiting import wait_for
 

@@ -24,12 +24,12 @@ from rig.config.models import ArmSection
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.motion.carried import FlangeLoad
-from rig.motion.state import ARM_STATE_DTYPE, ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration
+from rig.motion.turner_state import ARM_STATE_DTYPE, ArmState, Joints
 from rig.plans.motions.six_sweeps import plan_six_observation
-from rig.turners.ur.child.link import FROZEN_TICKS, TICK_S
-from rig.turners.ur.driver import Arm, look
-from rig.turners.ur.preflight import arm_problems
+from rig.turners.ur.arm_driver import Arm, look
+from rig.turners.ur.arm_preflight import arm_problems
+from rig.turners.ur.child.child_link import FROZEN_TICKS, TICK_S
 from support.laboratories.worlds import World, WorldHandle, merge
 from support.processes.waiting import PATIENCE_S, wait_for
 from support.wires.arm_relay import relay
@@ -404,7 +404,7 @@ def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_compu
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By as crowded a one a controller here would be excused for hours."""
-    monkeypatch.setattr("rig.data.processes.silence.CROWDED", 1e6)
+    monkeypatch.setattr("rig.data.processes.process_silence.CROWDED", 1e6)
     monkeypatch.setattr(os, "getloadavg", lambda: (1e6, 1e6, 1e6))
     with relay(laboratory.host, outside_address()) as wire:
         with Arm(wire.host) as arm:
@@ -517,7 +517,7 @@ def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "rig.data.processes.silence.crowding", lambda: 5.0
+        "rig.data.processes.process_silence.crowding", lambda: 5.0
     )  # so crowded that 3 s of silence are excused
     with Arm(laboratory.host) as arm:
         arm.take_control(PAYLOAD)
@@ -654,7 +654,7 @@ def test_a_speed_slider_below_full_is_refused_in_preflight(laboratory: WorldHand
 PARENT = """
 import sys
 from rig.motion.carried import FlangeLoad
-from rig.turners.ur.driver import Arm
+from rig.turners.ur.arm_driver import Arm
 from rig.motion.steps import Transfer
 
 if __name__ == "__main__":

@@ -15,12 +15,12 @@ from rig.config.models import ArmSection
 from rig.config.ranges import ModelName
 from rig.errors import Problem, Refused
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm, lengths_m
-from rig.motion.state import JointLimits
-from rig.turners.ur.driver import look
+from rig.motion.turner_state import JointLimits
+from rig.turners.ur.arm_driver import look
+from rig.turners.ur.arm_preflight import preflight_problems
+from rig.turners.ur.arm_report import ArmReport, ArmSetup
 from rig.turners.ur.identity import identify_model, identity_problems
-from rig.turners.ur.preflight import preflight_problems
-from rig.turners.ur.report import ArmReport, ArmSetup
-from rig.world.ur10e.motion.models import MODELS
+from rig.world.ur10e.motion.arm_models import MODELS
 from support.laboratories.commands import rig
 from support.laboratories.worlds import World, WorldHandle, hardware, worlds
 from support.page.told_runs import report

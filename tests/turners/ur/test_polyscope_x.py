@@ -8,7 +8,7 @@ from contextlib import closing, contextmanager, suppress
 
 import pytest
 
-from rig.turners.ur.controller.primary import PORT as PRIMARY_PORT
+from rig.turners.ur.controller.primary_interface import PORT as PRIMARY_PORT
 from rig.turners.ur.controller.primary_stop import MODE_DATA, PrimaryStop
 from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import series_problem

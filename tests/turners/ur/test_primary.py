@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from rig.motion.geometry import DenavitHartenberg, flange_axes
-from rig.motion.state import JointLimits
-from rig.turners.ur.controller.primary import PORT, ArmDescription, read_description
-from rig.turners.ur.driver import look
-from rig.turners.ur.report import ArmSetup
+from rig.motion.turner_state import JointLimits
+from rig.turners.ur.arm_driver import look
+from rig.turners.ur.arm_report import ArmSetup
+from rig.turners.ur.controller.primary_interface import PORT, ArmDescription, read_description
 from support.laboratories.worlds import World
 from support.processes.waiting import PATIENCE_S
 

@@ -13,10 +13,10 @@ from itertools import pairwise
 import pytest
 
 from rig.errors import Refused
+from rig.turners.ur.arm_driver import look
 from rig.turners.ur.controller.rtde_packages import HEADER, PORT
 from rig.turners.ur.controller.state_checks import clock_step
 from rig.turners.ur.controller.state_stream import PACKET, VARIABLES, StateStream
-from rig.turners.ur.driver import look
 from support.laboratories.worlds import fresh_host
 from support.processes.waiting import PATIENCE_S, wait_for
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rig.world.servo.registers import MODELS
+from rig.world.servo.control_tables import MODELS
 from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.truth import LineTruth, ServoTruth
 from rig.world.servo.wire_format import Receiver, ServoPacket, encode, encode_status

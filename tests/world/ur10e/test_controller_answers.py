@@ -8,16 +8,16 @@ from scipy.spatial.transform import Rotation
 from rig.config.load import load
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.laboratory import Laboratory
-from rig.world.section import read_world_section
 from rig.world.ur10e.controller_messages import MessageKind, ProgramError
 from rig.world.ur10e.interfaces.dashboard_server import DashboardSession
-from rig.world.ur10e.interfaces.primary import ROBOT_MESSAGE, PrimarySession
+from rig.world.ur10e.interfaces.primary_server import ROBOT_MESSAGE, PrimarySession
 from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.motion.forward_kinematics import flange_pose
 from rig.world.ur10e.programs.ur_rtde_questions import build_questions
 from rig.world.ur10e.programs.ur_rtde_registers import ProgramRegisters
 from rig.world.ur10e.programs.urscript import parse_arguments
 from rig.world.ur10e.robot import Robot
+from rig.world.world_section import read_world_section
 from support.paths import DEMO
 
 LOADED = load(DEMO)

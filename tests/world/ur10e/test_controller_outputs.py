@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from rig.world.clock import TICK_S
 from rig.world.laboratory import Laboratory
-from rig.world.section import read_world_section
-from rig.world.ur10e.interfaces.primary import PrimarySession
+from rig.world.ur10e.interfaces.primary_server import PrimarySession
 from rig.world.ur10e.interfaces.rtde import OutputRecipe, RtdeSession, build_package
 from rig.world.ur10e.interfaces.variables import OUTPUTS, TYPES
+from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal
 from support.paths import DEMO
 

@@ -13,10 +13,10 @@ import pytest
 import yaml
 
 from rig.config.load import Loaded, parse
-from rig.plans.registry import installed, sections
-from rig.world import process
-from rig.world.process import World
+from rig.plans.procedure_registry import installed, sections
+from rig.world import world_process
 from rig.world.ur10e.interfaces.rtde import build_package
+from rig.world.world_process import World
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 from support.processes.waiting import PATIENCE_S
@@ -155,8 +155,8 @@ def session(loaded: Loaded, ports: dict[str, int], dwell_s: float) -> tuple[dict
 @pytest.mark.slow
 def test_every_wire_carries_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     found, host = [], fresh_host()
-    for leap in (1, process.LEAP):
-        monkeypatch.setattr(process, "LEAP", leap)
+    for leap in (1, world_process.LEAP):
+        monkeypatch.setattr(world_process, "LEAP", leap)
         found.append(session(*loaded_from("own_port/kvh1775_earth.yaml", host), dwell_s=0.6))
     (one_by_one, looks), (leaping, fewer_looks) = found
     assert looks == 1.0 and fewer_looks > 1.5, "it leaps"

@@ -9,14 +9,14 @@ import pytest
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.laboratory import Laboratory
-from rig.world.section import read_world_section
 from rig.world.ur10e.controller_messages import READ_ONLY
 from rig.world.ur10e.interfaces.dashboard_server import NOT_ALLOWED, DashboardSession
-from rig.world.ur10e.interfaces.primary import PrimarySession
-from rig.world.ur10e.interfaces.robot_api import RobotApiSession
+from rig.world.ur10e.interfaces.primary_server import PrimarySession
+from rig.world.ur10e.interfaces.robot_api_server import RobotApiSession
 from rig.world.ur10e.interfaces.rtde import RtdeSession, build_package
 from rig.world.ur10e.modes import RuntimeState
 from rig.world.ur10e.robot import Robot
+from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal
 from support.laboratories.worlds import World, WorldHandle
 from support.paths import DEMO

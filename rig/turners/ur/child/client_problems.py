@@ -2,7 +2,7 @@
 
 from rig.errors import Problem
 from rig.turners.ur.condition import local_control
-from rig.turners.ur.controller.registers import registers_in_use
+from rig.turners.ur.controller.free_registers import registers_in_use
 from rig.turners.ur.controller.state_stream import ImpossibleState, NotSupported, StatePacket
 from rig.turners.ur.controller_answers import no_states
 from rig.turners.ur.identity import series_problem, version_text

@@ -9,7 +9,7 @@ import struct
 from dataclasses import dataclass
 
 from rig.errors.quoting import printable
-from rig.turners.ur.controller.primary import MESSAGE
+from rig.turners.ur.controller.primary_interface import MESSAGE
 
 ERROR_CODE, KEY, EXCEPTION = 6, 7, 10
 ERROR = struct.Struct(">iiiII")  # code, argument, level, type of the value, value

@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 
 from rig.turners.ur.controller.controller_words import READ_ONLY, ErrorCode, ProgramStopped, decode_message
-from rig.turners.ur.controller.primary import PORT, ROBOT_MESSAGE, ROBOT_STATE, packages
+from rig.turners.ur.controller.primary_interface import PORT, ROBOT_MESSAGE, ROBOT_STATE, packages
 
 ROBOT_MODE_DATA = 0
 # Time stamp; real robot connected, enabled, power on, emergency stop, protective stop, program runs, program is paused.

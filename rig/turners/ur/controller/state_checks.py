@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from itertools import chain
 
 from rig.errors import Problem
-from rig.motion.state import JOINT_NAMES, ArmState
+from rig.motion.turner_state import JOINT_NAMES, ArmState
 
 # Beyond all arms; the angle is large because a UR3e's wrist 3 turns without limit and counts its revolutions.
 ANGLE_RAD, SPEED_RAD_S, MODES = 1e3, 20.0, range(-1, 64)

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Self
 
 from rig.errors import Problem
-from rig.motion.state import ArmState
+from rig.motion.turner_state import ArmState
 from rig.turners.ur.controller.listener import is_loopback
 from rig.turners.ur.controller.rtde_packages import PORT, VERSION, package, packages
 from rig.turners.ur.controller.state_checks import clock_step, impossible_motion, impossible_payload, impossible_state

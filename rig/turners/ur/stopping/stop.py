@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 
 from rig.turners.stop_once import StopOutcome
-from rig.turners.ur.messages import Braked, BrakeRequest
+from rig.turners.ur.child_messages import Braked, BrakeRequest
 from rig.turners.ur.stopping.spare_descriptors import SpareDescriptors
 from rig.turners.ur.stopping.stop_paths import StopConnection, StopPath
 

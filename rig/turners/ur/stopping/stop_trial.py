@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import closing, suppress
 
 from rig.errors import Problem
-from rig.motion.state import RuntimeState
+from rig.motion.turner_state import RuntimeState
 from rig.turners.ur.condition import local_control
 from rig.turners.ur.controller.primary_stop import PrimaryStop
 from rig.turners.ur.controller.robot_api import RobotApi

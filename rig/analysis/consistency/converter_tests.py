@@ -1,0 +1,231 @@
+"""Tests of readings as the output of a converter with a noisy input: their bits, range and repetitions. Pure.
+
+With noise above one step every low bit is set in half of the readings, there is no gap, no pile-up at an end of the
+range, no run of equal readings and no repeated sequence. With less noise nothing can be said. A step is that of the
+source: one count of a converter, one unit of an integer message, the last digit of a printed line.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import Quantity
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.estimation.arrays import Array
+from rig.estimation.statistics.rounding import Steps
+from rig.observation.consistency.raw_readings import MEMORY, RawReadings, innovation_std
+from rig.observation.sound_steps import SPIKE
+
+Statistics = dict[str, tuple[float, float]]
+
+CHECKS = ("clipping", "repeated_readings", "skewed_noise", "spikes", "stuck_axis", "stuck_bit")  # of a sensor, at most
+SKEWNESS = 0.15  # below, hardly a fiftieth of the noise's deviation is left in a mean
+LONGEST_RUN = 25  # equal readings of one axis: at one step of noise every fourth reading equals the one before
+STRETCH = 8  # readings on three axes, some 50 bits at one step of noise
+FEWEST_VALUES = 24  # of an axis, to say that a bit ought to have changed
+ONE_BIT = 0.8  # of the spikes off by the same power of two: they are a bit's doing
+FEWEST_SPIKES = 5
+SINGLE = 21  # bits that a number in single precision sets as often as not; its last three it rounds
+FEWEST_OF_NOISE = 4 * MEMORY  # readings of a window that tell their noise
+VIBRATION_LEFT = 0.1  # of the arm's vibration, which the sensor's filter changes and the arm's states tell in part
+HEAP = 10  # readings
+SETTLING = 5  # readings at a window's beginning, in which a low-pass filter may still follow the arm
+CHECKS = (
+    "clipping",
+    "repeated_readings",
+    "skewed_noise",
+    "spikes",
+    "stuck_axis",
+    "stuck_bit",
+)  # of one sensor, at most
+LEAST_TO_SKEW = 0.7  # steps of noise: less falls on so few numbers that a mean between two of them makes it skewed
+BETWEEN_COUNTS = 1.5  # counts: readings that are farther apart are not a converter's
+
+
+@dataclass(frozen=True, slots=True)
+class Digits:
+    """The recorded numbers of a source: the `steps` of counts between them, and whether they have bits to test."""
+
+    has_bits: bool
+    steps: Steps
+
+    @property
+    def step_counts(self) -> Array:
+        """The largest difference (3,) of neighbouring numbers, in counts."""
+        return self.steps.units * (2 if self.steps.cut else 1)
+
+
+COUNTS = Digits(True, Steps(1.0))
+
+
+def find_digits(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[NDArray[Any]]) -> Digits:
+    """Return the digits of a sensor's quantity, from all its samples (n,) of each recording.
+
+    A board records the counts of the part's converter. Other sources send computed or printed numbers: if their steps
+    are several recorded counts, they have no bits to test.
+    """
+    channel = sensor.channel(quantity)
+    steps = channel.steps(
+        np.concatenate([channel.values(recorded) for recorded in samples]), trusts_counts=sensor.on_board
+    )
+    counts = replace(steps, unit=np.maximum(steps.units / channel.unit_per_count, 1.0))
+    has_bits = not steps.cut and (sensor.on_board or bool(counts.units.max() <= BETWEEN_COUNTS))
+    return Digits(has_bits, counts)
+
+
+def judge_readings(
+    counts: Sequence[NDArray[np.int64]],
+    windows: Sequence[RawReadings],
+    false_alarm_probability: float,
+    *,
+    digits: Digits = COUNTS,
+    frozen: int = 0,
+) -> Statistics:
+    """Return each check's statistic and limit by its name, from all readings (n, 3) of each recording and from the
+    windows.
+
+    Each has at most that false-alarm probability. The noise is the median of the windows': a window with a stuck axis
+    does not make a sensor without noise. `frozen`: the longest run of equal readings of an axis that moved meanwhile.
+    """
+    from scipy.special import ndtri
+
+    critical_value = -float(
+        ndtri(false_alarm_probability / (2 * 3 * 16))
+    )  # of a normal variable, over three axes and their bits
+    at_rest = [window for window in windows if window.sweep < 0] or windows
+    noises = [innovation_std(window.counts) for window in at_rest]
+    noise = np.asarray(np.median(noises, axis=0), dtype=np.float64)
+    steps_of_noise = noise / digits.step_counts
+    noisy = steps_of_noise >= 1
+    spikes, spike_bits = _find_spikes(windows, digits.step_counts)
+    statistics = {"spikes": (spikes, SPIKE)}
+    if digits.has_bits:
+        stuck = (
+            _count_constant_bits(np.concatenate(counts))
+            + _count_uneven_bits(windows, noise, critical_value)
+            + spike_bits
+        )
+        statistics = {"stuck_bit": (float(stuck), 0.0), **statistics}
+    informative = steps_of_noise >= LEAST_TO_SKEW
+    if any(window.sweep < 0 for window in windows) and informative.any():
+        statistics["skewed_noise"] = _skewness(at_rest, informative, critical_value)
+    runs = [_longest_run(recorded[:, noisy]) for recorded in counts]
+    statistics["stuck_axis"] = float(max(frozen, *runs)), LONGEST_RUN
+    if noisy.all():
+        statistics["repeated_readings"] = sum(map(_count_repeated, counts)), 0.0
+        turning = [window for window in windows if window.sweep >= 0] or windows
+        statistics["clipping"] = (
+            _count_heaped(np.concatenate([window.counts for window in turning]), critical_value),
+            0.0,
+        )
+    return statistics
+
+
+def _count_constant_bits(counts: NDArray[np.int64]) -> int:
+    """Count the bits, over the axes, that never change although the range of readings includes both values."""
+    constant = 0
+    for axis in counts.T:
+        if len(np.unique(axis)) < FEWEST_VALUES:
+            continue
+        bits = [bit for bit in range(16) if 2 ** (bit + 2) <= np.ptp(axis)]
+        constant += sum(int(np.ptp((axis >> bit) & 1) == 0) for bit in bits)
+    return constant
+
+
+def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_value: float) -> int:
+    """Count the bits, well below the noise, that are not set in half of the readings."""
+    uneven = 0
+    counts = np.concatenate([window.counts for window in windows])
+    for axis in range(3):
+        first = int(np.abs(counts[:, axis]).max()).bit_length() - SINGLE
+        for bit in range(max(first, 0), 16):
+            if 1.5 * 2**bit > noise[axis]:
+                break
+            ones = float(np.mean((counts[:, axis] >> bit) & 1))
+            uneven += abs(ones - 0.5) > critical_value * 0.5 / np.sqrt(len(counts))
+    return uneven
+
+
+def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[float, int]:
+    """Return the largest deviation in units of the noise, and the number of axes whose spikes are one power of two.
+
+    The noise includes vibration and is half a step at least; such spikes come from one bit. The first readings are
+    omitted, as the filter of a quiet sensor has not settled.
+    """
+    half = step_counts / 2
+    farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]
+    deviations_by_window = [
+        (window.residual_counts - np.median(window.residual_counts, axis=0))[SETTLING:] for window in windows
+    ]
+    noises = [np.maximum(1.4826 * np.median(np.abs(deviations), axis=0), half) for deviations in deviations_by_window]
+    informative = [
+        noise
+        for deviations, noise in zip(deviations_by_window, noises, strict=True)
+        if len(deviations) >= FEWEST_OF_NOISE
+    ]
+    least = np.min(informative or [half], axis=0)  # a short rest, as of an interrupted run, tells too little
+    for window, deviations, noise_of_window in zip(windows, deviations_by_window, noises, strict=True):
+        noise = np.maximum(noise_of_window, least)
+        deviation = np.maximum(noise, VIBRATION_LEFT * window.vibration_counts)
+        farthest = max(farthest, float(np.max(np.abs(deviations) / deviation)))
+        for axis in range(3):
+            beyond = np.abs(deviations[:, axis]) > SPIKE * deviation[axis]
+            power = np.round(np.log2(np.maximum(np.abs(deviations[beyond, axis]), 1)))
+            near = np.abs(np.abs(deviations[beyond, axis]) - 2**power) < np.maximum(
+                3 * deviation[axis], 0.05 * 2**power
+            )
+            sizes[axis].append(np.where(near, power, -1))
+    return farthest, sum(_is_one_bit(np.concatenate(powers)) for powers in sizes)
+
+
+def _is_one_bit(powers: Array) -> bool:
+    """Return whether most spikes have the same power of two; `powers` holds −1 for other sizes."""
+    if len(powers) < FEWEST_SPIKES:
+        return False
+    which, often = np.unique(powers, return_counts=True)
+    most = int(np.argmax(often))
+    return bool(which[most] >= 0 and often[most] >= ONE_BIT * len(powers))
+
+
+def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_value: float) -> tuple[float, float]:
+    """Return the largest skewness of the noise of these axes (3,), as a bit with occasional errors makes it, and its
+    limit.
+
+    At rest only: the arm's vibration may be skewed.
+    """
+    parts = [window.residual_counts / np.maximum(window.residual_counts.std(axis=0), 0.5) for window in windows]
+    noise = np.concatenate(parts)
+    noise -= noise.mean(axis=0)
+    std = np.sqrt(np.maximum(np.mean(noise**2, axis=0), 1e-12))  # an axis may stand still
+    skewness = np.mean((noise / std) ** 3, axis=0)  # by hand: scipy.stats takes half a second to import
+    return float(np.max(np.abs(skewness[axes]))), max(SKEWNESS, critical_value * float(np.sqrt(6 / len(noise))))
+
+
+def _longest_run(counts: NDArray[np.int64]) -> int:
+    """Return the longest run of equal readings of one axis."""
+    longest = 0
+    for axis in counts.T:
+        changes = np.flatnonzero(np.diff(axis))
+        longest = max(longest, int(np.max(np.diff(changes, prepend=-1, append=len(axis) - 1))))
+    return longest
+
+
+def _count_repeated(counts: NDArray[np.int64]) -> int:
+    """Count the sequences of readings that occurred before."""
+    stretches = np.lib.stride_tricks.sliding_window_view(counts.astype(np.int16), STRETCH, axis=0)
+    rows = np.ascontiguousarray(stretches.reshape(len(stretches), -1))
+    return len(rows) - len(np.unique(rows.view(f"V{rows.shape[1] * 2}")))
+
+
+def _count_heaped(counts: NDArray[np.int64], critical_value: float) -> int:
+    """Count the readings at the very end of an axis' range if they are more than next to it; else 0."""
+    heaped = 0
+    for axis in counts.T:
+        values, often = np.unique(axis, return_counts=True)
+        for end, next_to_end in ((often[0], often[1]), (often[-1], often[-2])) if len(values) > 1 else ():
+            if end >= HEAP and end - next_to_end > critical_value * np.sqrt(end + next_to_end):
+                heaped += int(end)
+    return heaped

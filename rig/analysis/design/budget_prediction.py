@@ -1,0 +1,195 @@
+"""The prediction of a plan's uncertainty: the budget of a simulated recording of it. Pure.
+
+The plan determines the joints' motion, the configuration the known errors of turner, site and sensor, the data sheet
+the sensor's noise. Only two parts of a budget come from readings alone: the bias drift beyond flicker, and the
+temperature change.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from rig.analysis.clock_comparison import BY_COMPUTER, BY_CRYSTAL, PPM, ClockCheck, ClockComparison
+from rig.analysis.design.planned_motion import (
+    STANDING_S,
+    PlannedRun,
+    Timed,
+    measuring_steps,
+    plan_run,
+    predict_attitude,
+    predict_revolution,
+    time_steps_of,
+)
+from rig.analysis.environment import Surroundings
+from rig.analysis.gyroscope.calibration import solve_six_observation
+from rig.analysis.gyroscope.vector_inputs import RecordingPart, combine_recordings, describe_sensor, list_uncertainties
+from rig.config.models import RigConfig
+from rig.config.procedures.servo_section import ServoSection
+from rig.config.procedures.stage_section import rotation_by
+from rig.config.sensors.sensor_catalogue import PARTS
+from rig.config.sensors.sensor_sections import SensorSection, mounting_matrix
+from rig.data.recording.settings import Uncertainty
+from rig.estimation.arrays import Array
+from rig.estimation.gyroscope.budget import Budget, budget
+from rig.estimation.gyroscope.six_observation_budget import six_observation_budget
+from rig.estimation.gyroscope.vector_fit import VectorInputs, explain
+from rig.estimation.statistics.bias_process import BiasProcess
+from rig.motion.steps import TURN_RAD, Plan, Step, Sweep
+from rig.motion.turner_state import TurnerIdentity
+from rig.observation.arm_rests import MIN_SAMPLES_AT_REST, REST_SETTLING_S
+from rig.observation.average import Average
+from rig.observation.motion.even_turn import GUARD_RAD
+from rig.observation.observe import Observation, nearest_axis
+
+ROOM_C = 22.0  # at one temperature all the time: what a run warms is not known beforehand
+STEP_K = 1 / 16  # of a thermometer, assumed
+REMOUNTING_S = 60.0  # between two stages, assumed
+# How far off its nominal mounting a sensor sits, in all, where no `uncertainty.mount_deg` says it of an item that is
+# mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
+MOUNTING_OFFSET_DEG = 5.0
+ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
+STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
+
+
+def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
+    """Return the budget that a run of the plan will have, for each sensor to calibrate.
+
+    It is that of the solution by which the turner's runs are judged: of the speeds alone if single readings of its
+    angle scatter. Raise Fault as the estimators do if the plan determines too little, Refused as `settings_of`.
+    """
+    run = plan_run(config, plan, turner.kinematics)
+    return {name: _budget(config, run, turner, name, sensor) for name, sensor in config.to_calibrate.items()}
+
+
+def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: str, sensor: SensorSection) -> Budget:
+    uncertainty, mounting = run.uncertainty, mounting_matrix(sensor.mounting)
+    scatters = turner.reading_std_rad > 0
+    jitter_s = 0.0 if scatters else STATE_JITTER_S  # what scatters tells no jitter beside
+    surroundings = Surroundings(
+        run.site, uncertainty, _clock(uncertainty, on_board=sensor.on_board), jitter_s, run.settings.extension_m
+    )
+    parts = [_part(config, stage, sensor, turner) for stage in _stages(run)]
+    inputs = combine_recordings(parts, surroundings)
+    constant_sensor = describe_sensor(
+        uncertainty, name, float(np.radians(sensor.range_deg_s)), np.full(len(inputs.windows_s), ROOM_C), STEP_K
+    )
+    off_deg = MOUNTING_OFFSET_DEG if inputs.mount_turns_rad is None else uncertainty.mount_deg
+    inputs = replace(
+        inputs, means_rad_s=_simulate_readings(inputs, _mounting_rotation(off_deg) @ mounting), sensor=constant_sensor
+    )
+    explained = explain(inputs, mounting, BiasProcess(0.0, 0.0, 0, constant_sensor.instability_rad_s))
+    uncertainty_inputs = list_uncertainties(surroundings, name, None)
+    if not scatters:
+        return budget(explained, uncertainty_inputs)
+    turns = [turn for part in parts for turn in part.turns]
+    readings = [
+        replace(turn, average=replace(turn.average, mean_rad_s=mean))
+        for turn, mean in zip(turns, inputs.means_rad_s, strict=False)  # the rests come after them
+    ]
+    axes_rad = float(np.radians(uncertainty.stated_size("non_orthogonality_deg", name)))
+    return six_observation_budget(explained, solve_six_observation(readings, "newton"), uncertainty_inputs, axes_rad)
+
+
+def _mounting_rotation(angle_deg: float) -> Array:
+    """Return the rotation (3, 3) by an angle about an axis equally far from x, y and z."""
+    return rotation_by(np.radians(angle_deg) / np.sqrt(3) * np.array([1.0, -1.0, 1.0]))
+
+
+def _simulate_readings(inputs: VectorInputs, matrix: Array) -> Array:
+    """Return the readings (N, 3) of a sensor of F (3, 3), with the same noise each time: no two readings are equal."""
+    noise = np.random.default_rng(len(inputs.windows_s)).standard_normal((len(inputs.windows_s), 3))
+    readings: Array = inputs.rates_rad_s @ matrix.T + np.sqrt(inputs.variances_rad2_s2) * noise
+    return readings
+
+
+def _clock(uncertainty: Uncertainty, *, on_board: bool) -> ClockCheck:
+    """Return the comparison of the controller's clock with the computer's and the board's crystal, as a run has it."""
+    stated = {
+        BY_COMPUTER: uncertainty.computer_clock_ppm,
+        **({BY_CRYSTAL: uncertainty.crystal_ppm} if on_board else {}),
+    }
+    compared = tuple(ClockComparison(by, 0.0, ppm * PPM, 0.0) for by, ppm in stated.items())
+    half_width = uncertainty.controller_clock_ppm * PPM
+    weights = 3 / half_width**2 + sum(1 / comparison.std**2 for comparison in compared)
+    return ClockCheck(0.0, float(weights**-0.5), compared, half_width)
+
+
+def _stages(run: PlannedRun) -> Iterator[PlannedRun]:
+    """Yield the recordings of a run, one of each stage of its plan; the run itself without stages."""
+    begins, clock_offset_s = [stage.begins for stage in run.plan.stages] or [0], 0.0
+    for number, (first, last) in enumerate(zip(begins, [*begins[1:], len(run.plan.steps)], strict=True)):
+        stage_plan = replace(run.plan, steps=run.plan.steps[first:last], stages=())
+        yield replace(run, plan=stage_plan, settings=replace(run.settings, stage=number), clock_offset_s=clock_offset_s)
+        clock_offset_s += stage_plan.duration_s + 2 * STANDING_S + REMOUNTING_S
+
+
+def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, turner: TurnerIdentity) -> RecordingPart:
+    """Return the turns and rests of a recording."""
+    turns = [
+        _turn(sweep, run, sensor, _scatter(config, sweep.step, turner)) for sweep in time_steps_of(run.plan, Sweep)
+    ]
+    at_rest = [
+        replace(
+            measuring_step,
+            start_s=measuring_step.start_s + REST_SETTLING_S,
+            end_s=measuring_step.end_s - REST_SETTLING_S,
+        )
+        for measuring_step in measuring_steps(run.plan)
+        if not isinstance(measuring_step.step, Sweep)
+    ]
+    usable = [rest for rest in at_rest if (rest.end_s - rest.start_s) * sensor.rate_hz >= MIN_SAMPLES_AT_REST]
+    rests = [_average(rest, run, sensor) for rest in usable]
+    return RecordingPart(turns, rests, run.clock_offset_s, run.settings.stage, np.array(run.settings.mount))
+
+
+def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average:
+    start_s, end_s = timed.window_s
+    lasting_s, walk_rad_sqrt_s = end_s - start_s, PARTS[sensor.part].angle_random_walk_rad_sqrt_s
+    samples = max(round(lasting_s * sensor.rate_hz), 2)
+    return Average(
+        mean_rad_s=np.zeros(3),
+        variance_rad2_s2=np.full(3, walk_rad_sqrt_s**2 / lasting_s),
+        noise_rad_s=np.full(3, walk_rad_sqrt_s * sensor.rate_hz**0.5),
+        samples=samples,
+        start_s=start_s,
+        end_s=end_s,
+        temperature_c=ROOM_C,
+        attitude=predict_attitude(timed, run.arm, np.array(run.settings.mount)),
+        freedom=float(samples - 1),
+    )
+
+
+def _turn(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
+    sweep, turn = timed.step, predict_revolution(timed, run.arm, np.array(run.settings.mount))
+    axis, sign = nearest_axis(mounting_matrix(sensor.mounting) @ turn.axis_flange)
+    return Observation(
+        sweep=sweep.index,
+        joint_name=sweep.joint_name,
+        direction=sweep.direction,
+        axis=axis,
+        sign=sign,
+        axis_flange=turn.axis_flange,
+        speed_rad_s=sweep.speed_rad_s,
+        speed_std_rad_s=speed_std * sweep.speed_rad_s,
+        lost=0,
+        average=_average(timed, run, sensor),
+        axis_errors=turn.axis_errors,
+        arm_m=turn.arm_m,
+        angle_rad=turn.angle_rad,
+        arc_rad=None if turn.closed else sweep.revolution_rad,
+    )
+
+
+def _scatter(config: RigConfig, sweep: Sweep, turner: TurnerIdentity) -> float:
+    """Return the relative standard deviation of the mean speed of a shaft whose single readings scatter.
+
+    Angles that repeat one revolution later are pairs of readings; see `rig.observation.motion.turn_speed`.
+    """
+    if not turner.reading_std_rad or not isinstance(config.turner, ServoSection):
+        return 0.0
+    ramp_rad = sweep.speed_rad_s**2 / (2 * sweep.acceleration_rad_s2) + GUARD_RAD
+    whole_rad = abs(sweep.end_q_rad[sweep.joint] - sweep.start_q_rad[sweep.joint])
+    repeats = (whole_rad - 2 * ramp_rad - TURN_RAD) / sweep.speed_rad_s * config.turner.state_rate_hz
+    scatter_rad = np.hypot(turner.reading_std_rad, ASKING_STD_S * sweep.speed_rad_s)
+    return float(scatter_rad * np.sqrt(2 / max(repeats, 1.0)) / TURN_RAD)

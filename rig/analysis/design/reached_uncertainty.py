@@ -1,0 +1,31 @@
+"""The uncertainty that a run has reached so far, solved as at its end. Pure."""
+
+from collections.abc import Sequence
+
+from rig.analysis.design.candidate_search import ReachedUncertainty
+from rig.analysis.environment import surroundings_of
+from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
+from rig.analysis.numeric_errors import solvable
+from rig.data.quantity import RATE
+from rig.data.recording.run_file import RunData
+from rig.errors import Fault
+
+
+def assess_reached(runs: Sequence[RunData], estimator: str) -> ReachedUncertainty | None:
+    """Return the worst U of all sensors to calibrate from the recordings so far; None without an uncertainty."""
+    settings = runs[0].settings
+    try:
+        with solvable():
+            recordings = observe_recordings(runs)
+            if not recordings:
+                return None
+            surroundings = surroundings_of(recordings, settings)
+            sensors = runs[0].measuring(RATE)
+            results = solve_observed(sensors, recordings, surroundings, estimator, settings.matrix_corrected)
+    except Fault:  # what is wrong with it, the end of the run will say
+        return None
+    budgets = {name: results[name].uncertainty for name in settings.to_calibrate}
+    known_budgets = {name: budget for name, budget in budgets.items() if budget is not None}
+    return (
+        ReachedUncertainty.of_budgets(known_budgets) if known_budgets and len(known_budgets) == len(budgets) else None
+    )

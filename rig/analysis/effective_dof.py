@@ -1,0 +1,133 @@
+"""The degrees of freedom of estimates without a budget of their own: angles, sensitivity to gravity.
+
+Their variance is divided among the budget's contributors of type A, each with its degrees of freedom (Welch and
+Satterthwaite, JCGM 100, G.4); the rest, errors of the arm of a stated size, counts as known.
+"""
+
+import numpy as np
+
+from rig.analysis.gyroscope.calibration import SensorResult
+from rig.analysis.reference.accelerometer import AccelerometerResult
+from rig.analysis.reference.magnetometer import MagnetometerResult
+from rig.analysis.reversal import MagnetometerReversal
+from rig.estimation.arrays import Array
+from rig.estimation.gyroscope.budget import NOISE, WANDERING, Budget
+from rig.estimation.gyroscope.vector_fit import Explained
+from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, regress
+from rig.estimation.reference.accelerometer_model import SECOND
+from rig.estimation.reference.reference_budget import ATTITUDES, response_in_attitudes
+from rig.estimation.reference.reference_model import F
+from rig.estimation.sensor_axes import SensorAxes
+from rig.estimation.statistics.coverage import effective_freedom
+
+
+def of_angles(result: SensorResult) -> Array | None:
+    """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then mounting; None without budget."""
+    explained, budget = result.explained, result.uncertainty
+    if explained is None or budget is None:
+        return None
+    solution = explained.solution
+    derivative = _to_angles(solution.matrix)
+    readings = np.einsum("aij,ijkl,akl->a", derivative, _of_matrix(solution), derivative)
+    walk = np.einsum("aij,ijl,ail->a", derivative, _walk(explained)[:, :3, :3], derivative)
+    return _split(np.diag(solution.angles_covariance_rad2), _of_readings(readings - walk, walk, explained), budget)
+
+
+def of_sensitivity(result: SensorResult) -> Array | None:
+    """Return the degrees of freedom (3, 3) of a gyroscope's sensitivity to gravity; None without it or a budget."""
+    explained, budget = result.explained, result.uncertainty
+    if explained is None or budget is None:
+        return None
+    covariance = explained.solution.g_sensitivity_covariance
+    if covariance is None:
+        return None
+    whole = np.diag(covariance).reshape(3, 3)
+    walk = np.diagonal(_walk(explained)[:, 4:, 4:], axis1=1, axis2=2)
+    return _split(whole, _of_readings(whole - walk, walk, explained), budget)
+
+
+def of_acceleration_angles(result: AccelerometerResult) -> Array:
+    """Return the degrees of freedom (3,) of an accelerometer's non-orthogonality."""
+    return _of_axes(result, result.solution.response, result.movement.noise())
+
+
+def of_second_order(result: AccelerometerResult) -> Array | None:
+    """Return the degrees of freedom (3,) of an accelerometer's φ; None if it was not estimated."""
+    if result.solution.second_order_s2_m is None:
+        return None
+    std = np.sqrt(np.diag(result.solution.covariance)[SECOND])
+    return _in_attitudes(result.budget, result.solution.response[SECOND], result.movement.noise(), std)
+
+
+def of_field_angles(result: MagnetometerResult) -> Array:
+    """Return the degrees of freedom (3,) of a magnetometer's non-orthogonality."""
+    response = response_in_attitudes(result.solution, result.measurements)
+    return _of_axes(result, response, np.diag(result.measurements.variances_m2_s4.ravel()))
+
+
+def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:
+    """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
+
+    The latter are the fewest of any run's bias: a sum of independent parts never has fewer.
+    """
+    budgets = [run.result.budget for run in reversal.runs]
+    # (Σ u_i²)² / ν of each run is Σ u_i⁴ / ν_i: what the runs share is known, and adds nothing to it.
+    scarce = np.sum([budget.std[:3] ** 4 / budget.freedom[:3] for budget in budgets], axis=0) / len(budgets) ** 4
+    with np.errstate(divide="ignore"):
+        scale: Array = reversal.scale_std**4 / scarce
+    return scale, np.full(6, min(float(budget.freedom[3:].min()) for budget in budgets))
+
+
+def _of_axes(result: AccelerometerResult | MagnetometerResult, response: Array, noise: Array) -> Array:
+    """Return the degrees of freedom of the angles between the axes, from the `response` (p, n) of all parameters."""
+    derivative = _to_angles(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
+    return _in_attitudes(result.budget, derivative, noise, result.triad.non_orthogonality_std_rad)
+
+
+def _in_attitudes(budget: Budget, response: Array, noise: Array, std: Array) -> Array:
+    """Return the degrees of freedom of `std` (q,), from the `response` (q, n) to readings with that `noise` (n, n)."""
+    by_noise = np.einsum("qn,nm,qm->q", response, noise, response)
+    return _split(std**2, {NOISE: by_noise, ATTITUDES: std**2 - by_noise}, budget)
+
+
+def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
+    """Return the parts of a gyroscope's variances by the contributors whose degrees of freedom they have.
+
+    If the readings show no bias drift, it is the flicker of the data sheet, and counts as known.
+    """
+    return {NOISE: noise, **({WANDERING: walk} if explained.bias.is_drifting else {})}
+
+
+def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
+    """Return the degrees of freedom (…) of variances (…) from their `parts` by contributor; the rest counts as known.
+
+    Raise KeyError if the budget has no such contributor.
+    """
+    clipped = [np.clip(part, 0.0, whole) for part in parts.values()]
+    rest = np.clip(whole - np.sum(clipped, axis=0), 0.0, None)
+    freedom = [budget.line(name).freedom for name in parts]
+    shape = (-1, *np.ones(np.ndim(whole), dtype=np.intp))
+    return effective_freedom(np.array([*clipped, rest]), np.reshape([*freedom, np.inf], shape))
+
+
+def _to_angles(matrix: Array) -> Array:
+    """Return the derivative (6, 3, 3) of angles between the axes and of their mounting with respect to F."""
+    return SensorAxes.from_matrix(matrix).to_angles.reshape(6, 3, 3)
+
+
+def _of_matrix(solution: VectorSolution) -> Array:
+    """Return the covariance (3, 3, 3, 3) of F by the readings."""
+    return solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)
+
+
+def _walk(explained: Explained) -> Array:
+    """Return the bias drift's part (3, p, p) in the covariance of each axis' coefficients F, c (and G)."""
+    inputs = explained.inputs
+    gravity = None if explained.solution.g_sensitivity is None else inputs.apparent_gravity_m_s2
+    design = design_matrix(inputs.rates_rad_s, gravity)
+    if explained.bias.steady:
+        return np.zeros((3, design.shape[1], design.shape[1]))
+    shared = explained.bias.covariance(inputs.windows_s)
+    _, gain = regress(design, inputs.means_rad_s, inputs.variances_rad2_s2, shared)
+    walk: Array = gain @ shared @ np.swapaxes(gain, -1, -2)
+    return walk

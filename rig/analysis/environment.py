@@ -1,0 +1,55 @@
+"""The surroundings of a run: the site, and the clock that all speeds are measured by."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, sqrt
+
+from rig.analysis.clock_comparison import ClockCheck, check_clock
+from rig.data.recording.settings import RunSettings, Site, Uncertainty
+from rig.observation.consistency.arm_clock import state_jitter
+from rig.observation.observed_run import ObservedRun
+
+# Of the jitter of one state, by that of a moment between two: √(f² + (1 − f)²), in the mean over all shares f.
+BETWEEN_TWO = sqrt(2 / 3)
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """The site, the stated uncertainty, the controller's clock, and its states' jitter in s.
+
+    - `clock`: speeds are corrected by it; `clocks`: those of all recordings, for the checks.
+    - `extension_m` (3,): the sensors' position from the flange, in its frame.
+    - `finds_earth_rate`: the Earth's rate is estimated, not taken from the site.
+    """
+
+    site: Site
+    uncertainty: Uncertainty
+    clock: ClockCheck
+    state_jitter_s: float
+    extension_m: tuple[float, float, float]
+    finds_earth_rate: bool = False
+    state_jitter_freedom: float = inf
+    clocks: tuple[ClockCheck, ...] = ()
+
+
+def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings:
+    """Return the surroundings by a run's settings.
+
+    The clock is that of the longest motion, which determines it best: all recordings share the controller's quartz, and
+    if they do not, or the computer's time is wrong, `clocks` show it.
+    """
+    uncertainty = settings.stated_uncertainty
+    longest = max(recordings, key=lambda run: float(run.motion.time_s[-1] - run.motion.time_s[0]))
+    clocks = tuple(check_clock(recording, uncertainty) for recording in recordings)
+    clock = next(check for recording, check in zip(recordings, clocks, strict=True) if recording is longest)
+    jitter = state_jitter(recordings)
+    return Surroundings(
+        settings.site,
+        uncertainty,
+        clock,
+        jitter.std_s * BETWEEN_TWO,
+        settings.extension_m,
+        settings.finds_earth_rate,
+        jitter.freedom,
+        clocks,
+    )

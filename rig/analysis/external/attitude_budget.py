@@ -1,0 +1,59 @@
+"""The uncertainty budget of a sensor calibrated in known attitudes: scale and bias, by contributor."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from rig.analysis.external.attitude_equations import Equations
+from rig.data.entries.budget import IN_U
+from rig.estimation.arrays import Array, scale_of
+from rig.estimation.external import increment_solution, placement
+from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.estimation.reference.reference_budget import (
+    fewest_freedom,
+    response_in_attitudes,
+    scale_and_bias,
+    scale_and_bias_covariance,
+)
+from rig.estimation.reference.triaxial import TriaxialSolution
+
+SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
+    placement.NOISE: ("A", "scatter of the readings"),
+    placement.ATTITUDES: ("A", f"what the readings say of them, {IN_U}"),
+    placement.PLACEMENTS: ("A", f"how the placements differ beside their attitudes, {IN_U}"),
+    increment_solution.DELAY: ("A", f"found, within 50 ms of none, {IN_U}"),
+    increment_solution.EARTHS_RATE: ("B", "its size, whichever way it points"),
+    increment_solution.STRETCHES: ("A", f"how six stretches of the recording differ, {IN_U}"),
+}
+
+
+def noise_freedom(solution: TriaxialSolution, equations: Equations) -> float:
+    """Return the noise's degrees of freedom, the fewest of scale and bias, by the weights of the readings."""
+    response = response_in_attitudes(solution, equations.measurements)
+    rows = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
+    return fewest_freedom(rows, equations.variances.ravel(), equations.freedom.ravel())
+
+
+def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: float | None = None) -> Budget:
+    """Return the budget by the contribution of each cause to a reference model's covariance (p, p), F (3, 3) first.
+
+    Estimated variance components are uncertain themselves. If their likelihood was integrated over, or the covariance
+    inflated as Student's t is, u contains that (JCGM 101, 6.4.9) and no degrees of freedom remain to be counted: so for
+    the noise too, without a `noise_freedom`.
+    """
+    scale = scale_of(matrix)
+    lines = []
+    for name, cause in causes.items():
+        kind, source = SOURCES[name]
+        freedom = np.inf
+        if name == placement.NOISE and noise_freedom is not None:
+            freedom = noise_freedom
+        elif name == placement.NOISE:
+            source = f"{source}, {IN_U}"
+        lines.append(
+            Contributor(
+                name, kind, "normal", None, "", source, freedom, scale_and_bias_covariance(matrix, scale, cause)
+            )
+        )
+    return Budget(tuple(lines))

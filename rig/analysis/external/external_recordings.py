@@ -1,0 +1,316 @@
+"""The solution and checks of external readings, whose motion a file describes. Pure."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from rig.analysis.by_hand.gyroscope import solve_hand_samples
+from rig.analysis.check import Check, fitness, list_unsolved
+from rig.analysis.estimator_names import ESTIMATORS, Estimator, choose_estimator
+from rig.analysis.external.attitudes import InAttitudes, Result, find_method, solve_placed
+from rig.analysis.external.increment_calibration import InIncrements
+from rig.analysis.external.omissions import list_omitted, notes_on_reading, notes_on_turns
+from rig.analysis.external.sweeps_agree import add_errors, check_agree, noise_freedom, sweep_errors
+from rig.analysis.gyroscope.calibration import (
+    ALGORITHM_1,
+    NEWTON,
+    VECTOR,
+    SensorResult,
+    solve_observations,
+    solve_six_observation,
+    solve_vector,
+)
+from rig.analysis.gyroscope.correction import diagonal_correction, matrix_correction
+from rig.analysis.installed_solvers import KindFound, OfKind
+from rig.analysis.temperature.over_temperature import add_rate_polynomials, correct_files
+from rig.data.quantity import RATE, Quantity
+from rig.data.recording.motion_file import Item, ReadElsewhere
+from rig.data.recording.settings import RunSettings
+from rig.errors import Fault, Refused
+from rig.errors.attempts import attempt
+from rig.estimation.gyroscope import rotations_by_angle
+from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.estimation.gyroscope.estimate import Estimate
+from rig.estimation.gyroscope.rotations_by_angle import BIAS, NOISE, TurnedSolution, solve_turned
+from rig.estimation.gyroscope.vector_model import VectorSolution
+from rig.estimation.reference import triaxial
+from rig.estimation.reference.reference_budget import scale_and_bias_covariance
+from rig.estimation.reference.reference_model import BIAS as OFFSET
+from rig.estimation.reference.reference_model import F
+from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD
+from rig.estimation.sensor_axes import SensorAxes
+from rig.estimation.temperature.over_temperature import OverTemperature
+from rig.observation.external.attitude_import import placed_by
+from rig.observation.external.csv_import import ExternalData, average_sweeps
+from rig.observation.external.csv_samples import Samples, samples_in
+from rig.observation.external.omission import Omitted
+from rig.observation.external.turns import TurnedData
+from rig.observation.statistics.mean import by_axis
+from rig.observation.timebase import TimeBase
+
+BySweeps = Estimator | Literal["increments"]
+BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
+FROM_READINGS = "scatter of the readings"
+SWEEPS, FROM_RESIDUALS = "sweeps", "what the sweeps contradict each other by"
+NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweeps", "Give sweeps in six directions")
+
+
+@dataclass(frozen=True, slots=True)
+class OfSensor:
+    """The solution of the readings of an `item`.
+
+    - `gyroscope`: its calibration; `rates`: its solution in attitudes; `at_rest`: the other quantities'.
+    - `unsolved`: why other recorded quantities have no solution; `of_kinds`: those of installed kinds.
+    - `turned`: the turns from rest to rest that it was solved by; `polynomials`: of a calibration over temperature.
+    - `omitted`: what was left out, by the quantity that lacks it, None of all; `notes`: remarkable steps.
+    """
+
+    item: Item
+    gyroscope: SensorResult | None
+    rates: Result | None
+    at_rest: Mapping[Quantity, InAttitudes]
+    unsolved: Mapping[Quantity, Fault]
+    turned: TurnedData | None = None
+    of_kinds: tuple[KindFound, ...] = ()
+    polynomials: OverTemperature | None = None
+    omitted: tuple[tuple[Quantity | None, Omitted], ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def solve_external(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
+    """Return the solution of readings whose motion a file describes; `estimator` None chooses one.
+
+    Raise Refused `unknown_estimator`; Fault as the observers do, and if no quantity has a solution, as the estimator
+    does, or for several `nothing_solved` with every reason.
+    """
+    if read.tells == "turns":
+        return _add_notes(_solve_turns(read, estimator), read)
+    solved = (
+        _solve_sweeps(read, estimator, settings.reference_c)
+        if read.tells == "sweeps"
+        else _solve_attitudes(read, settings, estimator)
+    )
+    if solved.gyroscope is None and not solved.at_rest and not solved.of_kinds:
+        raise _nothing_solved(solved.unsolved)
+    return _add_notes(solved, read)
+
+
+def _add_notes(sensor: OfSensor, read: ReadElsewhere) -> OfSensor:
+    return replace(sensor, notes=(*notes_on_reading(read, _samples(read).sampling), *sensor.notes))
+
+
+def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
+    """Yield the checks beyond the solvers' own: the condition of the equations, the error of attitudes.
+
+    Every quantity without a solution has a failing check. No configuration states limits of anything else.
+    """
+    yield from list_unsolved((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
+    if (gyroscope := sensor.gyroscope) is not None:
+        largest = triaxial.MAX_CONDITION if sensor.rates is not None else rotations_by_angle.MAX_CONDITION
+        yield fitness(name, RATE.name, "condition", gyroscope.solution.condition, largest)
+    for quantity, result in sensor.at_rest.items():
+        yield fitness(name, quantity.name, "condition", result.solution.condition, triaxial.MAX_CONDITION)
+        if (error := result.solution.attitude_error) is not None:
+            at_least = max(error.std_rad - 2 * error.uncertainty_rad, 0.0)  # a few placements determine it poorly
+            yield fitness(name, quantity.name, "attitude_error", at_least, UNTRUSTWORTHY_RAD, unit="rad")
+
+
+def _solve_turns(read: ReadElsewhere, name: str | None) -> OfSensor:
+    if name not in (None, "by_hand"):
+        choose_estimator(("by_hand",), str(name))
+    return OfSensor(read.item, solve_hand_samples(read.item, _samples(read), read.motion), None, {}, {})
+
+
+def _solve_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:
+    chosen = None if name is None else choose_estimator(BY_SWEEPS, name)
+    data, polynomials = average_sweeps(_samples(read), read.motion), None
+    if reference_c is not None and data.turned is not None:
+        raise Refused(
+            "bad_option",
+            "the body was turned from rest to rest, and over temperature mean rates are solved",
+            "Give sweeps at constant speed, with speed_rad_s; or leave out --reference-c",
+        )
+    if reference_c is not None:
+        data, polynomials = correct_files(data, reference_c)
+    solution, faults = solve_swept(data, chosen), dict[str, Fault]()
+    vector = (
+        solution
+        if isinstance(solution, VectorSolution | TurnedSolution)
+        else attempt(faults, VECTOR, lambda: add_errors(_vector(data), data))
+    )
+    gyroscope = SensorResult(
+        sensor=read.item,
+        solution=solution,
+        vector_model=vector,
+        explained=None,
+        uncertainty=budget_of(solution, data),
+        # Three sweeps may do for the vector model, not for the six observations.
+        six_observation=attempt(faults, NEWTON, lambda: solve_six_observation(data.sweeps, "newton")),
+        algorithm_1=attempt(faults, ALGORITHM_1, lambda: solve_six_observation(data.sweeps, "algorithm_1")),
+        observations=data.sweeps,
+        rests=data.rests,
+        time_bases=(),
+        corrected_by=(
+            matrix_correction(solution)
+            if isinstance(solution, VectorSolution | TurnedSolution)
+            else diagonal_correction(solution.scale)
+        ),
+        faults=faults,
+    )
+    by_turns = data.turned if isinstance(solution, TurnedSolution) else None
+    if polynomials is not None:
+        gyroscope, polynomials = add_rate_polynomials(gyroscope, polynomials)
+    notes = tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
+    omitted = tuple((RATE, part) for part in data.omitted)
+    return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes)
+
+
+def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
+    """Solve by `estimator`; None chooses "increments" if the body was turned from rest to rest, else "vector".
+
+    Raise Fault as the estimators do, and `no_turns`.
+    """
+    if estimator is None:
+        estimator = "vector" if data.turned is None else "increments"
+    if estimator != "increments":
+        vector = _vector(data)
+        check_agree(vector, data)
+        if estimator == "vector":
+            return add_errors(vector, data)
+        return solve_observations(data.sweeps, estimator, data.rests)
+    if data.turned is None:
+        raise Fault(
+            "no_turns",
+            "no row of the sweeps has an angle and begins and ends at rest",
+            "Let the body lie still for a second before and after each turn, and give angle_rad; or use vector",
+        )
+    start, turned = _vector(data), data.turned
+    return solve_turned(turned.gyroscope, turned.turns, turned.means, start.matrix, start.bias_rad_s)
+
+
+def budget_of(solution: Estimate, data: ExternalData) -> Budget:
+    """Return the budget of its covariance: the scatter of means, and the errors of the stated motion."""
+    if data.turned is None or not isinstance(solution, TurnedSolution):
+        vector = solution if isinstance(solution, VectorSolution) else _vector(data)
+        more, covariance = sweep_errors(vector, data), solution.covariance
+        freedom = noise_freedom(vector, data) if vector is solution else _fewest_of_means(data)
+        if more is not None and vector is solution:
+            covariance = covariance - more.covariance
+        noise = Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, covariance)
+        if more is None:
+            return Budget((noise,))
+        return Budget(
+            (noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, more.freedom, more.covariance))
+        )
+    dof = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
+    dof |= dict.fromkeys((rotations_by_angle.ENDS, rotations_by_angle.AXES), solution.widened_freedom)
+    lines = solution.budget.contributors
+    return Budget(tuple(replace(line, freedom=dof.get(line.name, line.freedom)) for line in lines))
+
+
+def _fewest_of_means(data: ExternalData) -> float:
+    """Return the fewest degrees of freedom of the noise of any mean."""
+    return float(by_axis(average.freedom for average in [*(sweep.average for sweep in data.sweeps), *data.rests]).min())
+
+
+def _vector(data: ExternalData) -> VectorSolution:
+    return solve_vector(data.sweeps, data.rests)
+
+
+def _solve_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) -> OfSensor:
+    method, site, options = find_method(name), settings.site, settings.elsewhere
+    assert options is not None, "of readings of others"
+    placed = placed_by(_samples(read), read.motion, find_clock=options.find_clock)
+    attempts = solve_placed(read.item.name, placed, site, options, method, second_order=settings.second_order)
+    rates = attempts.results.get(RATE)
+    gyroscope = rates if isinstance(rates, InAttitudes | InIncrements) else None
+    return OfSensor(
+        read.item,
+        gyroscope=None if gyroscope is None else _gyroscope(read.item, gyroscope, placed.clock),
+        rates=gyroscope,
+        at_rest={
+            quantity: result
+            for quantity, result in attempts.results.items()
+            if quantity != RATE and isinstance(result, InAttitudes)
+        },
+        unsolved=attempts.faults,
+        omitted=tuple(list_omitted(placed, attempts.results)),
+        of_kinds=tuple(
+            KindFound(read.item.name, read.item, quantity, result)
+            for quantity, result in attempts.results.items()
+            if isinstance(result, OfKind)
+        ),
+    )
+
+
+def _samples(read: ReadElsewhere) -> Samples:
+    return samples_in(read.readings, "the recording")
+
+
+def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:
+    """Return the calibration of a gyroscope in attitudes, described as one of sweeps."""
+    solution = _describe_as_swept(result)
+    return SensorResult(
+        sensor=item,
+        solution=solution,
+        vector_model=solution,
+        explained=None,
+        uncertainty=solution.budget,
+        six_observation=None,
+        algorithm_1=None,
+        observations=(),
+        rests=(),
+        time_bases=() if clock is None else (clock,),
+        corrected_by=matrix_correction(solution),
+        faults=dict.fromkeys((NEWTON, ALGORITHM_1), NO_SWEEPS),
+    )
+
+
+def _describe_as_swept(result: Result) -> TurnedSolution:
+    """F and b of m = F ω + b as g = K (m + b) has them, with what the covariance is made of."""
+    solution, matrix = result.solution, result.solution.matrix
+    axes = SensorAxes.from_matrix(matrix)
+    of_matrix = np.r_[F, OFFSET]
+    sign = np.diag(RATE.parameter_signs)
+    lines = tuple(replace(line, covariance=sign @ line.covariance @ sign) for line in result.budget.contributors)
+    if isinstance(result, InIncrements):
+        observations, rank = len(result.solution.residuals_rad), 12
+        warnings: tuple[str, ...] = ()
+        residuals, estimator = np.zeros((0, 3)), "increments"
+    else:
+        of_rows = result.solution
+        observations, rank, warnings = of_rows.observations, of_rows.rank, of_rows.warnings
+        residuals, estimator = of_rows.residuals, str(of_rows.method)
+    return TurnedSolution(
+        scale=axes.scale,
+        bias_rad_s=RATE.offset * solution.bias,
+        covariance=sign @ scale_and_bias_covariance(matrix, axes.scale, solution.covariance) @ sign,
+        matrix=matrix,
+        matrix_covariance=solution.covariance[np.ix_(of_matrix, of_matrix)],
+        non_orthogonality_rad=axes.non_orthogonality_rad,
+        mounting=axes.mounting,
+        angles_covariance_rad2=axes.angles_covariance_rad2(solution.covariance[F, F]),
+        residuals_rad_s=residuals,
+        widened=1.0,
+        widened_freedom=np.inf,
+        budget=Budget(lines),
+        observations=observations,
+        rank=rank,
+        condition=solution.condition,
+        iterations=solution.iterations,
+        warnings=warnings,
+        estimator=estimator,
+    )
+
+
+def _nothing_solved(unsolved: Mapping[Quantity, Fault]) -> Fault | Refused:
+    """Return all reasons, each with its own remedy; a single one as it is."""
+    faults: Sequence[Fault] = list(unsolved.values())
+    if len(faults) == 1:
+        return faults[0]
+    reasons = "; ".join(f"{quantity}: {str(fault).rstrip('.')}" for quantity, fault in unsolved.items())
+    return Refused(
+        "nothing_solved", f"no sensor has a solution: {reasons}", "Do what the message says about your sensor"
+    )

@@ -1,0 +1,85 @@
+"""The calibration of a gyroscope in known attitudes by the increments of angle between them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig.analysis.external.attitude_budget import budget_by_causes
+from rig.analysis.external.inverted import solve_unless_inverted
+from rig.analysis.external.rests_agree import check_rests_agree
+from rig.estimation.arrays import scale_of
+from rig.estimation.external.increment_solution import KnownIncrements, solve_known_increments
+from rig.estimation.gyroscope.budget import Budget
+from rig.estimation.refusals import check_axes, check_unit
+from rig.observation.external.fixes import Gathered, LeftOut, Turning, gather, rough_matrix
+from rig.observation.external.omission import Omitted
+
+CONTRADICTING = ("attitude_untrustworthy", "mirrored_axis", "wrong_unit", "ill_conditioned")
+PASSES = 3  # by the clock of the one before
+
+
+@dataclass(frozen=True, slots=True)
+class InIncrements:
+    """The solution, the length of the windows that its fixes are means over, and what was left out.
+
+    `increments` is their number with nothing left out.
+    """
+
+    solution: KnownIncrements
+    window_s: float
+    left_out: tuple[LeftOut, ...]
+    increments: int
+
+    @property
+    def budget(self) -> Budget:
+        """The contributors to the uncertainty."""
+        return budget_by_causes(self.solution.matrix, self.solution.causes)
+
+    @property
+    def omitted(self) -> Iterator[Omitted]:
+        """The increments that could not be formed, and those that contradict all others."""
+        for gap in self.left_out:
+            longest = f", for up to {gap.longest_s:.2g} s" if gap.name == "lost_samples" else ""
+            yield Omitted("increments", gap.count, self.increments, f"{gap.name}{longest}", _spell_time(gap.first_s))
+        if count := self.solution.set_aside:
+            reason = "attitude_untrustworthy: they contradict all others"
+            yield Omitted("increments", count, self.increments, reason, _spell_time(float(self.solution.aside_s[0])))
+
+
+def _spell_time(time_s: float) -> str:
+    return f"at {time_s:.2f} s"
+
+
+def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> InIncrements:
+    """Return the gyroscope's matrix and bias, from windows of a given or a suitable length.
+
+    Raise Fault as `gather`, `solve_known_increments`, `check_rests_agree` and `check_axes` do, and
+    `inverted_attitudes`.
+    """
+    solved = solve_unless_inverted(
+        turning.attitudes, lambda attitudes: _solve(replace(turning, attitudes=attitudes), window_s), CONTRADICTING
+    )
+    if not any_mounting:
+        matrix = solved.solution.matrix
+        check_axes(matrix / np.linalg.norm(matrix, axis=1, keepdims=True), np.eye(3))
+    check_rests_agree(turning, solved.solution)
+    return solved
+
+
+def _solve(turning: Turning, window_s: float | None) -> InIncrements:
+    """Return the solution; its clock offset determines which readings are missing, so it is iterated."""
+    start = rough_matrix(turning)
+    check_unit(scale_of(start))
+    gathered = gather(turning, window_s)
+    for _ in range(PASSES):
+        solution = solve_known_increments(turning.time_s, turning.readings_rad_s, gathered.fixes, start)
+        regathered = gather(turning, window_s, solution.clock_s)
+        if _same(gathered, regathered):
+            break
+        gathered = regathered
+    return InIncrements(solution, gathered.window_s, gathered.left_out, gathered.increments)
+
+
+def _same(one: Gathered, other: Gathered) -> bool:
+    return bool(np.array_equal(one.fixes.joined, other.fixes.joined))

@@ -1,0 +1,54 @@
+"""The omissions of external readings, and notes on how they were read."""
+
+from collections.abc import Iterator, Mapping
+
+from rig.analysis.external.attitudes import InAttitudes, Result
+from rig.analysis.external.increment_calibration import InIncrements
+from rig.analysis.installed_solvers import OfKind
+from rig.data.quantity import RATE, Quantity
+from rig.data.recording.motion_file import ReadElsewhere
+from rig.estimation.gyroscope.estimate import Estimate
+from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
+from rig.observation.external.attitude_import import PlacedReadings
+from rig.observation.external.csv_import import ExternalData
+from rig.observation.external.omission import Omitted
+from rig.observation.external.placements import Placements
+from rig.observation.sampling import Sampling
+
+
+def list_omitted(
+    placed: PlacedReadings, results: Mapping[Quantity, Result | OfKind]
+) -> Iterator[tuple[Quantity | None, Omitted]]:
+    """Yield what was left out of readings in attitudes, by the quantity that it is missing from, None of all."""
+    yield from ((None, omitted) for omitted in placed.omitted)
+    rates = results.get(RATE)
+    if isinstance(rates, InIncrements | InAttitudes):
+        yield from ((RATE, one) for one in (rates.omitted if isinstance(rates, InIncrements) else placed.incomplete))
+    solved = [quantity for quantity in results if quantity != RATE]
+    if isinstance(placed.placements, Placements) and solved:
+        yield from ((solved[0], omitted) for omitted in (*placed.unsampled, *placed.placements.omitted))
+
+
+def notes_on_reading(read: ReadElsewhere, sampling: Sampling | None) -> Iterator[str]:
+    """Yield what was done to the files' times and rows."""
+    if sampling is not None and sampling.on_arrival:
+        yield (
+            f"the readings are stamped on arrival, several at once: they count as taken every "
+            f"{1e3 * sampling.interval_s:.4g} ms"
+        )
+    if read.origin_s:
+        yield f"times count from {read.origin_s} s of the files' clock"
+    if read.other_rows:
+        yield f"{read.other_rows} rows of the samples hold none of these readings, and are left out"
+
+
+def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:
+    """Yield that rows with an angle were solved by their mean speed, if they were."""
+    if not data.by_mean:
+        return
+    why = "the body moves before or after them"
+    if isinstance(solution, TurnedSolution):
+        rows = ", ".join(map(str, data.by_mean))
+        yield f"{len(data.by_mean)} of {len(data.sweeps)} turns count by their mean speed, since {why}: rows {rows}"
+    else:
+        yield f"all {len(data.sweeps)} turns count by their mean speed: {why}"

@@ -1,0 +1,60 @@
+"""The kinds of sensors that packages add, with their own solvers, on an arm or from attitudes of a file. Pure."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from rig.analysis.check import Check
+from rig.data.installed_kinds import InstalledKind, installed_kinds
+from rig.data.quantity import Quantity
+from rig.data.recording.motion_file import Item
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.settings import RunSettings, Site
+from rig.errors import Fault
+from rig.errors.attempts import attempt
+from rig.observation.arm_placements import placements_on_arm
+from rig.observation.observed_run import ObservedRun
+
+
+@dataclass(frozen=True, slots=True)
+class OfKind:
+    """The solution by an installed kind's solver, and its checks of fitness."""
+
+    solution: object
+    checks: tuple[Check, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class KindFound:
+    """The solution of a `sensor` by its name, None if there is none: the `fault` says why."""
+
+    name: str
+    sensor: RecordedSensor | Item
+    quantity: Quantity
+    solved: OfKind | None
+    fault: Fault | None = None
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        """The solver's checks; none without a solution."""
+        return () if self.solved is None else self.solved.checks
+
+
+def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[KindFound, ...]:
+    """Return every sensor of an installed kind that was recorded, in the order of the kinds."""
+    return tuple(_solve_kinds(recordings, settings))
+
+
+def _solve_kinds(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
+    for kind in installed_kinds():
+        faults = dict[str, Fault]()
+        for name, sensor in recordings[0].run.measuring(kind.quantity).items():
+            solve = partial(_solve, kind, name, recordings, settings, settings.site)
+            yield KindFound(name, sensor, kind.quantity, attempt(faults, name, solve), faults.get(name))
+
+
+def _solve(
+    kind: InstalledKind, name: str, recordings: Sequence[ObservedRun], settings: RunSettings, site: Site
+) -> OfKind:
+    solved: OfKind = kind.solve(name, placements_on_arm(recordings, name, kind.quantity, settings.observation), site)
+    return solved

@@ -1,0 +1,115 @@
+"""The times and temperatures at which a calibration holds: those of the readings it is estimated from.
+
+A gyroscope's scale factors come from the sweeps alone, its bias from the rests between them too: in a sensor that warms
+up they have different temperatures.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from rig.observation.average import Average
+from rig.observation.finished_steps import dwell_times_s
+from rig.observation.observed_run import ObservedRun
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """The times of readings in UTC with their mean, and their mean temperature with its range.
+
+    No temperatures without a thermometer, and no range if the temperature was stated.
+    """
+
+    from_utc: datetime
+    to_utc: datetime
+    mean_utc: datetime
+    temperature_c: float | None
+    temperature_range_c: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class GyroscopeConditions:
+    """The times at which a gyroscope's scale factors hold, and its bias."""
+
+    scale: When
+    bias: When
+
+
+@dataclass(frozen=True, slots=True)
+class _WeightedReadings:
+    """Readings from start to end on the clock of the first recording, their weight and temperature (or NaN)."""
+
+    start_s: float
+    end_s: float
+    weight: float
+    temperature_c: float
+
+
+def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeConditions:
+    """Return when a gyroscope's scale and bias were read: in its sweeps, and in sweeps and rests."""
+    parts = [(recording.sensors[name], recording.clock_offset_s) for recording in recordings]
+    turns = [_read_average(turn.average, offset_s) for part, offset_s in parts for turn in part.revolutions]
+    rests = [_read_average(rest, offset_s) for part, offset_s in parts for rest in part.rests]
+    return GyroscopeConditions(
+        _average_conditions(recordings, name, turns), _average_conditions(recordings, name, [*turns, *rests])
+    )
+
+
+def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
+    """Return when an accelerometer was read: in the dwells of these indices, and its sweeps."""
+    wanted, read = frozenset(dwells), []
+    for recording in recordings:
+        part, offset_s = recording.sensors[name], recording.clock_offset_s
+        read += [_read_average(turn.average, offset_s) for turn in part.revolutions if turn.acceleration is not None]
+        read += [
+            _WeightedReadings(
+                dwell.window.start_s + offset_s,
+                dwell.window.end_s + offset_s,
+                dwell.reading.samples,
+                dwell.temperature_c,
+            )
+            for dwell in part.dwells
+            if dwell.index in wanted
+        ]
+    return _average_conditions(recordings, name, read)
+
+
+def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
+    """Return when a magnetometer, which has no thermometer, was read: in the last dwells of these indices."""
+    wanted = frozenset(dwells)
+    times_s = {
+        index: (start_s + recording.clock_offset_s, end_s + recording.clock_offset_s)
+        for recording in recordings
+        for index, (start_s, end_s) in dwell_times_s(recording.run).items()
+        if index in wanted
+    }
+    read = [_WeightedReadings(start_s, end_s, end_s - start_s, float("nan")) for start_s, end_s in times_s.values()]
+    return _average_conditions(recordings, name, read)
+
+
+def _read_average(average: Average, offset_s: float) -> _WeightedReadings:
+    return _WeightedReadings(
+        average.start_s + offset_s, average.end_s + offset_s, average.samples, average.temperature_c
+    )
+
+
+def _average_conditions(recordings: Sequence[ObservedRun], name: str, read: Sequence[_WeightedReadings]) -> When:
+    """Return the times of weighted windows; a recording's clock starts with its first state."""
+    began = datetime.fromisoformat(recordings[0].run.provenance.started_utc)
+    first_s, weights = float(recordings[0].motion.time_s[0]), [window.weight for window in read]
+
+    def utc(time_s: float) -> datetime:
+        return began + timedelta(seconds=time_s - first_s)
+
+    middles = [(window.start_s + window.end_s) / 2 for window in read]
+    stated = recordings[0].run.sensors[name].temperature_stated
+    warm = [window.temperature_c for window in read if np.isfinite(window.temperature_c)]
+    return When(
+        utc(min(window.start_s for window in read)),
+        utc(max(window.end_s for window in read)),
+        utc(float(np.average(middles, weights=weights))),
+        float(np.average(warm, weights=weights)) if warm else None,
+        (min(warm), max(warm)) if warm and not stated else None,
+    )

@@ -1,0 +1,170 @@
+"""The calibration of magnetometers from dwells in known attitudes: TRIAX, Eq. (7), on an arm.
+
+The solution contains iron and currents that turn with the magnetometer, those of the arm among them, which no residual
+shows. Runs with the sensor turned over separate them: `rig.analysis.reversal`.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from rig.analysis.reference.accelerometer import AccelerometerResult
+from rig.analysis.reference.reference_budgets import magnetometer_budget
+from rig.analysis.reference.triad import COMPARED, Triad, check_mounted, field_reference, stack_dwells
+from rig.data.quantity import FIELD
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.settings import RunSettings
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
+from rig.estimation.gyroscope.budget import Budget
+from rig.estimation.reference.accelerometer_model import Dwells
+from rig.estimation.reference.magnetometer import FieldDrift, Uniformity, field_drift, uniformity
+from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution, solve_triaxial
+from rig.observation.field_means import field_readings, field_tests, find_companion
+from rig.observation.observed_run import ObservedRun
+from rig.observation.statistics.mean import StaticReading, by_axis
+
+ESTIMATOR: Method = "attitude_weighted"
+REMEDY = "Take iron and currents away, or measure farther from them; set the sensor farther from the arm"
+
+
+@dataclass(frozen=True, slots=True)
+class MagnetometerResult:
+    """One magnetometer's calibration m = F B + b, in the axes of its nominal mounting.
+
+    - `field_t`: the size of the field; `extension_m` (3,): the sensor's position on the flange.
+    - `triad`: scale, relative to `field_t`, and axes by the solution alone; `budget`: the uncertainty by all causes.
+    - `uniformity`: the test of the field over the attitudes; `drift`: between tests at home, None with fewer than two.
+    - `measurements`: the means that the solution is estimated from, in tesla.
+    - `other_methods`: the solutions by the other methods, or the Fault each ends in.
+    """
+
+    sensor: RecordedSensor
+    field_t: float
+    extension_m: tuple[float, float, float]
+    solution: TriaxialSolution
+    uniformity: Uniformity
+    drift: FieldDrift | None
+    triad: Triad
+    budget: Budget
+    other_methods: Attempts[Method, TriaxialSolution]
+    dwells: tuple[StaticReading, ...]
+    measurements: Dwells
+
+
+def calibrate_magnetometers(
+    recordings: Sequence[ObservedRun], settings: RunSettings, accelerometers: Mapping[str, AccelerometerResult]
+) -> Attempts[str, MagnetometerResult]:
+    """Calibrate every magnetometer that was recorded; return the results, or the Fault of each that has none.
+
+    The `accelerometers` bound the error of the arm's attitudes. The Fault is `no_attitudes` without dwells,
+    `field_strength_unknown`, `field_drifts`, `field_not_uniform`, one of those of `field_readings` and of
+    `solve_triaxial`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
+    """
+    magnetometers = recordings[0].run.measuring(FIELD)
+    return attempt_each(
+        {
+            name: partial(_calibrate, name, sensor, recordings, settings, accelerometers)
+            for name, sensor in magnetometers.items()
+        }
+    )
+
+
+def _calibrate(
+    name: str,
+    sensor: RecordedSensor,
+    recordings: Sequence[ObservedRun],
+    settings: RunSettings,
+    accelerometers: Mapping[str, AccelerometerResult],
+) -> MagnetometerResult:
+    site = settings.site
+    if not settings.planned_dwells:
+        raise Fault(
+            "no_attitudes",
+            "recorded only: sweeps do not calibrate a magnetometer",
+            "Use the procedure static_attitudes or imu, which hold attitudes",
+        )
+    reference = field_reference(site, "site.magnetic_field_ut")
+    dwells = tuple(
+        field_reading for run in recordings for field_reading in field_readings(run, name, settings.observation)
+    )
+    drift = _drift(name, recordings, settings)
+    measurements = stack_dwells(dwells, np.array(sensor.mounting))
+    inputs = measurements.readings_m_s2, measurements.attitudes, measurements.variances_m2_s4
+    solve = partial(solve_triaxial, *inputs, reference)
+    solution = _solve(solve)
+    check_mounted(solution.matrix)
+    homogeneity = uniformity(solution, *inputs, _attitude_error_rad(name, recordings, accelerometers))
+    if not homogeneity.uniform:
+        raise Fault("field_not_uniform", _describe_nonuniformity(homogeneity, solution), REMEDY)
+    return MagnetometerResult(
+        sensor=sensor,
+        field_t=reference.norm,
+        extension_m=settings.extension_m,
+        solution=solution,
+        uniformity=homogeneity,
+        drift=drift,
+        triad=Triad.from_solution(solution),
+        budget=magnetometer_budget(
+            solution,
+            measurements,
+            (homogeneity, drift),
+            site,
+            field_t=reference.norm,
+            noise_freedom=by_axis(dwell.reading.freedom for dwell in dwells).ravel(),
+        ),
+        other_methods=attempt_each({method: partial(solve, method=method) for method in COMPARED}),
+        dwells=dwells,
+        measurements=measurements,
+    )
+
+
+def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
+    """Return the drift by the tests at home of all recordings, None with one. Raise Fault `field_drifts`."""
+    tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
+    if len(tests) < 2:
+        return None
+    means, variances = [test.mean for test in tests], [test.variance for test in tests]
+    drift = field_drift(means, variances, settings.stated_uncertainty.repeatability_std_rad)
+    if not drift.steady:
+        change_t, std_t = np.linalg.norm(drift.change_t), np.linalg.norm(drift.std_t)
+        raise Fault(
+            "field_drifts",
+            f"at home the readings changed by {1e6 * change_t:.3f} µT between two tests, and noise explains "
+            f"{1e6 * std_t:.3f}: a field that drifts reads as bias and scale",
+            "Find what changed (a lift, a vehicle, a current, a sensor that warms up), wait, and run again",
+        )
+    return drift
+
+
+def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
+    """Return the solution. Raise Fault `field_not_uniform`, as the accelerometer confirms the same attitudes."""
+    try:
+        return solve(method=ESTIMATOR)
+    except Fault as fault:
+        if fault.name != "attitude_untrustworthy":
+            raise
+        what = f"the accelerometer agrees with the attitudes, the magnetometer does not ({fault.what})"
+        raise Fault("field_not_uniform", what, REMEDY) from fault
+
+
+def _attitude_error_rad(
+    name: str, recordings: Sequence[ObservedRun], accelerometers: Mapping[str, AccelerometerResult]
+) -> float:
+    """Return the bound of the arm's attitude error, with 2σ, by the accelerometer on the same clock."""
+    by = next((other for run in recordings if (other := find_companion(run, name)) in accelerometers), None)
+    accelerometer = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
+    error = accelerometer.solution.attitude_error
+    return min(error.std_rad + 2 * error.uncertainty_rad, UNTRUSTWORTHY_RAD)
+
+
+def _describe_nonuniformity(uniformity: Uniformity, solution: TriaxialSolution) -> str:
+    residual_t = np.sqrt(np.mean(solution.residuals**2))
+    return (
+        f"the field is not the same in all attitudes: χ² of what the model leaves is {uniformity.chi_square:.4g}, "
+        f"{uniformity.limit:.3g} at most by noise and by attitudes off by "
+        f"{1e3 * uniformity.attitude_error_rad:.2g} mrad; "
+        f"{1e6 * residual_t:.3f} µT are left in the mean"
+    )

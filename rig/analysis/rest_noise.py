@@ -1,0 +1,132 @@
+"""The noise of sensors at rest: the Allan deviation of every rest and dwell, or of a log of another program. Pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
+from rig.estimation.arrays import Array
+from rig.estimation.statistics.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
+from rig.observation.arm_rests import still_samples
+from rig.observation.average import Stream, synchronize_stream
+from rig.observation.by_hand.steadiness import check_at_rest, contiguous_slices
+from rig.observation.external.csv_samples import Samples
+from rig.observation.motion.arm_motion import motion_of
+from rig.observation.reference.dwell_acceleration import accelerations
+
+FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
+
+
+@dataclass(frozen=True, slots=True)
+class AtRest:
+    """The Allan deviation of one quantity at rest in rad/s or m/s², and the noise parameters of its axes.
+
+    `longest_s` is the longest interval without a gap, `total_s` the sum of all; `temperature_c` the lowest and the
+    highest, None without a thermometer.
+    """
+
+    curve: AllanCurve
+    axes: tuple[AllanAxis, AllanAxis, AllanAxis]
+    stretches: int
+    longest_s: float
+    total_s: float
+    temperature_c: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class SensorAtRest:
+    """A sensor, None if the readings do not name it, and every quantity it measures, or the Fault it ends in."""
+
+    sensor: RecordedSensor | None
+    quantities: Attempts[Quantity, AtRest]
+
+
+def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
+    """Return every sensor with rates, by name, over all recordings of a run, without readings that the board corrected.
+
+    Raise Fault as `motion_of` and `synchronize_stream` do.
+    """
+    motions = [motion_of(run) for run in runs]
+    results = {}
+    for name, sensor in runs[0].measuring(RATE).items():
+        intervals = []
+        for run, motion in zip(runs, motions, strict=True):
+            stream = synchronize_stream(run.samples[name], sensor, motion)
+            intervals += [(stream, inside) for inside in still_samples(run, stream, motion)]
+        quantities = [RATE, ACCELERATION] if sensor.measures(ACCELERATION) else [RATE]
+        results[name] = SensorAtRest(
+            sensor,
+            attempt_each({quantity: partial(_summarise_streams, intervals, quantity) for quantity in quantities}),
+        )
+    return results
+
+
+def log_at_rest(samples: Samples) -> SensorAtRest:
+    """Return the noise of a sensor that was at rest during a whole log of another program.
+
+    Raise Fault `not_at_rest`.
+    """
+    for quantity, readings in samples.readings.items():
+        check_at_rest(samples.time_s, readings, quantity)
+    intervals = [inside for inside in contiguous_slices(samples.time_s) if inside.stop - inside.start > 2]
+    return SensorAtRest(
+        None,
+        attempt_each(
+            {
+                quantity: partial(
+                    _summarise,
+                    [samples.time_s[interval] for interval in intervals],
+                    [readings[interval] for interval in intervals],
+                    quantity,
+                )
+                for quantity, readings in samples.readings.items()
+            }
+        ),
+    )
+
+
+def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:
+    long = [(stream, inside) for stream, inside in intervals if inside.stop - inside.start > 2]
+    readings = [_readings(stream, inside, quantity) for stream, inside in long]
+    summary = _summarise([stream.time_s[inside] for stream, inside in long], readings, quantity)
+    temperatures = [_temperatures(stream, inside) for stream, inside in long]
+    return replace(summary, temperature_c=(min(low for low, _ in temperatures), max(high for _, high in temperatures)))
+
+
+def _summarise(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
+    """Return the noise by intervals at rest, (nᵢ,) times and (nᵢ, 3) readings."""
+    if not readings:
+        raise too_short("nothing stood still for longer than a few readings")
+    if any(not np.ptp(reading, axis=0).all() for reading in readings if len(reading) > FEWEST_TO_JUDGE):
+        raise Fault(
+            "stuck_sensor",
+            f"an axis repeats one {quantity} through a whole rest",
+            "Check the sensor's supply and its wiring; if the sensor's noise is below its resolution, it has "
+            "no such curve",
+        )
+    durations_s = [float(time_s[-1] - time_s[0]) for time_s in times_s]
+    interval_s = float(np.sum(durations_s) / np.sum([len(reading) - 1 for reading in readings]))
+    curve = allan_curve(readings, interval_s)
+    return AtRest(
+        curve=curve,
+        axes=(read_axis(curve, 0), read_axis(curve, 1), read_axis(curve, 2)),
+        stretches=len(readings),
+        longest_s=max(durations_s),
+        total_s=float(np.sum(durations_s)),
+        temperature_c=None,
+    )
+
+
+def _readings(stream: Stream, inside: slice, quantity: Quantity) -> Array:
+    return stream.readings_rad_s[inside] if quantity == RATE else accelerations(stream, inside)
+
+
+def _temperatures(stream: Stream, inside: slice) -> tuple[float, float]:
+    degrees = stream.sensor.channel(TEMPERATURE).values(stream.raw[inside])
+    return float(degrees.min()), float(degrees.max())

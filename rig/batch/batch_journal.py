@@ -1,0 +1,110 @@
+"""The journal of a batch: a line for each entry, on the disk before anything follows.
+
+A line that was interrupted was not entered.
+"""
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from rig.batch.batch_state import Batch, BatchEnded, Begun, Entry, PartBegun, PartEnded, after, state_of
+from rig.config.files.regular_file import UnfitFile, read_regular_file
+from rig.config.files.safe_writing import open_to_append
+from rig.data.run_folder import empty_folder, folder_of_its_own, refuse_links
+from rig.data.validation import parse_json, validate
+from rig.errors import Refused
+
+JOURNAL = "batch.jsonl"
+LARGEST_BYTES = 16_000_000
+_KINDS: dict[str, type[Entry]] = {
+    "batch_begun": Begun,
+    "part_begun": PartBegun,
+    "part_ended": PartEnded,
+    "batch_ended": BatchEnded,
+}
+_NAMES = {kind: name for name, kind in _KINDS.items()}
+
+
+@dataclass(slots=True)
+class Journal:
+    """The journal in a batch's folder, and the batch by its entries."""
+
+    folder: Path
+    batch: Batch
+    _path: Path = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._path = self.folder / JOURNAL
+
+    def enter(self, entry: Entry) -> None:
+        """Write an entry; it is completely on the disk on return. Raise ValueError for one that cannot follow."""
+        self.batch = after(self.batch, entry)
+        _append(self._path, entry)
+
+
+def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
+    """Continue or begin the batch in the folder `out`; without `out` begin one in a new folder below `parent`.
+
+    Raise Refused `run_folder` and as `resume_journal`; `no_batch` if one is measured and the other simulated.
+    """
+    if out is not None and (out / JOURNAL).exists():
+        journal = resume_journal(out)
+        if journal.batch.begun.simulated != entry.simulated:
+            begun = "in a simulated laboratory" if journal.batch.begun.simulated else "on a real rig"
+            raise _unusable(out, f"it was begun {begun}")
+        return journal
+    folder = empty_folder(out) if out is not None else folder_of_its_own(parent, "batch")
+    try:
+        _append(folder / JOURNAL, entry)
+    except OSError as error:
+        (folder / JOURNAL).unlink(missing_ok=True)  # an incomplete entry begins no batch, and would prevent one
+        raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
+    return Journal(folder, state_of([entry]))
+
+
+def resume_journal(folder: Path) -> Journal:
+    """Return the journal in `folder`; an incomplete line at its end is cut off.
+
+    Raise Refused `no_batch`, and as `refuse_links`.
+    """
+    path = folder / JOURNAL
+    try:
+        text = read_regular_file(path, LARGEST_BYTES, follow_links=False)
+        complete = text[: text.rfind(b"\n") + 1]
+        batch = state_of(_entries(complete))
+        if len(complete) < len(text):
+            os.truncate(path, len(complete))
+    except (OSError, UnfitFile, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise _unusable(folder, str(error)) from error
+    part = folder if batch.in_hand is None else folder / batch.in_hand.folder
+    refuse_links(*folder.iterdir(), *(part.iterdir() if part.is_dir() else ()))
+    return Journal(folder, batch)
+
+
+def _unusable(folder: Path, why: str) -> Refused:
+    return Refused(
+        "no_batch",
+        f"{folder / JOURNAL} cannot be continued: {why}",
+        "Begin a new batch in another folder: rig station CONFIG --out DIR",
+    )
+
+
+def _entries(text: bytes) -> Iterator[Entry]:
+    for line in text.splitlines():
+        fields = parse_json(line)
+        kind = _KINDS[fields.pop("entry")]
+        yield validate(kind, fields, "entry")
+
+
+def _append(path: Path, entry: Entry) -> None:
+    line = json.dumps({"entry": _NAMES[type(entry)], **asdict(entry)}, ensure_ascii=False) + "\n"
+    try:
+        with os.fdopen(open_to_append(path), "ab") as file:
+            file.write(line.encode())
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        error.filename = error.filename or str(path)  # an error of a full disk does not name the file
+        raise

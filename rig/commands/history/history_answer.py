@@ -1,0 +1,48 @@
+"""The answer of a history to a run, which waits for it a few seconds only."""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from rig.commands.history.waiting import await_answer
+from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from rig.history.storage.address import HistoryAddress
+
+T = TypeVar("T")
+
+ANSWER_S = 4.0  # docs/how-to/finished-runs/shared-history.md promises five until the verdict
+# Modules imported before the time begins, as on a busy computer the import alone takes longer: for any question, and
+# to enter a run.
+TO_ASK = ("rig.history.store",)
+TO_ENTER = ("rig.history.entered.index", "rig.report.kinds.kind_registry", "rig.history.series", "scipy.special")
+TO_CONNECT = {
+    "file": ("sqlalchemy.dialects.sqlite.pysqlite",),
+    "server": ("psycopg", "sqlalchemy.dialects.postgresql.psycopg"),
+}
+
+
+def ask_history(address: "HistoryAddress", work: Callable[[], T], modules: Sequence[str] = ()) -> T:
+    """Return what `work` returns of the history at `address`, or raise what it raises; TimeoutError after `ANSWER_S`.
+
+    That time is the history's alone: the modules that the work needs, and those named in `modules`, are imported
+    before.
+    """
+    for name in (*TO_ASK, *modules):
+        import_module(name)
+    with suppress(ImportError):  # the history itself then names the missing extra
+        for name in TO_CONNECT["file" if isinstance(address.where, Path) else "server"]:
+            import_module(name)
+    return await_answer(work, ANSWER_S)
+
+
+def explain_failure(error: Exception) -> str:
+    """Return in a few words why a history was of no use."""
+    if isinstance(error, RigError):
+        return f"{error.name}: {error.what}"
+    if isinstance(error, TimeoutError):
+        return f"it has not answered within {ANSWER_S:g} s"
+    return f"{type(error).__name__}: {error}"

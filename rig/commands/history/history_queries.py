@@ -1,0 +1,280 @@
+"""The commands of `rig history`, carried out."""
+
+import json
+import sys
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from rich.console import Console
+
+from rig.commands.history.named_history import read_history_name
+from rig.config.files.regular_file import UnfitFile
+from rig.data.run_folder import RESULT, recordings
+from rig.errors import Refused, RigError
+from rig.errors.extras import missing_extra
+from rig.history.documents import change_entry, history_csv, history_document, rigs_document
+from rig.history.entered.finished_run import PAGE, FinishedRun, read_finished_run
+from rig.history.series import Change, changes_between, effects, rig_states, subjects, trends
+from rig.history.storage.address import own_history_address, resolve_address
+from rig.history.store import History, Past, Selection, open_history
+from rig.history.terminal.change_words import comparison_in_words
+from rig.history.terminal.history_tables import (
+    calibrations_table,
+    changes_table,
+    effects_table,
+    parameters_table,
+    run_lines,
+    states_table,
+    title_of,
+    trend_lines,
+    trends_table,
+)
+from rig.station.plain_text import plain, say
+
+DISAGREE = 1
+
+
+def list_calibrations(options: Namespace) -> int:
+    """Print calibrations, and trends of one serial number. Raise `not_in_history`, and as `open_named_history`."""
+    selection = _read_selection(options)
+    with open_named_history(options) as history:
+        pasts = _select_pasts(history, selection)
+    series = {subject: trends(past) for subject, past in subjects(pasts).items()}
+    if options.csv:
+        for line in history_csv(pasts).rstrip("\n").split("\n"):
+            say(line)
+    elif options.json:
+        document = history_document(pasts, series if selection.serial_number is not None else None)
+        print(json.dumps(document, indent=2, allow_nan=False))
+    elif not pasts:
+        say("No calibration is in this history yet; `rig run` enters each one.")
+    else:
+        console = Console(highlight=False)
+        console.print(calibrations_table(pasts))
+        for subject, trends_of in series.items() if selection.serial_number is not None else ():
+            console.print(trends_table(subject, list(trends_of.values())))
+            for line in trend_lines(trends_of):
+                console.print(plain(line))
+    return 0
+
+
+def show(options: Namespace) -> int:
+    """Print one calibration, and where its run is stored. Raise Refused `not_in_history`."""
+    with open_named_history(options) as history:
+        past = history.calibration(options.number)
+        (kept,) = history.kept(past.run_id)
+    if options.json:
+        print(json.dumps(json.loads(kept.result), indent=2))
+        return 0
+    console = Console(highlight=False)
+    console.print(calibrations_table([past]))
+    console.print(parameters_table(past))
+    for line in run_lines(past, kept):
+        console.print(plain(line))
+    for computer, path in kept.places:
+        console.print(plain(f"stored on {computer} in {path}"))
+    for recording in kept.recordings:
+        console.print(plain(f"{recording.name}: {recording.size} bytes, SHA-256 {recording.sha256}"))
+    return 0
+
+
+def plot(options: Namespace) -> int:
+    """Draw the series of a serial number. Raise Refused `not_in_history`, `missing_extra`, `report_folder`."""
+    with open_named_history(options) as history:
+        pasts = _select_pasts(history, _read_selection(options))
+
+    def draw(folder: Path) -> list[Path]:
+        from rig.history.series_plots import draw_trends
+
+        return draw_trends({subject: trends(past) for subject, past in subjects(pasts).items()}, folder)
+
+    for path in _draw(options.out, draw):
+        say(str(path))
+    return 0
+
+
+def _draw_changes(title: str, changes: Sequence[Change], folder: Path, name: str) -> list[Path]:
+    from rig.history.series_plots import draw_changes
+
+    return draw_changes(title, changes, folder, name)
+
+
+def _draw(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
+    """Draw into a folder and return the files. Raise Refused `missing_extra`, `report_folder`."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise missing_extra(error, "study") from error
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return draw(folder)
+    except OSError as error:
+        why = f"{folder} cannot be written: {error}"
+        raise Refused("report_folder", why, "Choose another folder") from error
+
+
+def rigs(options: Namespace) -> int:
+    """Print how the rigs compare by check standards and shared sensors. Return 1 if one is out of control."""
+    with open_named_history(options) as history:
+        pasts = history.calibrations(Selection(part=options.part, since=options.since))
+    states, rig_effects = rig_states(pasts), effects(pasts)
+    alarmed = any(chart.out_of_control for state in states for chart in state.charts.values() if chart.alarm.size)
+    if options.json:
+        print(json.dumps(rigs_document(states, rig_effects), indent=2, allow_nan=False))
+        return DISAGREE if alarmed else 0
+    console = Console(highlight=False)
+    if any(state.charts for state in states):
+        console.print(states_table(states))
+    else:
+        console.print("no check standard was calibrated often enough on one rig; history.check_standards names them")
+    if rig_effects:
+        console.print(effects_table(rig_effects))
+    else:
+        console.print("no two rigs have calibrated the same sensors often enough to be compared")
+    return DISAGREE if alarmed else 0
+
+
+def import_runs(options: Namespace) -> int:
+    """Enter runs as their recordings give them, and report the outcome of each. Return 1 if one was refused."""
+    from rig.station.words import calibrations_in_words
+
+    new = existing = refused = 0
+    with open_named_history(options) as history:
+        for folder in _find_run_folders(options.folders, unsolved=options.solve):
+            try:
+                run = _recompute_finished(folder, history, solve=options.solve)
+                entered = history.enter(run)
+            except (RigError, UnfitFile, OSError) as error:
+                refused += 1
+                say(f"{folder}: {error}", sys.stderr)
+                continue
+            new, existing = new + entered.new, existing + (not entered.new)
+            numbers = calibrations_in_words([past.id for past in history.of_run(entered.run_id)])
+            say(f"{folder}: {'entered' if entered.new else 'already there'} as {numbers}")
+            if entered.new and run.certificate is None and (folder / PAGE).exists():
+                reason = f"its {PAGE} is not the one this version writes of its result, and was not entered"
+                say(f"{folder}: {reason}; rig report writes it again", sys.stderr)
+    say(f"{new} entered, {existing} already there, {refused} refused")
+    return DISAGREE if refused else 0
+
+
+def verify(options: Namespace) -> int:
+    """Compare rows with their journal and results, files with their hashes. Print differences; return 1 if any."""
+    from rig.history.integrity import STATES, WRONG, examine_history
+
+    counts = dict.fromkeys(STATES, 0)
+    with open_named_history(options) as history:
+        for finding in examine_history(history):
+            counts[finding.state] += 1
+            if finding.state != "ok":
+                say(f"{finding.state}: {finding.what}: {finding.why}")
+        end = history.head()
+    say(f"journal: entry {end.number}, chained to all before by SHA-256 {end.sha256}")
+    say(", ".join(f"{count} {state}" for state, count in counts.items()))
+    return DISAGREE if any(counts[state] for state in WRONG) else 0
+
+
+def compare(options: Namespace) -> int:
+    """Print how two calibrations of one sensor differ, and draw it with `--plot`; return 0.
+
+    Raise Refused `not_in_history`, `not_comparable`, and as `plot`.
+    """
+    with open_named_history(options) as history:
+        first, second = history.calibration(options.first), history.calibration(options.second)
+        before, now = ([*history.of_run(past.run_id), past] for past in (first, second))
+    if first.subject != second.subject:
+        raise Refused(
+            "not_comparable",
+            f"{first.id} is of {title_of(first.subject)}, {second.id} of {title_of(second.subject)}",
+            "Give two calibrations of one sensor at one range",
+        )
+    changes = changes_between(before, now)[second.subject]
+    title = f"{title_of(first.subject)}: {first.id} and {second.id}"
+    if options.plot is not None:
+        name = f"compare_{first.id}_{second.id}"
+        for path in _draw(options.plot, lambda folder: _draw_changes(title, changes, folder, name)):
+            say(str(path), sys.stderr)
+    if options.json:
+        numbers = {"before": first.id, "now": second.id}
+        document = {**numbers, "parameters": {change.name: change_entry(change) for change in changes}}
+        print(json.dumps(document, indent=2, allow_nan=False))
+        return 0
+    Console(highlight=False).print(changes_table(title, changes))
+    say(comparison_in_words(changes))
+    return 0
+
+
+def void(options: Namespace) -> int:
+    """Mark a calibration as void. Raise Refused `not_in_history`, `already_voided`."""
+    with open_named_history(options) as history:
+        history.void(options.number, options.reason)
+    say(f"calibration {options.number} is void")
+    return 0
+
+
+def open_named_history(options: Namespace) -> AbstractContextManager[History]:
+    """Open the named history. Raise Refused as `open_history`, and as `load` if a configuration names it."""
+    return open_history(own_history_address(read_history_name(options.history)) or resolve_address(None))
+
+
+def _read_selection(options: Namespace) -> Selection:
+    return Selection(options.serial_number, options.part, options.since, options.rig)
+
+
+def _select_pasts(history: History, selection: Selection) -> list[Past]:
+    """Return the selected calibrations. Raise Refused `not_in_history` if there is none of the chosen sensor."""
+    pasts = history.calibrations(selection)
+    if not pasts and selection.serial_number is not None:
+        raise Refused(
+            "not_in_history",
+            f"no calibration of {selection.serial_number} in the history matches",
+            "List all with `rig history`, or enter runs with `rig history import`",
+        )
+    return pasts
+
+
+def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
+    """Yield the run folders among and within `folders`; a folder without any comes as it is, for its own error."""
+    for folder in folders:
+        inner = {file.parent for file in folder.rglob(RESULT)}
+        if unsolved:
+            inner |= {file.parent for file in folder.rglob("*.h5") if recordings(file.parent, "raw")}
+        yield from sorted(inner) or [folder]
+
+
+def _recompute_finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
+    """Return the run as its recordings give it, as result.json alone is only a claim. A run in the history is not
+    solved.
+
+    Raise Refused `no_recording`, `result_not_of_recording`, and as the recordings' solution.
+    """
+    claimed = None if solve and not (folder / RESULT).exists() else read_finished_run(folder)
+    if claimed is not None:
+        if history.has(claimed.content_sha256):
+            return claimed
+        if not claimed.recordings:
+            raise Refused(
+                "no_recording",
+                f"{folder} has a {RESULT} but no recording from which it can be computed",
+                "Import the folder with its recordings",
+            )
+    from rig.history.entered.recomputed_result import not_given
+    from rig.history.integrity import MOST_TOLD
+    from rig.plans.recorded_run import judged, open_run
+    from rig.report.document import document_of
+
+    document = document_of(judged(open_run(folder)))
+    differing = [] if claimed is None else not_given(claimed.document, document)
+    if claimed is not None and not differing:
+        return claimed
+    if not solve:
+        more = f", and {len(differing) - MOST_TOLD} more" if len(differing) > MOST_TOLD else ""
+        raise Refused(
+            "result_not_of_recording",
+            f"the {RESULT} in {folder} does not agree with its recordings: {'; '.join(differing[:MOST_TOLD])}{more}",
+            "Enter the result of the recordings by `rig history import --solve DIR`; a result of an older "
+            "version may differ too",
+        )
+    return read_finished_run(folder, document)

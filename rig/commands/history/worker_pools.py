@@ -1,0 +1,188 @@
+"""The places where recordings are solved: this process, processes of this computer, or workers of a Dask scheduler.
+
+In all of them a worker that dies costs only the recording that it was solving.
+"""
+
+import signal
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, suppress
+from multiprocessing import get_context
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, Protocol
+
+from rig.commands.history.recompute_worker import Task
+from rig.errors import Fault
+from rig.history.recompute.result_comparison import Answer, Unsolved
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+LOOK_S = 1.0  # between two polls of a cluster that does not answer
+WITHOUT_WORKERS_S = 30.0  # to start new ones takes a while
+AHEAD = 2  # recordings per thread of a cluster: one in progress, and one that waits
+
+Solve = Callable[[Task], Answer]
+SolvedTask = tuple[Task, Answer]
+
+
+class Workers(Protocol):
+    """Workers, and the recordings that they are solving."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether a recording is being solved."""
+        ...
+
+    def room(self) -> int:
+        """Return how many more recordings they take now. Raise Fault `cluster_lost` if no worker is left."""
+        ...
+
+    def give(self, solve: Solve, task: Task) -> None:
+        """Give them one more recording."""
+        ...
+
+    def answers(self) -> Iterator[SolvedTask]:
+        """Yield the answers that have arrived, after a short wait if there is none. Raise Fault `cluster_lost`."""
+        ...
+
+
+def solve_one_by_one(tasks: Iterable[Task], solve: Solve) -> Iterator[SolvedTask]:
+    """Solve the tasks in this process, in their order, and yield the answers."""
+    for task in tasks:
+        try:
+            yield task, solve(task)
+        except Exception as error:  # a defect at one recording must not cost the others
+            yield task, _describe_defect(error)
+
+
+def distribute(tasks: Iterable[Task], solve: Solve, workers: Workers) -> Iterator[SolvedTask]:
+    """Solve the tasks by `workers`, and yield the answers as they arrive. Raise Fault `cluster_lost`.
+
+    Only as many tasks are given out as the workers have room for.
+    """
+    waiting = deque(tasks)
+    while waiting or workers.busy:
+        for _ in range(min(workers.room(), len(waiting))):
+            workers.give(solve, waiting.popleft())
+        yield from workers.answers()
+
+
+class Processes(AbstractContextManager["Processes"]):
+    """A number of processes of this computer, each a pool of its own: one that dies takes no other with it."""
+
+    def __init__(self, count: int) -> None:
+        self._idle = [_new_process() for _ in range(count)]
+        self._in_hand: dict[Future[Answer], tuple[Task, ProcessPoolExecutor]] = {}
+
+    def __exit__(self, *_: object) -> None:
+        for pool in (*self._idle, *(pool for _, pool in self._in_hand.values())):
+            pool.shutdown(cancel_futures=True)
+
+    @property
+    def busy(self) -> bool:
+        """Whether one of them is solving."""
+        return bool(self._in_hand)
+
+    def room(self) -> int:
+        """Return how many of them are idle."""
+        return len(self._idle)
+
+    def give(self, solve: Solve, task: Task) -> None:
+        """Give the task to an idle one."""
+        pool = self._idle.pop()
+        self._in_hand[pool.submit(solve, task)] = task, pool
+
+    def answers(self) -> Iterator[SolvedTask]:
+        """Yield the answers that have arrived; a process that died is replaced by a new one."""
+        for future in wait(self._in_hand, timeout=LOOK_S, return_when=FIRST_COMPLETED).done:
+            task, pool = self._in_hand.pop(future)
+            dead = isinstance(future.exception(), BrokenProcessPool)
+            self._idle.append(_new_process() if dead else pool)
+            yield task, _read_answer(future)
+
+
+class Cluster:
+    """The workers of a Dask scheduler, including those that join later."""
+
+    def __init__(self, client: "Client") -> None:
+        self._client = client
+        self._in_hand: dict[str, Task] = {}
+        self._done: SimpleQueue[Any] = SimpleQueue()  # of Dask's futures
+        self._futures: dict[str, Any] = {}  # Dask forgets futures that are not referenced
+        self._seen_s = time.monotonic()
+
+    @property
+    def busy(self) -> bool:
+        """Whether the scheduler has a task that it has not answered."""
+        return bool(self._in_hand)
+
+    def threads(self) -> dict[str, int]:
+        """Return the number of threads of each worker by its address. Raise Fault `cluster_lost`."""
+        if self._client.status == "running":
+            with suppress(OSError, RuntimeError):
+                threads: dict[str, int] = self._client.nthreads()  # type: ignore[no-untyped-call]
+                return threads
+        raise _cluster_lost("the scheduler does not answer any more")
+
+    def room(self) -> int:
+        """Return the free capacity: a few tasks per thread, less those in progress.
+
+        Raise Fault `cluster_lost` if there has been no worker for long.
+        """
+        threads, now_s = sum(self.threads().values()), time.monotonic()
+        if threads:
+            self._seen_s = now_s
+        elif now_s - self._seen_s > WITHOUT_WORKERS_S:
+            raise _cluster_lost(f"the scheduler has had no worker for {WITHOUT_WORKERS_S:g} s")
+        return max(0, AHEAD * threads - len(self._in_hand))
+
+    def give(self, solve: Solve, task: Task) -> None:
+        """Give the task to a worker that the scheduler chooses."""
+        future: Any = self._client.submit(solve, task, pure=False)
+        self._futures[future.key], self._in_hand[future.key] = future, task
+        future.add_done_callback(self._done.put)
+
+    def answers(self) -> Iterator[SolvedTask]:
+        """Yield the answer that arrives within a moment, if any."""
+        try:
+            future = self._done.get(timeout=LOOK_S)
+        except Empty:
+            return
+        del self._futures[future.key]
+        yield self._in_hand.pop(future.key), _read_answer(future)
+
+
+def _new_process() -> ProcessPoolExecutor:
+    # Not forked: this process may have threads. Its environment, which says one thread for linear algebra (rig/cli.py),
+    # is handed on.
+    return ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+
+
+def _read_answer(future: Any) -> Answer:
+    """Return the answer of a finished future, a process's or Dask's. Raise Fault `cluster_lost` if cancelled."""
+    if future.cancelled():
+        raise _cluster_lost("the scheduler has gone away with its unfinished tasks")
+    error = future.exception()
+    if error is None:
+        answer: Answer = future.result()
+        return answer
+    if isinstance(error, BrokenProcessPool) or type(error).__name__ == "KilledWorker":
+        return Unsolved("lost", "the worker that was solving it died")
+    return _describe_defect(error)
+
+
+def _describe_defect(error: BaseException) -> Unsolved:
+    return Unsolved("failed", f"{type(error).__name__}: {error}")
+
+
+def _cluster_lost(what: str) -> Fault:
+    return Fault("cluster_lost", what, "Start it again; the same command then goes on with the remaining recordings")
+
+
+def _ignore_interrupts() -> None:
+    """Ignore Ctrl-C, which reaches all processes of a terminal: the recording is finished, the parent then stops."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

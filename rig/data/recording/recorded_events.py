@@ -1,0 +1,212 @@
+"""The events of a run as its recording keeps them: one type for each kind, written and read here alone.
+
+In the file an event is a line of JSON: its kind's name, its times, and the fields of its type.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from firmware_host.answers import BoardObservation, BoardSolution
+from rig.data.recording.hand_events import (
+    HandAsked,
+    HandBegunAnew,
+    HandMoveRefused,
+    HandMoveTaken,
+    HandRested,
+    HandRestRefused,
+    OfTheHand,
+)
+from rig.data.recording.thermal_events import OfTheTemperature, SetMeasured, TemperatureWanted
+from rig.data.validation import Finite, parse_json, validate
+from rig.errors.quoting import quote
+from rig.motion.steps import Dwell, Sweep
+
+LARGEST_INTEGER = 2**63 - 1
+LARGEST = 1e6  # of a sweep or a dwell in rad, rad/s, rad/s² or s: ten days, and turns that no joint makes
+
+
+@dataclass(frozen=True, slots=True)
+class SweepStarted:
+    """The arm was commanded to make a sweep."""
+
+    sweep: Sweep
+
+
+@dataclass(frozen=True, slots=True)
+class SweepFinished:
+    """The arm has made the sweep."""
+
+    sweep: Sweep
+
+
+@dataclass(frozen=True, slots=True)
+class RestStarted:
+    """The arm stands still from now on."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestFinished:
+    """The arm has stood still until now."""
+
+
+@dataclass(frozen=True, slots=True)
+class DwellStarted:
+    """The arm stands in an attitude, and the sensors have settled: the dwell's measurement begins."""
+
+    dwell: Dwell
+
+
+@dataclass(frozen=True, slots=True)
+class DwellFinished:
+    """A dwell has been measured."""
+
+    dwell: Dwell
+
+
+@dataclass(frozen=True, slots=True)
+class BoardObserved:
+    """The board's average of a sensor's readings over the revolution of sweep `sweep`, with its mean speed."""
+
+    sensor: str
+    sweep: int
+    speed_rad_s: float
+    observation: BoardObservation
+
+
+@dataclass(frozen=True, slots=True)
+class BoardNotObserved:
+    """The board has no average of the sweep, for `reason`."""
+
+    sensor: str
+    sweep: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoardRecalled:
+    """The board was given its average of the sweep from before the run was interrupted."""
+
+    sensor: str
+    sweep: int
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSolved:
+    """The board's own calibration of a sensor, by one method."""
+
+    sensor: str
+    solution: BoardSolution
+
+
+OfTheBoard = BoardObserved | BoardNotObserved | BoardRecalled | BoardSolved
+OfTheArm = SweepStarted | SweepFinished | RestStarted | RestFinished | DwellStarted | DwellFinished
+Event = OfTheArm | OfTheBoard | OfTheHand | OfTheTemperature
+
+_KINDS: dict[str, type[Event]] = {
+    "sweep_started": SweepStarted,
+    "sweep_finished": SweepFinished,
+    "rest_started": RestStarted,
+    "rest_finished": RestFinished,
+    "dwell_started": DwellStarted,
+    "dwell_finished": DwellFinished,
+    "board_observed": BoardObserved,
+    "board_not_observed": BoardNotObserved,
+    "board_recalled": BoardRecalled,
+    "board_solved": BoardSolved,
+    "hand_asked": HandAsked,
+    "hand_rested": HandRested,
+    "hand_move_taken": HandMoveTaken,
+    "hand_move_refused": HandMoveRefused,
+    "hand_rest_refused": HandRestRefused,
+    "hand_begun_anew": HandBegunAnew,
+    "temperature_wanted": TemperatureWanted,
+    "set_measured": SetMeasured,
+}
+_NAMES = {kind: name for name, kind in _KINDS.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class TimedEvent:
+    """An event and its time: on the host's monotonic clock, and on the controller's if that was received by then."""
+
+    event: Event
+    host_time_s: float
+    controller_time_s: float | None
+
+
+def encode_event(recorded: TimedEvent) -> bytes:
+    """Return a line of a run file's events, with its end."""
+    document = {
+        "name": _NAMES[type(recorded.event)],
+        "host_time_s": recorded.host_time_s,
+        "controller_time_s": recorded.controller_time_s,
+        "detail": asdict(recorded.event),
+    }
+    return json.dumps(document).encode() + b"\n"
+
+
+def decode_events(stream: bytes) -> Iterator[TimedEvent]:
+    """Yield the events of a run file. A last line without an end was cut off by a kill and is left out.
+
+    Raise ValueError naming the first line that is no event, or not of the shape of its kind.
+    """
+    for number, line in enumerate(stream.split(b"\n")[:-1], start=1):
+        if line.strip(b"\0"):
+            try:
+                yield _decode_document(parse_json(line))
+            except (ValueError, RecursionError) as error:
+                raise ValueError(f"event {number} cannot be understood: {' '.join(str(error).split())}") from None
+
+
+def _decode_document(document: Any) -> TimedEvent:
+    if not isinstance(document, dict) or not isinstance(document.get("detail"), dict):
+        raise ValueError("it has no name and no details")
+    name, detail = document.get("name"), document["detail"]
+    if not isinstance(name, str) or name not in _KINDS:
+        raise ValueError(f"there is no event {quote(name)}")
+    event = validate(_KINDS[name], _nest_answer(name, detail), name)
+    if isinstance(event, SweepStarted | SweepFinished):
+        _check_sweep(event.sweep)
+    if isinstance(event, DwellStarted | DwellFinished):
+        _check_dwell(event.dwell)
+    if isinstance(event, BoardObserved):
+        _check_observation(event.observation)
+    times = validate(_Times, document, name)
+    return TimedEvent(event, times.host_time_s, times.controller_time_s)
+
+
+def _nest_answer(name: str, detail: dict[str, Any]) -> dict[str, Any]:
+    """Return the details with the board's answer nested: schema "rig.run/1" has its fields among the others."""
+    answer = {"board_observed": "observation", "board_solved": "solution"}.get(name)
+    return {**detail, answer: detail} if answer is not None and answer not in detail else detail
+
+
+@dataclass(frozen=True, slots=True)
+class _Times:
+    host_time_s: Finite
+    controller_time_s: Finite | None = None
+
+
+def _check_sweep(sweep: Sweep) -> None:
+    """Raise ValueError for a sweep that could not be planned: readers rely on its numbers."""
+    low, high = sweep.revolution_rad
+    rates = sweep.speed_rad_s, sweep.acceleration_rad_s2, sweep.duration_s
+    numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, *rates)
+    joints = len(sweep.start_q_rad)
+    possible = all(abs(number) <= LARGEST for number in numbers) and all(rate >= 1 / LARGEST for rate in rates)
+    counted = 0 <= sweep.index <= LARGEST and 0 <= sweep.joint < joints == len(sweep.end_q_rad)
+    if not (counted and low < high and possible):
+        raise ValueError(f"there is no such sweep as {quote(sweep)}")
+
+
+def _check_dwell(dwell: Dwell) -> None:
+    """Raise ValueError for a dwell that could not be planned."""
+    if not (0 <= dwell.index <= LARGEST and all(abs(number) <= LARGEST for number in (*dwell.q_rad, dwell.duration_s))):
+        raise ValueError(f"there is no such dwell as {quote(dwell)}")
+
+
+def _check_observation(observation: BoardObservation) -> None:
+    if not all(0 <= n <= LARGEST_INTEGER for n in (observation.start_us, observation.end_us, observation.samples)):
+        raise ValueError(f"there is no such observation as {quote(observation)}")

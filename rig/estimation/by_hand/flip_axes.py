@@ -1,0 +1,57 @@
+"""The comparison of the gyroscope's axes with the accelerometer's, by the axes of flips."""
+
+import numpy as np
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.session_parts import HandRecording, nearest_face
+from rig.estimation.refusals import MAX_SCALE
+
+SIDEWAYS = 0.3  # cosine between the verticals of a quarter turn
+SAME = 0.7  # of the size: an axis that is another one shows less of it
+FASTEST_RAD_S = 150.0  # no gyroscope of this kind reads so much: it is degrees
+
+
+def check_axes(session: HandRecording) -> None:
+    """Raise Fault `wrong_unit`, `mirrored_axis` or `swapped_axes` if quarter-turn flips show it."""
+    if max((move.peak_rad_s for move in session.moves), default=0.0) > FASTEST_RAD_S:
+        raise Fault("wrong_unit", "the readings look like degrees per second given as rad/s", "Give them in rad/s")
+    if session.acceleration is None:
+        return
+    about, swept = _quarters(session)
+    if len(about) < 3 or np.linalg.svd(about)[1][-1] < 0.5:
+        return
+    matrix = np.linalg.lstsq(about, swept, rcond=None)[0].T  # swept = M about
+    sizes = np.linalg.norm(matrix, axis=1)
+    if sizes.max() > MAX_SCALE or sizes.min() < 1 / MAX_SCALE:
+        raise Fault(
+            "wrong_unit", f"a quarter of a turn reads {sizes.max():.3g} times as much", "Give the readings in rad/s"
+        )
+    unit = matrix / sizes[:, None]
+    strongest = np.argmax(np.abs(unit), axis=1)
+    if (np.abs(unit[np.arange(3), strongest]) < SAME).any():
+        return
+    names = [nearest_face(row) for row in unit]
+    if names == ["+x", "+y", "+z"]:
+        return
+    axes_read = f"the gyroscope's x, y, z read the turning about the accelerometer's {', '.join(names)}"
+    remedy = "Correct order and signs of the columns of one of them"
+    raise Fault("mirrored_axis" if strongest.tolist() == [0, 1, 2] else "swapped_axes", axes_read, remedy)
+
+
+def _quarters(session: HandRecording) -> tuple[Array, Array]:
+    """Return the rotation vectors (k, 3) of quarter turns by the accelerometer, and (k, 3) by the gyroscope."""
+    about, swept = [], []
+    for row, move in enumerate(session.moves):
+        first, second = session.rests[row], session.rests[row + 1]
+        if not move.is_usable or first.acceleration_m_s2 is None or second.acceleration_m_s2 is None:
+            continue
+        start, end = (mean / np.linalg.norm(mean) for mean in (first.acceleration_m_s2, second.acceleration_m_s2))
+        if abs(start @ end) > SIDEWAYS:
+            continue
+        axis = np.cross(end, start)  # the vertical turns the other way in the body
+        inside = (session.time_s >= move.start_s) & (session.time_s <= move.end_s)
+        bias = (first.mean_rad_s + second.mean_rad_s) / 2
+        about.append(axis / np.linalg.norm(axis) * np.arctan2(np.linalg.norm(axis), start @ end))
+        swept.append(np.trapezoid(session.rates[inside] - bias, session.time_s[inside], axis=0))
+    return np.array(about).reshape(-1, 3), np.array(swept).reshape(-1, 3)

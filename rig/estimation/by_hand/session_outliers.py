@@ -1,0 +1,221 @@
+"""The search for the rest or move that contradicts the others: outlier tests of a session by hand.
+
+A fault hypothesis says that some factors do not hold: each of their equations gets a column of its own (Baarda's
+mean-shift model, 1968), and the drop of χ² is compared. The hypothesis with the largest drop is reported.
+
+A single large outlier inflates the hand's standard deviations and is masked by them: the result holds, with a larger
+U. `find_masked_fault` finds it with standard deviations estimated without it. Biases are excluded: real ones jump.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.fit import GraphFit, estimate_stds, replace_stds, solve_step, whiten_rows
+from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
+from rig.estimation.by_hand.session_parts import LARGEST, STATED, HandRest, HandStds
+
+A_ROW = 4.0  # of chi square for each equation left out
+BY_MUCH = 16.0  # of chi square beyond that: false-alarm probability 1 in 10^5
+NEARLY = 0.99  # of the largest size
+FACTORS_OF = {
+    "turn_not_closed": (CLOSURE, LEANING),
+    "lost_in_move": (MOVE, CLOSURE, LEANING),
+    "bias_jumped": (WALK,),
+    "not_flat": (FLAT, ACCELERATION),
+}
+JUMP_RAD_S = 1e-3  # no bias drifts so far from one rest to the next
+OF_ONE, HIDING = 3.0, ("repeat_rad", "closure_rad")  # a ratio, and standard deviations that one outlier inflates
+HIDDEN = ("not_flat", "table_moved", "turn_not_closed")
+FREE = 1e-9  # redundancy below which an equation is not checked by the others
+AT_ONCE = 8.0  # the same during the session, when a move can be repeated: 1 in 10^3
+
+
+@dataclass(frozen=True, slots=True)
+class FaultHypothesis:
+    """A fault of a rest or move, and the drop of χ² if its equations are left out."""
+
+    name: str
+    index: int
+    chi_square_drop: float
+
+
+def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
+    """Return the fault of a session, or of the part `since` a rest; None if there is none."""
+    worst = max(_test_hypotheses(fit, since), key=lambda hypothesis: hypothesis.chi_square_drop, default=None)
+    if worst is not None and worst.chi_square_drop > (BY_MUCH if since is None else AT_ONCE):
+        return describe_fault(fit, worst)
+    return None if since is not None else _find_excessive_std(fit)
+
+
+def find_masked_fault(fit: GraphFit) -> Fault | None:
+    """Return the fault of the one rest or turn that inflates the hand's standard deviations and U, or None."""
+    if not _much_larger(fit.stds, STATED):
+        return None
+    hypotheses = sorted(_test_hypotheses(fit, None), key=lambda hypothesis: hypothesis.chi_square_drop)
+    most = {hypothesis.name: hypothesis for hypothesis in hypotheses if hypothesis.name in HIDDEN}
+    re_estimated = [
+        replace(hypothesis, chi_square_drop=_drop_with_new_stds(fit, hypothesis.name, hypothesis.index))
+        for hypothesis in most.values()
+    ]
+    worst = max(re_estimated, key=lambda hypothesis: hypothesis.chi_square_drop, default=None)
+    return describe_fault(fit, worst) if worst is not None and worst.chi_square_drop > BY_MUCH else None
+
+
+def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
+    """Yield the possible faults of a session, or of the part `since` a rest."""
+    count = len(fit.session.rests)
+    first = 0 if since is None else since
+    for index in range(max(first - 1, 0), count - 1):
+        if fit.faces.turns[index] and fit.conditions.closure:
+            yield "turn_not_closed", index
+        yield "lost_in_move", index
+        if np.abs(fit.session.rests[index + 1].mean_rad_s - fit.session.rests[index].mean_rad_s).max() > JUMP_RAD_S:
+            yield "bias_jumped", index
+    faces = fit.faces.faces
+    yield from (("not_flat", index) for index in range(first, count) if faces[index] is not None)
+    if fit.session.acceleration is not None:
+        yield from (("table_moved", index) for index in range(max(first, 1), count) if faces[index] is not None)
+
+
+def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
+    """Return every hypothesis with its drop of χ², less what leaving out as many equations explains by chance.
+
+    The columns are projected off the model's, so the graph is not solved for each hypothesis.
+    """
+    design, residual = whiten_rows(fit.factors)
+    std = np.concatenate([row.std for row in fit.factors])
+    basis = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+
+    def remove_explained(columns: Array) -> Array:
+        return np.asarray(columns - basis @ (basis.T @ columns), dtype=np.float64)
+
+    remaining, hypotheses = remove_explained(residual), []
+    for name, index in _hypotheses(fit, since):
+        columns = remove_explained(_fault_columns(fit, name, index) / std[:, None])
+        rest = remaining - columns @ np.linalg.lstsq(columns, remaining, rcond=FREE)[0]
+        chi_square_drop = float(residual @ residual - rest @ rest) - A_ROW * columns.shape[1]
+        hypotheses.append(FaultHypothesis(name, index, chi_square_drop if columns.size else 0.0))
+    return hypotheses
+
+
+def _drop_with_new_stds(fit: GraphFit, name: str, index: int) -> float:
+    """Return the drop of χ² by standard deviations estimated without the fault; 0 if none is much smaller."""
+    columns = _fault_columns(fit, name, index)
+    ends = np.cumsum([len(row.residual) for row in fit.factors])[:-1]
+    parts = zip(fit.factors, np.split(columns, ends), strict=True)
+    rows = [replace(row, design=np.hstack([row.design, part])) for row, part in parts]
+    try:
+        rows, stds = estimate_stds(rows, fit.stds)
+        if not columns.size or not _much_larger(fit.stds, stds):
+            return 0.0
+        chi_square_drop = _minimum_chi_square(replace_stds(fit.factors, fit.stds, stds)) - _minimum_chi_square(rows)
+        return chi_square_drop - float(A_ROW * columns.shape[1])
+    except np.linalg.LinAlgError:
+        return 0.0
+
+
+def _matches(row: Factor, index: int, *kinds: str) -> bool:
+    return row.index == index and row.kind in kinds
+
+
+def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
+    """Return the columns (R, q) that a fault adds to the design of all R equations."""
+    if name == "table_moved":
+        return np.concatenate([_tilt_columns(fit, row, index) for row in fit.factors])
+    out = np.concatenate([np.full(len(row.residual), _matches(row, index, *FACTORS_OF[name])) for row in fit.factors])
+    return np.eye(len(out))[:, out]
+
+
+def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
+    """Return the columns (r, 2) of a factor for a table that tilts at rest `index`, and for the move before it.
+
+    The last rest has none: there a body that does not lie flat looks the same.
+    """
+    other = np.zeros((len(row.design), 2))
+    if row.kind == ACCELERATION and row.index >= index:
+        other = row.design[:, TABLE]
+    elif row.kind == MOVE and row.index == index - 1 and index < len(fit.session.rests) - 1:
+        other = fit.state.attitudes[row.index].T[:, :2] @ np.array([[0.0, -1.0], [1.0, 0.0]])
+    return other
+
+
+def _much_larger(stds: HandStds, than: HandStds) -> bool:
+    return any(getattr(stds, name) > OF_ONE * getattr(than, name) for name in HIDING)
+
+
+def _minimum_chi_square(rows: Sequence[Factor]) -> float:
+    """Return the chi square of the rows at its minimum."""
+    design, residual = whiten_rows(rows)
+    return float(np.sum(np.square(residual + design @ solve_step(rows)[0])))
+
+
+def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
+    rests, moves = fit.session.rests, fit.session.moves
+    at_s = rests[hypothesis.index].start_s
+    if hypothesis.name == "turn_not_closed":
+        move = moves[hypothesis.index]
+        residual = float(next(row for row in fit.factors if _matches(row, hypothesis.index, CLOSURE)).residual[0])
+        return Fault(
+            "turn_not_closed",
+            f"the turn from {move.start_s:.1f} to {move.end_s:.1f} s ended {abs(np.degrees(residual)):.1f}° from where "
+            "it began",
+            "Turn against a straight edge, so that it ends where it began (rig solve: or say --no-closure)",
+        )
+    if hypothesis.name == "lost_in_move":
+        move = moves[hypothesis.index]
+        return Fault(
+            "lost_in_move",
+            f"what the gyroscope read from {move.start_s:.1f} to {move.end_s:.1f} s is not how the body turned",
+            "See that no reading is lost, and that time stamps are those of the readings; make the move again",
+        )
+    if hypothesis.name == "bias_jumped":
+        return _describe_jump(hypothesis.index, rests)
+    if hypothesis.name == "table_moved":
+        return Fault("table_moved", f"from {at_s:.1f} s on the table leans otherwise", "Begin anew, and leave it alone")
+    return Fault(
+        "not_flat",
+        f"at {at_s:.1f} s the body did not lie flat on its face, as it does at the other rests",
+        "Look for what lies under it, and lay it down again",
+    )
+
+
+def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
+    """Return the Fault of a bias that jumped in the move `index`; at the first and last rest a creep looks the same."""
+    after_s = rests[index + 1].start_s
+    what = f"the gyroscope's bias was another after the move that ended at {after_s:.1f} s"
+    if index == len(rests) - 2:
+        what += ", or the body crept in the last rest, which comes then"
+        return Fault(
+            "bias_jumped", what, "Let it lie for another rest, which tells them apart; after a fall begin anew"
+        )
+    if index == 0:
+        what += f", or the body crept in the first rest, until {rests[0].end_s:.1f} s"
+    return Fault("bias_jumped", what, "Handle it gently: a fall or a knock does that; begin anew")
+
+
+def _find_excessive_std(fit: GraphFit) -> Fault | None:
+    """Return the fault of a standard deviation that no hand or sensor makes so large, or None."""
+    stds = fit.stds
+    if stds.repeat_rad >= NEARLY * LARGEST.repeat_rad:
+        what = f"the faces do not lie as they lay before, by {1e3 * stds.repeat_rad:.1f} mrad or more"
+        return Fault("not_flat", what, _REMEDY)
+    if stds.acceleration_m_s2 >= NEARLY * LARGEST.acceleration_m_s2:
+        what = f"the accelerometer contradicts the faces by {stds.acceleration_m_s2:.2f} m/s² or more"
+        return Fault("not_flat", what, _REMEDY)
+    if stds.closure_rad >= NEARLY * LARGEST.closure_rad:
+        what = f"the turns do not end where they began, by {1e3 * stds.closure_rad:.0f} mrad or more"
+        return Fault("turn_not_closed", what, "Turn against a straight edge (rig solve: or say --no-closure)")
+    if stds.of_angle >= NEARLY * LARGEST.of_angle:
+        what = f"the moves contradict each other by {100 * stds.of_angle:.2f} % of a quarter turn or more"
+        return Fault("lost_in_move", what, _REMEDY)
+    if stds.walk_rad_s_sqrt_s >= NEARLY * LARGEST.walk_rad_s_sqrt_s:
+        what = f"the bias goes by {stds.walk_rad_s_sqrt_s:.1g} rad/s within a second"
+        return Fault("bias_jumped", what, "Let it warm up, and handle it gently")
+    return None
+
+
+_REMEDY = "Lay it down on a flat table, each time on the whole of a face, and see that no reading is lost"

@@ -1,0 +1,94 @@
+"""Comparison of a result with that of its recordings: all numbers, checks and provenance. Pure."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from rig.config.judging.verdict_limits import Kind
+from rig.data.installed_kinds import quantities
+from rig.data.result_file import CheckEntry, ResultDocument
+from rig.history.entered.index import SAME, unlike
+from rig.report.findings.history_records import BIASES, SCALES, HistoryRecord
+from rig.report.kinds.kind_registry import followed
+
+ROUNDING = 1e-15  # of values that are zero except for rounding: no quantity of a result is so small
+# The same numbers may be reached with other iterations, at another time.
+AS_IT_COMES = ("iterations", "solved_utc")
+
+
+def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
+    """Return parts of a `claimed` result that its recordings do not give, beyond a processor's rounding.
+
+    `recomputed` is solved from the recordings. Calibrations agree within 1e-6 of their standard uncertainty, other
+    numbers within 1e-6 of the largest in their list. Texts are not compared, and fields that the claim lacks are not
+    required: both change from version to version.
+    """
+    origin = _origin(recomputed)
+    rows = [f"provenance.{name}" for name, value in _origin(claimed).items() if value != origin.get(name)]
+    rows += ["verdict"] if claimed.verdict != recomputed.verdict else []
+    checks = {check.name: _check_values(check) for check in recomputed.checks}
+    rows += [check.name for check in claimed.checks if checks.get(check.name) != _check_values(check)]
+    numbers = _differences(_numbers_of(claimed), _numbers_of(recomputed), "")
+    stated = {(record.sensor, record.quantity): record for record in followed(claimed)}
+    records = []
+    for record in followed(recomputed):
+        key = record.sensor, record.quantity
+        if record.quantity in quantities() or key in stated:
+            records.append(_without_later_parameters(record, stated.get(key)))
+    return [*rows, *unlike(claimed, records), *numbers]
+
+
+def _without_later_parameters(recomputed: HistoryRecord, claimed: HistoryRecord | None) -> HistoryRecord:
+    """Return a record without characteristics that the claim lacks: later versions have more of them."""
+    if claimed is None:
+        return recomputed
+    names = {*SCALES, *BIASES, *(parameter.name for parameter in claimed.parameters)}
+    return replace(
+        recomputed, parameters=tuple(parameter for parameter in recomputed.parameters if parameter.name in names)
+    )
+
+
+def _check_values(check: CheckEntry) -> tuple[bool, str, Kind]:
+    return check.passed, check.unit, check.means.kind
+
+
+def _origin(document: ResultDocument) -> dict[str, object]:
+    fields: dict[str, object] = json.loads(document.provenance.model_dump_json(exclude_unset=True))
+    return {name: value for name, value in fields.items() if name not in AS_IT_COMES}
+
+
+def _numbers_of(document: ResultDocument) -> dict[str, object]:
+    """Return the numbers of a result as JSON, with checks by name: a check of a later version moves no others."""
+    fields: dict[str, object] = json.loads(document.text())
+    checks = {check.name: [check.value, check.limit, check.uncertainty] for check in document.checks}
+    return {**{name: value for name, value in fields.items() if name != "provenance"}, "checks": checks}
+
+
+def _differences(claimed: object, recomputed: object, where: str, scale: float = 0.0) -> Iterator[str]:
+    if isinstance(claimed, Mapping) and isinstance(recomputed, Mapping):
+        for name, item in claimed.items():
+            if name not in recomputed:
+                yield f"{where}{name}"
+            elif name not in AS_IT_COMES:
+                yield from _differences(item, recomputed[name], f"{where}{name}.")
+    elif isinstance(claimed, Sequence) and isinstance(recomputed, Sequence) and not isinstance(claimed, str):
+        if len(claimed) != len(recomputed):
+            yield where.rstrip(".")
+            return
+        largest = scale or _largest(recomputed)
+        for number, (item, other) in enumerate(zip(claimed, recomputed, strict=True)):
+            yield from _differences(item, other, f"{where}{number}.", largest)
+    elif isinstance(claimed, float | int) and isinstance(recomputed, float | int):
+        if abs(claimed - recomputed) > max(SAME * max(scale, abs(recomputed)), ROUNDING):
+            yield f"{where.rstrip('.')} {claimed:.9g}, which is {recomputed:.9g}"
+    elif type(claimed) is not type(recomputed):
+        yield where.rstrip(".")
+
+
+def _largest(numbers: object) -> float:
+    """Return the largest absolute value in a list or a matrix."""
+    if isinstance(numbers, float | int):
+        return abs(numbers)
+    if isinstance(numbers, Sequence) and not isinstance(numbers, str):
+        return max(map(_largest, numbers), default=0.0)
+    return 0.0

@@ -1,0 +1,214 @@
+"""Recomputation: the present result of a recording, compared with the stated one. Pure."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from rig.history.entered.finished_run import EnteredRecording
+from rig.history.entered.issued_certificate import Issued
+from rig.history.store import Past
+from rig.report.findings.history_records import HistoryRecord, Parameter
+
+OF_U = 0.1  # of U: a smaller shift changes at most the second digit of a stated uncertainty
+
+# Why there is no present result: the method refuses the recording; the requested setting or estimator does not fit it;
+# the recording is missing; it is not as it was entered; the worker that solved it died; the program failed.
+State = Literal["refused", "unjudged", "missing", "damaged", "lost", "failed"]
+
+
+@dataclass(frozen=True, slots=True)
+class StatedResult:
+    """A result of the history, with its recordings and the certificates that rely on it.
+
+    - `run_id`, `content_sha256`, `started_utc`, `rig`, `verdict`: the run.
+    - `calibrations`: the selected valid ones.
+    - `recordings`: its recordings. `places`: computer and folder, the newest first.
+    - `certificates`: those in force, without a mark and not replaced.
+    """
+
+    run_id: int
+    content_sha256: str
+    started_utc: str
+    rig: str
+    verdict: str
+    calibrations: tuple[Past, ...]
+    recordings: tuple[EnteredRecording, ...]
+    places: tuple[tuple[str, str], ...]
+    certificates: tuple[Issued, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RecomputedResult:
+    """The present result of recordings: the verdict, the names of failed checks, and all calibrations.
+
+    `left_out` names omitted quantities in a sentence.
+    """
+
+    verdict: str
+    failed: tuple[str, ...]
+    calibrations: tuple[HistoryRecord, ...]
+    left_out: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unsolved:
+    """Why recordings have no present result, by the kind of reason and in words."""
+
+    state: State
+    why: str
+
+
+Answer = RecomputedResult | Unsolved
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterMove:
+    """One parameter as stated and as recomputed, None if the present result does not have it."""
+
+    before: Parameter
+    now: Parameter | None
+
+    @property
+    def shift(self) -> float:
+        """The shift of the value in multiples of the stated U; infinite if the value is gone."""
+        return (
+            math.inf if self.now is None else _in_units(abs(self.now.value - self.before.value), self.before.expanded)
+        )
+
+    @property
+    def growth(self) -> float:
+        """The growth of U in multiples of the stated one, which then was too small; negative if U became smaller."""
+        return (
+            math.inf if self.now is None else _in_units(self.now.expanded - self.before.expanded, self.before.expanded)
+        )
+
+    @property
+    def size(self) -> float:
+        """The larger of both."""
+        return max(self.shift, self.growth)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A stated result with the present one of its recordings; None if they were not reached."""
+
+    stated: StatedResult
+    answer: Answer | None
+    of_u: float = OF_U
+
+    @cached_property
+    def moves(self) -> Mapping[int, tuple[ParameterMove, ...]]:
+        """Every parameter of each calibration, by its number, the largest move first; empty if unsolved."""
+        if not isinstance(self.answer, RecomputedResult):
+            return {}
+        now = {(record.sensor, record.quantity): record.parameters for record in self.answer.calibrations}
+        by_number = {}
+        for past in self.stated.calibrations:
+            present = {parameter.name: parameter for parameter in now.get((past.sensor, past.quantity), ())}
+            moves = (ParameterMove(stated, present.get(name)) for name, stated in past.parameters.items())
+            by_number[past.id] = tuple(sorted(moves, key=lambda move: -move.size))
+        return by_number
+
+    @property
+    def moved(self) -> tuple[int, ...]:
+        """The numbers of calibrations with a value shifted, or U grown, by more than `of_u` of the stated U."""
+        return tuple(number for number, moves in self.moves.items() if moves and moves[0].size > self.of_u)
+
+    @property
+    def verdict_changed(self) -> bool:
+        """Whether the present verdict differs from the stated one."""
+        return isinstance(self.answer, RecomputedResult) and self.answer.verdict != self.stated.verdict
+
+    @property
+    def withdrawn(self) -> tuple[Issued, ...]:
+        """The certificates that the recordings do not confirm (ISO/IEC 17025, 7.10.1, 7.8.8 and 8.7)."""
+        refused = isinstance(self.answer, Unsolved) and self.answer.state == "refused"
+        return self.stated.certificates if refused or self.verdict_changed or self.moved else ()
+
+    @property
+    def unconfirmed(self) -> tuple[Issued, ...]:
+        """The certificates that could not be checked, because their recordings were not solved."""
+        unsolved = not isinstance(self.answer, RecomputedResult) and not self.withdrawn
+        return self.stated.certificates if unsolved else ()
+
+    @property
+    def same(self) -> bool:
+        """Whether it was solved with the stated result."""
+        return isinstance(self.answer, RecomputedResult) and not (self.moved or self.verdict_changed)
+
+
+@dataclass(frozen=True, slots=True)
+class RecomputeOutcome:
+    """All comparisons in the order of time, and their numbers."""
+
+    of_u: float
+    compared: tuple[Compared, ...]
+
+    @property
+    def solved(self) -> int:
+        """The number of solved recordings."""
+        return sum(isinstance(comparison.answer, RecomputedResult) for comparison in self.compared)
+
+    @property
+    def unsolved(self) -> Mapping[State, int]:
+        """The number of unsolved ones, by the kind of reason."""
+        return Counter(
+            comparison.answer.state for comparison in self.compared if isinstance(comparison.answer, Unsolved)
+        )
+
+    @property
+    def unreached(self) -> int:
+        """The number of recordings that were not reached."""
+        return sum(comparison.answer is None for comparison in self.compared)
+
+    @property
+    def moved(self) -> int:
+        """The number of calibrations that moved."""
+        return sum(len(comparison.moved) for comparison in self.compared)
+
+    @property
+    def verdicts_changed(self) -> int:
+        """The number of results with another verdict."""
+        return sum(comparison.verdict_changed for comparison in self.compared)
+
+    @property
+    def withdrawn(self) -> tuple[Issued, ...]:
+        """All certificates to withdraw."""
+        return tuple(issued for comparison in self.compared for issued in comparison.withdrawn)
+
+    @property
+    def unconfirmed(self) -> tuple[Issued, ...]:
+        """All certificates that could not be checked."""
+        return tuple(issued for comparison in self.compared for issued in comparison.unconfirmed)
+
+    @property
+    def same(self) -> bool:
+        """Whether all were solved with the stated results."""
+        return all(comparison.same for comparison in self.compared)
+
+    @property
+    def notable(self) -> tuple[Compared, ...]:
+        """The comparisons that need attention."""
+        return tuple(comparison for comparison in self.compared if not comparison.same)
+
+
+def compared(stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = OF_U) -> RecomputeOutcome:
+    """Return the results with their answers, found by the checksum of the result."""
+    return RecomputeOutcome(
+        of_u, tuple(Compared(result, answers.get(result.content_sha256), of_u) for result in stated)
+    )
+
+
+def to_solve(stated: Sequence[StatedResult], solved: Mapping[str, Answer]) -> tuple[StatedResult, ...]:
+    """Return the recordings still to be solved: all without a result, failed ones included."""
+    return tuple(result for result in stated if not isinstance(solved.get(result.content_sha256), RecomputedResult))
+
+
+def _in_units(difference: float, expanded: float) -> float:
+    """Return a difference in multiples of U; infinite if U is 0."""
+    if expanded > 0:
+        return difference / expanded
+    return math.inf if difference > 0 else 0.0

@@ -1,0 +1,181 @@
+"""A recording by hand, segmented into rests and moves by its readings alone.
+
+Rests are those of `rig.observation.by_hand.rests`; a move reaches from one rest to the next and a little into either,
+where the body still rocks or already moves.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import RATE
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move
+from rig.observation.by_hand.rests import ROUNDING, find_rests
+from rig.observation.sampling import find_sampling
+from rig.observation.windows import Window
+
+MARGIN_S = 0.1  # of a rest at either end that belongs to the adjacent moves
+GAP = 2  # readings that are missing
+AT_THE_TOP = 3  # equal readings in a row at the largest value
+NEAR_RANGE = 0.995
+FIRST_S, STILL_RAD_S = 1.0, 0.03  # scatter of a body in a steady hand
+SETTLED_S, LOOKS_S = 1.0, 0.25  # a rest of a session in progress; interval of the evaluations
+HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25  # a body held in hand: least duration, largest rate; blocks
+
+
+def segment_session(
+    time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
+) -> HandRecording:
+    """Return the session of readings (n, 3) at rising times (n,), rad/s and m/s²; `range_rad_s` if it is known."""
+    windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
+    rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
+    top = _find_clipped(rates, range_rad_s)
+    lost = find_sampling(time_s).gaps(time_s, GAP) if len(time_s) > 1 else np.zeros(0, np.bool_)
+    gaps = np.append(lost, False)[: len(time_s)]
+    moves = []
+    for first, second in pairwise(windows):
+        start_s, end_s = first.end_s - _margin(first), second.start_s + _margin(second)
+        inside = (time_s >= start_s) & (time_s <= end_s)
+        peak = float(np.abs(rates[inside]).max())
+        moves.append(Move(start_s, end_s, peak, bool(gaps[inside].any()), bool(top[inside].any())))
+    return HandRecording(time_s, rates, acceleration, rests, tuple(moves), _find_held_intervals(time_s, rates, rests))
+
+
+def _began_still(time_s: Array, rates: Array) -> bool:
+    """Return whether the body hardly moved in the first second: if a hand held it then, one may hold it later."""
+    first = rates[time_s < time_s[0] + FIRST_S]
+    return bool(len(first) > 1 and first.std(axis=0).max() < STILL_RAD_S)
+
+
+def _margin(window: Window) -> float:
+    return min(MARGIN_S, (window.end_s - window.start_s) / 4)
+
+
+def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window) -> HandRest:
+    start_s, end_s = window.start_s + _margin(window), window.end_s - _margin(window)
+    inside = (time_s >= start_s) & (time_s <= end_s)
+    forces = None if acceleration is None else acceleration[inside]
+    return HandRest(
+        start_s,
+        end_s,
+        int(inside.sum()),
+        rates[inside].mean(axis=0),
+        rates[inside].std(axis=0, ddof=1),
+        None if forces is None else forces.mean(axis=0),
+        None if forces is None else forces.std(axis=0, ddof=1),
+    )
+
+
+def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
+    """Return the readings (n,) at the end of the range; of an unknown one, too many equal ones in a row."""
+    if range_rad_s is not None:
+        return np.asarray((np.abs(rates) >= NEAR_RANGE * range_rad_s).any(axis=1))
+    size = np.abs(rates)
+    same = ((size >= size.max(axis=0) * (1 - 1e-9)) & (size > 0)).astype(np.intp)
+    ahead = np.cumsum(np.vstack([np.zeros((1, 3), np.intp), same]), axis=0)
+    top = np.zeros(len(rates), dtype=np.bool_)
+    for first in np.flatnonzero((ahead[AT_THE_TOP:] - ahead[:-AT_THE_TOP] == AT_THE_TOP).any(axis=1)):
+        top[first : first + AT_THE_TOP] = True
+    return top
+
+
+def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...]) -> tuple[tuple[float, float], ...]:
+    """Return the intervals in which a hand held the body: it turned too little for a move, and too much for a rest."""
+    if not rests:
+        return ()
+    width = max(2, int(np.ceil(PAUSE_S / find_sampling(time_s).interval_s - ROUNDING)))
+    count = len(time_s) // width
+    bias = np.median([rest.mean_rad_s for rest in rests], axis=0)
+    blocks = (rates[: count * width] - bias).reshape(count, width, 3)
+    times = time_s[: count * width].reshape(count, width)
+    slow = np.linalg.norm(blocks.mean(axis=1), axis=1) < HELD_RAD_S
+    slow &= np.abs(blocks).max(axis=(1, 2)) < 4 * HELD_RAD_S
+    for rest in rests:
+        slow &= (times[:, -1] < rest.start_s - PAUSE_S) | (times[:, 0] > rest.end_s + PAUSE_S)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8))).reshape(-1, 2)
+    intervals = ((float(times[first, 0]), float(times[last - 1, -1])) for first, last in edges.tolist())
+    return tuple((start_s, end_s) for start_s, end_s in intervals if end_s - start_s >= HELD_S)
+
+
+State = Literal["starting", "resting", "moving", "held"]
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """The body's state at `time_s`, and since when; the rotation (3,) of the move so far and its peak rate."""
+
+    time_s: float
+    state: State
+    since_s: float
+    turned_rad: Array
+    peak_rad_s: float
+
+
+class Segmenter:
+    """The feed of a session in progress: it finds what `segment_session` finds in the readings so far.
+
+    A rest is settled after `SETTLED_S`. `range_rad_s` is that of the gyroscope, None if unknown.
+    """
+
+    def __init__(self, range_rad_s: float | None = None) -> None:
+        self._range_rad_s = range_rad_s
+        self._blocks: list[tuple[Array, Array, Array | None]] = []
+        self._given_s = -np.inf  # beginning of the last rest that was given
+        self._looked_s = -np.inf
+        self._session = HandRecording(np.empty(0), np.empty((0, 3)), None, (), ())
+
+    def feed(self, time_s: Array, rates: Array, acceleration: Array | None = None) -> tuple[HandRest | Move, ...]:
+        """Add readings (k, 3) at times (k,) that follow; return the moves and rests that have settled since."""
+        if not len(time_s):
+            return ()
+        self._blocks.append((time_s, rates, acceleration))
+        if time_s[-1] < self._looked_s + LOOKS_S:
+            return ()
+        self._looked_s = float(time_s[-1])
+        self._session = segment_session(*self._all(), range_rad_s=self._range_rad_s)
+        settled: list[HandRest | Move] = []
+        for row, rest in enumerate(self._session.rests):
+            if rest.end_s - rest.start_s < SETTLED_S - 2 * MARGIN_S or rest.start_s < self._given_s + LOOKS_S:
+                continue
+            if row:
+                settled.append(self._session.moves[row - 1])
+            settled.append(rest)
+            self._given_s = rest.start_s
+        return tuple(settled)
+
+    @property
+    def handled(self) -> HandRecording:
+        """The recording, with its rests and moves up to the last rest that lasted `SETTLED_S`."""
+        session = self._session
+        count = len(session.rests)
+        while count and session.rests[count - 1].end_s - session.rests[count - 1].start_s < SETTLED_S - 2 * MARGIN_S:
+            count -= 1
+        return replace(session, rests=session.rests[:count], moves=session.moves[: max(count - 1, 0)])
+
+    @property
+    def live(self) -> Live:
+        """The body's state by the latest evaluation."""
+        session = self._session
+        if not session.rests:
+            return Live(self._looked_s, "starting", self._looked_s, np.zeros(3), 0.0)
+        last, now_s = session.rests[-1], self._looked_s
+        if now_s - last.end_s < MARGIN_S + 2 * PAUSE_S:
+            return Live(now_s, "resting", last.start_s - MARGIN_S, np.zeros(3), 0.0)
+        moving = session.time_s > last.end_s
+        rates = session.rates[moving] - last.mean_rad_s
+        turned_rad = np.asarray(np.trapezoid(rates, session.time_s[moving], axis=0), dtype=np.float64)
+        span = next((span for span in session.held_in_air_s if span[1] > now_s - 2 * PAUSE_S), None)
+        state: State = "moving" if span is None else "held"
+        since_s = last.end_s if span is None else span[0]
+        return Live(now_s, state, since_s, turned_rad, float(np.abs(rates).max()))
+
+    def _all(self) -> tuple[Array, Array, Array | None]:
+        time_s, rates, acceleration = zip(*self._blocks, strict=True)
+        forces = [block for block in acceleration if block is not None]
+        whole = (np.concatenate(time_s), np.concatenate(rates), np.concatenate(forces) if forces else None)
+        self._blocks = [whole]
+        return whole

@@ -1,0 +1,174 @@
+"""The rests and moves of a session by hand, from its recordings. What the operator refused does not count."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.recording.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
+from rig.data.recording.provenance import Provenance
+from rig.data.recording.recorded_events import Event
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import RunSettings
+from rig.errors import Refused
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.session_parts import (
+    HandRecording,
+    HandRest,
+    Move,
+    SessionConditions,
+    axis_of,
+    merge_moves,
+    nearest_face,
+)
+from rig.motion.by_hand import FACES, Face
+from rig.observation.by_hand.hand_segmentation import Segmenter
+from rig.observation.timebase import NOMINAL_DRIFT, check_readings
+
+BETWEEN_S = 10.0  # assumed pause between two recordings of a session, which the boards' clocks do not show
+MICROSECOND_S = 1e-6 * (1 + NOMINAL_DRIFT)  # of the board's counter, by its crystal
+ITS_OWN_CLOCK = "the sensor's own clock, as stated: uncertainty.crystal_ppm"
+
+Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accelerations (n, 3) where they are sent
+
+
+def microsecond_of(sensor: RecordedSensor) -> float:
+    """Return the duration, s, of a microsecond of a sensor's time stamps: the board's counter runs at its own rate."""
+    return MICROSECOND_S if sensor.on_board else 1e-6
+
+
+def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float = 0.0) -> Readings:
+    """Return samples (n,) in SI units, on the crystal that stamps them, shifted by `from_s`."""
+    time_s = from_s + microsecond_of(sensor) * samples["board_time_us"].astype(np.float64)
+    force = sensor.channel(ACCELERATION).values(samples) if sensor.measures(ACCELERATION) else None
+    return time_s, sensor.channel(RATE).values(samples), force
+
+
+def range_of(sensor: RecordedSensor) -> float | None:
+    """Return the largest rate that a sensor reads, rad/s; None if its part does not state it."""
+    rate = sensor.channel(RATE)
+    return None if rate.full_scale_counts is None else rate.full_scale_counts * rate.unit_per_count
+
+
+@dataclass(slots=True)
+class NotCounted:
+    """The parts of a session that do not count, in the session's seconds.
+
+    `moves` and `rests`: their intervals; `seams`: the middle between two recordings; `from_s`: the time from which on
+    anything counts. Events give times in microseconds of `microsecond_s`.
+    """
+
+    moves: list[tuple[float, float]] = field(default_factory=list)
+    rests: list[tuple[float, float]] = field(default_factory=list)
+    seams: list[float] = field(default_factory=list)
+    from_s: float = -inf
+    microsecond_s: float = MICROSECOND_S
+
+    def take(self, event: Event, shift_s: float) -> None:
+        """Add an event of a recording whose board's clock is behind the session's by `shift_s`."""
+        match event:
+            case HandMoveRefused(begin_us, end_us):
+                self.moves.append(self._span_s(begin_us, end_us, shift_s))
+            case HandRestRefused(begin_us, end_us):
+                self.rests.append(self._span_s(begin_us, end_us, shift_s))
+            case HandBegunAnew(begin_us):
+                self.from_s = shift_s + self.microsecond_s * begin_us
+            case _:
+                pass
+
+    def _span_s(self, begin_us: int, end_us: int, shift_s: float) -> tuple[float, float]:
+        return shift_s + self.microsecond_s * begin_us, shift_s + self.microsecond_s * end_us
+
+    def filter_session(self, session: HandRecording) -> HandRecording:
+        """Return the session without them: a rest that does not count is a pause of the move through it."""
+        rests, moves, through = list[HandRest](), list[Move](), list[Move]()
+        for index, rest in enumerate(session.rests):
+            if _middle(rest) < self.from_s:
+                continue
+            if rests:
+                through.append(self._mark_move(session.moves[index - 1]))
+            if any(rest.start_s < end_s and start_s < rest.end_s for start_s, end_s in self.rests):
+                continue
+            if rests:
+                moves.append(merge_moves(through))
+                through.clear()
+            rests.append(rest)
+        return replace(session, rests=tuple(rests), moves=tuple(moves))
+
+    def _mark_move(self, move: Move) -> Move:
+        crosses = any(move.start_s <= seam_s <= move.end_s for seam_s in self.seams)
+        return replace(move, left_out=True) if crosses or _within(move, self.moves) else move
+
+
+def _middle(part: HandRest | Move) -> float:
+    return (part.start_s + part.end_s) / 2
+
+
+def _within(part: HandRest | Move, spans: Sequence[tuple[float, float]]) -> bool:
+    return any(start_s <= _middle(part) <= end_s for start_s, end_s in spans)
+
+
+def replay_runs(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted, float]:
+    """Return the session's rests and moves so far by one sensor, its parts that do not count, and when it may go on.
+
+    The item may have been moved in any way between two recordings, so no move connects the last rest of one with the
+    first of the next. Raise Fault as `check_readings` does.
+    """
+    microsecond_s, ends_s = microsecond_of(runs[0].sensors[name]), None
+    segmenter, refused = Segmenter(range_of(runs[0].sensors[name])), NotCounted(microsecond_s=microsecond_s)
+    for run in runs:
+        samples = run.samples[name]
+        if not len(samples):
+            continue
+        board_s = microsecond_s * samples["board_time_us"][[0, -1]].astype(np.float64)
+        shift_s = 0.0 if ends_s is None else ends_s + BETWEEN_S - board_s[0]
+        if ends_s is not None:
+            refused.seams.append(ends_s + BETWEEN_S / 2)
+        readings = readings_of(run.sensors[name], samples, shift_s)
+        time_s, *measured = readings
+        check_readings(time_s, np.column_stack([values for values in measured if values is not None]))
+        segmenter.feed(*readings)
+        ends_s = shift_s + board_s[1]
+        for recorded in run.events:
+            refused.take(recorded.event, shift_s)
+    return segmenter, refused, 0.0 if ends_s is None else float(ends_s)
+
+
+def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
+    """Return a session's rests and moves by one sensor, for the solution."""
+    segmenter, refused, _ = replay_runs(runs, name)
+    return refused.filter_session(segmenter.handled)
+
+
+def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> SessionConditions:
+    """Return what the solution of a session needs besides a sensor's readings. Raise Refused `clock_unknown`.
+
+    The clock that stamps the readings is the only measure of time, and no reading shows an error of it. Without an
+    accelerometer to show which side is up, the first face is the one that is asked for first.
+    """
+    by_hand, uncertainty = settings.by_hand, settings.uncertainty
+    if by_hand is None or uncertainty is None or (sensor.on_board and not provenance.board_follows_crystal):
+        raise Refused(
+            "clock_unknown",
+            "the board's clock does not follow its crystal, so it may be a per cent off, and nothing in a session by "
+            "hand can show that",
+            "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
+        )
+    first = None if sensor.measures(ACCELERATION) else rotate_face(FACES[0], np.array(sensor.mounting))
+    return SessionConditions(
+        clock_ppm=uncertainty.crystal_ppm,
+        clock_source="the board's crystal" if sensor.on_board else ITS_OWN_CLOCK,
+        box_rad=by_hand.box_rad,
+        first_face=first,
+        gravity_m_s2=settings.site.gravity_m_s2,
+    )
+
+
+def rotate_face(face: str, rotation: Array) -> Face:
+    """Return the face nearest to the axis of `face` after a `rotation` (3, 3) to other axes."""
+    name = nearest_face(rotation @ axis_of(face))
+    return next(candidate for candidate in FACES if candidate == name)

@@ -1,0 +1,120 @@
+"""Averages of a magnetometer's readings at rest: in dwells, with the arm's attitude, and at the home position. Pure."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from typing import Any
+
+from numpy.typing import NDArray
+
+from rig.data.quantity import FIELD
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import ObservationThresholds
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.observation.arm_rests import MIN_SAMPLES_AT_REST
+from rig.observation.average import steps_of
+from rig.observation.observed_run import ObservedRun, one_clock
+from rig.observation.reference.dwell_acceleration import DwellReading, check_complete
+from rig.observation.statistics.mean import Mean, StaticReading, even_mean
+from rig.observation.windows import Window, inside, rested
+
+AT_HOME_RAD = 1e-3  # of any joint
+SETTLING_S = 0.2  # cut off at either end of a rest
+
+
+def find_companion(recording: ObservedRun, name: str) -> str | None:
+    """Return the sensor on the clock of the magnetometer `name` whose accelerometer was read in dwells, or None."""
+    return find_dwelling_companion(
+        recording.run, name, (sensor for sensor, observations in recording.sensors.items() if observations.dwells)
+    )
+
+
+def find_dwelling_companion(run: RunData, name: str, sensors: Iterable[str]) -> str | None:
+    """Return the first of `sensors` that is on the clock of the magnetometer `name`; None without one."""
+    return next((sensor for sensor in sensors if one_clock(run, sensor, name)), None)
+
+
+def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[StaticReading, ...]:
+    """Average a magnetometer's readings in the dwells in which an accelerometer on its clock was read.
+
+    The gyroscope's time base serves both. The magnetometer's delay against that gyroscope does not matter for a mean at
+    rest. Raise Fault `lost_samples` or `saturation`.
+    """
+    other = find_companion(recording, name)
+    if other is None:
+        return ()
+    time_s = recording.time_s(name, other)
+    return tuple(
+        StaticReading(
+            dwell.index,
+            dwell.name,
+            field_mean(recording.run, name, time_s, dwell, thresholds),
+            dwell.attitude,
+            dwell.window,
+        )
+        for dwell in recording.sensors[other].dwells
+    )
+
+
+def field_mean(run: RunData, name: str, time_s: Array, dwell: DwellReading, thresholds: ObservationThresholds) -> Mean:
+    """Average a magnetometer's readings in a dwell, in tesla; `time_s` (n,) are its samples' times on the arm's clock.
+
+    Raise Fault `lost_samples` or `saturation`.
+    """
+    samples = _samples(run, name, time_s, dwell.window)
+    return _mean(run, name, samples, f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds)
+
+
+def read_field_in_dwells(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReading, NDArray[Any], Array]]:
+    """Yield each dwell with the magnetometer's raw counts (n, 3) in it and their times (n,) on the arm's clock."""
+    other = find_companion(recording, name)
+    if other is not None:
+        time_s, channel = recording.time_s(name, other), recording.run.sensors[name].channel(FIELD)
+        for dwell in recording.sensors[other].dwells:
+            samples = inside(time_s, dwell.window)
+            yield dwell, channel.counts(recording.run.samples[name])[samples], time_s[samples]
+
+
+def field_tests(
+    recording: ObservedRun, name: str, thresholds: ObservationThresholds, home_q_rad: Sequence[float]
+) -> tuple[Mean, ...]:
+    """Average the magnetometer's readings, in tesla, in the rests at home, in order. Raise as `field_readings` does.
+
+    A rest with fewer samples than a dwell needs is skipped: a run's last samples may not have arrived when it ends.
+    """
+    other = find_companion(recording, name)
+    if other is None:
+        return ()
+    time_s = recording.time_s(name, other)
+    samples = partial(_samples, recording.run, name, time_s)
+    windows = (Window(rest.start_s + SETTLING_S, rest.end_s - SETTLING_S) for rest in rested(recording.run))
+    return tuple(
+        _mean(recording.run, name, samples(window), f"a field test of {name}", thresholds)
+        for window in windows
+        if window.end_s > window.start_s
+        and _is_at_home(recording, window, home_q_rad)
+        and len(samples(window)) >= MIN_SAMPLES_AT_REST
+    )
+
+
+def _is_at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) -> bool:
+    away_rad = recording.motion.max_distance_rad(rest, home_q_rad)
+    return away_rad is not None and away_rad < AT_HOME_RAD
+
+
+def _mean(run: RunData, name: str, samples: NDArray[Any], where: str, thresholds: ObservationThresholds) -> Mean:
+    check_complete(run.sensors[name], samples, where, thresholds)
+    channel = run.sensors[name].channel(FIELD)
+    if channel.is_saturated(samples).any():
+        raise Fault(
+            "saturation",
+            f"in {where} the field is beyond the magnetometer's range",
+            "Choose a wider range_gauss, or take away the iron beside it",
+        )
+    return even_mean(channel.values(samples), steps_of(run.samples[name], run.sensors[name], FIELD))
+
+
+def _samples(run: RunData, name: str, time_s: Array, window: Window) -> NDArray[Any]:
+    """Return a sensor's samples (n,) in a window, by the times (N,) of all its samples on the arm's clock."""
+    samples: NDArray[Any] = run.samples[name]
+    return samples[inside(time_s, window)]

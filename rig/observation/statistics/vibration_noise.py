@@ -1,0 +1,65 @@
+"""The noise of readings that vibrate: spectral lines model the vibration, and the residuals are the sensor's own noise.
+
+The scatter of a vibration is no noise: the few low frequencies without it are too few to show the noise in one turn.
+Without its lines the noise is usually white, and then all residuals determine it; else their correlations do.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.estimation.statistics.rounding import Steps
+from rig.observation.statistics.coloured_noise import MEMORIES, fit_autoregression
+from rig.observation.statistics.mean import Mean, MeanNoise, mean_at_rest, weighted_means, whole
+from rig.observation.statistics.spectral_lines import LineSearch, find_lines, fit_columns, waves
+from rig.observation.statistics.tapered_weights import weights
+from rig.observation.windows import Window
+
+FEWEST = 120  # readings that separate lines from noise
+BRIEF = (1, 2)  # memories that fit a colour, but not the remainder of a line
+
+
+def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
+    """Average readings at rest by weights that cancel a vibration (`average_tapered`), with the noise without lines."""
+    residuals = readings - readings.mean(axis=0)
+    shaking = _columns(residuals, LineSearch(beats=0))
+    columns = np.column_stack([np.ones(len(residuals)), shaking])
+    smooth = columns @ fit_columns(columns, residuals)
+    noise = estimate_noise(residuals - smooth, columns.shape[1], steps, BRIEF if shaking.size else MEMORIES)
+    tapered = weights(time_s, window.start_s, window.end_s)[None]
+    (mean,) = weighted_means(readings, whole(readings), tapered, smooth=smooth, noise=noise, steps=steps)
+    return mean
+
+
+def average_standstill(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
+    """Return the mean of readings (n, 3) of a standing arm, and the window that it represents."""
+    mean, averaged_window = mean_at_rest(readings, time_s, window, steps)
+    if len(readings) >= FEWEST and averaged_window != window:
+        mean = average_rest(readings, time_s, window, steps)
+    return mean, averaged_window
+
+
+def line_columns(residuals: Array) -> Array:
+    """Return columns (n, 8 k) of the k spectral lines in residuals (n, 3) of a sensor that makes a turn."""
+    return _columns(residuals, LineSearch())
+
+
+def fit_inflation(residuals: Array) -> float:
+    """Return the factor of `fit_noise_factor`, of residuals (n,) that may hold the remainder of a line."""
+    return fit_autoregression(residuals, BRIEF).factor
+
+
+def _columns(residuals: Array, search: LineSearch) -> Array:
+    return waves(find_lines(residuals, search), np.arange(len(residuals)) / len(residuals), search.beats)
+
+
+def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:
+    """Return the noise of readings in these steps from residuals (n, 3) after a fit of `parameters` columns."""
+    scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - parameters), steps.variance)
+    inflations = [fit_autoregression(axis, memories) for axis in residuals.T]
+    return MeanNoise(
+        scatter=scatter,
+        in_a_mean=scatter * np.array([axis.factor for axis in inflations]),
+        freedom=np.array([min(axis.freedom, len(residuals) - parameters) for axis in inflations]),
+    )

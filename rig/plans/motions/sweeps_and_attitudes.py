@@ -1,0 +1,28 @@
+"""Sweeps and attitudes in one run, for a gyroscope and the accelerometer in the same device."""
+
+from collections.abc import Collection
+
+from rig.config.models import ArmSection
+from rig.config.procedures.procedure_sections import ImuSection
+from rig.motion.steps import Plan
+from rig.motion.turner_state import Joints
+from rig.plans.motions.six_sweeps import plan_six_observation
+from rig.plans.motions.static_attitudes import dwells
+from rig.plans.motions.transfer_steps import append_steps
+
+
+def plan_imu(
+    arm: ArmSection,
+    procedure: ImuSection,
+    start_q_rad: Joints | None = None,
+    done: Collection[int] = (),
+) -> Plan:
+    """Plan all sweeps as in `plan_six_observation`, home, then all attitudes as in `plan_static_attitudes`, and home
+    again.
+
+    Sweeps are counted first, dwells after them; `done` holds the indices of either to leave out. Raise Refused
+    `axes_do_not_span`.
+    """
+    sweeps = plan_six_observation(arm, procedure, start_q_rad, done)
+    first = len(plan_six_observation(arm, procedure).sweeps)
+    return append_steps(sweeps, dwells(arm, procedure, procedure.repeats, done, first))

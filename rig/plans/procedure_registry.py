@@ -1,0 +1,130 @@
+"""The procedures by name: the stock ones, and those that packages add through the entry-point group `rig.procedures`.
+
+The stock ones are those of `STOCK_SECTIONS`: the script of each is the module of its name in `procedures/`. The rig
+knows a procedure only through its `Procedure`; one that is not installed comes from a file of its own
+(`rig.plans.script_file`).
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint
+from typing import Any, Generic, Literal, Protocol, TypeVar
+
+from rig.analysis.analyses import calibrate
+from rig.analysis.estimator_names import DEFAULT_ESTIMATOR, Estimator
+from rig.analysis.outcome import Outcome
+from rig.config.models import ArmSection, ProcedureSection, TurnerSection
+from rig.config.procedures.procedure_sections import STOCK_SECTIONS
+from rig.data.recording.run_file import RunData
+from rig.errors import Refused
+from rig.errors.installed import added
+from rig.motion.steps import Plan
+from rig.motion.turner_state import Joints
+from rig.plans.verbs import Script
+
+GROUP = "rig.procedures"
+Readings = Literal["raw", "calibrated"]
+SectionT = TypeVar("SectionT", bound=ProcedureSection)
+SectionT_contra = TypeVar("SectionT_contra", bound=ProcedureSection, contravariant=True)
+
+
+class Planner(Protocol[SectionT_contra]):
+    """A function that plans the steps; pure. `start_q_rad` is the turner's pose (home if None), `done` the steps to
+    leave out.
+
+    The `index` of sweeps and dwells, by which `done` names them, counts through the whole procedure. Raise Refused by
+    name if the movement is impossible.
+    """
+
+    def __call__(
+        self,
+        turner: Any,  # of the section that `Procedure.turner` names
+        procedure: SectionT_contra,
+        start_q_rad: Joints | None = None,
+        done: Collection[int] = (),
+        /,
+    ) -> Plan: ...
+
+
+# The recordings of this phase (none if it did not happen), the outcome of the phase before (None for the first one),
+# the estimator's name.
+Analysis = Callable[[Sequence[RunData], Outcome | None, str], Outcome]
+
+
+def calibration(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
+    """Return the usual analysis: scale and bias of every sensor from averaged revolutions, compared with the limits."""
+    return calibrate(runs, estimator)
+
+
+@dataclass(frozen=True, slots=True)
+class Procedure(Generic[SectionT]):
+    """A procedure: its name, its section in the configuration, its planner, its script and its analysis.
+
+    - readings: those that the sensors to calibrate stream: raw counts, which the board averages as well, or readings
+      that the board has corrected by its stored calibration.
+    - then: the procedure that follows with the same movement if the section has `then_verify`.
+    - turner: the section of the kind of turner that it plans for.
+    - estimator: the one of the result, unless another is requested.
+    """
+
+    name: str
+    section: type[SectionT]
+    plan: Planner[SectionT]
+    script: Script
+    analyse: Analysis = calibration
+    readings: Readings = "raw"
+    then: str | None = None
+    turner: type[TurnerSection] = ArmSection
+    estimator: Estimator = DEFAULT_ESTIMATOR
+
+    @property
+    def reads_corrected(self) -> bool:
+        """Whether the board corrects what the sensors to calibrate stream, by the calibrations it has stored."""
+        return self.readings == "calibrated"
+
+    @property
+    def calibrates_along(self) -> bool:
+        """Whether the board averages and solves while the host records: it can from raw readings alone."""
+        return self.readings == "raw"
+
+    def following(self, procedures: "Procedures") -> "AnyProcedure | None":
+        """Return the procedure that `then` names, or None. Raise Refused `no_such_procedure`."""
+        if self.then is not None and self.then not in procedures:
+            raise Refused(
+                "no_such_procedure",
+                f"the procedure {self.name} is to be followed by {self.then!r}, which is not installed",
+                f"Let `then` name one of: {', '.join(procedures)}",
+            )
+        return None if self.then is None else procedures[self.then]
+
+
+AnyProcedure = Procedure[Any]
+Procedures = Mapping[str, AnyProcedure]
+
+
+@cache
+def _load_installed() -> Mapping[str, tuple[AnyProcedure, str]]:
+    """Return the installed procedures by name, each with its module."""
+    stock = (EntryPoint(name, f"procedures.{name}:PROCEDURE", GROUP) for name in STOCK_SECTIONS)
+    entries = added(GROUP, _not_loaded, stock)
+    return {procedure.name: (procedure, entry.module) for entry, procedure in entries}
+
+
+def _not_loaded(what: str, remedy: str) -> Refused:
+    return Refused("procedure_not_loaded", f"the procedure {what}", remedy)
+
+
+def installed() -> Procedures:
+    """Return the procedures of the packages installed here. Raise Refused `procedure_not_loaded`."""
+    return {name: procedure for name, (procedure, _) in _load_installed().items()}
+
+
+def module_of(name: str) -> str:
+    """Return the module of an installed procedure."""
+    return _load_installed()[name][1]
+
+
+def sections(procedures: Procedures) -> Mapping[str, type[ProcedureSection]]:
+    """Return the types of the `procedure:` section of a configuration, by name."""
+    return {name: procedure.section for name, procedure in procedures.items()}

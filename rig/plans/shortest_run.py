@@ -1,0 +1,327 @@
+"""The search for the shortest run of a configuration that reaches a target uncertainty. Pure.
+
+The file's order, directions, stages, several speeds and six axes stay, and the attitudes if magnetometers need them.
+"""
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from math import inf
+from typing import Protocol, TypeVar
+
+import numpy as np
+from pydantic import ValidationError
+
+from rig.analysis.by_hand.hand_prediction import duration_s, predict_hand_budgets
+from rig.analysis.design.budget_prediction import predict_budgets
+from rig.analysis.design.candidate_search import (
+    SIZES,
+    Budgets,
+    Candidate,
+    Planned,
+    Searched,
+    Shortest,
+    TargetUncertainty,
+    find_shortest,
+)
+from rig.analysis.design.predicted_accelerations import predict_accelerometer_budgets
+from rig.config.models import ProcedureSection, RigConfig
+from rig.config.procedures.hand_sections import ByHandSection
+from rig.config.procedures.procedure_sections import SixObservationSection, StaticAttitudesSection
+from rig.config.section import Section
+from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.solution import LINES, REAL_HANDS
+from rig.estimation.gyroscope.budget import FLICKER, NOISE, STATES, WANDERING
+from rig.motion.by_hand import Instruction
+from rig.motion.steps import Plan
+from rig.plans.by_hand import WantedMoves as Asked
+from rig.plans.by_hand import simulate_session
+from rig.plans.phase import turner_for
+from rig.plans.procedure_registry import installed
+from rig.plans.shortest_motions import Motion, vary_arm, vary_attitudes, vary_imu, vary_servo
+from rig.turners.turner_registry import kind_of
+
+SectionT = TypeVar("SectionT", bound=Section)
+REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
+MOST = 100  # sweeps or dwells of one plan
+RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
+# The endless run is predicted from a plan of two repeats: in one alone, noise weighs too much beside the errors that
+# repeats share. Other rests and more repeats reduce its U further, but by no more than this factor.
+TWICE, HOPELESS = 2, 2.0
+ANEW = NOISE, WANDERING, FLICKER, STATES  # the budget lines that repeats reduce, also for accelerometers
+FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
+REST_STEP_S = 0.1  # of the last, fine search
+
+
+class Tried(Protocol):
+    """The runs of a procedure among which the search chooses, with the prediction of each.
+
+    - `predict`: the budgets, None of a run that is not possible.
+    - `anew`: the budget lines whose error is new in each repeat; a run repeated without end has none of them.
+    - `ending`: the keys that end a run before its last repeat, when the target is reached.
+    """
+
+    @property
+    def anew(self) -> Collection[str]: ...
+    def candidates(self) -> Sequence[Candidate]: ...
+    def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
+    def finer(self, best: Candidate) -> Sequence[Candidate]: ...
+    def duration_s(self, procedure: ProcedureSection) -> float: ...
+    def predict(self, candidate: Candidate) -> Budgets | None: ...
+    def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]: ...
+
+
+def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
+    """Return the shortest run of this configuration whose predicted uncertainty meets the target.
+
+    Raise Refused `not_foretold` if the procedure's uncertainty, or that of the target's quantity, is not predicted.
+    """
+    what = find_search(config)
+    _refuse_others(wanted, config)
+    candidates = what.candidates()
+    floors = [
+        (candidate.family, once.without(what.anew))
+        for candidate in what.select_endless(candidates)
+        if (once := what.predict(candidate)) is not None
+    ]
+    able = {family for family, floor in floors if wanted.ratio_to_target(floor.reached) <= HOPELESS}
+    least = min(floors, key=lambda floor: wanted.ratio_to_target(floor[1].reached))[0]
+    hopeful = [run for run in candidates if run.family in able] or _longest(candidates, least, wanted.at_most_s)
+    coarse = find_shortest(hopeful, what.predict, wanted)
+    evaluated = [*(floor for _, floor in floors), *coarse.evaluated]
+    unreachable = not any(wanted.is_met_by(budgets.reached) for budgets in evaluated)
+    if coarse.best is None and unreachable and able and wanted.at_most_s < inf:
+        unreachable = find_shortest(hopeful, what.predict, replace(wanted, at_most_s=inf)).best is None
+    fine = find_shortest(what.finer(coarse.best.candidate), what.predict, wanted) if coarse.best else Searched()
+    best = fine.best or coarse.best
+    best = best and _add_target(best, what.ending(best.candidate.procedure, wanted))
+    shown = best or coarse.nearest
+    before = Candidate(config.procedure, (), (), what.duration_s(config.procedure))
+    configured = what.predict(before)
+    return Shortest(
+        wanted,
+        None if configured is None else Planned(before, configured),
+        best,
+        coarse.nearest,
+        evaluated,
+        unreachable,
+        len(coarse.evaluated) + len(fine.evaluated),
+        len(candidates),
+        None if shown is None else _directions(plan_of(config, shown.candidate.procedure)),
+    )
+
+
+def find_search(config: RigConfig) -> Tried:
+    """Return the search among the runs of a configuration. Raise Refused `not_foretold`."""
+    procedure = config.procedure
+    if not config.to_calibrate:
+        raise _not_foretold("nothing is to be calibrated")
+    if procedure.name not in TRIED or procedure.finds_earth_rate:
+        raise _not_foretold(f"the uncertainty of the procedure {procedure.name} is not predicted")
+    return TRIED[procedure.name](config)
+
+
+def _not_foretold(what: str) -> Refused:
+    return Refused(
+        "not_foretold",
+        what,
+        "Use six_observation or imu with the Earth's rate known or left out, static_attitudes, servo_six_observation, "
+        "or by_hand",
+    )
+
+
+def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
+    """Raise Refused `not_foretold` if the target is for a kind of sensor that is not calibrated."""
+    kinds = {"gyroscope": not isinstance(config.procedure, StaticAttitudesSection)}
+    kinds["accelerometer"] = config.procedure.accelerometer_order > 0 and any(
+        sensor.acceleration is not None for sensor in config.to_calibrate.values()
+    )
+    for (kind, calibrated), sizes in zip(kinds.items(), (SIZES[:2], SIZES[2:]), strict=True):
+        if not calibrated and any(getattr(wanted, size) < inf for size in sizes):
+            raise _not_foretold(f"the procedure calibrates no {kind} whose uncertainty could be wanted")
+
+
+def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
+    """Return the motions of a procedure; none by hand. Raise Refused `other_turner`."""
+    script = installed()[procedure.name]
+    return script.plan(turner_for(script, config), procedure)
+
+
+def _change(section: SectionT, **keys: object) -> SectionT:
+    """Return the section with other values of these keys. Raise ValidationError if the file may not have them."""
+    return type(section).model_validate({**dict(section), **keys})
+
+
+def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:
+    """Return the run with these keys of its procedure, which end it when the target is reached."""
+    procedure = planned.candidate.procedure
+    with suppress(ValidationError):  # the target is larger than a file may have
+        procedure = _change(procedure, **keys)
+    return replace(planned, candidate=replace(planned.candidate, procedure=procedure))
+
+
+def _directions(plan: Plan) -> Array | None:
+    """Return the axes (N, 3) of the sweeps in the item's frame; None without sweeps."""
+    mounts = {index: stage.mount for stage in plan.stages for index in stage.indices}
+    axes = [np.array(mounts.get(sweep.index, np.eye(3))) @ sweep.axis_flange for sweep in plan.sweeps]
+    return np.array(axes) if axes else None
+
+
+def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_most_s: float) -> list[Candidate]:
+    """Return a list with the longest candidate of a family."""
+    same = [candidate for candidate in candidates if candidate.family == family and candidate.duration_s <= at_most_s]
+    return sorted(same, key=lambda candidate: candidate.duration_s)[-1:]
+
+
+@dataclass(frozen=True, slots=True)
+class _Swept:
+    """Runs of a turner with joints, with sweeps or attitudes.
+
+    - `motions`: each motion's family, its angle, and its keys of the procedure.
+    - `waits`: the keys of the times at standstill, after a sweep or in an attitude.
+    """
+
+    motions: Callable[[RigConfig], Iterator[Motion]]
+    waits: tuple[str, ...]
+    config: RigConfig
+    anew: Collection[str] = ANEW
+
+    def candidates(self) -> Sequence[Candidate]:
+        candidates = []
+        least_s = dict.fromkeys(self.waits, RESTS_S[0])
+        for family, turned, keys in self.motions(self.config):
+            once, twice = (_change(self.config.procedure, **keys, **least_s, repeats=repeats) for repeats in (1, 2))
+            plan = plan_of(self.config, once)
+            if kind_of(self.config.turner).problems([plan], self.config.turner, None):
+                continue
+            counts, again_s = self._counts(plan), plan_of(self.config, twice).duration_s - plan.duration_s
+            some = [number for number in REPEATS if number * len(plan.sweeps or plan.dwells) <= MOST or number == 1]
+            if any(twice.problems(self.config)):
+                some = [1]
+            for repeats, *values_s in product(some, *[RESTS_S] * len(self.waits)):
+                waits_s = dict(zip(self.waits, values_s, strict=True))
+                lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * _longer_s(counts, least_s, waits_s)
+                rests_s, dwells_s = (  # longer dwells determine more
+                    tuple(wait_s for key, wait_s in waits_s.items() if key == name) for name in ("rest_s", "dwell_s")
+                )
+                procedure = once.model_copy(update={**waits_s, "repeats": repeats})  # too many to validate each
+                candidates.append(Candidate(procedure, family, (turned, repeats, *dwells_s), lasting_s, rests_s))
+        return candidates
+
+    def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Return those of each family with the largest angle and dwell, at most two repeats, short rests and long."""
+        selected = {
+            (candidate.family, candidate.rests_s): candidate
+            for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)
+            if set(candidate.rests_s) <= {RESTS_S[0], RESTS_S[-1]} and candidate.sizes[1] <= TWICE
+        }
+        return list(selected.values())
+
+    def finer(self, best: Candidate) -> Sequence[Candidate]:
+        """Return the candidates with slightly shorter waits, down to the next coarse value.
+
+        The steps are so small that longer waits are taken to give a smaller uncertainty.
+        """
+        waits_s = {key: float(getattr(best.procedure, key)) for key in self.waits}
+        counts, candidates = self._counts(plan_of(self.config, best.procedure)), []  # of all repeats
+        for values_s in product(*map(_down_from, waits_s.values())):
+            shorter_s = dict(zip(waits_s, values_s, strict=True))
+            procedure = best.procedure.model_copy(update=shorter_s)  # too many to validate each
+            lasting_s = best.duration_s + _longer_s(counts, waits_s, shorter_s)
+            candidates.append(Candidate(procedure, best.family, (*best.sizes, *values_s), lasting_s))
+        return candidates
+
+    def _counts(self, plan: Plan) -> Mapping[str, int]:
+        """Return the number of waits of each key in a plan."""
+        # By their names: a field test is a Rest as well, but its duration has another key.
+        rests = sum(step.name.startswith("rest") for step in plan.steps)
+        return {key: {"rest_s": rests, "dwell_s": len(plan.dwells)}[key] for key in self.waits}
+
+    def duration_s(self, procedure: ProcedureSection) -> float:
+        return plan_of(self.config, procedure).duration_s
+
+    def predict(self, candidate: Candidate) -> Budgets | None:
+        config = _change(self.config, procedure=candidate.procedure)
+        plan, turner = plan_of(config, candidate.procedure), kind_of(config.turner).describe_configured(config.turner)
+        try:
+            rates = predict_budgets(config, plan, turner) if plan.sweeps else {}
+            return Budgets(rates, predict_accelerometer_budgets(config, plan, turner.kinematics))
+        except (Fault, np.linalg.LinAlgError):  # these sweeps, rests or attitudes do not determine it
+            return None
+
+    def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
+        """Return the target's keys, if the run has several repeats."""
+        if not isinstance(procedure, SixObservationSection) or procedure.repeats == 1 or procedure.stages:
+            return {}
+        sizes = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias_rad_s}
+        return {key: size for key, size in sizes.items() if size < inf}
+
+
+def _longer_s(counts: Mapping[str, int], waits_s: Mapping[str, float], others_s: Mapping[str, float]) -> float:
+    """Return the extra duration, s, of waits of the lengths `others_s` instead of `waits_s`."""
+    return sum(count * (others_s[key] - waits_s[key]) for key, count in counts.items())
+
+
+def _down_from(wait_s: float) -> list[float]:
+    """Return waits from `wait_s` down to the next coarse value, s."""
+    below = max((rest_s for rest_s in RESTS_S if rest_s < wait_s), default=wait_s - REST_STEP_S)
+    return np.arange(wait_s, below + REST_STEP_S / 2, -REST_STEP_S).round(3).tolist()
+
+
+@dataclass(frozen=True, slots=True)
+class _ByHand:
+    """Sessions by hand with different numbers of flips and turns."""
+
+    config: RigConfig
+    anew: Collection[str] = tuple(LINES)  # all that the readings determine
+
+    def candidates(self) -> Sequence[Candidate]:
+        return [self._candidate(*numbers) for numbers in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
+
+    def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Return the candidate of most flips and least rests: without noise, more adds nothing."""
+        return [max(candidates, key=lambda candidate: (candidate.sizes[0], -candidate.sizes[1], -candidate.sizes[2]))]
+
+    def finer(self, best: Candidate) -> Sequence[Candidate]:
+        """Return the candidates with fewer flips, down to the next coarse number."""
+        flips, turns, rest_s = best.sizes
+        below = max((number for number in FLIPS if number < flips), default=int(flips))
+        return [self._candidate(number, int(turns), rest_s) for number in range(below + 1, int(flips))]
+
+    def duration_s(self, procedure: ProcedureSection) -> float:
+        _, moves, rest_s = _session(procedure)
+        return duration_s(moves, rest_s)
+
+    def predict(self, candidate: Candidate) -> Budgets | None:
+        try:
+            return Budgets(predict_hand_budgets(self.config, *_session(candidate.procedure)))
+        except Fault:
+            return None
+
+    def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
+        """Return the target's key for a session, less the part of U that no session shows."""
+        remaining = wanted.scale**2 - (2 * REAL_HANDS) ** 2
+        return {"target_scale_u": round(remaining**0.5, 7)} if 0 < remaining < inf else {}
+
+    def _candidate(self, flips: int, turns: int, rest_s: float) -> Candidate:
+        procedure = _change(self.config.procedure, flips=flips, turns=turns, rest_s=rest_s)
+        return Candidate(procedure, (), (flips, turns, rest_s), self.duration_s(procedure))
+
+
+def _session(procedure: ProcedureSection) -> tuple[ByHandSection, Sequence[Instruction], float]:
+    """Return the section of a session by hand, its instructions, and the rest between two of them, s."""
+    assert isinstance(procedure, ByHandSection)
+    return procedure, list(simulate_session(Asked(procedure.flips, procedure.turns))), procedure.rest_s
+
+
+# The search among the runs of a procedure, by its name.
+TRIED: Mapping[str, Callable[[RigConfig], Tried]] = {
+    "six_observation": partial(_Swept, vary_arm, ("rest_s",)),
+    "servo_six_observation": partial(_Swept, vary_servo, ("rest_s",)),
+    "static_attitudes": partial(_Swept, vary_attitudes, ("dwell_s",)),
+    "imu": partial(_Swept, vary_imu, ("rest_s", "dwell_s")),
+    "by_hand": _ByHand,
+}

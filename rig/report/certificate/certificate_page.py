@@ -1,0 +1,54 @@
+"""The certificate as one HTML page: self-contained, for screens light and dark, for paper and for screen readers."""
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+from rig.config.sensors.sensor_catalogue import has_own_port
+from rig.data.absent import NO_BOARD
+from rig.data.installed_kinds import quantities
+from rig.report.certificate import at_rest_tables, method_words, svg_plots, temperature_curves, validity
+from rig.report.certificate.content import Certificate
+from rig.report.findings import characteristics
+from rig.report.findings.result_kind import OWN_TEMPLATES
+from rig.report.kinds.kind_registry import kinds
+from rig.report.tables import certificate as tables
+from rig.report.tables import coverage_statements as coverage_words
+from rig.report.tables.certificate import DEG, JOINT_FACTOR
+from rig.report.words import (
+    detection_limit_words,
+    expanded_uncertainty,
+    printed_budget,
+    printed_values,
+    temperature_words,
+    validity_words,
+)
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+MODULES = (
+    printed_values, expanded_uncertainty, validity_words, detection_limit_words, printed_budget, tables, coverage_words,
+    at_rest_tables, validity, svg_plots, temperature_curves, temperature_words, method_words,
+)  # fmt: skip
+TEMPLATE = "certificate.html.j2"
+FOOTING = "Relates only to the items calibrated. Not issued under an accreditation."
+
+
+def certificate_page(certificate: Certificate) -> str:
+    """Return HTML that loads nothing from outside; every text of configuration, board or arm is escaped."""
+    return _template().render(certificate=certificate, deg=DEG, joint=JOINT_FACTOR, footing=FOOTING)
+
+
+@cache
+def _template() -> "Template":
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    loader = FileSystemLoader(list(dict.fromkeys([OWN_TEMPLATES, *(kind.templates for kind in kinds())])))
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.globals |= {"has_own_port": has_own_port, "no_board": NO_BOARD, "quantities": quantities()}
+    environment.globals["characteristics"] = characteristics
+    for module in MODULES:
+        environment.globals |= {name: value for name, value in vars(module).items() if callable(value)}
+    return environment.get_template(TEMPLATE)

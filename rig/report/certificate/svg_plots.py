@@ -1,0 +1,132 @@
+"""Geometry of the certificate's pictures; the page draws them as inline SVG."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rig.data.entries.bias_drift import DriftEntry
+from rig.data.entries.budget import BudgetEntry
+from rig.data.quantity import DisplayUnit
+from rig.data.result_file import GyroscopeEntry
+from rig.report.findings.finding import Finding
+from rig.report.findings.unexplained import (
+    Unexplained,
+    find_attitude_residuals,
+    find_repeat_residuals,
+    find_sweep_residuals,
+)
+from rig.report.tables.certificate import AXES
+from rig.report.words.printed_budget import printed_indices
+
+WIDTH, LEFT_MARGIN, RIGHT_MARGIN = 340.0, 42.0, 8.0
+TOP, HEIGHT = 18.0, 104.0
+NAMES, ROW, DECADES = 106.0, 13.0, 4
+
+
+@dataclass(frozen=True, slots=True)
+class PlotPoint:
+    """A residual and its bar, in pixels."""
+
+    x: float
+    y: float
+    low: float
+    high: float
+    axis: int
+
+
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """Three values of each sweep, attitude or repeat; `ticks` are heights with their labels, rests begin at `split`.
+
+    `shown` describes the points, `expectation` the bars, which are two standard deviations.
+    """
+
+    points: tuple[PlotPoint, ...]
+    ticks: tuple[tuple[float, str], ...]
+    zero: float
+    split: float | None
+    unit: str
+    within: int
+    shown: str
+    expectation: str
+
+
+@dataclass(frozen=True, slots=True)
+class Contributions:
+    """Contributions to the combined uncertainty on a logarithmic axis: (name, y, x of k, x of b).
+
+    They are of the values of the printed budget, on their `axes`.
+    """
+
+    axes: tuple[str, str]
+    rows: tuple[tuple[str, float, float, float], ...]
+    ticks: tuple[tuple[float, str], ...]
+    end: float
+
+
+def residuals(finding: Finding[GyroscopeEntry]) -> Residuals | None:
+    """Return the residuals of a gyroscope's sweeps and rests; None if there are none."""
+    unexplained = find_sweep_residuals(finding)
+    return None if unexplained is None else _draw(unexplained)
+
+
+def attitude_residuals(finding: Finding[Any]) -> Residuals:
+    """Return the residuals of each attitude."""
+    return _draw(find_attitude_residuals(finding))
+
+
+def biases_by_repeat(finding: Finding[DriftEntry]) -> Residuals:
+    """Return the biases by repeat, minus their mean over the repeats."""
+    return _draw(find_repeat_residuals(finding))
+
+
+def _draw(unexplained: Unexplained) -> Residuals:
+    """Return values (n, 3) side by side, with bars of two standard deviations, in a unit that suits the largest."""
+    values, bars, split = unexplained.values, 2 * unexplained.stds, unexplained.split
+    reach, unit = reach_in(float((np.abs(values) + bars).max()), unexplained.quantity.residuals)
+    across = (WIDTH - LEFT_MARGIN - RIGHT_MARGIN) / len(values)
+
+    def height(value: float) -> float:
+        return round(TOP + HEIGHT / 2 * (1 - value / unit.size / reach), 1)
+
+    def point(index: int, axis: int) -> PlotPoint:
+        value, bar = values[index, axis], bars[index, axis]
+        x = LEFT_MARGIN + across * (index + 0.5 + 0.22 * (axis - 1))
+        return PlotPoint(round(x, 1), height(value), height(value - bar), height(value + bar), axis)
+
+    points = tuple(point(index, axis) for index in range(len(values)) for axis in range(3))
+    ticks = tuple(
+        (height(value * unit.size), f"{value:g}".replace("-", "−")) for value in (-reach / 1.1, 0.0, reach / 1.1)
+    )
+    begins = None if split is None else round(LEFT_MARGIN + across * split, 1)
+    within = int((np.abs(values) <= bars).sum())
+    return Residuals(points, ticks, height(0.0), begins, unit.name, within, unexplained.shown, unexplained.expectation)
+
+
+def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, DisplayUnit]:
+    """Return a round limit above `largest`, and its unit: the first in which `largest` is above 1."""
+    unit = next((unit for unit in units if largest >= unit.size), units[-1])
+    shown = largest / unit.size
+    decade = 10 ** np.floor(np.log10(max(shown, 1e-9)))
+    reach = next(step * decade for step in (1, 2, 3, 4, 5, 6, 8, 10) if step * decade >= shown)
+    return 1.1 * float(reach), unit
+
+
+def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
+    """Return standard uncertainties over the combined one, for the printed budget; at least 1e-4 is drawn."""
+    k, b = printed_indices(budget, scale)
+    across = (WIDTH - NAMES - RIGHT_MARGIN) / DECADES
+
+    def position(fraction: float) -> float:
+        return round(NAMES + across * (DECADES + float(np.log10(np.clip(np.sqrt(fraction), 10.0**-DECADES, 1.0)))), 1)
+
+    lines = sorted(budget.contributors, key=lambda line: -max(line.variance_fraction[k], line.variance_fraction[b]))
+    rows = tuple(
+        (line.name, TOP + ROW * (i + 0.5), position(line.variance_fraction[k]), position(line.variance_fraction[b]))
+        for i, line in enumerate(lines)
+    )
+    labels = ("0.01 %", "0.1 %", "1 %", "10 %", "100 %")
+    ticks = tuple((NAMES + across * i, label) for i, label in enumerate(labels))
+    return Contributions((AXES[k], AXES[b - 3]), rows, ticks, TOP + ROW * len(rows))

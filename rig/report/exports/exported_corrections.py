@@ -1,0 +1,81 @@
+"""A run's calibrations for exports: the corrections of all kinds, and IMUs of gyroscope and accelerometer."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rig.data.entries.temperature import OverTemperatureEntry
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.result_file import ResultDocument
+from rig.errors import Refused
+from rig.errors.quoting import printable
+from rig.estimation.arrays import Array
+from rig.report.findings.linear_corrections import Corrected
+from rig.report.kinds.kind_registry import outlets, terms_of
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """A gyroscope with the accelerometer of the same sensor, if one was calibrated."""
+
+    gyroscope: Corrected
+    accelerometer: Corrected | None
+
+    @property
+    def name(self) -> str:
+        """The sensor of which both are parts."""
+        return self.gyroscope.sensor
+
+    @property
+    def g_sensitivity(self) -> Array:
+        """The gyroscope's g-sensitivity (3, 3), rad/s per m/s²; zero if unknown."""
+        matrix = self.gyroscope.g_sensitivity
+        return np.zeros((3, 3)) if matrix is None else matrix
+
+
+@dataclass(frozen=True)
+class ExportedCalibrations:
+    """The `sensors` that a run calibrated, kind by kind, and polynomials of temperature by sensor and quantity."""
+
+    result: ResultDocument
+    sensors: tuple[Corrected, ...]
+    over_temperature: Mapping[str, Mapping[str, OverTemperatureEntry]]
+
+    @cached_property
+    def imus(self) -> tuple[Imu, ...]:
+        """All gyroscopes, with their accelerometers. Raise Refused `nothing_to_export` if there are none."""
+        accelerometers = {triad.sensor: triad for triad in self.sensors if triad.quantity == ACCELERATION}
+        gyroscopes = [triad for triad in self.sensors if triad.quantity == RATE]
+        if not gyroscopes:
+            raise Refused("nothing_to_export", "the run calibrated no gyroscope", "Give a run that calibrates one")
+        return tuple(Imu(gyroscope, accelerometers.get(gyroscope.sensor)) for gyroscope in gyroscopes)
+
+    @property
+    def not_in_imus(self) -> tuple[str, ...]:
+        """Results that a file of an IMU cannot hold: sensors outside of an IMU, and `further_terms`."""
+        parts = [triad for imu in self.imus for triad in (imu.gyroscope, imu.accelerometer)]
+        return (*(triad.name for triad in self.sensors if triad not in parts), *self.further_terms)
+
+    @property
+    def further_terms(self) -> tuple[str, ...]:
+        """Results other than scale and bias, which no format supports."""
+        terms = (term for term in terms_of(self.result, "exports") if not term.finding.is_reference)
+        return tuple(printable(f"{term.whose}, {term.name}") for term in terms)
+
+    def origin(self, sensor: Corrected) -> Iterator[str]:
+        """Yield the sensor, the time and temperature of its calibration, and the program."""
+        provenance = self.result.provenance
+        temperature = "" if sensor.temperature_c is None else f" at {sensor.temperature_c:.1f} degC,"
+        yield printable(f"{sensor.sensor}: {sensor.part} {sensor.serial_number},{temperature} {provenance.started_utc}")
+        yield printable(
+            f"by calibration-rig {provenance.rig_version}, configuration {provenance.configuration_sha256[:16]}"
+        )
+
+
+def calibrations(result: ResultDocument) -> ExportedCalibrations:
+    """Return the corrections of all kinds of results; references are left out."""
+    corrections = (correct(finding) for _, correct, finding in outlets(result, lambda kind: kind.corrected))
+    sensors = tuple(correction for correction in corrections if correction is not None)
+    return ExportedCalibrations(result, sensors, result.over_temperature)

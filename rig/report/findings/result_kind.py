@@ -1,0 +1,153 @@
+"""The interface of a kind of result to all outlets: terminal, page, notebook, certificate, history, header, exports."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+from xml.etree.ElementTree import Element
+
+from rich.table import Table
+
+from rig.analysis.outcome import Outcome
+from rig.config.judging.judging_sections import SiteSection
+from rig.data.entries.magnetometer import ReversalEntry
+from rig.data.quantity import DisplayUnit, Quantity
+from rig.data.result_file import ResultDocument
+from rig.estimation.arrays import Array
+from rig.report.findings.characteristic import Characteristic, Term
+from rig.report.findings.finding import EntryT, Finding
+from rig.report.findings.history_records import HistoryRecord
+from rig.report.findings.linear_corrections import Corrected
+from rig.report.findings.unexplained import Unexplained
+
+ItemT = TypeVar("ItemT")
+OWN_TEMPLATES = Path(__file__).parents[1] / "certificate" / "templates"
+
+
+@dataclass(frozen=True, slots=True)
+class NoOutlet:
+    """The reason why a kind of result has no such outlet."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class AxisValues:
+    """Values of the axes x, y, z, or by other labels, with their expanded uncertainties."""
+
+    values: Sequence[float]
+    expanded: Sequence[float]
+
+
+@dataclass(frozen=True, slots=True)
+class DisplayRow:
+    """A row of page and notebook: numbers under a `name`, in `unit`, with scale factors if there are any.
+
+    - `sensor`, `quantity`: the sensor and what it measures.
+    - `name`, `unit`, `numbers`: the row's name, its unit, and its values with U.
+    - `combined`: whether U includes all contributors; else it is two standard deviations of the noise.
+    - `scale`: the scale factors with U.
+    - `held_at`: the conditions of validity at the end of a run ("at ±60.0 °/s").
+    - `model`: the model there ("g = K (m + b)").
+    - `noun`: the name of numbers without scale factors.
+    - `labels`: the labels of the numbers.
+    """
+
+    sensor: str
+    quantity: Quantity
+    name: str
+    unit: DisplayUnit
+    numbers: AxisValues
+    combined: bool
+    scale: AxisValues | None = None
+    held_at: str = ""
+    model: str = ""
+    noun: str = "bias"
+    labels: Sequence[str] = "xyz"
+
+
+@dataclass(frozen=True, slots=True)
+class CertifiedItem:
+    """The digital certificate's content for one item: named results, and the temperatures of their readings.
+
+    The item is the `sensor` of that name of one kind (`item`: gyroscope), with part and serial number if the result
+    states them.
+    """
+
+    item: str
+    sensor: str
+    part: str | None
+    serial_number: str | None
+    name: str
+    results: Iterable[Element]
+    temperatures_c: Mapping[str, float | None] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Standard:
+    """The reference standard of the scale factors of sensors in known attitudes, for certificates.
+
+    `size` is the required quantity, `value` formats its value from an entry, `origin` is the laboratory's statement of
+    its source. `quantity` is its name when a file gives the motion; `method` describes the measurement on an
+    arm, with or without sweeps of a gyroscope.
+    """
+
+    size: str
+    value: Callable[[Any], str]
+    origin: Callable[[SiteSection], str | None]
+    quantity: str
+    method: Callable[[bool], str]
+
+
+@dataclass(frozen=True, slots=True)
+class ResultKind(Generic[EntryT]):
+    """A kind of result, by its outlets or the reasons why it has none.
+
+    - `name`: its name for people. `key`: its key in `result.json`. `entries`: builds the entries there, none if the run
+      has none. `find`: finds them in a document.
+    - `printed`: yields tables and lines for the terminal. `unsolved`: yields why sensors have no solution. `in_short`:
+      yields lines for the end of a run, if the kind has no row.
+    - `shown`: builds the row of page and notebook. `followed`: builds the record of a history.
+    - `figures`: the writer of its pictures in a run folder (`module:function`). `header`: yields the lines of
+      `calibration.h`, by the g-sensitivities (3, 3) of the gyroscopes.
+    - `block`: the macro of the certificate's page (`template:macro`) that prints one; the template is in `templates`.
+    - `measured`: the content of the digital certificate, with reversals by sensor. `standard`: the statement of
+      traceability in both certificates.
+    - `characteristics`: quantities other than scale and bias, which terminal, page, notebook, both certificates,
+      history and exports walk after the kind's own output.
+    - `corrected`: the correction of readings for exports; None for a reference. `unexplained`: the residuals of its
+      means for pictures; None if it has none.
+    """
+
+    name: str
+    key: str
+    entries: Callable[[Outcome], Mapping[str, object]] | NoOutlet
+    find: Callable[[ResultDocument], Iterator[Finding[EntryT]]]
+    printed: Callable[[Finding[EntryT]], Iterator[Table | str]] | NoOutlet
+    shown: Callable[[Finding[EntryT]], DisplayRow] | NoOutlet
+    followed: Callable[[Finding[EntryT], ResultDocument], HistoryRecord | None] | NoOutlet
+    header: Callable[[Finding[EntryT], Mapping[str, Array]], Iterable[str]] | NoOutlet
+    figures: str | NoOutlet
+    block: str | NoOutlet
+    measured: Callable[[Finding[EntryT], Mapping[str, ReversalEntry]], CertifiedItem | None] | NoOutlet
+    standard: Standard | NoOutlet
+    corrected: Callable[[Finding[EntryT]], Corrected | None] | NoOutlet
+    unexplained: Callable[[Finding[EntryT]], Unexplained | None] | NoOutlet
+    templates: Path = OWN_TEMPLATES
+    unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
+    in_short: Callable[[Finding[EntryT]], Iterable[str]] = lambda _: ()
+    characteristics: tuple[Characteristic, ...] = ()
+
+
+def row_of(term: Term, whose: str | None = None, noun: str | None = None) -> DisplayRow:
+    """Return the row of a characteristic, by default under the names of its sensor and its own."""
+    finding, whose, noun = term.finding, whose or term.whose, noun or term.name
+    labels, values, widths = zip(*term.printed, strict=True)
+    numbers, unit = AxisValues(values, widths), term.units.shown
+    about = finding.sensor, finding.quantity, f"{whose}: {noun}", unit, numbers
+    return DisplayRow(*about, combined=True, noun=noun, labels=labels)
+
+
+def outlet_items(outlet: Callable[..., Iterable[ItemT]] | NoOutlet, *about: object) -> Iterable[ItemT]:
+    """Return the items that an outlet yields for its arguments; none if the kind has no such outlet."""
+    return () if isinstance(outlet, NoOutlet) else outlet(*about)

@@ -1,0 +1,65 @@
+"""All kinds of results, in the order in which they are shown: a new one is a file and a line here."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache
+from typing import Any, Final, TypeVar
+
+from rig.data.installed_kinds import installed_kinds
+from rig.data.result_file import ResultDocument
+from rig.report.findings.characteristic import Outlet, Term, terms
+from rig.report.findings.finding import Finding
+from rig.report.findings.history_records import HistoryRecord, parameters, select_uncertain
+from rig.report.findings.result_kind import DisplayRow, NoOutlet, ResultKind, row_of
+from rig.report.kinds.accelerometer import ACCELEROMETER
+from rig.report.kinds.bias_drift import BIAS_DRIFT
+from rig.report.kinds.earth_rate import EARTHS_RATE
+from rig.report.kinds.gyroscope import GYROSCOPE
+from rig.report.kinds.magnetometer import MAGNETOMETER
+from rig.report.kinds.over_temperature import OVER_TEMPERATURE
+from rig.report.kinds.verification import VERIFICATION
+
+OutletT = TypeVar("OutletT")
+OF_THE_RIG: Final[tuple[ResultKind[Any], ...]] = (
+    GYROSCOPE, EARTHS_RATE, ACCELEROMETER, MAGNETOMETER, BIAS_DRIFT, OVER_TEMPERATURE, VERIFICATION,
+)  # fmt: skip
+
+
+@cache
+def kinds() -> tuple[ResultKind[Any], ...]:
+    """Return all kinds of results; those of packages (`rig.data.installed_kinds`) follow the rig's own."""
+    return (*OF_THE_RIG, *(kind.result for kind in installed_kinds()))
+
+
+def outlets(
+    document: ResultDocument, outlet_of: Callable[[ResultKind[Any]], OutletT | NoOutlet]
+) -> Iterator[tuple[ResultKind[Any], OutletT, Finding[Any]]]:
+    """Yield for everything in a result that has this outlet: the kind, the outlet and the finding."""
+    for kind in kinds():
+        if not isinstance(outlet := outlet_of(kind), NoOutlet):
+            yield from ((kind, outlet, finding) for finding in kind.find(document))
+
+
+def terms_of(document: ResultDocument, outlet: Outlet | None = None) -> Iterator[Term]:
+    """Yield all characteristics in a result, kind by kind, or those that `outlet` takes."""
+    for kind in kinds():
+        for finding in kind.find(document):
+            yield from terms(kind.characteristics, finding, outlet)
+
+
+def shown(document: ResultDocument) -> Iterator[DisplayRow]:
+    """Yield the rows of page and notebook: the kinds' rows of all sensors, then those of characteristics."""
+    yield from (show(finding) for _, show, finding in outlets(document, lambda kind: kind.shown))
+    yield from map(row_of, terms_of(document, "page"))
+
+
+def followed(document: ResultDocument) -> tuple[HistoryRecord, ...]:
+    """Return the records of all sensors of a result for a history, references included."""
+    return tuple(_records(document))
+
+
+def _records(document: ResultDocument) -> Iterator[HistoryRecord]:
+    for kind, follow, finding in outlets(document, lambda kind: kind.followed):
+        if (record := follow(finding, document)) is not None:
+            more = select_uncertain([*parameters(terms(kind.characteristics, finding, "history"))])
+            yield replace(record, parameters=(*record.parameters, *more))

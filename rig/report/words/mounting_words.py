@@ -1,0 +1,41 @@
+"""The measured mounting of the item in each stage of a run, in words. Pure.
+
+If each stage turns the item about one axis only, its mounting is not measured, and there are no words.
+"""
+
+from collections.abc import Iterator
+from math import degrees, hypot
+
+from rig.data.result_file import MountEntry, ResultDocument
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR
+from rig.report.words.printed_values import plus_minus
+
+ROUNDING = 1e-6  # of its uncertainty: a smaller rotation is the assumed one, not a measured one
+
+
+def mount_lines(result: ResultDocument) -> Iterator[str]:
+    """Yield a line for each stage after the first, relative to the first; none if the item stayed mounted."""
+    yield from map(_line, _measured_mounts(result))
+
+
+def farthest_off(result: ResultDocument) -> Iterator[str]:
+    """Yield the line of the stage with the largest mounting error, and the number of other stages."""
+    mounts = _measured_mounts(result)
+    if not mounts:
+        return
+    others = len(mounts) - 1
+    farthest = _line(max(mounts, key=lambda mount: hypot(*mount.rotation_rad)))
+    yield farthest if not others else f"{farthest}; less in {others} other stage{'s' if others > 1 else ''}"
+
+
+def _measured_mounts(result: ResultDocument) -> list[MountEntry]:
+    return [mount for mount in result.mounts if hypot(*mount.rotation_rad) > ROUNDING * hypot(*mount.std_rad)]
+
+
+def _line(mount: MountEntry) -> str:
+    angles = (
+        f"{plus_minus(degrees(angle), degrees(COVERAGE_FACTOR * std))}°"
+        for angle, std in zip(mount.rotation_rad, mount.std_rad, strict=True)
+    )
+    x, y, z = angles
+    return f"mounting error in stage {mount.stage}: {x} about x, {y} about y, {z} about z"

@@ -1,0 +1,277 @@
+"""A session by hand while it happens: asks for a move, waits for the rest after it, accepts the move or asks again.
+
+Nothing here can move anything. The first sensor to calibrate decides; the others are recorded too, and all are solved
+from the recording afterwards, without the refused moves.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from queue import SimpleQueue
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.recording.hand_events import (
+    HandAsked,
+    HandBegunAnew,
+    HandMoveRefused,
+    HandMoveTaken,
+    HandRested,
+    HandRestRefused,
+    OfTheHand,
+)
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import HandSettings
+from rig.errors import Fault
+from rig.estimation.by_hand.progress import SessionProgress, assess_progress
+from rig.estimation.by_hand.session_parts import HandRest, Move, SessionConditions
+from rig.motion.by_hand import FACES, Face, HandMove, Instruction
+from rig.observation.by_hand.hand_segmentation import Segmenter
+from rig.observation.by_hand.rests_and_moves import (
+    BETWEEN_S,
+    NotCounted,
+    microsecond_of,
+    range_of,
+    readings_of,
+    replay_runs,
+    rotate_face,
+)
+from rig.plans.by_hand import Open, WantedMoves, next_instruction, still_open
+from rig.runner.acquisition import Acquisition
+from rig.station.events import HandSeen, RunEvent
+
+LOOK_S = 0.05
+HELD_S = 3.0  # in the hand, before the operator is reminded to lay it down
+MISSED = 3.0  # standard deviations of a whole turn's end
+REFUSED_IN_A_ROW = 10  # then the session ends, as another error is likely
+NO_REST = frozenset({"held_not_laid_down", "not_flat"})  # the item lies still, but not on a side
+ANEW = frozenset({"bias_jumped", "table_moved"})  # the readings before and after do not agree
+MENDED_BY_HAND = frozenset({"clipping", "lost_in_move", "no_fit", "turn_not_closed"}) | NO_REST | ANEW
+
+
+@dataclass(slots=True)
+class HandSession:
+    """A session of `settings`, judged by the sensor `name`.
+
+    - `conditions`: the other inputs of the solution.
+    - `earlier`: the recordings before an interruption; their rests and moves count.
+    - `wait`: lets a number of seconds pass between two looks at the samples.
+    """
+
+    acquisition: Acquisition
+    note: Callable[[OfTheHand], None]
+    tell: Callable[[RunEvent], None]
+    settings: HandSettings
+    name: str
+    sensor: RecordedSensor
+    conditions: SessionConditions
+    earlier: Sequence[RunData] = ()
+    wait: Callable[[float], None] = time.sleep
+    _segmenter: Segmenter = field(init=False)
+    _not_counted: NotCounted = field(init=False)
+    _begins_s: float | None = None  # start of this recording by the session's clock; None: by the board's
+    _shift_s: float | None = None  # from the board's clock to the session's, once samples have come
+    _move: Move | None = None  # that has ended, before the rest after it is judged
+    _rest: HandRest | None = None  # that has begun, while it is shorter than required
+    _judged_s: float = -np.inf  # when the rest ended that was judged last
+    _accepted: list[HandMove] = field(default_factory=list)
+    _lay: list[Face] = field(default_factory=list)  # the faces that lay up
+    _refused: int = 0  # in a row
+    _bias_doubted: bool = False  # at the rest before, in which the item may have crept
+    _reminded: bool = False
+    _request: HandAsked | None = None
+    _progress: SessionProgress | None = None
+
+    def __post_init__(self) -> None:
+        if not self.earlier:
+            self._segmenter = Segmenter(range_of(self.sensor))
+            self._not_counted = NotCounted(microsecond_s=microsecond_of(self.sensor))
+            return
+        self._segmenter, self._not_counted, ends_s = replay_runs(self.earlier, self.name)
+        self._not_counted.seams.append(ends_s + BETWEEN_S / 2)
+        self._begins_s = self._judged_s = ends_s + BETWEEN_S
+        for event in (recorded.event for run in self.earlier for recorded in run.events):
+            if isinstance(event, HandMoveTaken):
+                self._accepted.append(HandMove(event.kind, event.from_face, event.to_face, event.turns))
+            elif isinstance(event, HandRested):
+                self._lay.append(event.face)
+            elif isinstance(event, HandBegunAnew):
+                self._accepted, self._lay = [], []
+
+    def carry_out(self, check: Callable[[], None]) -> None:
+        """Ask for the moves of the list until all are made or U reaches the target. Call `check` many times a second.
+
+        Raise Fault for an error that no move can correct, and for ten errors in a row.
+        """
+        heard = self.acquisition.hear()
+        self._ask(next_instruction(self._open, None))
+        while self._request is not None:
+            self.wait(LOOK_S)
+            check()
+            self._feed([samples for name, samples in drain(heard) if name == self.name])
+            self._remind()
+            self.tell(self._describe())
+
+    @property
+    def _open(self) -> Open:
+        return still_open(WantedMoves(self.settings.flips, self.settings.turns), self._accepted, self._lay)
+
+    def _feed(self, batches: Sequence[NDArray[Any]]) -> None:
+        """Take the readings that have arrived."""
+        if not batches:
+            return
+        samples = np.concatenate(batches)
+        if self._shift_s is None:
+            first_s = microsecond_of(self.sensor) * float(samples["board_time_us"][0])
+            self._shift_s = 0.0 if self._begins_s is None else self._begins_s - first_s
+        for segment in self._segmenter.feed(*readings_of(self.sensor, samples, self._shift_s)):
+            if self._rest is not None:
+                self._judge_rest(self._rest)
+            self._move, self._rest = (segment, None) if isinstance(segment, Move) else (self._move, segment)
+        live = self._segmenter.live
+        lasts = self._rest is not None and live.time_s - self._rest.start_s >= self.settings.rest_s
+        if self._rest is not None and (lasts or live.state != "resting"):
+            self._judge_rest(self._rest)
+
+    def _judge_rest(self, rest: HandRest) -> None:
+        """Judge the move before a rest, and ask for the next."""
+        move, self._move, self._rest = self._move, None, None
+        if move is not None and self._begins_s is not None and move.start_s < self._begins_s:
+            move = None  # it began in the interruption
+        self._pauses_before(rest)
+        session = self._not_counted.filter_session(self._segmenter.handled)
+        now = self._progress = assess_progress(session, self.conditions)
+        wrong = now.fault_of_last or self._not_closed(now)
+        read = now.faces[-1] if now.faces else None
+        if read is None:
+            wrong = wrong or Fault("not_flat", "it lies on none of its six sides", "Lay it down on a side, and let go")
+        counts = wrong is None or self._wrong(wrong, move, rest)
+        face = None if read is None else self._face(read)
+        if face is None or not counts:
+            last = Instruction("lay", FACES[0]) if self._request is None else self._request.instruction
+            self._ask(last if face is None else Instruction("lay", face), wrong)
+            return
+        self._bias_doubted = False
+        self.note(HandRested(*self._board_us(rest), face))
+        if move is not None and wrong is None:
+            self._take(move, now, face)
+        self._lay.append(face)
+        self._ask(self._next(now, face), wrong)
+
+    def _pauses_before(self, rest: HandRest) -> None:
+        """Refuse rests too short to be judged: they are pauses in the hand."""
+        for pause in self._segmenter.handled.rests:
+            if self._judged_s < pause.start_s and pause.end_s < rest.start_s:
+                event = HandRestRefused(*self._board_us(pause), "held_not_laid_down")
+                self._not_counted.take(event, self._shift_s or 0.0)
+                self.note(event)
+        self._judged_s = rest.end_s
+
+    def _not_closed(self, now: SessionProgress) -> Fault | None:
+        """Return the fault of a whole turn that ends too far from its start, or None."""
+        if not now.moves or self._request is None:
+            return None
+        last, whole_rad = now.moves[-1], 2 * np.pi
+        missed_rad = last.closure_rad
+        if missed_rad is None and self._request.instruction.say == "turn" and last.angle_rad > np.pi:
+            missed_rad = last.angle_rad - whole_rad * max(1, round(last.angle_rad / whole_rad))
+        if missed_rad is None or abs(missed_rad) <= MISSED * self.settings.closure_rad:
+            return None
+        what = f"that turn ended {abs(np.degrees(missed_rad)):.1f}° from where it began"
+        return Fault("turn_not_closed", what, "Lay it back against the rule, and turn again")
+
+    def _next(self, now: SessionProgress, face: Face | None) -> Instruction | None:
+        """Return the next instruction; None if the session has enough."""
+        wanted = self.settings.wanted_scale_u
+        enough = wanted is not None and now.solution is not None and float(max(now.expanded_scale)) <= wanted
+        return None if enough else next_instruction(self._open, face)
+
+    def _take(self, move: Move, now: SessionProgress, face: Face) -> None:
+        """Count a move, unless it took too long to be of use."""
+        self._refused = 0
+        if now.moves[-1].kind == "omitted":
+            return
+        before, turns = self._lay[-1] if self._lay else face, now.moves[-1].turns
+        kind: Literal["flip", "turn"] = "flip" if before != face else "turn"
+        self._accepted.append(HandMove(kind, before, face, turns if kind == "turn" else 0))
+        self.note(HandMoveTaken(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
+
+    def _wrong(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
+        """Leave out a faulty move, a rest, or all before; return whether the rest counts.
+
+        A changed bias at one rest may be a creep and costs this rest; at the next rest too it is a new bias. Raise the
+        Fault that no move can correct.
+        """
+        self._refused += 1
+        if wrong.name not in MENDED_BY_HAND:
+            raise wrong
+        if self._refused >= REFUSED_IN_A_ROW:
+            what = f"{REFUSED_IN_A_ROW} moves in a row were refused; the last: {wrong.what}"
+            raise Fault(wrong.name, what, wrong.remedy)
+        events: list[OfTheHand] = []
+        crept = wrong.name == "bias_jumped" and not self._bias_doubted
+        no_rest = crept or wrong.name in NO_REST
+        if no_rest:
+            self._bias_doubted |= crept
+            events.append(HandRestRefused(*self._board_us(rest), wrong.name))
+        elif wrong.name in ANEW:
+            events.append(HandBegunAnew(self._board_us(rest)[0], wrong.name))
+            self._accepted, self._lay = [], []
+        elif move is not None:
+            events.append(HandMoveRefused(*self._board_us(move), wrong.name))
+        for event in events:
+            self._not_counted.take(event, self._shift_s or 0.0)
+            self.note(event)
+        return not no_rest
+
+    def _remind(self) -> None:
+        """Remind the operator to lay the item down if it is held in the hand."""
+        live = self._segmenter.live
+        in_hand = live.state == "held" and live.time_s - live.since_s >= HELD_S
+        if in_hand and not self._reminded and self._request is not None:
+            what = f"it has been held in the hand for {live.time_s - live.since_s:.0f} s"
+            wrong = Fault("held_not_laid_down", what, "Lay it down and let go")
+            self._ask(self._request.instruction, wrong)
+        self._reminded = in_hand
+
+    def _ask(self, instruction: Instruction | None, wrong: Fault | None = None) -> None:
+        """Ask the operator for a move; None ends the session."""
+        self._request = None
+        if instruction is not None:
+            again, why = (None, "") if wrong is None else (wrong.name, f"{wrong.what}. {wrong.remedy}"[:500])
+            self._request = HandAsked(instruction, again, why)
+            self.note(self._request)
+
+    def _face(self, of_sensor: str) -> Face:
+        """Return the face of the item that has the sensor's axis `of_sensor` upwards."""
+        return rotate_face(of_sensor, np.array(self.sensor.mounting).T)
+
+    def _board_us(self, part: HandRest | Move) -> tuple[int, int]:
+        """Return the start and the end of a rest or a move by the board's clock, µs."""
+        shift_s, microsecond_s = self._shift_s or 0.0, microsecond_of(self.sensor)
+        return round((part.start_s - shift_s) / microsecond_s), round((part.end_s - shift_s) / microsecond_s)
+
+    def _describe(self) -> HandSeen:
+        live, remaining, progress = self._segmenter.live, self._open, self._progress
+        return HandSeen(
+            time_s=live.time_s,
+            doing=live.state,
+            since_s=max(live.time_s - live.since_s, 0.0),
+            turned_rad=float(np.linalg.norm(live.turned_rad)),
+            peak_rad_s=live.peak_rad_s,
+            range_rad_s=range_of(self.sensor) or 0.0,
+            expanded_scale=None if progress is None else float(max(progress.expanded_scale)),
+            faces=tuple(dict.fromkeys(self._lay)),
+            pairs=remaining.pairs,
+            turns=remaining.turns,
+            accepted=len(self._accepted),
+        )
+
+
+def drain(heard: "SimpleQueue[tuple[str, NDArray[Any]]]") -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the samples that have arrived, without waiting for more."""
+    while not heard.empty():
+        yield heard.get()

@@ -1,0 +1,98 @@
+"""A turner that is connected before the run that uses it, while the operator mounts the part. Nothing moves.
+
+A run ends with its turner stopped for good, so each run needs its own connection, which takes seconds.
+"""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from pathlib import Path
+
+from rig.errors import RigError
+from rig.motion.turner_state import State
+from rig.turners.turner import Turner
+from rig.turners.turner_kind import OnState
+
+Connecting = Callable[[OnState, Path], AbstractContextManager[Turner]]
+
+
+class Ahead:
+    """A connection by `connect`, logged into `log`, that is made before the run; the next run takes it over.
+
+    If it has failed or was lost meanwhile, the run connects by itself and reports the error.
+    """
+
+    def __init__(self, connect: Connecting, log: Path) -> None:
+        self._connect, self._log = connect, log
+        self._next: _Connection | None = None
+
+    def begin(self) -> None:
+        """Connect the next turner in a thread, unless one is connected already."""
+        if self._next is None:
+            self._next = _Connection(self._connect, self._log)
+
+    @contextmanager
+    def connect_turner(self, on_state: OnState, log: Path) -> Iterator[Turner]:
+        """Provide the turner of a run, as its kind connects it; every state from now on goes to `on_state`."""
+        connection, self._next = self._next, None
+        with ExitStack() as stack:
+            turner = None if connection is None else connection.hand_over(stack, on_state)
+            yield turner or stack.enter_context(self._connect(on_state, log))
+
+    def close(self) -> None:
+        """Close a connection that no run has used."""
+        if self._next is not None:
+            self._next.close()
+            self._next = None
+
+
+class _Connection:
+    """One turner, from the thread that connects it to the run that takes it."""
+
+    def __init__(self, connect: Connecting, log: Path) -> None:
+        self._on_state: OnState = _forget
+        self._context = connect(self._pass_on, log)
+        self._turner: Turner | None = None
+        self._thread = threading.Thread(target=self._work, name="ahead", daemon=True)
+        self._thread.start()
+
+    def _work(self) -> None:
+        try:
+            self._turner = self._context.__enter__()
+        except (RigError, OSError):
+            return  # the run connects by itself, and meets the same
+
+    def _pass_on(self, state: State) -> None:
+        self._on_state(state)
+
+    def hand_over(self, stack: ExitStack, on_state: OnState) -> Turner | None:
+        """Return the turner if it is connected and without fault, else None; `stack` closes it then."""
+        self._thread.join()
+        if self._turner is None:
+            return None
+        try:
+            self._turner.check()
+            well = self._turner.missed_states == 0  # else the run would report states that were missed before it began
+        except RigError:
+            well = False
+        if not well:
+            self.close()
+            return None
+        stack.callback(self._let_go)
+        stack.push(self._context)
+        self._on_state = on_state
+        return self._turner
+
+    def _let_go(self) -> None:
+        """Drop the references to the run, which would keep all of its readings in memory."""
+        self._on_state, self._turner = _forget, None
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._thread.join()
+        if self._turner is not None:
+            self._context.__exit__(None, None, None)
+
+
+def _forget(state: State) -> None:
+    """Drop a state that arrives before a run has begun."""

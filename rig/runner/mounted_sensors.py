@@ -1,0 +1,142 @@
+"""The mounted sensors beside the earlier calibrations of their serial numbers, confirmed before anything moves."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.errors import Refused
+from rig.station.events import Prompt
+from rig.station.operator_station import Station
+
+
+@dataclass(frozen=True, slots=True)
+class CalibratedBefore:
+    """A calibration in the history that counts: its `number` there, its day, its verdict.
+
+    `board_unique_id` is None if the sensor was on no board.
+    """
+
+    part: str
+    serial_number: str
+    simulated: bool
+    number: int
+    day: str
+    verdict: str
+    board_unique_id: str | None
+
+    @property
+    def words(self) -> str:
+        """The day and the verdict of the calibration, and its number."""
+        return f"{self.day}, {self.verdict.upper()} (calibration {self.number})"
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """The earlier calibrations of the sensors' serial numbers, the newest first.
+
+    `silent` is why none can be read, None if the history answered. `moved` are the serial numbers of sensors that the
+    operator has declared to be on another board than before.
+    """
+
+    calibrations: Sequence[CalibratedBefore] = ()
+    silent: str | None = "no history was asked"
+    moved: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class MountedSensor:
+    """A sensor of this run: its name, its part, the board it is on (None: a port of its own).
+
+    `last` is the last calibration of its serial number, `elsewhere` the last one on a board if that was another.
+    """
+
+    name: str
+    part: str
+    serial_number: str
+    board: str | None
+    last: CalibratedBefore | None
+    elsewhere: CalibratedBefore | None
+
+
+@dataclass(frozen=True, slots=True)
+class Mounted:
+    """The sensors that are turned, and their earlier calibrations."""
+
+    sensors: tuple[MountedSensor, ...]
+    memory: Memory
+
+    @property
+    def doubtful(self) -> tuple[MountedSensor, ...]:
+        """The sensors last calibrated on another board, unless the operator has declared that to be right."""
+        moved = self.memory.moved
+        return tuple(sensor for sensor in self.sensors if sensor.elsewhere and sensor.serial_number not in moved)
+
+    def lines(self) -> Iterator[str]:
+        """Return a line for each board and sensor, with the sensor's last calibration."""
+        for board in dict.fromkeys(sensor.board for sensor in self.sensors if sensor.board is not None):
+            yield f"The board is {board}."
+        for sensor in self.sensors:
+            before = "not calibrated before" if sensor.last is None else f"last calibrated {sensor.last.words}"
+            past = f", {before}" if self.memory.silent is None else ""
+            if sensor.elsewhere is not None:
+                past += f", on another board ({sensor.elsewhere.board_unique_id})"
+            yield f"{sensor.name}: {sensor.part} {sensor.serial_number}{past}."
+        if self.memory.silent is not None:
+            yield f"What was calibrated before is not known: {self.memory.silent}."
+
+
+def find_mounted(
+    sensors: Mapping[str, RecordedSensor], board: str | None, memory: Memory, *, simulated: bool
+) -> Mounted:
+    """Return the sensors of a run that can be calibrated, on the board with the identifier `board`.
+
+    `sensors` is by name. A simulated sensor is never the same as a real one.
+    """
+    turned = []
+    for name, sensor in sensors.items():
+        if not sensor.has_axes:
+            continue
+        identity = sensor.part, sensor.serial_number, simulated
+        same = [past for past in memory.calibrations if (past.part, past.serial_number, past.simulated) == identity]
+        on_board = board if sensor.on_board else None
+        elsewhere = next((past for past in same if past.board_unique_id is not None), None)
+        if on_board is None or elsewhere is None or elsewhere.board_unique_id == on_board:
+            elsewhere = None
+        turned.append(
+            MountedSensor(name, sensor.part, sensor.serial_number, on_board, next(iter(same), None), elsewhere)
+        )
+    return Mounted(tuple(turned), memory)
+
+
+def ask_of_other_boards(mounted: Mounted, station: Station) -> None:
+    """Ask the operator to confirm the serial number of each doubtful sensor. Raise Refused `other_board`."""
+    doubtful = mounted.doubtful
+    if not doubtful:
+        return
+    statements = [_elsewhere(sensor, sensor.elsewhere) for sensor in doubtful if sensor.elsewhere is not None]
+    numbers = ", ".join(sensor.serial_number for sensor in doubtful)
+    another = (
+        "If this is another sensor, its serial number in the configuration is wrong, and this calibration would be "
+        "taken for one of the other sensor."
+    )
+    question = Prompt(
+        (*statements, another),
+        f"go on with {numbers} on another board",
+        to_tick=f"I have looked: the serial number is {numbers}, on another board than before",
+        for_a_person=True,
+    )
+    if not station.ask(question):
+        wrong = ", ".join(f"sensors.{sensor.name}.serial_number" for sensor in doubtful)
+        stated = " ".join(f"--other-board {sensor.serial_number}" for sensor in doubtful)
+        raise Refused(
+            "other_board",
+            "; ".join(statement.rstrip(".") for statement in statements),
+            f"Correct {wrong}; or, where a sensor was moved to this board, state that: {stated}",
+        )
+
+
+def _elsewhere(sensor: MountedSensor, last: CalibratedBefore) -> str:
+    return (
+        f"{sensor.part} {sensor.serial_number} was last calibrated {last.words} on ANOTHER board, "
+        f"{last.board_unique_id}; this one is {sensor.board}."
+    )

@@ -1,0 +1,67 @@
+"""Movements in the servo's terms: a goal in pulses, and a profile in milliseconds. Pure.
+
+Only the time-based profile is used (firmware 42 and later). The velocity-based one has steps of 1.37 °/s and of 21
+°/s², too coarse for a sweep at 60 °/s. The duration of the whole move in milliseconds sets its speed to 2e-4.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from rig.errors import Problem
+from rig.motion.steps import Motion
+from rig.turners.servo.servo_models import FARTHEST, LONGEST_MS, PULSE_RAD
+
+SHORTEST_MS = 20  # shortest profile: a few of the servo's control steps; 0 would mean the fastest motion
+
+
+class ProfileMove(NamedTuple):
+    """A goal in pulses, and the durations of the whole move and of each ramp."""
+
+    goal: int
+    total_ms: int
+    ramp_ms: int
+
+
+def move_of(motion: Motion) -> ProfileMove:
+    """Return the servo's nearest equivalent of a motion: ramps by acceleration, both within the total duration."""
+    total_ms = max(SHORTEST_MS, round(1000 * motion.duration_s))
+    ramp_ms = min(round(1000 * motion.speed_rad_s / motion.acceleration_rad_s2), total_ms // 2)
+    return ProfileMove(round(motion.target_q_rad[0] / PULSE_RAD), total_ms, ramp_ms)
+
+
+def cruise_rad_s(from_rad: float, move: ProfileMove) -> float:
+    """Return the speed between the ramps, rad/s, of the trapezoidal profile from `from_rad`."""
+    distance_rad = abs(move.goal * PULSE_RAD - from_rad)
+    return distance_rad / (1e-3 * (move.total_ms - move.ramp_ms))
+
+
+def move_problems(motions: Iterable[Motion], velocity_limit_rad_s: float) -> list[Problem]:
+    """Return the problems of motions that exceed the servo's limits, one of each kind."""
+    problems: dict[str, Problem] = {}
+    for motion in motions:
+        move = move_of(motion)
+        speed_rad_s = cruise_rad_s(motion.start_q_rad[0], move)
+        if abs(move.goal) > FARTHEST:
+            problem = Problem(
+                "servo_out_of_range",
+                f"{motion.name} ends {move.goal} pulses from zero, and the servo counts {FARTHEST} either way",
+                "Switch the servo off and on, so that it forgets its turns, and plan fewer",
+            )
+        elif move.total_ms > LONGEST_MS:
+            problem = Problem(
+                "servo_move_too_long",
+                f"{motion.name} takes {motion.duration_s:.1f} s, and the longest that the servo can do is "
+                f"{1e-3 * LONGEST_MS:.1f} s",
+                "Turn faster, or fewer turns at a time",
+            )
+        elif speed_rad_s > velocity_limit_rad_s:
+            problem = Problem(
+                "servo_too_fast",
+                f"{motion.name} needs {speed_rad_s:.2f} rad/s, and the servo's velocity limit is "
+                f"{velocity_limit_rad_s:.2f} rad/s",
+                "Turn slower; raise Velocity Limit (44) only as far as the servo's no-load speed",
+            )
+        else:
+            continue
+        problems.setdefault(problem.name, problem)
+    return list(problems.values())

@@ -1,0 +1,192 @@
+"""The maker's packet handler with exceptions: every call returns a valid reply or raises the reason."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from rig.errors import Problem, Refused
+from rig.errors.extras import missing_extra
+from rig.turners.servo.driver_clock import HOST, Clock
+from rig.turners.servo.latency import lower_latency
+from rig.turners.servo.servo_port import Port
+from rig.turners.servo.servo_registers import RETURN_LEVEL, Register
+
+# The errors of an unplugged port: pyserial's own is an OSError; a port closed meanwhile raises TypeError.
+FAILURES: tuple[type[Exception], ...] = (OSError, TypeError)
+with suppress(ImportError):  # on Windows
+    import termios
+
+    FAILURES = (*FAILURES, termios.error)
+SLACK_S = 0.020  # return delay (0.5 ms as delivered), latency of the adapter, and a busy host
+SETTLE_MOST_S = 0.1  # the longest wait for a line to fall silent
+ATTEMPTS = 4  # a write without acknowledgement is read back, and repeated if it did not take effect
+ALERT = 0x80  # in the error byte: Hardware Error Status is not zero. A flag, no failure of the instruction
+SUCCESS, NOT_SENT = 0, (-1000, -1001, -2000)  # results of the packet handler: port busy, not sent, wrong instruction
+DAMAGED = -3002
+
+
+class BusError(Exception):
+    """An error between this computer and the servo."""
+
+
+class ReplyLost(BusError):
+    """A missing reply, or a `damaged` one."""
+
+    def __init__(self, damaged: bool) -> None:
+        super().__init__("a damaged reply" if damaged else "no reply")
+        self.damaged = damaged
+
+
+class InstructionDenied(BusError):
+    """The servo's refusal of an instruction, with the error number of protocol 2.0."""
+
+    def __init__(self, number: int, register: Register) -> None:
+        super().__init__(f"error {number} at {register.name}")
+        self.number = number
+
+
+class PortGone(BusError):
+    """A failed port. It remains failed; another `Bus` may open it again."""
+
+
+class Bus:
+    """The line to one servo, for one thread at a time."""
+
+    def __init__(self, path: str, baud: int, servo_id: int, clock: Clock = HOST) -> None:
+        """Open and lock the port. Raise Refused `missing_extra`, `servo_port_in_use`, `no_servo_port`, …."""
+        try:
+            from dynamixel_sdk import PacketHandler
+        except ImportError as error:
+            raise missing_extra(error, "servo") from error
+        self._id, self._path, self.clock = servo_id, path, clock
+        self._packets: Any = PacketHandler(2.0)
+        self._gone = False
+        self.alert = False  # of the newest reply
+        try:
+            self._port = Port(path, baud, SLACK_S, clock)
+        except (OSError, ValueError) as error:  # SerialException is an OSError
+            raise Refused.of(_no_port(path, baud, error)) from error
+        try:
+            lower_latency(self._port.serial, path)
+        except BaseException:
+            self._port.close()
+            raise
+
+    def close(self) -> None:
+        """Close the port."""
+        self._gone = True
+        self._port.close()
+
+    def ping(self) -> int:
+        """Return the model number. Raise Lost, PortGone."""
+        with self._failing():
+            number, result, error = self._packets.ping(self._port, self._id)
+        self._judge(result, error, RETURN_LEVEL)
+        return int(number)
+
+    def more_came(self, wait_s: float) -> bool:
+        """Return whether an unrequested byte follows within `wait_s`."""
+        with self._failing():
+            for _ in range(max(1, round(wait_s / 0.002))):
+                if self._port.readPort(1):
+                    return True
+        return False
+
+    def read(self, register: Register) -> tuple[int, ...]:
+        """Read a register's values. Raise Lost, Denied, PortGone."""
+        return register.unpack(self.read_bytes(register))
+
+    def read_bytes(self, register: Register) -> bytes:
+        """Read a register's bytes. Raise Lost, Denied, PortGone."""
+        with self._failing():
+            data, result, error = self._packets.readTxRx(self._port, self._id, register.address, register.size)
+        self._judge(result, error, register)
+        if len(data) != register.size:  # the late reply to another question
+            raise ReplyLost(damaged=True)
+        return bytes(data)
+
+    def look_up(self, register: Register) -> tuple[int, ...]:
+        """Read a register's values, and repeat after a lost reply. Raise Lost, Denied, PortGone."""
+        for _ in range(ATTEMPTS - 1):
+            try:
+                return self.read(register)
+            except ReplyLost:
+                self.settle()
+        return self.read(register)
+
+    def write(self, register: Register, *values: int) -> None:
+        """Write absolute values, so that a repeated write does no harm.
+
+        Without an acknowledgement, read the register, and repeat a lost instruction. Raise Lost, Denied, PortGone.
+        """
+        data = register.pack(*values)
+        for attempt in range(ATTEMPTS):
+            try:
+                with self._failing():
+                    result, error = self._packets.writeTxRx(
+                        self._port, self._id, register.address, register.size, list(data)
+                    )
+                self._judge(result, error, register)
+                return
+            except ReplyLost:
+                self.settle()
+                if attempt == ATTEMPTS - 1:
+                    raise
+                try:
+                    if self.read_bytes(register) == data:
+                        return
+                except ReplyLost:
+                    self.settle()
+
+    def write_unheard(self, register: Register, *values: int) -> None:
+        """Write values without waiting for an acknowledgement. Raise PortGone."""
+        with self._failing():
+            data = list(register.pack(*values))
+            self._packets.writeTxOnly(self._port, self._id, register.address, register.size, data)
+
+    def settle(self) -> None:
+        """Wait until the line was silent for `SLACK_S`, so that a late reply is not taken for the next. Raise PortGone.
+
+        Replies do not name the instruction that they answer.
+        """
+        with self._failing():
+            now_s = self.clock.now_s()
+            quiet_s, give_up_s = now_s + SLACK_S, now_s + SETTLE_MOST_S
+            while (now_s := self.clock.now_s()) < min(quiet_s, give_up_s):
+                if self._port.readPort(1024):
+                    quiet_s = now_s + SLACK_S
+
+    def _judge(self, result: int, error: int, register: Register) -> None:
+        if result in NOT_SENT:
+            raise PortGone(f"the packet handler gives {result}")
+        if result != SUCCESS:
+            raise ReplyLost(damaged=result == DAMAGED)
+        self.alert = bool(error & ALERT)
+        if error & ~ALERT:
+            raise InstructionDenied(error & ~ALERT, register)
+
+    @contextmanager
+    def _failing(self) -> Iterator[None]:
+        """Translate the exceptions of the packet handler into Lost and PortGone."""
+        if self._gone:
+            raise PortGone("it has been closed")
+        try:
+            yield
+        except IndexError as error:  # it reads on in a reply that is too short
+            self._port.is_using = False
+            raise ReplyLost(damaged=True) from error
+        except FAILURES as error:
+            self._gone = True
+            raise PortGone(str(error)) from error
+
+
+def _no_port(path: str, baud: int, error: Exception) -> Problem:
+    if "exclusively lock" in str(error) or getattr(error, "errno", None) == 16:  # EBUSY
+        return Problem(
+            "servo_port_in_use", f"another program has the servo's port {path}", "End that program, then start again"
+        )
+    return Problem(
+        "no_servo_port",
+        f"the servo's port {path} does not open at {baud} baud: {error}",
+        "Check turner.port, the adapter and its cable, and whether you may use serial ports (group dialout)",
+    )

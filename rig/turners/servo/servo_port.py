@@ -1,0 +1,77 @@
+"""The serial port under the maker's packet handler, with the method names that the handler calls.
+
+The handler builds and reads the packets; the caller chooses the port. The maker's own `PortHandler` polls with a full
+processor core, measures its time-outs by the wall clock, which may be set meanwhile, has one time-out for every
+adapter, shares the port with other programs, and stays busy after an exception. Here the system waits, the clock is
+monotonic, the time-out is the line's, the port is locked, and a failed port is never used again.
+"""
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+import serial
+
+from rig.turners.servo.driver_clock import Clock
+
+WAIT_S = 0.002  # longest wait of a read for its bytes; then the time-out is checked
+WRITE_S = 1.0  # a longer write has no receiver; pyserial's count includes delays of this program
+BITS = 10  # per byte on the line: start, eight, stop
+
+
+class Port:
+    """The port at a path or at socket://host:port. Raises `serial.SerialException` if it cannot be opened.
+
+    A path is locked for this process, against programs that ask for a lock; the server behind a socket takes one client
+    at a time. TIOCEXCL would bind all programs, but outlasts a killed program while another holds the port open.
+    `slack_s`: the delay of a reply beyond the time of its bytes.
+    """
+
+    def __init__(self, path: str, baud: int, slack_s: float, clock: Clock) -> None:
+        locked = True if "://" not in path else None
+        self.serial = serial.serial_for_url(path, baud, timeout=WAIT_S, write_timeout=WRITE_S, exclusive=locked)
+        self.is_using = False
+        self._baud, self._slack_s, self._clock = baud, slack_s, clock
+        self._deadline_s = 0.0
+
+    def close(self) -> None:
+        """Close the port; one that is gone already is no problem."""
+        sock = getattr(self.serial, "_socket", None)  # pyserial leaves it open if the far end has closed it first
+        with suppress(OSError):
+            self.serial.close()
+        if sock is not None:
+            sock.close()
+
+    @property
+    def byte_s(self) -> float:
+        """The duration of a byte, s."""
+        return BITS / self._baud
+
+    # Called by the packet handler ------------------------------------------------------------------------------
+    def getBaudRate(self) -> int:  # noqa: N802
+        """Return the baud rate."""
+        return self._baud
+
+    def clearPort(self) -> None:  # noqa: N802
+        """Discard received bytes."""
+        self.serial.reset_input_buffer()
+
+    def writePort(self, packet: Sequence[int]) -> int:  # noqa: N802
+        """Send a packet; return the number of bytes sent."""
+        return self.serial.write(bytes(packet)) or 0
+
+    def readPort(self, length: int) -> bytes:  # noqa: N802
+        """Return the next bytes, at most `length`, as soon as they are there."""
+        data: bytes = self.serial.read(length)
+        return data
+
+    def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
+        """Start the time-out of a reply of `packet_length` bytes."""
+        self._deadline_s = self._clock.now_s() + packet_length * self.byte_s + self._slack_s
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:  # noqa: N802
+        """Start a time-out of `msec`."""
+        self._deadline_s = self._clock.now_s() + msec / 1000
+
+    def isPacketTimeout(self) -> bool:  # noqa: N802
+        """Return whether the reply is late."""
+        return self._clock.now_s() > self._deadline_s

@@ -1,0 +1,59 @@
+"""Kinds of turners by name. A package adds its own through the entry-point group `rig.turners`.
+
+The rest of the rig knows a turner only through its `TurnerKind`.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import EntryPoint
+
+from rig.config.load import STOCK_TURNERS
+from rig.config.models import TurnerSection
+from rig.errors import Refused
+from rig.errors.installed import added
+from rig.turners.turner_kind import AnyTurner, Wording
+
+GROUP = "rig.turners"
+
+
+@cache
+def installed() -> Mapping[str, AnyTurner]:
+    """Return the kinds of turners in stock and in installed packages, by name. Raise Refused `turner_not_loaded`."""
+    stock = (EntryPoint(name, f"rig.turners.{name}.{name}_kind:{name.upper()}", GROUP) for name in STOCK_TURNERS)
+    return {kind.name: kind for _, kind in added(GROUP, _not_loaded, stock)}
+
+
+def _not_loaded(what: str, remedy: str) -> Refused:
+    return Refused("turner_not_loaded", f"the turner {what}", remedy)
+
+
+def sections() -> Mapping[str, type[TurnerSection]]:
+    """Return the models of the configuration's section `turner:`, by its `kind`."""
+    return {name: kind.section for name, kind in installed().items()}
+
+
+def kind_of(section: TurnerSection) -> AnyTurner:
+    """Return the kind of turner of a section. Raise Refused `turner_not_installed`."""
+    for kind in installed().values():
+        if type(section) is kind.section:
+            return kind
+    raise Refused(
+        "turner_not_installed",
+        f"no installed turner has the section {type(section).__name__}",
+        "Install the package that brings it; after an update of the rig, install the rig again",
+    )
+
+
+def words_of(name: str) -> Wording:
+    """Return the wording for a kind of turner, in general terms if it is not installed."""
+    kind = installed().get(name)
+    if kind is not None:
+        return kind.words
+    return Wording(
+        name=f"turner of the kind {name}",
+        short="turner",
+        turned="it",
+        method=f"A turner of the kind {name} turns the items",
+        briefly=f"turns and attitudes at rest on a turner of the kind {name}",
+        directions="the turner's geometry",
+    )

@@ -1,0 +1,64 @@
+"""The report of an arm of Universal Robots, and its controller's setup."""
+
+from dataclasses import dataclass
+
+from rig.motion.geometry import DenavitHartenberg, Pose
+from rig.motion.turner_state import JOINT_NAMES, ArmState, JointLimits
+
+MAKER = "Universal Robots"
+
+
+@dataclass(frozen=True, slots=True)
+class ArmSetup:
+    """The arm that the controller is set up for: the maker's type number, its lengths, its joints' limits."""
+
+    robot_type: int
+    drawing: DenavitHartenberg
+    limits: JointLimits
+
+
+@dataclass(frozen=True, slots=True)
+class ArmReport:
+    """The arm's report of itself, a `Report`; None for items that the controller does not report.
+
+    - `host`: its address.
+    - `version`, `polyscope`: its software (major, minor, bugfix, build), and the same in its own words.
+    - `serial_number`: the arm's, or "not told".
+    - `remote_control`, `program_running`: the pendant's control mode, and the controller's program.
+    - `state`: the state at that time.
+    - `kinematics`: the arm's geometry as measured in the factory.
+    - `tcp_offset`: the pose of its tool centre point in the flange's frame.
+    - `setup`, `called`: the arm it is set up for, and the dashboard's name for it.
+    - `model`: the maker's name of the arm that these items mean.
+    - `registers_free`: whether a half of the registers is free for the client's script.
+    """
+
+    host: str
+    version: tuple[int, ...]
+    polyscope: str
+    serial_number: str
+    remote_control: bool | None
+    program_running: bool
+    state: ArmState
+    kinematics: DenavitHartenberg | None = None
+    tcp_offset: Pose | None = None
+    setup: ArmSetup | None = None
+    called: str | None = None
+    model: str | None = None
+    registers_free: bool | None = None
+
+    @property
+    def software(self) -> str:
+        """The controller's software in its own words."""
+        return self.polyscope
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The names of its joints."""
+        return JOINT_NAMES
+
+    @property
+    def words(self) -> str:
+        """The arm in a line of text: model, serial number, software."""
+        model = "model not told" if self.model is None else f"{MAKER} {self.model}"
+        return f"{model}, serial number {self.serial_number}, PolyScope {self.polyscope}"

@@ -1,0 +1,51 @@
+"""What to do about an error by the way in use: every row is of an error that there is, and says what can be done."""
+
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from rig.cli import main
+from rig.data.latest_run import note_run
+from rig.errors.catalogue import catalogue
+from rig.errors.remedies_by_method import TABLE, CalibrationMethod, remedies_by_method
+
+NAMES = {
+    line.partition(" | ")[0] for line in TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")
+}
+
+
+def test_every_row_is_of_an_error_and_ends_without_a_full_stop() -> None:
+    assert {entry.name for entry in catalogue()} >= NAMES
+    remedies = [remedy for name in NAMES for remedy in remedies_by_method(name).values()]
+    assert remedies and not [remedy for remedy in remedies if remedy.endswith(".") or not remedy[0].isupper()]
+
+
+@pytest.mark.parametrize(
+    ("configuration", "way"),
+    [("turner: {kind: hand}\n", "by hand"), ("arm: {host: h}\n", "on an arm"), (None, "with readings from files")],
+)
+def test_the_way_of_the_latest_run_comes_first(
+    configuration: str | None,
+    way: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "share"))
+    (tmp_path / "run").mkdir()
+    if configuration is not None:
+        (tmp_path / "run" / "config.yaml").write_text(configuration, encoding="utf-8")
+    note_run(tmp_path / "run")
+    assert main(["explain", "rank_deficient"]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("What to do")]
+    assert len(lines) == len(get_args(CalibrationMethod)) and lines[0].startswith(f"What to do {way}")
+    assert "as in your latest run" in lines[0] and not any("as in" in line for line in lines[1:])
+
+
+def test_no_answer_ends_with_two_stops(capsys: pytest.CaptureFixture[str]) -> None:
+    for entry in catalogue():
+        main(["explain", entry.name])
+    main(["explain", "ac"])
+    said = capsys.readouterr()
+    assert ".." not in said.out + said.err and "?." not in said.out + said.err
