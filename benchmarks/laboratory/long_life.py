@@ -54,7 +54,7 @@ def conclude(life: Life, warm_up: int) -> int:
     for course in courses(passed):
         print(
             f"{course.name}: mean {course.mean:.6f}, slope {course.slope:+.1e} ± {course.slope_std:.1e} a run "
-            f"({course.slope / course.slope_std:+.1f} σ), χ² {course.chi2:.0f} of {course.freedom}"
+            f"({course.slope / course.slope_std:+.1f} σ), χ² {course.chi2:.0f} of {course.dof}"
         )
     commit = subprocess.run(
         ["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False

@@ -24,7 +24,7 @@ def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, 
     from rig.analysis import judging
     from rig.analysis.external import external_outcome as external_judging
 
-    if (external := runs[0].elsewhere) is not None:
+    if (external := runs[0].external) is not None:
         return external_judging.calibrate_external(runs, external, estimator)
     return judging.calibrate(runs, estimator, drifting=drifting)
 

@@ -15,12 +15,16 @@ ONLY_RECORDED = ("no_attitudes", "field_strength_unknown")  # why a sensor was n
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One limit: it passes if `value` is a number not above `limit` less `guard`, all in `unit`.
+    """One limit of the verdict: a check passes if its value is a number not above limit - guard.
 
-    - `name`: for people; programs read `means`.
-    - `value`, `limit`: None if nothing was measured, or no limit was set.
-    - `uncertainty`: the expanded one by `coverage_factor` and `freedom` degrees of freedom, None without one.
-    - `guard`: that uncertainty if the decision rule is the guard band (ILAC-G8, 4.2).
+    - name: the check in words, for people; programs read means.
+    - value, limit: in unit; None if nothing was measured, or no limit was set.
+    - unit: the unit of value, limit, uncertainty and guard.
+    - means: the sensor and quantity that the check is about.
+    - uncertainty: U of the value, None without one.
+    - guard: U if the decision rule is the guard band (ILAC-G8, 4.2), else 0.
+    - coverage_factor: k of U.
+    - dof: degrees of freedom of U.
     """
 
     name: str
@@ -31,7 +35,7 @@ class Check:
     uncertainty: float | None = None
     guard: float = 0.0
     coverage_factor: float = COVERAGE_FACTOR
-    freedom: float = math.inf
+    dof: float = math.inf
 
     @property
     def passed(self) -> bool:
@@ -45,7 +49,7 @@ class Check:
         """The probability that a value which passed is beyond the limit; None if it did not pass."""
         if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
             return None
-        return float(beyond((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.freedom))
+        return float(beyond((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.dof))
 
 
 def fitness(

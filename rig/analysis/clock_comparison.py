@@ -29,7 +29,7 @@ SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
 class ClockComparison:
     """The relative error of the controller's clock by another one, and its standard uncertainty.
 
-    `half_width` is stated of the other clock, `noise_std` the uncertainty by the recording with `freedom` degrees of
+    `half_width` is stated of the other clock, `noise_std` the uncertainty by the recording with `dof` degrees of
     freedom; `std` combines both.
     """
 
@@ -37,7 +37,7 @@ class ClockComparison:
     error: float
     half_width: float
     noise_std: float
-    freedom: float = np.inf
+    dof: float = np.inf
 
     @property
     def std(self) -> float:
@@ -83,10 +83,10 @@ class ClockCheck:
             yield ClockDifference((one, other), abs(error - its_error), limit)
 
     @property
-    def freedom(self) -> float:
+    def dof(self) -> float:
         """The degrees of freedom of `std` by Welch and Satterthwaite, infinite without readings."""
         terms = [
-            (comparison.noise_std * (self.std / comparison.std) ** 2) ** 4 / comparison.freedom
+            (comparison.noise_std * (self.std / comparison.std) ** 2) ** 4 / comparison.dof
             for comparison in self.comparisons
         ]
         return self.std**4 / sum(terms) if any(terms) else np.inf
@@ -116,7 +116,7 @@ def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
 def _compare_to_computer(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison:
     """Compare the controller's clock with the computer's, by the times at which the states came."""
     rate = compare_with_computer(recording.motion)
-    return ClockComparison(BY_COMPUTER, rate.error, uncertainty.computer_clock_ppm * PPM, rate.std, rate.freedom)
+    return ClockComparison(BY_COMPUTER, rate.error, uncertainty.computer_clock_ppm * PPM, rate.std, rate.dof)
 
 
 def _compare_to_crystal(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison | None:

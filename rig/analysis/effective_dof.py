@@ -18,7 +18,7 @@ from rig.estimation.reference.accelerometer_model import SECOND
 from rig.estimation.reference.reference_budget import ATTITUDES, response_in_attitudes
 from rig.estimation.reference.reference_model import F
 from rig.estimation.sensor_axes import SensorAxes
-from rig.estimation.statistics.coverage import effective_freedom
+from rig.estimation.statistics.coverage import effective_dof
 
 
 def of_angles(result: SensorResult) -> Array | None:
@@ -72,10 +72,10 @@ def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:
     """
     budgets = [run.result.budget for run in reversal.runs]
     # (Σ u_i²)² / ν of each run is Σ u_i⁴ / ν_i: what the runs share is known, and adds nothing to it.
-    scarce = np.sum([budget.std[:3] ** 4 / budget.freedom[:3] for budget in budgets], axis=0) / len(budgets) ** 4
+    scarce = np.sum([budget.std[:3] ** 4 / budget.dof[:3] for budget in budgets], axis=0) / len(budgets) ** 4
     with np.errstate(divide="ignore"):
         scale: Array = reversal.scale_std**4 / scarce
-    return scale, np.full(6, min(float(budget.freedom[3:].min()) for budget in budgets))
+    return scale, np.full(6, min(float(budget.dof[3:].min()) for budget in budgets))
 
 
 def _of_axes(result: AccelerometerResult | MagnetometerResult, response: Array, noise: Array) -> Array:
@@ -105,9 +105,9 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
     """
     clipped = [np.clip(part, 0.0, whole) for part in parts.values()]
     rest = np.clip(whole - np.sum(clipped, axis=0), 0.0, None)
-    freedom = [budget.line(name).freedom for name in parts]
+    dof = [budget.line(name).dof for name in parts]
     shape = (-1, *np.ones(np.ndim(whole), dtype=np.intp))
-    return effective_freedom(np.array([*clipped, rest]), np.reshape([*freedom, np.inf], shape))
+    return effective_dof(np.array([*clipped, rest]), np.reshape([*dof, np.inf], shape))
 
 
 def _to_angles(matrix: Array) -> Array:

@@ -28,7 +28,7 @@ class Surroundings:
     state_jitter_s: float
     extension_m: tuple[float, float, float]
     finds_earth_rate: bool = False
-    state_jitter_freedom: float = inf
+    state_jitter_dof: float = inf
     clocks: tuple[ClockCheck, ...] = ()
 
 
@@ -50,6 +50,6 @@ def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) ->
         jitter.std_s * BETWEEN_TWO,
         settings.extension_m,
         settings.finds_earth_rate,
-        jitter.freedom,
+        jitter.dof,
         clocks,
     )

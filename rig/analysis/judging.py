@@ -70,7 +70,7 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
         accelerometers, ACCELERATION, add_acceleration_polynomials, swept.polynomials
     )
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
-    of_kinds = kinds_on_arm(recordings, settings)
+    installed_kinds = kinds_on_arm(recordings, settings)
     among_dwells = check_references(recordings, accelerometers, magnetometers.results, settings, drifting=drifting)
     return Outcome(
         recordings=recordings,
@@ -82,10 +82,10 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
             *(check for average in averages for check in average),
             *_acceleration_checks(accelerometers, settings),
             *among_dwells.checks,
-            *(check for kind in of_kinds for check in kind.checks),
-            *_check_unsolved(magnetometers, of_kinds),
+            *(check for kind in installed_kinds for check in kind.checks),
+            *_check_unsolved(magnetometers, installed_kinds),
         ),
-        of_kinds=of_kinds,
+        installed_kinds=installed_kinds,
         mounts=mounts,
         provenance=origin_of(runs),
         clock=swept.clock,
@@ -97,10 +97,12 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
     )
 
 
-def _check_unsolved(magnetometers: Attempts[str, MagnetometerResult], of_kinds: Sequence[KindFound]) -> Iterator[Check]:
+def _check_unsolved(
+    magnetometers: Attempts[str, MagnetometerResult], installed_kinds: Sequence[KindFound]
+) -> Iterator[Check]:
     """Yield the checks of sensors that were to be calibrated and have no solution."""
     yield from list_unsolved((name, FIELD.name, fault) for name, fault in magnetometers.faults.items())
-    yield from list_unsolved((kind.name, kind.quantity.name, kind.fault) for kind in of_kinds if kind.fault)
+    yield from list_unsolved((kind.name, kind.quantity.name, kind.fault) for kind in installed_kinds if kind.fault)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -60,16 +60,22 @@ def origin_of(runs: "Sequence[RunData]") -> Origin:
 class Outcome:
     """The results of a run's recordings, by sensor name.
 
-    - `recordings`: those of the calibration with a finished sweep.
-    - `results`: the calibrations of gyroscopes; `onboard`: the board's own of its sensors. Both are empty, with
-      `recordings`, if stored calibrations were verified; `verifications`: those that could be made.
-    - `clock`: the controller's, None if a recording does not state its uncertainty.
-    - `accelerometers`, `magnetometers`: no limit of scale and bias judges the latter.
-    - `drifts`: if attitudes were repeated to watch the bias.
-    - `detection_limits`, `reference_detection_limits`: detection limits of the checks of gyroscopes, and of the others.
-    - `elsewhere`: the results of external recordings; gyroscopes are in `results` too.
-    - `of_kinds`: by the solvers of installed kinds of sensors; `mounts`: of the item in the stages after the first.
-    - `polynomials`: of a calibration over temperature; all else is at the reference temperature then.
+    - settings, provenance: those of the recordings.
+    - recordings: those of the calibration with a finished sweep; empty if stored calibrations were verified.
+    - checks: the limits of the verdict.
+    - results: the calibrations of gyroscopes; empty if stored calibrations were verified.
+    - onboard: the board's own calibrations, compared with the host's; empty if stored ones were verified.
+    - verifications: those that could be made.
+    - clock: the controller's, None if a recording does not state its uncertainty.
+    - accelerometers: the calibrations of accelerometers.
+    - magnetometers: the calibrations of magnetometers; no limit of scale and bias judges them.
+    - drifts: biases by repeat, if attitudes were repeated.
+    - detection_limits: those of the checks of gyroscopes.
+    - reference_detection_limits: those of the checks of accelerometers and magnetometers.
+    - external: the results of external recordings; their gyroscopes are in results too.
+    - installed_kinds: the results of the solvers of installed kinds.
+    - mounts: the item's mount in each stage after the first.
+    - polynomials: a calibration over temperature; all other results hold at the reference temperature then.
     """
 
     settings: "RunSettings"
@@ -85,8 +91,8 @@ class Outcome:
     drifts: "Drifts" = field(default_factory=dict)
     detection_limits: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
     reference_detection_limits: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)
-    elsewhere: "Mapping[str, OfSensor]" = field(default_factory=dict)
-    of_kinds: "tuple[KindFound, ...]" = ()
+    external: "Mapping[str, OfSensor]" = field(default_factory=dict)
+    installed_kinds: "tuple[KindFound, ...]" = ()
     mounts: "tuple[EstimatedMount, ...]" = ()
     polynomials: "Polynomials" = field(default_factory=dict)
 

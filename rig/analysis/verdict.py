@@ -30,7 +30,7 @@ class ExpandedUncertainty:
 
     expanded: Array
     factors: Array
-    freedom: Array
+    dof: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class _LimitSet:
             uncertainty=float(uncertainty.expanded[worst]),
             guard=float(guards[worst]),
             coverage_factor=float(uncertainty.factors[worst]),
-            freedom=float(uncertainty.freedom[worst]),
+            dof=float(uncertainty.dof[worst]),
         )
 
     def calibration(
@@ -160,7 +160,7 @@ def drift_checks(
     checks = []
     for quantity, drift in drifts.items():
         std = drift.scale_fixed.largest_change_std
-        limit_set, uncertainty = _LimitSet(sensor, quantity.name, limits, rule), _expand(std, drift.freedom)
+        limit_set, uncertainty = _LimitSet(sensor, quantity.name, limits, rule), _expand(std, drift.dof)
         checks.append(limit_set.nearest("bias_drift", drift.scale_fixed.largest_change, uncertainty))
     return tuple(checks)
 
@@ -172,13 +172,13 @@ def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
 
 def _split_expanded(budget: Budget) -> tuple[ExpandedUncertainty, ExpandedUncertainty]:
     """Return the expanded uncertainties of scale factors and of biases."""
-    rows = budget.expanded, budget.coverage_factors, budget.freedom
+    rows = budget.expanded, budget.coverage_factors, budget.dof
     return ExpandedUncertainty(*(row[:3] for row in rows)), ExpandedUncertainty(*(row[3:] for row in rows))
 
 
-def _expand(std: Array, freedom: Array) -> ExpandedUncertainty:
-    factors = coverage_factors(freedom)
-    return ExpandedUncertainty(factors * std, factors, freedom)
+def _expand(std: Array, dof: Array) -> ExpandedUncertainty:
+    factors = coverage_factors(dof)
+    return ExpandedUncertainty(factors * std, factors, dof)
 
 
 def _largest(values: np.ndarray) -> float | None:

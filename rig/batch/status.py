@@ -32,13 +32,19 @@ ENDINGS = ("fault", "stopped", "ended")  # final states of a station
 class Now:
     """The present state of a station.
 
-    - `state`, `part`, `doing` (in words), `left_s`: the present activity and its remaining time.
-    - `fraction` of the run (0 to 1), `turn_deg_s`: during a run. `sensors`: name, samples, lost ones of each.
-    - `verdict`, `why`: the last part's serial number and state, until the next part begins.
-    - `operator`, `work_order`, `simulated`: of the batch.
-    - `counts`: the numbers of parts by state. `parts`: the newest parts, serial number and state of each.
-    - `rig`: the rig's name in a history, empty if unknown.
-    - `over`: whether this is the last state.
+    - state, part: the present activity, and the serial number of its part.
+    - doing: the activity in words.
+    - left_s: its remaining time, None if unknown.
+    - operator, work_order, simulated: of the batch.
+    - counts: the numbers of parts by state.
+    - parts: serial number and state of the newest parts.
+    - rig: the rig's name in a history, empty if unknown.
+    - over: whether this is the last state.
+    - fraction: the finished fraction of the run (0 to 1), None without a run.
+    - turn_deg_s: the present rate of the turner.
+    - sensors: name, number of samples and number of lost samples of each.
+    - verdict: the last part's serial number and state, until the next part begins.
+    - why: the reason of that state.
     """
 
     state: State = "waiting"

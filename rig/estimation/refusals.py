@@ -274,11 +274,11 @@ def check_conditioning(conditioned: Conditioning, needed: int, limit: float, wha
         )
 
 
-def warn_of_residuals(residuals: Array, variances: Array, freedom: int) -> tuple[str, ...]:
-    """Return a warning if residuals exceed their variances; `freedom` is the fit's residual degrees of freedom."""
-    if freedom <= 0:
+def warn_of_residuals(residuals: Array, variances: Array, dof: int) -> tuple[str, ...]:
+    """Return a warning if residuals exceed their variances; `dof` is the fit's residual degrees of freedom."""
+    if dof <= 0:
         return ()
-    ratio = float(np.sqrt(np.sum(residuals**2 / variances) / freedom))
+    ratio = float(np.sqrt(np.sum(residuals**2 / variances) / dof))
     if ratio < CONSISTENT:
         return ()
     return (f"residuals are {ratio:.1f} times what the variances explain: the readings contain more than noise",)

@@ -11,7 +11,7 @@ import numpy as np
 from rig.data.absent import NO_ARM
 from rig.data.installed_kinds import quantities
 from rig.estimation.arrays import Array
-from rig.estimation.statistics.coverage import effective_freedom, joint_factors
+from rig.estimation.statistics.coverage import effective_dof, joint_factors
 from rig.history.statistics.charts import FEWEST, Chart, chart, merge_charts
 from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
 from rig.history.statistics.recall import days_to_limit
@@ -136,8 +136,8 @@ class Change:
         a history does not store the correlations between parameters of one calibration.
         """
         both = (self.before, self.now)
-        freedom = effective_freedom([parameter.std**2 for parameter in both], [parameter.freedom for parameter in both])
-        factor = float(joint_factors(self.compared, freedom, UNCHANGED))
+        dof = effective_dof([parameter.std**2 for parameter in both], [parameter.dof for parameter in both])
+        factor = float(joint_factors(self.compared, dof, UNCHANGED))
         return factor * math.hypot(self.before.std, self.now.std) / math.hypot(self.before.expanded, self.now.expanded)
 
     @property

@@ -170,7 +170,7 @@ class Readings:
     @cached_property
     def _time_s(self) -> Array:
         """Times (n,) of all samples, computed once; those of a file for external readings."""
-        if any(run.elsewhere is not None for run in self.recordings):
+        if any(run.external is not None for run in self.recordings):
             times_of_file: Array = self.samples["host_time_s"]
             return times_of_file
         return np.concatenate([times_s(run, self.name, self._bases(run)) for run in self.recordings])

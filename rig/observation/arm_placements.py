@@ -39,7 +39,7 @@ def placements_on_arm(
             "Use the procedure static_attitudes or imu, which hold attitudes",
         )
     windows, means, attitudes = zip(*readings.values(), strict=True)
-    dof = np.array([np.broadcast_to(mean.freedom, mean.mean.shape) for mean in means])
+    dof = np.array([np.broadcast_to(mean.dof, mean.mean.shape) for mean in means])
     rested = Rested(
         {quantity: np.array([mean.mean for mean in means])},
         {quantity: np.array([mean.variance for mean in means])},

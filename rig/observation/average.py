@@ -45,7 +45,7 @@ class Average:
     temperature_c: float
     attitude: Array | None = None
     drift_rad2_s2: Array | float = 0.0
-    freedom: Array | float = np.inf
+    dof: Array | float = np.inf
     lines_hz: Array = field(default_factory=partial(np.zeros, 0))
     rounding_rad2_s2: Array | float = 0.0
 
@@ -144,7 +144,7 @@ def build_average(stream: Stream, inside: slice, window: Window, mean: Mean) -> 
         start_s=window.start_s,
         end_s=window.end_s,
         temperature_c=stream.temperature_c(inside),
-        freedom=mean.freedom,
+        dof=mean.dof,
         lines_hz=mean.cycles / (window.end_s - window.start_s),
         rounding_rad2_s2=mean.rounding,
     )

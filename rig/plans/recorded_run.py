@@ -97,7 +97,7 @@ def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
 def left_out(run: RecordedRun) -> str | None:
     """Return the sentence that a script's analysis is missing in the solution, because it is not executed here."""
     for recording in (*run.raw, *run.corrected):
-        if recording.elsewhere is None and _script_of(run, recording) is None and not _is_by_installed(recording):
+        if recording.external is None and _script_of(run, recording) is None and not _is_by_installed(recording):
             return (
                 f"recorded by the script {recording.provenance.script}, which no run of yours on this computer was "
                 "begun with: it is not executed, and what it adds to the analysis is left out (--script FILE names it)"

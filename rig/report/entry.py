@@ -26,12 +26,12 @@ def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
     return kind.model_validate({name: _plain(value) for name, value in {**fields, **more}.items()})
 
 
-def counted(freedom: Array | None) -> list[Any] | None:
+def counted(dof: Array | None) -> list[Any] | None:
     """Return degrees of freedom of any shape as lists, infinite ones as null; None if they are unknown."""
-    if freedom is None:
+    if dof is None:
         return None
-    numbers = freedom.astype(object)
-    numbers[~np.isfinite(freedom)] = None
+    numbers = dof.astype(object)
+    numbers[~np.isfinite(dof)] = None
     return list(numbers.tolist())
 
 

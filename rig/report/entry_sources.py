@@ -194,7 +194,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
             BiasProcess,
             same="scatter_rad_s",
             random_walk_rad_s_sqrt_s="walk_rad_s_sqrt_s",
-            degrees_of_freedom="freedom",
+            degrees_of_freedom="dof",
         ),
     ),
     budget.ClockEntry: (_row(ClockCheck, same="error std"),),
@@ -218,7 +218,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
             EarthRate,
             same="rate_rad_s covariance_rad2_s2 norm_rad_s norm_std_rad_s latitude_rad latitude_std_rad heading_rad "
             "heading_std_rad up vertical_fixed birge_ratio",
-            degrees_of_freedom="freedom",
+            degrees_of_freedom="dof",
         ),
     ),
 }

@@ -47,7 +47,7 @@ class Memory:
 class MountedSensor:
     """A sensor of this run: its name, its part, the board it is on (None: a port of its own).
 
-    `last` is the last calibration of its serial number, `elsewhere` the last one on a board if that was another.
+    `last` is the last calibration of its serial number, `other_board` the last one on a board if that was another.
     """
 
     name: str
@@ -55,7 +55,7 @@ class MountedSensor:
     serial_number: str
     board: str | None
     last: CalibratedBefore | None
-    elsewhere: CalibratedBefore | None
+    other_board: CalibratedBefore | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class Mounted:
     def doubtful(self) -> tuple[MountedSensor, ...]:
         """The sensors last calibrated on another board, unless the operator has declared that to be right."""
         moved = self.memory.moved
-        return tuple(sensor for sensor in self.sensors if sensor.elsewhere and sensor.serial_number not in moved)
+        return tuple(sensor for sensor in self.sensors if sensor.other_board and sensor.serial_number not in moved)
 
     def lines(self) -> Iterator[str]:
         """Return a line for each board and sensor, with the sensor's last calibration."""
@@ -78,8 +78,8 @@ class Mounted:
         for sensor in self.sensors:
             before = "not calibrated before" if sensor.last is None else f"last calibrated {sensor.last.words}"
             past = f", {before}" if self.memory.silent is None else ""
-            if sensor.elsewhere is not None:
-                past += f", on another board ({sensor.elsewhere.board_unique_id})"
+            if sensor.other_board is not None:
+                past += f", on another board ({sensor.other_board.board_unique_id})"
             yield f"{sensor.name}: {sensor.part} {sensor.serial_number}{past}."
         if self.memory.silent is not None:
             yield f"What was calibrated before is not known: {self.memory.silent}."
@@ -99,11 +99,11 @@ def find_mounted(
         identity = sensor.part, sensor.serial_number, simulated
         same = [past for past in memory.calibrations if (past.part, past.serial_number, past.simulated) == identity]
         on_board = board if sensor.on_board else None
-        elsewhere = next((past for past in same if past.board_unique_id is not None), None)
-        if on_board is None or elsewhere is None or elsewhere.board_unique_id == on_board:
-            elsewhere = None
+        other_board = next((past for past in same if past.board_unique_id is not None), None)
+        if on_board is None or other_board is None or other_board.board_unique_id == on_board:
+            other_board = None
         turned.append(
-            MountedSensor(name, sensor.part, sensor.serial_number, on_board, next(iter(same), None), elsewhere)
+            MountedSensor(name, sensor.part, sensor.serial_number, on_board, next(iter(same), None), other_board)
         )
     return Mounted(tuple(turned), memory)
 
@@ -113,7 +113,7 @@ def ask_of_other_boards(mounted: Mounted, station: Station) -> None:
     doubtful = mounted.doubtful
     if not doubtful:
         return
-    statements = [_elsewhere(sensor, sensor.elsewhere) for sensor in doubtful if sensor.elsewhere is not None]
+    statements = [_elsewhere(sensor, sensor.other_board) for sensor in doubtful if sensor.other_board is not None]
     numbers = ", ".join(sensor.serial_number for sensor in doubtful)
     another = (
         "If this is another sensor, its serial number in the configuration is wrong, and this calibration would be "

@@ -179,10 +179,16 @@ class PhaseRecorded:
 class HandSeen:
     """The present movement of a hand, ten times a second, by the first sensor to calibrate.
 
-    - `time_s`: by the board's clock. `doing`: "starting", "resting", "moving" or "held", for `since_s`.
-    - `turned_rad`: the angle of the move so far. `peak_rad_s`: its fastest reading. `range_rad_s`: the sensor's range.
-    - `expanded_scale`: the largest U (k = 2) of the scale factors so far, None before a solution.
-    - `faces`: the sides done. `pairs`, `turns`: the open moves. `taken`: the number of accepted moves.
+    - time_s: by the board's clock.
+    - doing: "starting", "resting", "moving" or "held".
+    - since_s: the duration of that.
+    - turned_rad: the angle of the move so far.
+    - peak_rad_s: its fastest reading.
+    - range_rad_s: the sensor's range.
+    - expanded_scale: the largest U (k = 2) of the scale factors so far, None before a solution.
+    - faces: the sides done.
+    - pairs, turns: the open moves.
+    - accepted: the number of accepted moves.
     """
 
     time_s: float

@@ -22,17 +22,17 @@ OnState = Callable[[State], None]
 class Wording:
     """The wording for a turner in documents and messages.
 
-    - `name`: a noun without an article ("robot arm").
-    - `short`: the operator's name for it ("arm").
-    - `turned`: the part that sweeps turn ("the wrists").
-    - `method`: a clause for the certificate on how it turns the items; `{turns}` stands for the rotation of the sweeps.
-    - `briefly`: `method` in a few words, for the digital certificate.
-    - `directions`: the source of its axes' directions.
-    - `beware`: a warning for the operator before it moves.
-    - `stands`: a clause on its state while the item is mounted anew.
-    - `clock`: the clock that stamps its states.
-    - `axes_source`: the source of its axes, as a clause.
-    - `axes_traceability`: the traceability of its axes, for the certificate.
+    - name: a noun without an article ("robot arm").
+    - short: the operator's name for it ("arm").
+    - turned: the part that sweeps turn ("the wrists").
+    - method: a clause for the certificate on how it turns the items; "{turns}" stands for the rotation of the sweeps.
+    - briefly: the method in a few words, for the digital certificate.
+    - directions: the source of its axes' directions.
+    - beware: a warning for the operator before it moves.
+    - stands: a clause on its state while the item is mounted anew.
+    - clock: the clock that stamps its states.
+    - axes_source: the source of its axes, as a clause.
+    - axes_traceability: the traceability of its axes, for the certificate.
     """
 
     name: str
@@ -50,19 +50,21 @@ class Wording:
 
 @dataclass(frozen=True, slots=True)
 class TurnerKind(Generic[SectionT, ReportT]):
-    """A kind of turner, registered by the entry point `name` of the group `rig.turners`.
+    """A kind of turner, registered by the entry point of its name in the group `rig.turners`.
 
-    - `section`: the model of the section `turner:` with `kind: name`.
-    - `connect`: returns a context manager of the turner, which stops it at its end. Every state goes, in order, to the
+    - name: the kind in a configuration (`turner: kind: name`).
+    - section: the model of the section `turner:`.
+    - connect: returns a context manager of the turner, which stops it at its end. Every state goes, in order, to the
       function passed; the file takes the output of a maker's client. Raises `Refused` by name.
-    - `look`: reads a report of itself; nothing moves and no program is stopped. Raises `Refused` by name.
-    - `stance`: describes its pose in a line of text.
-    - `problems`: lists all reasons not to drive the last of the plans, before anything moves; without a report, those
-      of the plans alone. Pure.
-    - `describe_configured`: returns the configured turner with its nominal geometry, before any connection.
-    - `describe_connected`: returns the connected turner for the recording. Raises `Refused` if it is another one.
-    - `carried`: returns the payload to set on the turner.
-    - `fields`: the fields of its states after times and joints, in the order of `to_record`.
+    - look: reads a report of itself; nothing moves and no program is stopped. Raises `Refused` by name.
+    - stance: describes its pose in a line of text.
+    - problems: lists all reasons not to drive the last of the plans, before anything moves; without a report, those of
+      the plans alone. Pure.
+    - describe_configured: returns the configured turner with its nominal geometry, before any connection.
+    - describe_connected: returns the connected turner for the recording. Raises `Refused` if it is another one.
+    - carried: returns the payload to set on the turner.
+    - words: its wording in documents and messages.
+    - fields: the fields of its states after times and joints, in the order of `to_record`.
     """
 
     name: str

@@ -145,7 +145,7 @@ def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_unce
     held = BiasByRepeat(
         np.array([[0.0, 0, 0], [9.5e-5, 0, 0], [4e-5, 0, 0]]), np.full((3, 3), 3e-6), np.ones(3), (), FOREVER
     )
-    drift = cast(BiasDrift, SimpleNamespace(scale_fixed=held, freedom=FOREVER))
+    drift = cast(BiasDrift, SimpleNamespace(scale_fixed=held, dof=FOREVER))
     checks |= {each.name: each for each in drift_checks("a", {RATE: drift}, limits, rule)}
     for name, uncertainty in (
         ("a.acceleration_scale_deviation", 1.4e-3),

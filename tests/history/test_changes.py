@@ -18,19 +18,17 @@ SENSORS = {
 }
 
 
-def drawn(
-    random: np.random.Generator, freedom: np.ndarray, correlation: float, shift: float = 0.0
-) -> dict[str, Parameter]:
+def drawn(random: np.random.Generator, dof: np.ndarray, correlation: float, shift: float = 0.0) -> dict[str, Parameter]:
     """A calibration of values that are zero, their u as so few readings tell it; the first is off by `shift`."""
     common = np.sqrt(correlation) * random.standard_normal()
-    errors = common + np.sqrt(1 - correlation) * random.standard_normal(len(freedom))
-    finite = np.where(np.isfinite(freedom), freedom, 1.0)
-    found = np.where(np.isfinite(freedom), np.sqrt(random.chisquare(finite) / finite), 1.0)
+    errors = common + np.sqrt(1 - correlation) * random.standard_normal(len(dof))
+    finite = np.where(np.isfinite(dof), dof, 1.0)
+    found = np.where(np.isfinite(dof), np.sqrt(random.chisquare(finite) / finite), 1.0)
     errors[0] += shift
-    factors = coverage_factors(freedom)
+    factors = coverage_factors(dof)
     return {
         str(i): Parameter(str(i), errors[i], found[i], None, "1", coverage_factor=float(factors[i]))
-        for i in range(len(freedom))
+        for i in range(len(dof))
     }
 
 
@@ -44,8 +42,8 @@ def alarms(pairs: list[tuple[dict[str, Parameter], dict[str, Parameter]]]) -> fl
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 @pytest.mark.parametrize("sensor", SENSORS)
 def test_an_undamaged_part_has_changed_in_one_of_fifty_comparisons_at_most(sensor: str, correlation: float) -> None:
-    random, freedom = np.random.default_rng(1), np.array(SENSORS[sensor])
-    pairs = [(drawn(random, freedom, correlation), drawn(random, freedom, correlation)) for _ in range(PAIRS)]
+    random, dof = np.random.default_rng(1), np.array(SENSORS[sensor])
+    pairs = [(drawn(random, dof, correlation), drawn(random, dof, correlation)) for _ in range(PAIRS)]
     allowed = ALARMS + 3 * np.sqrt(ALARMS * (1 - ALARMS) / PAIRS)  # by chance of the draw
     share = alarms(pairs)
     print(f"{sensor}, correlation {correlation}: {share:.1%}")
@@ -56,8 +54,8 @@ def test_an_undamaged_part_has_changed_in_one_of_fifty_comparisons_at_most(senso
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_all_values_of_a_run_are_one_comparison() -> None:
-    random, freedom = np.random.default_rng(2), np.full(12, np.inf)
-    sensors = [[(drawn(random, freedom, 0.0), drawn(random, freedom, 0.0)) for _ in range(4)] for _ in range(400)]
+    random, dof = np.random.default_rng(2), np.full(12, np.inf)
+    sensors = [[(drawn(random, dof, 0.0), drawn(random, dof, 0.0)) for _ in range(4)] for _ in range(400)]
     share = np.mean([any(each.has_changed for of in changes_in(pairs) for each in of) for pairs in sensors])
     assert share <= ALARMS + 3 * np.sqrt(ALARMS / 400)
 
@@ -65,9 +63,9 @@ def test_all_values_of_a_run_are_one_comparison() -> None:
 @pytest.mark.slow
 def test_a_change_of_2_u_in_one_value_of_nineteen_is_told() -> None:
     """2 U of the change: noise hides it in a quarter of the comparisons, and in none if it is what both results say."""
-    random, freedom = np.random.default_rng(3), np.full(19, np.inf)
+    random, dof = np.random.default_rng(3), np.full(19, np.inf)
     shift = 2 * 2 * np.sqrt(2)
-    told = alarms([(drawn(random, freedom, 0.0), drawn(random, freedom, 0.0, shift)) for _ in range(400)])
+    told = alarms([(drawn(random, dof, 0.0), drawn(random, dof, 0.0, shift)) for _ in range(400)])
     assert 0.70 < told < 0.85
     before = {str(i): Parameter(str(i), 0.0, 1.0, None, "1") for i in range(19)}
     (changes,) = changes_in([(before, before | {"7": Parameter("7", shift, 1.0, None, "1")})])

@@ -84,10 +84,10 @@ def test_a_result_of_the_same_recordings_replaces_the_one_before(history: Histor
 
 
 def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(history: History) -> None:
-    def scarce(day: float, bias_rad_s: float, freedom: float) -> FinishedRun:
+    def scarce(day: float, bias_rad_s: float, dof: float) -> FinishedRun:
         run = finished(day, bias_rad_s=(bias_rad_s, 0.0, 0.0))
         sensor = run.document.gyroscopes["gyro"]
-        line = Contributor("noise", "A", "normal", None, "", "", freedom, np.array(sensor.covariance))
+        line = Contributor("noise", "A", "normal", None, "", "", dof, np.array(sensor.covariance))
         found = {"budget": budget_entry(Budget((line,))), "covariance_combined": sensor.covariance}
         document = run.document.model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update=found)}})
         return replace(run, document=document, text=compact(json.loads(document.text())))
@@ -100,7 +100,7 @@ def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(his
     assert now.parameters["bx"].expanded == pytest.approx(2.649 * u, rel=1e-3)
     (change,) = (each for each in changes_between([before], [now])[now.subject] if each.name == "bx")
     assert change.normalised_error == pytest.approx(3.2 / np.hypot(2, 2.649), rel=1e-3) and not change.has_changed
-    assert (change.before.freedom, change.now.freedom) == (np.inf, 5.0)
+    assert (change.before.dof, change.now.dof) == (np.inf, 5.0)
     assert now.parameters["k"].coverage_factor == now.parameters["kx"].coverage_factor
     assert list(history.broken()) == []
 

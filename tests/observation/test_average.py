@@ -59,4 +59,4 @@ def test_a_mean_of_readings_that_hardly_change_is_known(other: slice) -> None:
     steps = Steps(1e-3, cut=True)
     for mean in (even_mean(readings, steps), average_rest(readings, time_s, Window(0.0, 2.33), steps)):
         assert np.isfinite(mean.variance).all() and (mean.variance >= steps.variance).all()
-        assert np.isfinite(mean.freedom).all()
+        assert np.isfinite(mean.dof).all()

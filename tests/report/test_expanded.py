@@ -140,11 +140,11 @@ def test_what_a_run_finds_beside_scale_and_bias_has_freedom_between_the_scarcest
     assert isinstance(sensor.vector_model, VectorEntry) and sensor.budget is not None
     fewest = min(each.degrees_of_freedom for each in sensor.budget.contributors if each.degrees_of_freedom is not None)
     vector = sensor.vector_model
-    for freedom in (
+    for dof in (
         vector.non_orthogonality_degrees_of_freedom,
         vector.mounting_degrees_of_freedom,
         *(vector.g_sensitivity_degrees_of_freedom or ()),
     ):
-        assert freedom is not None and all(each is not None and each >= fewest for each in freedom)
-        factors = expanded([1.0] * 3, freedom).factors
-        assert covered(factors, freedom) == pytest.approx([PROBABILITY] * 3)
+        assert dof is not None and all(each is not None and each >= fewest for each in dof)
+        factors = expanded([1.0] * 3, dof).factors
+        assert covered(factors, dof) == pytest.approx([PROBABILITY] * 3)

@@ -147,14 +147,14 @@ def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPa
     The χ² of all segments less that of those without transfers is the transfers': it is to equal their number. The
     factor is at most `MOST`.
     """
-    transfers, (segments_chi_square, segments_freedom) = allowance.transfers, _residual_chi_square(segments_only)
+    transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     for ratio in np.geomspace(1.0, MOST, TRIED):
         variances = transfers.variances_rad2_s2 + (ratio - 1) * transfers.unexplained_rad2_s2
         with_transfers = _test_transfers(
             matrix, replace(allowance, transfers=replace(transfers, variances_rad2_s2=variances)), bias
         )
-        chi_square, freedom = _residual_chi_square(with_transfers)
-        if chi_square - segments_chi_square <= freedom - segments_freedom:
+        chi_square, dof = _residual_chi_square(with_transfers)
+        if chi_square - segments_chi_square <= dof - segments_dof:
             break
     return with_transfers
 

@@ -72,9 +72,9 @@ class WhitenedReference:
         model = self._extend_model(nuisance)
         delta_rad, base_likelihood = maximise_likelihood(self.growth, self.residuals, model)
         if columns is None:
-            freedom = len(self.residuals) - model.shape[1]
+            dof = len(self.residuals) - model.shape[1]
             residuals = self._whiten_residuals(model, delta_rad)[1]
-            return (float(residuals @ residuals), float(chdtri(freedom, false_alarm_probability))) if freedom else None
+            return (float(residuals @ residuals), float(chdtri(dof, false_alarm_probability))) if dof else None
         new = remaining_directions(orthonormal_basis(model), self.rotation @ columns)
         if not new.shape[1]:
             return None
@@ -105,12 +105,12 @@ class WhitenedReference:
         from scipy.special import chdtri, fdtri
 
         count = new.shape[1]
-        chi_square_limit, freedom = (
+        chi_square_limit, dof = (
             float(chdtri(count, false_alarm_probability)),
             max(self._delta_dof(model, delta_rad), count + 1.0),
         )
-        projections = count / (freedom - count) * fdtri(count, freedom - count, 1 - false_alarm_probability)
-        f_limit, fraction = freedom * float(np.log1p(projections)), self._delta_fraction(model, new, delta_rad)
+        projections = count / (dof - count) * fdtri(count, dof - count, 1 - false_alarm_probability)
+        f_limit, fraction = dof * float(np.log1p(projections)), self._delta_fraction(model, new, delta_rad)
         return float(chi_square_limit + fraction * max(f_limit - chi_square_limit, 0.0))
 
     def _extend_model(self, nuisance: Sequence[Array]) -> Array:

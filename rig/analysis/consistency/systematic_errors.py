@@ -51,14 +51,18 @@ class NonlinearityPrior:
 
 @dataclass(frozen=True, slots=True)
 class KnownErrors:
-    """The errors of arm, site and sensor that are known by their standard deviation.
+    """The standard uncertainties of arm, site and sensor.
 
-    - `angles_rad` (17,): of each of `ANGLES`; `repeatability_rad`: of a joint that was moved away and back.
-    - `encoder_rad`: of a joint's angle against its encoder at one mark, zero if all sweeps are whole turns.
-    - `mount_rad`: of an item that was mounted again, about each axis.
-    - `jitter_s`: of the times of the arm's states; `stamp_s`: of the times of the sensor's samples.
-    - `earth_rad_s` (3, k): of the Earth's rate in the base's frame, one column for each unknown direction.
-    - `curve`: the sensor's nonlinearity; `sensor`: its temperatures at `temperature_times_s` and its slopes.
+    - angles_rad (17,): of each of ANGLES.
+    - repeatability_rad: of a joint that was moved away and back.
+    - encoder_rad: of a joint's angle by its encoder at one mark; zero if all sweeps are whole turns.
+    - mount_rad: of an item that was mounted again, about each axis.
+    - jitter_s: of the times of the arm's states.
+    - earth_rad_s (3, k): of the Earth's rate in the base's frame, a column for each unknown direction.
+    - curve: prior of the sensor's nonlinearity.
+    - sensor: the properties by its data sheet, None if unknown.
+    - temperature_times_s: the times of the sensor's temperatures.
+    - stamp_s: of the times of the sensor's samples.
     """
 
     angles_rad: Array

@@ -52,8 +52,8 @@ class WhitenedSegments:
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
         """Return the statistic of columns with its critical value: see `WhitenedModel`."""
-        value, freedom = self._explain(columns, nuisance)
-        return (value, critical_value(false_alarm_probability)(freedom)) if freedom else None
+        value, dof = self._explain(columns, nuisance)
+        return (value, critical_value(false_alarm_probability)(dof)) if dof else None
 
     def test_single_columns(self, columns: Array, false_alarm_probability: float) -> Statistic | None:
         """Return the largest χ² of a single column (3, N, k), with its critical value; None if the model spans all."""
@@ -96,7 +96,7 @@ def critical_value(false_alarm_probability: float) -> Callable[[int], float]:
     """Return the critical value of χ² by its degrees of freedom, for this false-alarm probability."""
     from scipy.special import chdtri
 
-    return lambda freedom: float(chdtri(freedom, false_alarm_probability))
+    return lambda dof: float(chdtri(dof, false_alarm_probability))
 
 
 def whiten_segments(segments: Segments, scatter: Scatter, bias: BiasProcess) -> WhitenedSegments:

@@ -156,7 +156,7 @@ def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Aver
         end_s=end_s,
         temperature_c=ROOM_C,
         attitude=predict_attitude(timed, run.arm, np.array(run.settings.mount)),
-        freedom=float(samples - 1),
+        dof=float(samples - 1),
     )
 
 

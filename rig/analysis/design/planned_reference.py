@@ -103,7 +103,7 @@ def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_
         covariance_m2_s4=noise_m_s2_sqrt_hz**2 / turn.duration_s * waves,
         speed_rad_s=timed_step.step.growing * turn.speed_rad_s,
         noise_m_s2=np.zeros(3),
-        freedom=0,
+        dof=0,
         residuals_m_s2=np.zeros((0, 3)),
         vibration_m_s2=np.zeros(3),
         turning_rad2_s2=evenly_turning(turn.speed_rad_s),

@@ -11,7 +11,7 @@ from rig.estimation.arrays import Array, scale_of
 from rig.estimation.external import increment_solution, placement
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.estimation.reference.reference_budget import (
-    fewest_freedom,
+    fewest_dof,
     response_in_attitudes,
     scale_and_bias,
     scale_and_bias_covariance,
@@ -28,32 +28,30 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
 }
 
 
-def noise_freedom(solution: TriaxialSolution, equations: Equations) -> float:
+def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
     """Return the noise's degrees of freedom, the fewest of scale and bias, by the weights of the readings."""
     response = response_in_attitudes(solution, equations.measurements)
     rows = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
-    return fewest_freedom(rows, equations.variances.ravel(), equations.freedom.ravel())
+    return fewest_dof(rows, equations.variances.ravel(), equations.dof.ravel())
 
 
-def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: float | None = None) -> Budget:
+def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: float | None = None) -> Budget:
     """Return the budget by the contribution of each cause to a reference model's covariance (p, p), F (3, 3) first.
 
     Estimated variance components are uncertain themselves. If their likelihood was integrated over, or the covariance
     inflated as Student's t is, u contains that (JCGM 101, 6.4.9) and no degrees of freedom remain to be counted: so for
-    the noise too, without a `noise_freedom`.
+    the noise too, without a `noise_dof`.
     """
     scale = scale_of(matrix)
     lines = []
     for name, cause in causes.items():
         kind, source = SOURCES[name]
-        freedom = np.inf
-        if name == placement.NOISE and noise_freedom is not None:
-            freedom = noise_freedom
+        dof = np.inf
+        if name == placement.NOISE and noise_dof is not None:
+            dof = noise_dof
         elif name == placement.NOISE:
             source = f"{source}, {IN_U}"
         lines.append(
-            Contributor(
-                name, kind, "normal", None, "", source, freedom, scale_and_bias_covariance(matrix, scale, cause)
-            )
+            Contributor(name, kind, "normal", None, "", source, dof, scale_and_bias_covariance(matrix, scale, cause))
         )
     return Budget(tuple(lines))

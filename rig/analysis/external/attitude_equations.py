@@ -22,7 +22,7 @@ from rig.observation.external.placements import Placements
 class Equations:
     """The readings of a sensor and the attitudes in which it read them.
 
-    - `means`, `variances` (N, 3), with `freedom` (N, 3) degrees of freedom of the variances.
+    - `means`, `variances` (N, 3), with `dof` (N, 3) degrees of freedom of the variances.
     - `attitudes` (N, 3, 3), `std_rad` (N,): their stated standard deviation; `reference`: its size, or its vectors.
     """
 
@@ -31,7 +31,7 @@ class Equations:
     attitudes: Array
     std_rad: Array | None
     reference: ReferencePrior
-    freedom: Array
+    dof: Array
     second_order: bool = False
 
     @staticmethod
@@ -46,11 +46,11 @@ class Equations:
                 "in body coordinates, with --exact-rates where their noise is far below the sensor's",
             )
         reference = KnownVector(rows.rates_rad_s)
-        if rows.variances is None or rows.freedom is None:
-            variances, freedom = _estimate_variances(rows, reference)
+        if rows.variances is None or rows.dof is None:
+            variances, dof = _estimate_variances(rows, reference)
         else:
-            variances, freedom = rows.variances, rows.freedom
-        return Equations(rows.means, variances, rows.attitudes, rows.attitude_std_rad, reference, freedom)
+            variances, dof = rows.variances, rows.dof
+        return Equations(rows.means, variances, rows.attitudes, rows.attitude_std_rad, reference, dof)
 
     @staticmethod
     def from_placements(
@@ -63,7 +63,7 @@ class Equations:
             placements.attitudes,
             placements.attitude_std_rad,
             reference,
-            placements.read.freedom[quantity],
+            placements.read.dof[quantity],
             second_order and quantity == ACCELERATION,
         )
 
@@ -107,12 +107,12 @@ def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Arra
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts
     residuals = solve_triaxial(rows.means, rows.attitudes, quiet, reference).residuals
-    freedom = len(rows.means) - 15 / 3
-    if freedom < 1:
+    dof = len(rows.means) - 15 / 3
+    if dof < 1:
         raise Fault(
             "too_few_observations",
             f"{len(rows.means)} rows of few samples do not show their noise",
             "Give longer rows, or more of them",
         )
-    variances: Array = np.maximum(np.sum(residuals**2 * counts, axis=0) / freedom, 1e-30) / counts
-    return variances, np.full_like(variances, freedom)
+    variances: Array = np.maximum(np.sum(residuals**2 * counts, axis=0) / dof, 1e-30) / counts
+    return variances, np.full_like(variances, dof)

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from rig.analysis.estimator_names import choose_estimator
-from rig.analysis.external.attitude_budget import budget_by_causes, noise_freedom
+from rig.analysis.external.attitude_budget import budget_by_causes, noise_dof
 from rig.analysis.external.attitude_equations import Equations
 from rig.analysis.external.increment_calibration import InIncrements, solve_turning
 from rig.analysis.installed_solvers import OfKind
@@ -46,7 +46,7 @@ class InAttitudes:
     - `other_methods`: the solutions by the other methods, or the Fault each ends in.
     - `measurements`: the means in attitudes; `dwells`: the placements.
     - `reference_fault`: why the estimated reference of a gyroscope is not the Earth's rate.
-    - `laid`: the differences of the placements; `elsewhere` rests without an attitude contributed to it.
+    - `laid`: the differences of the placements; `unplaced_rests` rests without an attitude contributed to it.
     - `moving`: the number of rows that were left out for the body's motion.
     """
 
@@ -57,7 +57,7 @@ class InAttitudes:
     measurements: Dwells
     reference_fault: Fault | None = None
     laid: LaidDown | None = None
-    elsewhere: int = 0
+    unplaced_rests: int = 0
     moving: int = 0
     dwells: tuple[StaticReading, ...] = ()
 
@@ -129,7 +129,7 @@ def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> 
     solution = equations.solve(method)
     if not any_mounting:
         check_mounted(solution.matrix)
-    budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance}, float(equations.freedom.min()))
+    budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance}, float(equations.dof.min()))
     other_methods = equations.solve_others(method, *get_args(EqualWeights))
     return InAttitudes(
         solution,
@@ -145,14 +145,14 @@ def _solve_placements(
     placements: Placements, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
 ) -> InAttitudes:
     """Return the calibration from placements, with their differences if the method models wrong attitudes."""
-    elsewhere, moving = placements.elsewhere, placements.left_out
+    unplaced, moving = placements.unplaced, placements.left_out
     solution, laid = _solve(equations, method, placements), None
     if method == "attitude_weighted":
         laid = laid_down(
             solution.theta,
             equations.placed,
-            elsewhere.means[quantity],
-            elsewhere.variances[quantity],
+            unplaced.means[quantity],
+            unplaced.variances[quantity],
         )
         solution = _replace_parameters(solution, laid)
     if solution.second_order is not None:
@@ -160,7 +160,7 @@ def _solve_placements(
     if not any_mounting:
         check_mounted(solution.matrix)
     causes = {NOISE: solution.covariance} if laid is None else laid.causes
-    budget = budget_by_causes(solution.matrix, causes, noise_freedom(solution, equations))
+    budget = budget_by_causes(solution.matrix, causes, noise_dof(solution, equations))
     return InAttitudes(
         solution,
         Triad.from_solution(solution),
@@ -168,7 +168,7 @@ def _solve_placements(
         budget,
         equations.measurements,
         laid=laid,
-        elsewhere=len(elsewhere.windows),
+        unplaced_rests=len(unplaced.windows),
         moving=moving,
         dwells=tuple(_dwells(placements, quantity)),
     )

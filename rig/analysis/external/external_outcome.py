@@ -21,9 +21,9 @@ def calibrate_external(runs: Sequence[RunData], external: ReadElsewhere, estimat
     return Outcome(
         settings=settings,
         provenance=origin_of(runs),
-        checks=(*check_external(name, solved), *(check for kind in solved.of_kinds for check in kind.checks)),
+        checks=(*check_external(name, solved), *(check for kind in solved.installed_kinds for check in kind.checks)),
         results={} if solved.gyroscope is None else {name: solved.gyroscope},
-        elsewhere={name: solved},
-        of_kinds=solved.of_kinds,
+        external={name: solved},
+        installed_kinds=solved.installed_kinds,
         polynomials={} if solved.polynomials is None else {name: {RATE: solved.polynomials}},
     )

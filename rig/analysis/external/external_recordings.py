@@ -12,7 +12,7 @@ from rig.analysis.estimator_names import ESTIMATORS, Estimator, choose_estimator
 from rig.analysis.external.attitudes import InAttitudes, Result, find_method, solve_placed
 from rig.analysis.external.increment_calibration import InIncrements
 from rig.analysis.external.omissions import list_omitted, notes_on_reading, notes_on_turns
-from rig.analysis.external.sweeps_agree import add_errors, check_agree, noise_freedom, sweep_errors
+from rig.analysis.external.sweeps_agree import add_errors, check_agree, noise_dof, sweep_errors
 from rig.analysis.gyroscope.calibration import (
     ALGORITHM_1,
     NEWTON,
@@ -59,12 +59,18 @@ NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweep
 
 @dataclass(frozen=True, slots=True)
 class OfSensor:
-    """The solution of the readings of an `item`.
+    """The solution of an external recording.
 
-    - `gyroscope`: its calibration; `rates`: its solution in attitudes; `at_rest`: the other quantities'.
-    - `unsolved`: why other recorded quantities have no solution; `of_kinds`: those of installed kinds.
-    - `turned`: the turns from rest to rest that it was solved by; `polynomials`: of a calibration over temperature.
-    - `omitted`: what was left out, by the quantity that lacks it, None of all; `notes`: remarkable steps.
+    - item: the sensor.
+    - gyroscope: its calibration, None without one.
+    - rates: the gyroscope's solution in attitudes, None by another method.
+    - at_rest: the solutions of the other quantities, from rests.
+    - unsolved: the faults of recorded quantities without a solution.
+    - turned: the turns from rest to rest that solved it, if any.
+    - installed_kinds: the solutions by installed kinds of sensors.
+    - polynomials: the calibration over temperature, if any.
+    - omitted: what was left out, by quantity, None for all of them.
+    - notes: remarkable steps of reading and solving.
     """
 
     item: Item
@@ -73,7 +79,7 @@ class OfSensor:
     at_rest: Mapping[Quantity, InAttitudes]
     unsolved: Mapping[Quantity, Fault]
     turned: TurnedData | None = None
-    of_kinds: tuple[KindFound, ...] = ()
+    installed_kinds: tuple[KindFound, ...] = ()
     polynomials: OverTemperature | None = None
     omitted: tuple[tuple[Quantity | None, Omitted], ...] = ()
     notes: tuple[str, ...] = ()
@@ -92,7 +98,7 @@ def solve_external(read: ReadElsewhere, settings: RunSettings, estimator: str | 
         if read.tells == "sweeps"
         else _solve_attitudes(read, settings, estimator)
     )
-    if solved.gyroscope is None and not solved.at_rest and not solved.of_kinds:
+    if solved.gyroscope is None and not solved.at_rest and not solved.installed_kinds:
         raise _nothing_solved(solved.unsolved)
     return _add_notes(solved, read)
 
@@ -195,24 +201,22 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
     if data.turned is None or not isinstance(solution, TurnedSolution):
         vector = solution if isinstance(solution, VectorSolution) else _vector(data)
         more, covariance = sweep_errors(vector, data), solution.covariance
-        freedom = noise_freedom(vector, data) if vector is solution else _fewest_of_means(data)
+        dof = noise_dof(vector, data) if vector is solution else _fewest_of_means(data)
         if more is not None and vector is solution:
             covariance = covariance - more.covariance
-        noise = Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, covariance)
+        noise = Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, dof, covariance)
         if more is None:
             return Budget((noise,))
-        return Budget(
-            (noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, more.freedom, more.covariance))
-        )
-    dof = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
-    dof |= dict.fromkeys((rotations_by_angle.ENDS, rotations_by_angle.AXES), solution.widened_freedom)
+        return Budget((noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, more.dof, more.covariance)))
+    dof_by_name = {NOISE: float(data.turned.noise_dof), BIAS: float(data.turned.bias_dof)}
+    dof_by_name |= dict.fromkeys((rotations_by_angle.ENDS, rotations_by_angle.AXES), solution.widened_dof)
     lines = solution.budget.contributors
-    return Budget(tuple(replace(line, freedom=dof.get(line.name, line.freedom)) for line in lines))
+    return Budget(tuple(replace(line, dof=dof_by_name.get(line.name, line.dof)) for line in lines))
 
 
 def _fewest_of_means(data: ExternalData) -> float:
     """Return the fewest degrees of freedom of the noise of any mean."""
-    return float(by_axis(average.freedom for average in [*(sweep.average for sweep in data.sweeps), *data.rests]).min())
+    return float(by_axis(average.dof for average in [*(sweep.average for sweep in data.sweeps), *data.rests]).min())
 
 
 def _vector(data: ExternalData) -> VectorSolution:
@@ -237,7 +241,7 @@ def _solve_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | Non
         },
         unsolved=attempts.faults,
         omitted=tuple(list_omitted(placed, attempts.results)),
-        of_kinds=tuple(
+        installed_kinds=tuple(
             KindFound(read.item.name, read.item, quantity, result)
             for quantity, result in attempts.results.items()
             if isinstance(result, OfKind)
@@ -294,7 +298,7 @@ def _describe_as_swept(result: Result) -> TurnedSolution:
         angles_covariance_rad2=axes.angles_covariance_rad2(solution.covariance[F, F]),
         residuals_rad_s=residuals,
         widened=1.0,
-        widened_freedom=np.inf,
+        widened_dof=np.inf,
         budget=Budget(lines),
         observations=observations,
         rank=rank,

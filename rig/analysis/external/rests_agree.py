@@ -48,12 +48,12 @@ def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
     )
 
 
-def _critical_value(freedom: float) -> float:
+def _critical_value(dof: float) -> float:
     """Return the critical value of the worst of three axes for `FALSE_ALARM` of sound recordings, by Student's t."""
     from scipy.special import ndtri, stdtrit
 
     tail = false_alarm_of_each(FALSE_ALARM, 2 * len(RATE.axes))
-    return -float(ndtri(tail) if np.isinf(freedom) else stdtrit(freedom, tail))
+    return -float(ndtri(tail) if np.isinf(dof) else stdtrit(dof, tail))
 
 
 def _undetected_std_rad_s(turned_rad_s: Array) -> float:

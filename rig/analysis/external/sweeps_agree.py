@@ -8,9 +8,9 @@ from rig.errors import Refused
 from rig.estimation.arrays import Array, bisect
 from rig.estimation.gyroscope.stated_motion import MotionErrors, StatedMotion, motion_errors
 from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, index_coefficients, regress
-from rig.estimation.reference.reference_budget import fewest_freedom
+from rig.estimation.reference.reference_budget import fewest_dof
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
-from rig.estimation.statistics.coverage import coverage_factors, effective_freedom
+from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 from rig.observation.external.csv_import import ExternalData
 from rig.observation.statistics.mean import by_axis
 
@@ -56,7 +56,7 @@ def _name_contradiction(worst: int, data: ExternalData) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SweepErrors:
-    """The covariances that errors of the stated motion add to a solution, with `freedom` degrees of freedom.
+    """The covariances that errors of the stated motion add to a solution, with `dof` degrees of freedom.
 
     `covariance` (6, 6) of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6) as in
     `VectorSolution`, so that twice a standard uncertainty is U.
@@ -65,7 +65,7 @@ class SweepErrors:
     covariance: Array
     matrix_covariance: Array
     angles_covariance_rad2: Array
-    freedom: float
+    dof: float
 
 
 def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | None:
@@ -87,23 +87,23 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     to_angles = np.hstack([axes.to_angles, np.zeros((6, 3))])
     rate_variance, axis_variance = sizes.median_variances
 
-    def inflate(to_values: Array, freedom: float, noise_freedom: float) -> Array:
+    def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
         """Return the covariance (q, q) of values with derivatives (q, 12), by U over all sizes of errors."""
         on_noise, on_rate, on_axis, on_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)
         )
         expanded = sizes.expanded(np.diag(on_noise + on_wrong), np.diag(on_rate), np.diag(on_axis))
         beyond = rate_variance * on_rate + axis_variance * on_axis + on_wrong
-        std = _additional_std(np.sqrt(np.diag(on_noise)), expanded, noise_freedom, freedom)
+        std = _additional_std(np.sqrt(np.diag(on_noise)), expanded, noise_dof, dof)
         inflation = std / np.sqrt(np.maximum(np.diag(beyond), np.finfo(np.float64).tiny))
         return np.asarray(inflation[:, None] * beyond * inflation, dtype=np.float64)
 
-    freedom = float(max(count_redundant_rows(data), FEWEST_FREEDOM))
+    dof = float(max(count_redundant_rows(data), FEWEST_FREEDOM))
     return SweepErrors(
-        covariance=inflate(parameter_jacobian(solution.matrix, axes.scale), freedom, noise_freedom(solution, data)),
+        covariance=inflate(parameter_jacobian(solution.matrix, axes.scale), dof, noise_dof(solution, data)),
         matrix_covariance=inflate(np.eye(12), np.inf, np.inf),
         angles_covariance_rad2=inflate(to_angles, np.inf, np.inf),
-        freedom=freedom,
+        dof=dof,
     )
 
 
@@ -115,12 +115,12 @@ def count_redundant_rows(data: ExternalData) -> int:
     return len(data.sweeps) + len(data.rests) - 4
 
 
-def noise_freedom(solution: VectorSolution, data: ExternalData) -> float:
+def noise_dof(solution: VectorSolution, data: ExternalData) -> float:
     """Return the noise's fewest degrees of freedom, by how the vector model weighs the means."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     variances = np.array([average.variance_rad2_s2 for average in averages])
-    freedom = by_axis(average.freedom for average in averages)
-    return fewest_freedom(solution.response.reshape(6, -1), variances.ravel(), freedom.ravel())
+    dof = by_axis(average.dof for average in averages)
+    return fewest_dof(solution.response.reshape(6, -1), variances.ravel(), dof.ravel())
 
 
 def add_errors(solution: VectorSolution, data: ExternalData) -> VectorSolution:
@@ -165,12 +165,12 @@ def _redundancy_numbers(design: Array) -> Array:
     return redundancy[:, None]
 
 
-def _additional_std(noise_std: Array, expanded: Array, known_freedom: float, freedom: float) -> Array:
+def _additional_std(noise_std: Array, expanded: Array, known_dof: float, dof: float) -> Array:
     """Return standard uncertainties (q,) that with those of the noise (q,) give U = k u of `expanded` (q,)."""
 
     def is_too_small(std: Array) -> Array:
         variances = np.array([noise_std**2, std**2])
-        factors = coverage_factors(effective_freedom(variances, np.array([[known_freedom], [freedom]])))
+        factors = coverage_factors(effective_dof(variances, np.array([[known_dof], [dof]])))
         small: Array = factors * np.sqrt(variances.sum(axis=0)) < expanded
         return small
 

@@ -40,13 +40,20 @@ VECTOR, NEWTON, ALGORITHM_1, EARTH_RATE = "vector", "newton", "algorithm_1", "ea
 class SensorResult:
     """One gyroscope's calibration and its origins.
 
-    - `solution`: by the chosen estimator; `uncertainty` its budget, which the vector model and `newton` have.
-    - `vector_model`, `six_observation` (exact), `algorithm_1` (SIX): the other solutions from the same observations.
-    - `explained`: the vector model with gravity and bias drift, None if it has no solution.
-    - `observations`, `rests`, `time_bases`: averages of sweeps and rests; one time base for each recording.
-    - `corrected_by`: the correction on the board and in `calibration.h`.
-    - `earth`: the Earth's rate, None if it was not estimated; `by_hand`: the solution if a hand turned the sensor.
-    - `faults`: why one of these is missing, by the estimator (VECTOR, NEWTON, ALGORITHM_1) or EARTH_RATE.
+    - sensor: the sensor as recorded.
+    - solution: the estimate by the chosen estimator.
+    - vector_model: the solution of the vector model.
+    - explained: the vector model with gravity and bias drift, None without a solution.
+    - uncertainty: the budget, which the estimators "vector" and "newton" have.
+    - six_observation: the exact solution of SIX.
+    - algorithm_1: the iterative solution of SIX.
+    - observations: the averages of the sweeps.
+    - rests: the averages of the rests.
+    - time_bases: one for each recording.
+    - corrected_by: the correction on the board and in calibration.h.
+    - earth: the Earth's rate, None if it was not estimated.
+    - by_hand: the solution if a hand turned the sensor.
+    - faults: the reasons of missing parts, by the estimator's name or EARTH_RATE.
     """
 
     sensor: RecordedSensor | Item

@@ -89,7 +89,7 @@ def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surrounding
         encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         mount_turns_rad=list_mount_rotations(stages, len(rests), surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([lever_arms, np.zeros((len(rests), 3))]),
-        noise_freedom=by_axis(average.freedom for average in averages),
+        noise_dof=by_axis(average.dof for average in averages),
         ripples=np.array([*(turn.ripple for turn, _ in turns), *np.zeros(len(rests))]),
         roundings_rad_s=np.sqrt(by_axis(average.rounding_rad2_s2 for average in averages)),
     )
@@ -213,12 +213,12 @@ def list_uncertainties(
     uncertainty, clock = surroundings.uncertainty, surroundings.clock
     return Unknown(
         clock_std=clock.std,
-        clock_freedom=clock.freedom,
+        clock_dof=clock.dof,
         clock_half_width=None if clock.comparisons else PPM * uncertainty.controller_clock_ppm,
         clock_source="held against "
         + (" and ".join(comparison.by for comparison in clock.comparisons) or "no other clock"),
         state_jitter_s=surroundings.state_jitter_s,
-        state_jitter_freedom=surroundings.state_jitter_freedom,
+        state_jitter_dof=surroundings.state_jitter_dof,
         axis_rad=float(np.radians(uncertainty.axis_deg)),
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg)),
         angle_std_rad=0.0 if uncertainty.angle_std_deg is None else uncertainty.angle_std_rad,
@@ -228,5 +228,5 @@ def list_uncertainties(
         g_sensitivity_rad_s_per_g=float(np.radians(uncertainty.stated_size("g_sensitivity_deg_s_g", name))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
-        earth_freedom=np.inf if earth_rate is None else earth_rate.freedom,
+        earth_dof=np.inf if earth_rate is None else earth_rate.dof,
     )

@@ -192,7 +192,7 @@ def _calibrate(
             site,
             1e-3 * uncertainty.acceleration_lag_ms,
             datasheet=datasheet,
-            noise_freedom=_readings_dof(used, swept),
+            noise_dof=_readings_dof(used, swept),
         ),
         alignment=None if gyroscope is None else _align_to_gyroscope(gyroscope, solution, mounting),
         other_methods=other_methods,
@@ -259,8 +259,8 @@ def _list_swept(name: str, recordings: Sequence[ObservedRun]) -> list[SweptAccel
 
 def _readings_dof(dwells: Sequence[DwellReading], swept: Sequence[SweptAcceleration]) -> Array:
     """Return the degrees of freedom (3 N + 9 M,) of the readings of dwells, then of the harmonics of sweeps."""
-    still = by_axis(dwell.reading.freedom for dwell in dwells).ravel()
-    return np.concatenate([still, *(np.full(9, float(sweep.harmonic.freedom)) for sweep in swept)])
+    still = by_axis(dwell.reading.dof for dwell in dwells).ravel()
+    return np.concatenate([still, *(np.full(9, float(sweep.harmonic.dof)) for sweep in swept)])
 
 
 def _align_to_gyroscope(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) -> Alignment | None:

@@ -113,7 +113,7 @@ def _calibrate(
             (homogeneity, drift),
             site,
             field_t=reference.norm,
-            noise_freedom=by_axis(dwell.reading.freedom for dwell in dwells).ravel(),
+            noise_dof=by_axis(dwell.reading.dof for dwell in dwells).ravel(),
         ),
         other_methods=attempt_each({method: partial(solve, method=method) for method in COMPARED}),
         dwells=dwells,

@@ -41,12 +41,12 @@ def accelerometer_budget(
     site: Site,
     lag_s: float,
     *,
-    noise_freedom: Array,
+    noise_dof: Array,
     datasheet: Datasheet | None = None,
 ) -> Budget:
     """Return the budget of the solution of the `movement`; `lag_s` is the half-width of the sensor's filter lag.
 
-    `noise_freedom` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics. By the
+    `noise_dof` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics. By the
     `datasheet` the solution's `own` errors are known.
     """
     spread = _propagate(
@@ -54,8 +54,8 @@ def accelerometer_budget(
         solution.response,
         movement.noise(),
         solution.attitude_error,
-        (solution.chi_square, solution.freedom),
-        noise_freedom=noise_freedom,
+        (solution.chi_square, solution.dof),
+        noise_dof=noise_dof,
     )
     errors = None if datasheet is None else solution.sensor_errors
     return combine_errors(
@@ -81,7 +81,7 @@ def magnetometer_budget(
     site: Site,
     *,
     field_t: float,
-    noise_freedom: Array,
+    noise_dof: Array,
 ) -> Budget:
     """Return the budget of a solution of measurements in tesla."""
     homogeneity, drift = tested
@@ -91,7 +91,7 @@ def magnetometer_budget(
         np.diag(measured.variances_m2_s4.ravel()),
         solution.attitude_error or AttitudeError(0.0, 0.0),
         (homogeneity.chi_square, homogeneity.degrees_of_freedom),
-        noise_freedom=noise_freedom,
+        noise_dof=noise_dof,
     )
     return reference_budget(spread, _field(site, field_t), [_drift(spread, solution.matrix, measured.attitudes, drift)])
 
@@ -103,7 +103,7 @@ def _propagate(
     error: AttitudeError,
     chi_square: tuple[float, int],
     *,
-    noise_freedom: Array,
+    noise_dof: Array,
 ) -> Spread:
     """Return the spread of scale and bias, from the `response` (p, n) of all parameters.
 
@@ -111,7 +111,7 @@ def _propagate(
     """
     scale = scale_of(solution.matrix)
     rows = scale_and_bias(solution.matrix, scale, len(solution.covariance))
-    return Spread(scale, rows @ solution.covariance @ rows.T, rows @ response, noise, error, *chi_square, noise_freedom)
+    return Spread(scale, rows @ solution.covariance @ rows.T, rows @ response, noise, error, *chi_square, noise_dof)
 
 
 def _gravity(site: Site) -> KnownSize:

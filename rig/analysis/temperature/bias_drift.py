@@ -19,7 +19,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.reference_model import BIAS, KnownNorm
 from rig.estimation.reference.triaxial import TriaxialSolution, solve_triaxial
 from rig.estimation.sensor_axes import nearest_rotation
-from rig.estimation.statistics.coverage import effective_freedom
+from rig.estimation.statistics.coverage import effective_dof
 from rig.estimation.temperature.bias_by_repeat import BiasByRepeat, bias_by_repeat
 from rig.estimation.temperature.bias_over_temperature import BiasOverTemperature, bias_over_temperature
 from rig.observation.finished_steps import dwell_times_s
@@ -49,7 +49,7 @@ class BiasDrift:
     - `common_std` (3,): the further standard deviation common to all biases.
     - `scale_free`: the solution of every repeat by itself, by its index.
     - `time_s`, `temperature_c` (R,): means over every repeat, times since the first.
-    - `freedom`, `slope_freedom` (3,): those of `scale_fixed.std` and of the slope's standard deviation.
+    - `dof`, `slope_dof` (3,): those of `scale_fixed.std` and of the slope's standard deviation.
     - `faults`: by the name SLOPE, why there is no slope.
     """
 
@@ -60,8 +60,8 @@ class BiasDrift:
     temperature_c: Array
     over_temperature: BiasOverTemperature | None
     earth_rate_known: bool
-    freedom: Array
-    slope_freedom: Array
+    dof: Array
+    slope_dof: Array
     faults: Mapping[str, Fault] = field(default_factory=dict)
 
 
@@ -72,7 +72,7 @@ Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
 class DwellMean:
     """A sensor's means (3,) in one dwell, their variances, the attitude base → sensor, time and temperature.
 
-    `freedom` (3,) is that of the variances.
+    `dof` (3,) is that of the variances.
     """
 
     mean: Array
@@ -80,7 +80,7 @@ class DwellMean:
     attitude: Array
     time_s: float
     temperature_c: float
-    freedom: Array | float = np.inf
+    dof: Array | float = np.inf
 
 
 def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
@@ -126,7 +126,7 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
             mounting @ nearest_rotation(dwell.attitude),
             (dwell.window.start_s + dwell.window.end_s) / 2 + recording.clock_offset_s,
             dwell.temperature_c,
-            dwell.reading.freedom,
+            dwell.reading.dof,
         )
         for recording in recordings
         for dwell in recording.sensors[name].dwells
@@ -147,7 +147,7 @@ def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor)
                         mounting @ nearest_rotation(rest.attitude),
                         (rest.start_s + rest.end_s) / 2 + recording.clock_offset_s,
                         rest.temperature_c,
-                        rest.freedom,
+                        rest.dof,
                     )
     return means
 
@@ -210,7 +210,7 @@ def _combine(
     temperatures = np.array([np.mean([mean.temperature_c for mean in repeat]) for repeat in repeats])
     faults = dict[str, Fault]()
     slope = attempt(faults, SLOPE, partial(bias_over_temperature, by_repeat.bias, by_repeat.std, temperatures, times))
-    freedom = np.minimum(by_repeat.freedom, np.min([_repeat_dof(repeat) for repeat in repeats], axis=0))
+    dof = np.minimum(by_repeat.dof, np.min([_repeat_dof(repeat) for repeat in repeats], axis=0))
     return BiasDrift(
         scale_fixed=by_repeat,
         common_std=common_std,
@@ -219,15 +219,15 @@ def _combine(
         temperature_c=temperatures,
         over_temperature=slope,
         earth_rate_known=earth_rate_known,
-        freedom=freedom,
-        slope_freedom=freedom if slope is None else np.minimum(slope.freedom, freedom),
+        dof=dof,
+        slope_dof=dof if slope is None else np.minimum(slope.dof, dof),
         faults=faults,
     )
 
 
 def _repeat_dof(repeat: Sequence[DwellMean]) -> Array:
     """Return the degrees of freedom (3,) of a repeat's mean over its attitudes."""
-    return effective_freedom([mean.variance for mean in repeat], by_axis(mean.freedom for mean in repeat))
+    return effective_dof([mean.variance for mean in repeat], by_axis(mean.dof for mean in repeat))
 
 
 def _solve_repeat(solve: Callable[[int], TriaxialSolution], repeat: int) -> ScaleFreeBias:

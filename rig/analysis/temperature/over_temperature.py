@@ -120,7 +120,7 @@ def _combine(
             contributor.kind,
             contributor.distribution,
             contributor.source,
-            contributor.freedom,
+            contributor.dof,
             sign @ contributor.covariance @ sign,
         )
         for contributor in budget.contributors
@@ -128,7 +128,7 @@ def _combine(
     powers = powers_at(0.0)
     corrected = sign @ powers @ combine_with_reference(polynomials, values, ()).covariance @ powers.T @ sign
     source = "what the repeats tell of the way to the reference temperature"
-    added = Contributor(CONTRIBUTOR, "A", "normal", None, "", source, float(polynomials.process.freedom), corrected)
+    added = Contributor(CONTRIBUTOR, "A", "normal", None, "", source, float(polynomials.process.dof), corrected)
     return replace(budget, contributors=(*budget.contributors, added)), combine_with_reference(
         polynomials, values, lines
     )

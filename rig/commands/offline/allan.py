@@ -71,7 +71,7 @@ def _analyse_run(path: Path) -> "dict[str, SensorAtRest]":
             f"{path} holds only readings that the board has corrected",
             "Give the recording of a calibration, or of `bias_drift`",
         )
-    if (read := recorded[0].elsewhere) is not None:
+    if (read := recorded[0].external) is not None:
         return {read.item.name: log_at_rest(samples_in(read.readings, str(path)))}
     return at_rest(recorded)
 

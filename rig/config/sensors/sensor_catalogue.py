@@ -25,18 +25,26 @@ class Delivered:
 
 @dataclass(frozen=True, slots=True)
 class PartSpec:
-    """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
+    """One kind of sensor, by its data sheet: limits (half-widths) unless stated otherwise.
 
-    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity_percent` how far it may be
-    from the best straight line, of full scale, `asymmetry_percent` by what is even of its curve; `bias_deg_s_k` and
-    `scale_ppm_k` how much bias and scale may change with temperature, `angle_random_walk_deg_sqrt_h` is its white
-    noise, `bias_instability_deg_h` the least Allan deviation of its bias, `non_orthogonality_deg` how far from 90° two
-    of its axes may stand. `ranges_g` are those of its accelerometer, which shares its data rate, the usual one first;
-    `acceleration_noise_ug_sqrt_hz` is the noise density of that, in µg/√Hz; its nonlinearity is of the range
-    `acceleration_nonlinear_over_g` either way, the one that is set where that is 0; the rest is as the gyroscope's.
-    `delivered` is what calibrating finds. A part with a port of its own stands beside the board, with a clock of its
-    own. `any_rate` says that it may be any sensor: its rates and ranges are what its section says, and the half-widths
-    are those of a consumer part.
+    - rates_hz, ranges_deg_s: all data rates and ranges of its gyroscope.
+    - rates_rule: the permitted rates in words.
+    - default_rate_hz, default_range_deg_s: those without a setting.
+    - g_sensitivity_deg_s_g: change of a reading by 1 g.
+    - nonlinearity_percent: deviation from the best straight line, of full scale.
+    - asymmetry_percent: the even part of that curve.
+    - bias_deg_s_k, scale_ppm_k: change of bias and scale with temperature.
+    - angle_random_walk_deg_sqrt_h: white noise, typical.
+    - bias_instability_deg_h: the least Allan deviation of the bias.
+    - non_orthogonality_deg: deviation from 90° between two axes.
+    - ranges_g: the ranges of its accelerometer, the usual one first; the data rate is the gyroscope's.
+    - acceleration_noise_ug_sqrt_hz: noise density.
+    - acceleration_nonlinearity_percent: of the range that acceleration_nonlinear_over_g states.
+    - acceleration_bias_mg_k, acceleration_scale_ppm_k, acceleration_bias_instability_ug: as the gyroscope's.
+    - acceleration_nonlinear_over_g: that range either way; 0 for the range that is set.
+    - delivered: the quantities that its calibration estimates.
+    - own_port: whether it has a port and a clock of its own, beside the board.
+    - any_rate: whether it may be any sensor: its section states rates and ranges, the limits are a consumer part's.
     """
 
     rates_hz: tuple[float, ...]

@@ -42,15 +42,20 @@ class SlopeEntry(Entry):
 
 
 class DriftEntry(Entry):
-    """One quantity's bias by repeat, in its `unit`.
+    """One quantity's bias by repeat.
 
-    - `common_std`: standard deviation that all biases share; `scatter_ratio`: scatter of the readings from repeat to
-      repeat over that within a dwell.
-    - `degrees_of_freedom`: those of the standard deviations of `scale_fixed`, null if infinite.
-    - `false_alarm_probability`: probability that a steady bias shows `steps`.
-    - `temperature_slope`: slope of the bias over temperature. Temperatures are `temperature_stated` if the sensor has
-      no thermometer.
-    - `part`, `serial_number`, `full_scale` (in the same unit): those of the sensor.
+    - unit: of all values without another one.
+    - repeats: bias and temperature of each repeat.
+    - common_std: standard deviation that all biases share.
+    - scatter_ratio: scatter of the readings from repeat to repeat over that within a dwell.
+    - steps: jumps of the bias.
+    - false_alarm_probability: probability that a steady bias shows steps.
+    - largest_change: between any two repeats.
+    - temperature_slope: slope of the bias over temperature, or the error.
+    - earth_rate_known: whether the Earth's rate was subtracted.
+    - degrees_of_freedom: those of the standard deviations with the scale fixed, null if infinite.
+    - part, serial_number, full_scale: of the sensor.
+    - temperature_stated: whether the temperatures are stated because the sensor has no thermometer.
     """
 
     unit: str

@@ -27,6 +27,6 @@ class EarthRateEntry(Entry):
     birge_ratio: float
     degrees_of_freedom: Freedom
 
-    def freedoms(self, count: int) -> list[Freedom]:
+    def dofs(self, count: int) -> list[Freedom]:
         """Return the degrees of freedom of `count` of the entry's numbers."""
         return [self.degrees_of_freedom] * count

@@ -44,15 +44,15 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         if schema not in TEXTS:
             raise ValueError(f"its schema is {schema!r:.60}; this version of the rig reads {SCHEMA!r}")
         texts = {name: _text(file, name) for name in TEXTS[schema]}
-        elsewhere = schema == SCHEMA_ELSEWHERE
-        group = {} if elsewhere else _member(file, "samples", h5py.Group)
+        is_external = schema == SCHEMA_ELSEWHERE
+        group = {} if is_external else _member(file, "samples", h5py.Group)
         if len(group) > MAX_SENSORS:
             raise ValueError(f"it announces {len(group)} sensors")
         samples = {name: _member(group, name, h5py.Dataset) for name in group}
         described = {
             name: {key: _plain(value) for key, value in dataset.attrs.items()} for name, dataset in samples.items()
         }
-        named = ("states", "events", *(TABLES if elsewhere else ()))
+        named = ("states", "events", *(TABLES if is_external else ()))
         rows = {f"samples/{name}": dataset for name, dataset in samples.items()}
         rows |= {name: _member(file, name, h5py.Dataset) for name in named}
         for name, dataset in rows.items():

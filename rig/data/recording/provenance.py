@@ -32,15 +32,21 @@ PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Versions, serial numbers (`NO_BOARD` where there is none), the configuration's and the script's hashes, the time.
+    """The origin of a recording; "arm" stands for any turner, `NO_BOARD` for what a recording without a board lacks.
 
-    What turned the sensors is called the arm, whatever it is. `stored_calibrations` are those by which the board
-    corrected what it streamed, by sensor name. `arm_kinematics` is the geometry of the turner, None where there is
-    none. `tcp_offset` is where the controller's tool centre point stood in the flange's frame, which nothing is
-    reckoned with; None where it was not told. `arm_maker` and `arm_model` are those of what was found,
-    `turner_kind` is the kind it is registered as. `board_follows_crystal` is the board's own word on its clock,
-    None where there is no board. `readings_file` and `motion_file` are those of readings recorded elsewhere, with
-    no arm and no board.
+    - started_utc: the time of its start.
+    - rig_version, python_version, package_versions, firmware_version: the software.
+    - configuration_sha256: the hash of the configuration.
+    - arm_serial_number, arm_software, board_unique_id: the devices.
+    - sensor_serial_numbers: by sensor name.
+    - stored_calibrations: those by which the board corrected its stream, by sensor name.
+    - script, script_sha256, script_installed: the procedure's script, its hash, whether it came with a package.
+    - arm_kinematics: the turner's geometry, None without one.
+    - tcp_offset: the controller's tool centre point in the flange's frame, unused; None if unknown.
+    - arm_maker, arm_model: of the turner that was found.
+    - turner_kind: its registered kind.
+    - board_follows_crystal: the board's statement on its clock, None without a board.
+    - readings_file, motion_file: the files of an external recording.
     """
 
     started_utc: Utc

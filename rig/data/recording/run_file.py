@@ -56,7 +56,7 @@ class RunData:
     samples: dict[str, NDArray[Any]]
     states: NDArray[Any]
     events: tuple[TimedEvent, ...]
-    elsewhere: ReadElsewhere | None = None
+    external: ReadElsewhere | None = None
 
     def measuring(self, quantity: Quantity | Scalar) -> dict[str, RecordedSensor]:
         """Return the sensors whose samples hold that quantity, by name."""
@@ -201,16 +201,16 @@ def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask |
     contents = _contents(path, timeout_s, begun)
     try:
         validate(_Named, {"sensors": [*contents.described]}, "samples")
-        elsewhere = _elsewhere(contents) if contents.tables else None
+        external = _elsewhere(contents) if contents.tables else None
         sensors = contents.sensors
         samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
-        if elsewhere is not None:
-            sensors, samples = {elsewhere.item.name: elsewhere.sensor}, {elsewhere.item.name: elsewhere.samples}
+        if external is not None:
+            sensors, samples = {external.item.name: external.sensor}, {external.item.name: external.samples}
         settings = _settings(contents, sensors)
         provenance = validate(Provenance, parse_json(contents.texts["provenance"]), "provenance")
         events = tuple(decode_events(contents.events.tobytes()))
         turner = None
-        if elsewhere is None:
+        if external is None:
             turner = _turner(contents, provenance)
             check_joints(turner, settings, events)
         states = _whole_rows(contents.states)
@@ -226,7 +226,7 @@ def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask |
             samples=samples,
             states=states,
             events=events,
-            elsewhere=elsewhere,
+            external=external,
         )
     except (ValueError, RecursionError) as error:
         raise _not_a_run_file(path, str(error)) from None
@@ -234,8 +234,8 @@ def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask |
 
 def write_elsewhere(path: Path, run: RunData) -> None:
     """Write a new run file of external readings. Raise OSError."""
-    read = run.elsewhere
-    assert read is not None, "of readings from elsewhere"
+    read = run.external
+    assert read is not None, "external readings"
     provenance = json.dumps(run.provenance.document())
     texts = {"config": run.config, "settings": run.settings.to_json(), "provenance": provenance}
     texts["elsewhere"] = json.dumps(asdict(ExternalHeader(read.item, read.tells, read.origin_s, read.other_rows)))

@@ -180,23 +180,25 @@ class PlannedDwell:
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """What a run was to do, and how it is solved and judged.
+    """The task of a run, and how it is solved and judged.
 
-    - `procedure`: the procedure's name; `then_verify`: whether a verification was to follow the calibration.
-    - `observation`, `limits`, `uncertainty`: what the configuration's sections of these names state. Recordings of
-      others (`elsewhere`) have no limits and no uncertainty.
-    - `to_calibrate`: names of the sensors to calibrate; `matrix_corrected`: those of them whose readings the whole
-      matrix corrects; `reference`: the sensor whose calibration is known.
-    - `home_q_rad`: angles of the turner's joints, of which there may be none.
-    - `planned_sweeps`, `planned_dwells`: those of the whole procedure, however often the run was interrupted.
-    - `site`: where the arm stands; `finds_earth_rate`: whether the Earth's rate is to be found from the gyroscopes'
-      readings instead of taken from the site.
-    - `second_order`: whether the accelerometers' model has terms of second order.
-    - `extension_m`: end of the extension on which the sensors sit, in the flange's frame.
-    - `mounts`: nominal rotations from the flange's frame to the item's in the stages of the procedure, none if the item
-      stays mounted as it is; `stage`: number of this recording's stage, from 0.
-    - `elsewhere`: how readings of others are solved; `by_hand`: how a session by hand is solved.
-    - `reference_c`: temperature at which a calibration over temperature is stated, None of any other.
+    - procedure: the procedure's name.
+    - then_verify: whether a verification was to follow the calibration.
+    - observation, limits, uncertainty: sections of the configuration; external recordings lack the latter two.
+    - to_calibrate: names of the sensors to calibrate.
+    - reference: the sensor with a given calibration.
+    - home_q_rad: angles of the turner's joints, of which there may be none.
+    - planned_sweeps, planned_dwells: of the complete procedure, however often the run was interrupted.
+    - site: location of the arm.
+    - matrix_corrected: names of the sensors whose readings the complete matrix corrects.
+    - second_order: whether the accelerometers' model has terms of second order.
+    - finds_earth_rate: whether the gyroscopes' readings give the Earth's rate, instead of the site.
+    - extension_m: end of the extension that carries the sensors, in the flange's frame.
+    - elsewhere: how an external recording is solved.
+    - mounts: nominal rotations from the flange's to the item's frame by stage, empty for an item that stays as it is.
+    - stage: number of this recording's stage, from 0.
+    - by_hand: how a session by hand is solved.
+    - reference_c: temperature at which a calibration over temperature is stated, None for other calibrations.
     """
 
     procedure: str

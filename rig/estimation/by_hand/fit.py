@@ -43,7 +43,7 @@ NEVER_LESS = ("of_angle", "walk_rad_s_sqrt_s")  # errors outside the model exist
 
 @dataclass(frozen=True, slots=True)
 class GraphFit:
-    """The converged graph; `covariance` (p, p), `chi_square` of all factors but the priors, `freedom` its dof."""
+    """The converged graph; `covariance` (p, p), `chi_square` of all factors but the priors with `dof`."""
 
     session: HandRecording
     conditions: SessionConditions
@@ -54,7 +54,7 @@ class GraphFit:
     factors: tuple[Factor, ...]
     covariance: Array
     chi_square: float
-    freedom: float
+    dof: float
     iterations: int
 
     def redundancy_numbers(self, factor: Factor) -> Array:
@@ -86,9 +86,9 @@ def fit_session(session: HandRecording, conditions: SessionConditions, trusted: 
         integrals = integrate_moves(session, state.gyroscope, state.attitudes[:, 2])
     rows = list(linearise(Graph(session, faces, conditions, state, integrals, stds)))
     _, covariance = solve_step(rows)
-    chi_square, freedom = sum_squares(rows, covariance)
+    chi_square, dof = sum_squares(rows, covariance)
     return GraphFit(
-        session, conditions, faces, state, integrals, stds, tuple(rows), covariance, chi_square, freedom, iterations
+        session, conditions, faces, state, integrals, stds, tuple(rows), covariance, chi_square, dof, iterations
     )
 
 
@@ -192,15 +192,15 @@ def _stds_of_rows(rows: Sequence[Factor], step: Array, covariance: Array, now: H
     stds: dict[str, float] = {}
     for name, (kind, cause) in CAUSE_OF_STD.items():
         stated = getattr(STATED, name)
-        square = freedom = PRIOR_DOF
+        square = dof = PRIOR_DOF
         if rows_of_kind := [row for row in rows if row.kind == kind]:
             design, residual = whiten_rows(rows_of_kind)
             share = np.concatenate([np.square(row.causes[cause] / row.std) for row in rows_of_kind])
             free = np.clip(1 - _leverages(design, covariance), 0.0, 1.0)
             sum_squares = np.square(residual + design @ step) - free * (1 - share)
             square += float(sum_squares.sum()) * (getattr(now, name) / stated) ** 2
-            freedom += float(share @ free)
+            dof += float(share @ free)
         least = stated * (1.0 if name in NEVER_LESS else LEAST)
-        size = stated * float(np.sqrt(max(square, 0.0) / freedom))
+        size = stated * float(np.sqrt(max(square, 0.0) / dof))
         stds[name] = min(max(least, size), getattr(LARGEST, name))
     return HandStds(**stds)

@@ -73,7 +73,7 @@ class HandSolution:
     moves: tuple[MoveSummary, ...]
     stds: dict[str, tuple[float, float, float]]
     chi_square: float
-    freedom: float
+    dof: float
     expanded_scale: Array
     creeping_s: tuple[tuple[float, float], ...] = ()
 
@@ -156,7 +156,7 @@ def summarise_fit(fit: GraphFit, warnings: tuple[str, ...] = ()) -> HandSolution
         angles_covariance_rad2=axes.angles_covariance_rad2(covariance[:9, :9]),
         residuals_rad_s=np.zeros((0, 3)),
         widened=max(1.0, fit.stds.repeat_rad / STATED.repeat_rad),
-        widened_freedom=np.inf,
+        widened_dof=np.inf,
         budget=_budget(fit, to_parameters, clock),
         observations=len(fit.session.rests) + sum(move.is_usable for move in fit.session.moves),
         rank=12,
@@ -175,7 +175,7 @@ def summarise_fit(fit: GraphFit, warnings: tuple[str, ...] = ()) -> HandSolution
             if name != "acceleration_m_s2" or fit.session.acceleration is not None
         },
         chi_square=fit.chi_square,
-        freedom=fit.freedom,
+        dof=fit.dof,
         expanded_scale=2 * np.sqrt(np.diag(of_session)[:3]),
         creeping_s=fit.session.creeping_s,
     )
@@ -263,10 +263,10 @@ def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
             effect = gain * std
             covariances[line_of[cause]] += effect @ effect.T
     samples = float(sum(rest.samples for rest in fit.session.rests))
-    estimated = dict.fromkeys(("placement", "bias from rest to rest", "angles of the moves"), fit.freedom + PRIOR_DOF)
-    freedom = {"noise": samples} | estimated
+    estimated = dict.fromkeys(("placement", "bias from rest to rest", "angles of the moves"), fit.dof + PRIOR_DOF)
+    dof = {"noise": samples} | estimated
     lines = [
-        Contributor(name, kind, "normal", None, "", source, freedom.get(name, np.inf), covariances[name])
+        Contributor(name, kind, "normal", None, "", source, dof.get(name, np.inf), covariances[name])
         for name, (kind, _, source) in LINES.items()
     ]
     ppm, source = fit.conditions.clock_ppm, fit.conditions.clock_source

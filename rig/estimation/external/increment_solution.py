@@ -73,14 +73,20 @@ class EarthSeen:
 
 @dataclass(frozen=True, slots=True)
 class KnownIncrements:
-    """`matrix` F (3, 3), `bias` b (3,) with `covariance` (15, 15) [F row by row, ω_E, b], and the variance components.
+    """A gyroscope's matrix and bias by its increments, with their covariance and variance components.
 
-    - `causes`: the parts (15, 15) of the covariance by name.
-    - `earth`: the Earth's rate by the increments, or the fault.
-    - `clock_s` with `clock_std_s`: the reference's attitude of the time t was that of t + τ.
-    - `fix_std_rad`: error of a fix about each axis; `random_walk_rad_sqrt_s` of the gyroscope's angle.
-    - `matrix_scatter`, `bias_scatter_rad_s`: standard deviation of each element between intervals of the recording.
-    - `residuals_rad` (n, 3) of the increments; `aside_s` (k,): the start of each outlier.
+    - matrix (3, 3), bias (3,): F and b.
+    - covariance (15, 15): of F row by row, ω_E, b.
+    - causes: parts (15, 15) of the covariance, by name.
+    - earth: the Earth's rate by the increments, or the fault.
+    - clock_s, clock_std_s: τ, where the reference's attitude of the time t was that of t + τ.
+    - fix_std_rad: error of a fix about each axis.
+    - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
+    - matrix_scatter, bias_scatter_rad_s: standard deviation of each element between intervals of the recording.
+    - residuals_rad (n, 3): of the increments.
+    - aside_s (k,): start of each outlier.
+    - condition: of the scaled design.
+    - iterations: number of Gauss-Newton steps.
     """
 
     matrix: Array
@@ -246,11 +252,10 @@ def _summarise(settled: _Settled, aside_s: Array) -> KnownIncrements:
     combinations = np.eye(len(solved.theta))[np.r_[MATRIX, EARTH, BIAS]]
     for interval in range(intervals):
         combinations[12:, COMMON + 12 * interval :][:, BIAS] = np.eye(3) / intervals
-    residual_freedom = solved.residuals.size - BIAS.stop - 1  # less F, b and the clock
-    freedom = np.minimum(settled.model.freedom(sizes, combinations), residual_freedom)
+    residual_dof = solved.residuals.size - BIAS.stop - 1  # less F, b and the clock
+    dof = np.minimum(settled.model.dof(sizes, combinations), residual_dof)
     causes = {
-        name: inflate_to_student(combinations @ cause @ combinations.T, freedom)
-        for name, cause in _causes(settled).items()
+        name: inflate_to_student(combinations @ cause @ combinations.T, dof) for name, cause in _causes(settled).items()
     }
     return KnownIncrements(
         matrix=state.matrix,

@@ -16,7 +16,7 @@ from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.mount_squares import propagate_mount_squares
 from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs
 from rig.estimation.statistics.bias_process import BiasProcess
-from rig.estimation.statistics.coverage import coverage_factors, effective_freedom
+from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 
 NOISE = "noise"
 WANDERING, FLICKER = "bias instability", "flicker of the bias"
@@ -34,7 +34,7 @@ class Contributor:
 
     - `kind`: the type of evaluation (JCGM 100, 4.2 and 4.3).
     - `half_width`: the assumed one, in `unit`; if normal, the stated expanded uncertainty (k = 2); None if estimated.
-    - `freedom`: its degrees of freedom, infinite for an exact uncertainty.
+    - `dof`: its degrees of freedom, infinite for an exact uncertainty.
     - `covariance` (6, 6): of kx ky kz bx by bz.
     """
 
@@ -44,7 +44,7 @@ class Contributor:
     half_width: float | None
     unit: str
     source: str
-    freedom: float
+    dof: float
     covariance: Array
 
     @property
@@ -89,7 +89,7 @@ class Budget:
     @property
     def coverage_factors(self) -> Array:
         """The coverage factors k (6,)."""
-        return coverage_factors(self.freedom)
+        return coverage_factors(self.dof)
 
     @property
     def expanded(self) -> Array:
@@ -98,10 +98,10 @@ class Budget:
         return expanded
 
     @property
-    def freedom(self) -> Array:
+    def dof(self) -> Array:
         """The effective degrees of freedom (6,) by Welch–Satterthwaite (JCGM 100, G.4); infinite if all are exact."""
         variances = np.array([contributor.std**2 for contributor in self.contributors])
-        return effective_freedom(variances, np.array([[contributor.freedom] for contributor in self.contributors]))
+        return effective_dof(variances, np.array([[contributor.dof] for contributor in self.contributors]))
 
     @property
     def shares(self) -> Array:
@@ -114,14 +114,19 @@ class Budget:
 class Unknown:
     """The standard uncertainties, or half-widths, of error sources that no recording determines.
 
-    - `clock_std`: a standard uncertainty, as a fraction, explained by `clock_source`; `clock_half_width`: if of any
-      clock.
-    - `state_jitter_s`, `stamp_std_s`: standard uncertainties of the times of the arm's states and the sensor's samples.
-    - `axis_rad`: half-width of the direction of each swept axis; `sensor_offset_m`: of the sensor's position.
-    - `repeatability_rad`: half-width of the return to an angle; `mount_rad`: of a mounted item's tilt about each axis.
-    - `angle_std_rad`: standard uncertainty of a joint's encoder at the ends of arcs.
-    - `earth_rate`: True if unknown; `earth_covariance_rad2_s2` (3, 3): in the base frame, if estimated.
-    - `…_freedom`: degrees of freedom of the uncertainties estimated from readings.
+    - clock_std: of the clock, as a fraction.
+    - clock_source: explanation of clock_std.
+    - state_jitter_s, stamp_std_s: of the times of the arm's states, and of the sensor's samples.
+    - axis_rad: half-width of the direction of each swept axis.
+    - sensor_offset_m: half-width of the sensor's position.
+    - g_sensitivity_rad_s_per_g: half-width of the change of a reading by 1 g.
+    - earth_rate: whether the Earth's rate is unknown.
+    - earth_covariance_rad2_s2 (3, 3): in the base frame, None if it was not estimated.
+    - clock_dof, state_jitter_dof, earth_dof: degrees of freedom of those estimated from readings.
+    - clock_half_width: that of a clock with limits, else None.
+    - repeatability_rad: half-width of the return to an angle.
+    - angle_std_rad: of a joint's encoder at the ends of arcs.
+    - mount_rad: half-width of a mounted item's tilt about each axis.
     """
 
     clock_std: float
@@ -132,10 +137,10 @@ class Unknown:
     g_sensitivity_rad_s_per_g: float
     earth_rate: bool
     earth_covariance_rad2_s2: Array | None = None
-    clock_freedom: float = np.inf
+    clock_dof: float = np.inf
     clock_half_width: float | None = None
-    state_jitter_freedom: float = np.inf
-    earth_freedom: float = np.inf
+    state_jitter_dof: float = np.inf
+    earth_dof: float = np.inf
     repeatability_rad: float = 0.0
     angle_std_rad: float = 0.0
     mount_rad: float = 0.0
@@ -169,8 +174,8 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     turned = inputs.turns_rad_s @ matrix.T
     clock_half_width, clock_source = unknown.clock_half_width, unknown.clock_source
     if clock_half_width is None:
-        timed = evaluate_a(CLOCK, clock_source, propagate(unknown.clock_std * turned[None]), unknown.clock_freedom)
-        yield timed if np.isfinite(timed.freedom) else replace(timed, kind="B")  # by the statement about clocks alone
+        timed = evaluate_a(CLOCK, clock_source, propagate(unknown.clock_std * turned[None]), unknown.clock_dof)
+        yield timed if np.isfinite(timed.dof) else replace(timed, kind="B")  # by the statement about clocks alone
     else:
         yield evaluate_b(CLOCK, 1e6 * clock_half_width, "ppm", clock_source, clock_half_width * turned[None])
     yield from _evaluate_times(inputs, unknown, turned, propagate)
@@ -186,7 +191,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         variances, directions = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         spread = inputs.attitudes @ (directions * np.sqrt(variances.clip(min=0.0)))  # principal axes
         source, patterns = "found from sweeps and rests", np.moveaxis(spread, -1, 0) @ matrix.T
-        yield evaluate_a("Earth's rate", source, propagate(patterns), unknown.earth_freedom)
+        yield evaluate_a("Earth's rate", source, propagate(patterns), unknown.earth_dof)
     elif unknown.earth_rate:
         base_axes = EARTH_RATE_RAD_S * np.moveaxis(inputs.attitudes, -1, 0) @ matrix.T  # for each axis of the base
         yield evaluate_b("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", base_axes)
@@ -235,7 +240,7 @@ def _evaluate_times(
     per_sweep = np.eye(len(turned))[:, :, None]
     jitter = per_sweep * (unknown.state_jitter_s * per_s[:, None] * turned)[None]
     source = "scatter of the joint angles"
-    yield evaluate_a(STATES, source, propagate(jitter), unknown.state_jitter_freedom)
+    yield evaluate_a(STATES, source, propagate(jitter), unknown.state_jitter_dof)
     if unknown.stamp_std_s:
         # A window moved in time covers other rates at its ends: those of the ripple.
         moved = per_sweep * ((unknown.stamp_std_s * per_s * inputs.ripples)[:, None] * turned)[None]
@@ -243,27 +248,27 @@ def _evaluate_times(
         yield Contributor(STAMPS, "B", "rectangular", float(half_width), "ms", source, np.inf, propagate(moved))
 
 
-def _find_noise_freedom(explained: Explained) -> float:
+def _find_noise_dof(explained: Explained) -> float:
     """Return the fewest degrees of freedom of scale and bias by the noise of the readings (JCGM 100, G.4.1)."""
     variances = explained.solution.response**2 * explained.inputs.variances_rad2_s2
-    freedom = np.broadcast_to(explained.inputs.noise_freedom, variances.shape)
-    parts, freedoms = (array.reshape(len(variances), -1).T for array in (variances, freedom))
-    return float(effective_freedom(parts, freedoms).min())
+    dof = np.broadcast_to(explained.inputs.noise_dof, variances.shape)
+    parts, dofs = (array.reshape(len(variances), -1).T for array in (variances, dof))
+    return float(effective_dof(parts, dofs).min())
 
 
-def evaluate_a(name: str, source: str, covariance: Array, freedom: float = np.inf) -> Contributor:
+def evaluate_a(name: str, source: str, covariance: Array, dof: float = np.inf) -> Contributor:
     """Return a contributor that was estimated from the readings."""
-    return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
+    return Contributor(name, "A", "normal", None, "", source, dof, covariance)
 
 
 def _evaluate_readings(explained: Explained) -> Iterator[Contributor]:
     """Yield the contributors of the readings: their noise, and the drift of the bias."""
     bias, (flicker, wandering) = explained.bias, _split_bias_covariance(explained)
     noise = explained.solution.covariance - flicker - wandering
-    yield evaluate_a(NOISE, "scatter of the readings", noise, _find_noise_freedom(explained))
+    yield evaluate_a(NOISE, "scatter of the readings", noise, _find_noise_dof(explained))
     if bias.is_drifting:
         source = "scatter of rests and sweeps about each other"
-        yield evaluate_a(WANDERING, source, wandering, float(bias.freedom))
+        yield evaluate_a(WANDERING, source, wandering, float(bias.dof))
     if bias.instability_rad_s:
         source = f"least Allan deviation: {np.degrees(bias.instability_rad_s) * 3600:.3g} °/h"
         yield Contributor(FLICKER, "B", "normal", None, "", source, np.inf, flicker)

@@ -63,7 +63,7 @@ class EarthRate:
     """The estimated Earth's rate: `rate_rad_s` (3,) in the frame of the arm's base, `covariance_rad2_s2` (3, 3).
 
     `up` (3,) is upwards there; `vertical_fixed` is True if the vertical component was fixed by the latitude.
-    `birge_ratio` is the RMS ratio of residuals to their expected standard deviation, with `freedom` degrees of freedom;
+    `birge_ratio` is the RMS ratio of residuals to their expected standard deviation, with `dof` degrees of freedom;
     above 1 it multiplies the standard deviations.
     """
 
@@ -72,7 +72,7 @@ class EarthRate:
     up: Array
     vertical_fixed: bool
     birge_ratio: float
-    freedom: float = np.inf
+    dof: float = np.inf
 
     @property
     def norm_rad_s(self) -> float:
@@ -140,15 +140,15 @@ def find_earth_rate(inputs: VectorInputs, nominal_mounting: Array, prior: EarthR
     sensed_gravity = None if gravity is None else inputs.apparent_gravity_m_s2
     fit = _fit(replace(inputs, earth_rate_rad_s=fixed), nominal_mounting, directions, sensed_gravity, prior)
     free, covariance = _extract_earth_rate(fit, len(directions))
-    freedom = 3 * (fit.solution.observations - (4 if gravity is None else 7)) - len(directions)
-    birge_ratio = _find_birge_ratio(fit, freedom)
+    dof = 3 * (fit.solution.observations - (4 if gravity is None else 7)) - len(directions)
+    birge_ratio = _find_birge_ratio(fit, dof)
     earth = EarthRate(
         rate_rad_s=fixed + free @ directions,
         covariance_rad2_s2=directions.T @ covariance @ directions * max(1.0, birge_ratio) ** 2,
         up=prior.up,
         vertical_fixed=len(directions) < 3,
         birge_ratio=birge_ratio,
-        freedom=max(freedom, 1),
+        dof=max(dof, 1),
     )
     expected = float(np.sqrt(EARTH_RATE_RAD_S**2 - fixed @ fixed))
     component = "its level part" if earth.vertical_fixed else "it"
@@ -201,10 +201,10 @@ def _extract_earth_rate(fit: _EarthRateFit, directions: int) -> tuple[Array, Arr
     return PRIOR_STD_RAD_S * sizes, PRIOR_STD_RAD_S**2 * covariance
 
 
-def _find_birge_ratio(fit: _EarthRateFit, freedom: int) -> float:
+def _find_birge_ratio(fit: _EarthRateFit, dof: int) -> float:
     """Return the RMS of residuals over their expected stds, less the dof that the arm's errors absorb."""
     squares = float(np.sum(fit.solution.residuals_rad_s**2 / fit.expected_rad2_s2))
-    return float(np.sqrt(squares / freedom)) if freedom > 0 else 1.0
+    return float(np.sqrt(squares / dof)) if dof > 0 else 1.0
 
 
 def _tilt_sweeps(turns_rad_s: Array) -> Array:

@@ -74,7 +74,7 @@ class TurnedSolution:
     """A solution with the fields of `vector_model.VectorSolution`; `budget` has the causes of the covariance.
 
     - `residuals_rad_s` (N, 3): of the means, then of the rotations as mean rates.
-    - `widened`: the Birge ratio of the rotations, at least 1, with `widened_freedom` degrees of freedom.
+    - `widened`: the Birge ratio of the rotations, at least 1, with `widened_dof` degrees of freedom.
     - `estimator`: another name if readings in attitudes are used as rotations.
     """
 
@@ -88,7 +88,7 @@ class TurnedSolution:
     angles_covariance_rad2: Array
     residuals_rad_s: Array
     widened: float
-    widened_freedom: float
+    widened_dof: float
     budget: Budget
     observations: int
     rank: int
@@ -148,7 +148,7 @@ def solve_turned(
         state, iterations = state.after_step(step), iterations + 1
         settled = bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
     equations = _equate(gyroscope, turns, means, state)
-    ratio, freedom = _find_birge_ratio(equations[len(means) :], covariance)
+    ratio, dof = _find_birge_ratio(equations[len(means) :], covariance)
     _check_closed(turns, equations[len(means) :], ratio)
     equations = [equation.inflate(ratio) for equation in equations]
     step, covariance = _solve(equations)
@@ -169,7 +169,7 @@ def solve_turned(
         angles_covariance_rad2=axes.angles_covariance_rad2(covariance[:9, :9]),
         residuals_rad_s=np.array([(equation.observed - equation.design @ step)[:3] for equation in equations]),
         widened=ratio,
-        widened_freedom=freedom,
+        widened_dof=dof,
         budget=_budget(equations, to_parameters @ covariance),
         observations=len(equations),
         rank=conditioning.rank,
@@ -267,14 +267,14 @@ def _conditioning(equations: Sequence[_NormalEquations]) -> refusals.Conditionin
 
 def _find_birge_ratio(turns: Sequence[_NormalEquations], covariance: Array) -> tuple[float, float]:
     """Return the Birge ratio of the rotations and its degrees of freedom; 1 and infinity if χ² is not above these."""
-    chi_square, freedom = 0.0, 0.0
+    chi_square, dof = 0.0, 0.0
     for turn in turns:
         weight = np.linalg.inv(turn.covariance)
         chi_square += float(turn.observed @ weight @ turn.observed)
-        freedom += len(turn.observed) - float(np.trace(weight @ turn.design @ covariance @ turn.design.T))
-    if freedom <= 1 or chi_square <= freedom:
+        dof += len(turn.observed) - float(np.trace(weight @ turn.design @ covariance @ turn.design.T))
+    if dof <= 1 or chi_square <= dof:
         return 1.0, np.inf
-    return float(np.sqrt(chi_square / freedom)), freedom
+    return float(np.sqrt(chi_square / dof)), dof
 
 
 def _check_closed(turns: Sequence[Turn], equations: Sequence[_NormalEquations], ratio: float) -> None:

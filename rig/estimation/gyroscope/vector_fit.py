@@ -29,20 +29,23 @@ LEAST_LOAD = 0.25  # of the largest rate: a smaller one has less than a sixteent
 class VectorInputs:
     """The inputs of the vector model: sweeps first, then rests, N in all.
 
-    - `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of their noise.
-    - `turns_rad_s` (N, 3): rates of the flange in the room; `earth_rate_rad_s` (3,): of the room, in the base frame.
-    - `speed_std_rad_s` (N,): standard deviations of the speeds.
-    - `attitudes` (N, 3, 3): from the base into the flange; `gravity_m_s2` (N, 3): downwards, in the flange's frame.
-    - `windows_s` (N, 2): on the clock of the first recording; `joints` (N): the joint that turned, None for a rest.
-    - `axis_errors_rad_s` (P, N, 3): effect of one standard uncertainty of each of the arm's angles on the rates.
-    - `return_errors_rad_s` (P, N, 3): the same for each return of a joint to an angle.
-    - `mount_turns_rad` (3 S, N, 3): rotation vectors of an item by one std of each mount of S stages (the first last).
-    - `arms_m` (N, 3): lever arm from the rotation axis to the sensor in the flange's frame, None to neglect it.
-    - `noise_freedom` (N, 3): degrees of freedom of the variances.
-    - `sensor`: the data sheet's properties, if any.
-    - `encoder_errors_rad_s` (P, N, 3): effect of encoders at the ends of arcs, None for whole revolutions.
-    - `ripples` (N,): RMS ripple of each rotation as a fraction of its rate.
-    - `roundings_rad_s` (N, 3): standard uncertainty of each mean by rounding.
+    - means_rad_s, variances_rad2_s2 (N, 3): mean readings, and the variances of their noise.
+    - turns_rad_s (N, 3): rates of the flange in the room.
+    - earth_rate_rad_s (3,): rate of the room, in the base frame.
+    - speed_std_rad_s (N,): standard deviations of the speeds.
+    - attitudes (N, 3, 3): rotations from the base into the flange frame.
+    - gravity_m_s2 (N, 3): downwards, in the flange frame.
+    - windows_s (N, 2): begin and end on the clock of the first recording.
+    - joints (N): the joint that turned, None for a rest.
+    - axis_errors_rad_s (P, N, 3): effect of one standard uncertainty of each of the arm's angles on the rates.
+    - return_errors_rad_s (P, N, 3): the same for each return of a joint to an angle.
+    - mount_turns_rad (3 S, N, 3): rotation vectors of an item by one std of each mount of S stages (the first last).
+    - arms_m (N, 3): lever arms from the rotation axis to the sensor in the flange frame, None to neglect them.
+    - noise_dof (N, 3): degrees of freedom of the variances.
+    - sensor: the properties by the data sheet, None if unknown.
+    - encoder_errors_rad_s (P, N, 3): effect of encoders at the ends of arcs, None for whole revolutions.
+    - ripples (N,): RMS ripple of each rotation as a fraction of its rate.
+    - roundings_rad_s (N, 3): standard uncertainty of each mean by rounding.
     """
 
     means_rad_s: Array
@@ -58,7 +61,7 @@ class VectorInputs:
     return_errors_rad_s: Array | None = None
     mount_turns_rad: Array | None = None
     arms_m: Array | None = None
-    noise_freedom: Array | float = np.inf
+    noise_dof: Array | float = np.inf
     sensor: KnownSensor | None = None
     encoder_errors_rad_s: Array | None = None
     ripples: Array | float = 0.0

@@ -45,17 +45,24 @@ REMEDY = "Sweep about three different axes, and turn the flange against gravity 
 
 @dataclass(frozen=True, slots=True)
 class VectorSolution:
-    """A gyroscope's calibration by the vector model, with its covariance.
+    """A gyroscope's calibration by the vector model g = K (m + b), with its covariance.
 
-    - `scale` (3,), `bias_rad_s` (3,): g = K (m + b); `covariance` (6, 6) in the order kx ky kz bx by bz.
-    - `matrix` (3, 3): F. `matrix_covariance` (12, 12): the rows of F, then c.
-    - `non_orthogonality_rad` (3,): 90° less the angles between y and z, z and x, x and y.
-    - `mounting` (3, 3): the rotation from the flange frame to the sensor frame nearest to the three axes.
-    - `angles_covariance_rad2` (6, 6): of `non_orthogonality_rad`, then of small turns of `mounting` about sensor x y z.
-    - `g_sensitivity` (3, 3) in rad/s per m/s² and its (9, 9) covariance (row by row), or None.
-    - `response` (6, N, 3): derivative of scale and bias with respect to the mean readings.
-    - `residuals_rad_s` (N, 3): reading less model.
-    - `rank`: of the scaled design; `condition`: of its part for axes and bias, without gravity.
+    - scale, bias_rad_s (3,): the diagonal of K, and b.
+    - covariance (6, 6): in the order kx ky kz bx by bz.
+    - matrix (3, 3): F.
+    - matrix_covariance (12, 12): of the rows of F, then c.
+    - non_orthogonality_rad (3,): 90° less the angles between y and z, z and x, x and y.
+    - mounting (3, 3): rotation from the flange frame to the sensor frame nearest to the three axes.
+    - angles_covariance_rad2 (6, 6): of non_orthogonality_rad, then of small rotations of mounting about sensor x y z.
+    - g_sensitivity (3, 3): in rad/s per m/s², None if not estimated.
+    - g_sensitivity_covariance (9, 9): of its rows.
+    - response (6, N, 3): derivative of scale and bias with respect to the mean readings.
+    - residuals_rad_s (N, 3): reading less model.
+    - rank: of the scaled design.
+    - condition: of the design's part for axes and bias, without gravity.
+    - observations, iterations: numbers of means and of solutions.
+    - warnings: sentences for people.
+    - estimator: the name of this one.
     """
 
     scale: Array

@@ -20,14 +20,17 @@ from rig.estimation.arrays import Array
 class AccelerometerErrors:
     """One standard uncertainty of each error, alike for all axes, and the records of K' dwells and sweeps.
 
-    - `even_s2_m` φ, zero if it is estimated; `odd_s4_m2` χ; `norm_m_s2` g.
-    - `bias_m_s2_k` β, `scale_per_k` κ; `warmer_k` (K',): ΔT as recorded, `unseen_k` (K',): hidden by the recorded
-      steps.
-    - `windows_s` (K', 2): begin and end of each.
-    - `instability_m_s2`: the least Allan deviation of the flicker in w.
-
-    Estimated from the readings: `walk_m_s2_sqrt_s`, the random walk of w; `louder` (K',), the extra variance of a
-    disturbed dwell or sweep, relative to its noise; `turning_m_s2`, the difference of the bias in all sweeps.
+    - even_s2_m: φ, zero if it is estimated.
+    - odd_s4_m2: χ.
+    - norm_m_s2: g.
+    - bias_m_s2_k, scale_per_k: β and κ.
+    - warmer_k (K',): ΔT as recorded.
+    - unseen_k (K',): ΔT hidden by the recorded steps.
+    - windows_s (K', 2): begin and end of each.
+    - instability_m_s2: the least Allan deviation of the flicker in w.
+    - walk_m_s2_sqrt_s: random walk of w, estimated from the readings.
+    - louder (K',): extra variance of a disturbed dwell or sweep relative to its noise, estimated.
+    - turning_m_s2: difference of the bias in all sweeps, estimated.
     """
 
     even_s2_m: float

@@ -52,16 +52,20 @@ MODEL = "m = F (s + φ s²) + b, s = Rᵀ v_ref + ω × (ω × (p + r)) + α × 
 class ImuSolution:
     """An accelerometer's calibration from dwells and sweeps.
 
-    - `matrix` F (3, 3), `bias_m_s2` b (3,), `reference_m_s2` v_ref (3,) in base coordinates.
-    - `lever_arm_m` r (3,) in the flange's frame and `delay_s` τ, None without sweeps.
-    - `second_order_s2_m` φ (3,) or None.
-    - `covariance` (22, 22): of F by rows, v_ref, b, r, τ, φ; zero for fixed ones. `response` (22, 3 K): by the
-      readings.
-    - `attitude_error`: δ of the arm, about each axis.
-    - `dwell_residuals_m_s2` (N, 3): reading less model; `chi_square` of these and the sweeps', with its `freedom`.
-    - `rank`, `condition`: of the readings' derivatives, each column scaled to its norm.
-    - `sensor_errors`: the sensor's own errors with those estimated; None if unknown.
-    - `own_share`: the independent fraction of δ².
+    - matrix (3, 3), bias_m_s2 (3,): F and b.
+    - reference_m_s2 (3,): v_ref in base coordinates.
+    - lever_arm_m (3,), delay_s: r in the flange's frame, and τ; None without sweeps.
+    - second_order_s2_m (3,): φ, or None.
+    - covariance (22, 22): of F by rows, v_ref, b, r, τ, φ; zero for fixed ones.
+    - response (22, 3 K): derivative of the parameters with respect to the readings.
+    - attitude_error: δ of the arm, about each axis.
+    - dwell_residuals_m_s2 (N, 3): reading less model.
+    - chi_square, dof: of these and the sweeps' residuals.
+    - rank, condition: of the readings' derivatives, each column scaled to its norm.
+    - sensor_errors: the sensor's own errors with those estimated, None if unknown.
+    - own_share: the independent fraction of δ².
+    - iterations: number of Gauss-Newton steps.
+    - warnings: sentences for people.
     """
 
     matrix: Array
@@ -75,7 +79,7 @@ class ImuSolution:
     attitude_error: AttitudeError
     dwell_residuals_m_s2: Array
     chi_square: float
-    freedom: int
+    dof: int
     rank: int
     condition: float
     iterations: int
@@ -136,7 +140,7 @@ def solve_imu(
     refusals.check_handedness(f)
     residuals = movement.readings() - predicted(fit.theta, movement)
     whitened = fit.readings.whitener(fit.std_rad) @ residuals.ravel()
-    count, swept, freedom = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s) > 0, len(whitened) - parameters
+    count, swept, dof = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s) > 0, len(whitened) - parameters
     return ImuSolution(
         matrix=f,
         bias_m_s2=fit.theta[BIAS],
@@ -149,13 +153,13 @@ def solve_imu(
         attitude_error=add_uncertainty(fit.readings, fit.std_rad, fit.jacobian),
         dwell_residuals_m_s2=residuals[:count],
         chi_square=float(whitened @ whitened),
-        freedom=freedom,
+        dof=dof,
         rank=conditioning.rank,
         condition=conditioning.condition,
         iterations=fit.iterations,
         sensor_errors=movement.sensor_errors,
         own_share=movement.own_share,
-        warnings=refusals.warn_of_residuals(whitened, np.ones_like(whitened), freedom),
+        warnings=refusals.warn_of_residuals(whitened, np.ones_like(whitened), dof),
     )
 
 

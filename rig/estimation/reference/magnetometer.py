@@ -68,10 +68,8 @@ def uniformity(
         whiteners = find_whiteners(v, effects(start, r, v_bar), np.full(len(m), attitude_error_rad))
         theta, _ = most_likely(start, m, r, v_bar, whiteners, norm_known=True)
     whitened_residuals = whitened(whiteners, m - predicted(theta, r, v_bar))
-    freedom = whitened_residuals.size - FREE
-    return Uniformity(
-        float(np.sum(whitened_residuals**2)), freedom, float(chdtri(freedom, FALSE_ALARM)), attitude_error_rad
-    )
+    dof = whitened_residuals.size - FREE
+    return Uniformity(float(np.sum(whitened_residuals**2)), dof, float(chdtri(dof, FALSE_ALARM)), attitude_error_rad)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from rig.estimation.reference.attitude_error import AttitudeError, effects, find
 from rig.estimation.reference.reference_model import BIAS, SECOND, F, covariance_bound, jacobian
 from rig.estimation.reference.triaxial import TriaxialSolution
 from rig.estimation.sensor_axes import parameter_jacobian
-from rig.estimation.statistics.coverage import COVERAGE_FACTOR, effective_freedom
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR, effective_dof
 
 ATTITUDES = "arm's attitudes"
 
@@ -30,8 +30,8 @@ class Spread:
     - `scale` (3,), `covariance` (6, 6) of noise and attitudes, `response` (6, n) to the readings.
     - `noise` (n, n): covariance of the readings' own.
     - `attitude_error`: that of the attitudes.
-    - `chi_square` of the residuals, and its `freedom`.
-    - `noise_freedom` (n,): degrees of freedom of the readings' variances.
+    - `chi_square` of the residuals, and its `dof`.
+    - `noise_dof` (n,): degrees of freedom of the readings' variances.
     """
 
     scale: Array
@@ -40,13 +40,13 @@ class Spread:
     noise: Array
     attitude_error: AttitudeError
     chi_square: float
-    freedom: int
-    noise_freedom: Array
+    dof: int
+    noise_dof: Array
 
     @property
     def known_noise(self) -> float:
         """The fewest degrees of freedom of the noise's part in scale and bias."""
-        return fewest_freedom(self.response, np.diag(self.noise), self.noise_freedom)
+        return fewest_dof(self.response, np.diag(self.noise), self.noise_dof)
 
     def covariance_of(self, patterns: Array) -> Array:
         """Return the covariance (6, 6) of independent patterns (k, n) of one standard uncertainty in the readings."""
@@ -87,12 +87,12 @@ def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) ->
     return propagated
 
 
-def fewest_freedom(response: Array, variances: Array, freedom: Array) -> float:
+def fewest_dof(response: Array, variances: Array, dof: Array) -> float:
     """Return the fewest degrees of freedom of the noise's part in scale and bias by their `response` (6, n).
 
-    The readings' `variances` (n,) have `freedom` (n,) degrees of freedom.
+    The readings' `variances` (n,) have `dof` (n,) degrees of freedom.
     """
-    return float(effective_freedom((response**2 * variances).T, freedom[:, None]).min())
+    return float(effective_dof((response**2 * variances).T, dof[:, None]).min())
 
 
 def response_in_attitudes(solution: TriaxialSolution, dwells: Dwells) -> Array:
@@ -115,15 +115,15 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
             ATTITUDES,
             "what the readings say of them",
             spread.covariance - noise,
-            freedom_of(spread.attitude_error),
+            find_uncertainty_dof(spread.attitude_error),
         ),
     ]
-    excess = spread.chi_square / max(spread.freedom, 1) - 1.0
-    if spread.freedom > 0 and excess > 0.0:
+    excess = spread.chi_square / max(spread.dof, 1) - 1.0
+    if spread.dof > 0 and excess > 0.0:
         model_covariance = excess * spread.covariance
         contributors.append(
             evaluate_a(
-                "what the model leaves", "residuals beside noise and attitudes", model_covariance, float(spread.freedom)
+                "what the model leaves", "residuals beside noise and attitudes", model_covariance, float(spread.dof)
             )
         )
     return Budget((*contributors, _evaluate_norm(spread.scale, size), *others))
@@ -144,7 +144,7 @@ def _evaluate_norm(scale: Array, size: KnownSize) -> Contributor:
     return Contributor(size.name, "B", distribution, half_width, size.unit, size.source, np.inf, covariance)
 
 
-def freedom_of(error: AttitudeError) -> float:
+def find_uncertainty_dof(error: AttitudeError) -> float:
     """Return the degrees of freedom of an uncertain uncertainty (JCGM 100, G.4.2)."""
     if error.uncertainty_rad == 0.0:
         return np.inf

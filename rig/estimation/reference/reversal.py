@@ -62,8 +62,8 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
     inverse = np.linalg.pinv(whitened, rcond=1e-6)
     estimate = inverse @ (whiteners @ biases_t[..., None]).reshape(-1)
     residuals = (whiteners @ (biases_t - design @ estimate)[..., None]).reshape(-1)
-    chi_square, freedom = float(residuals @ residuals), len(residuals) - (6 - common.shape[1])
-    limit = float(chdtri(freedom, FALSE_ALARM))
+    chi_square, dof = float(residuals @ residuals), len(residuals) - (6 - common.shape[1])
+    limit = float(chdtri(dof, FALSE_ALARM))
     if chi_square > limit:
         raise Fault(
             "reversal_contradicts",
@@ -75,7 +75,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
     covariance = to_axes @ (inverse @ inverse.T) @ to_axes.T
     inseparable = np.abs(mountings[0] @ common).max(axis=1, initial=0.0) > SAME
     x, y, z = inseparable.tolist()
-    return Reversal(estimate[:3], mountings[0] @ estimate[3:], covariance, (x, y, z), chi_square, freedom, limit)
+    return Reversal(estimate[:3], mountings[0] @ estimate[3:], covariance, (x, y, z), chi_square, dof, limit)
 
 
 def _find_common_directions(mountings: Array) -> Array:

@@ -32,7 +32,7 @@ class FirstHarmonic:
 
     - `harmonic_m_s2` (3, 3): mean, cosine, sine (rows) of the axes x y z; `covariance_m2_s4` (9, 9), row by row.
     - `speed_rad_s`: 2π over the time of a revolution, negative if the angle falls.
-    - `noise_m_s2` (3,): std of one sample, with `freedom` degrees of freedom; `residuals_m_s2` (n, 3).
+    - `noise_m_s2` (3,): std of one sample, with `dof` degrees of freedom; `residuals_m_s2` (n, 3).
     - `vibration_m_s2` (3,): RMS of the removed vibration of servo and arm.
     - `turning_rad2_s2` (6, 3): mean, cosine and sine, by the same weights, of ω² and α, of the derivatives of both per
       radian of the mean rotation, and of ω₀ (ω − ω₀) cos θ and sin θ with the mean rate ω₀: the filter's lag needs
@@ -43,7 +43,7 @@ class FirstHarmonic:
     covariance_m2_s4: Array
     speed_rad_s: float
     noise_m_s2: Array
-    freedom: int
+    dof: int
     residuals_m_s2: Array
     vibration_m_s2: Array
     turning_rad2_s2: Array
@@ -89,7 +89,7 @@ def first_harmonic(
         covariance_m2_s4=np.asarray(np.kron(gain @ gain.T, long_run), dtype=np.float64),
         speed_rad_s=mean_speed,
         noise_m_s2=np.sqrt(np.diag(scatter)),
-        freedom=count - int(rank),
+        dof=count - int(rank),
         residuals_m_s2=residuals,
         vibration_m_s2=np.sqrt(np.mean(vibration**2, axis=0)),
         turning_rad2_s2=_turning(uneven, angle, mean_speed) @ gain.T,

@@ -61,12 +61,17 @@ REMEDY = "Take more attitudes, turned about at least two different axes"
 class TriaxialSolution:
     """A tri-axial sensor's calibration, in the unit of the readings.
 
-    - `matrix` F (3, 3), `bias` b (3,), `reference` v_ref (3,) in table coordinates.
-    - `second_order` φ (3,), the diagonal of F̄ in 1/unit, or None.
-    - `covariance` (15, 15) or (18, 18): the rows of F, v_ref, b, φ.
-    - `residuals` (N, 3): reading less model. `iterations` counts linear solutions or Gauss–Newton steps.
-    - `rank` and `condition`: of the scaled X; full is 15 (18), one less if ‖v_ref‖ is given.
-    - `attitude_error` by the method "attitude_weighted", else None.
+    - method: the method's name.
+    - matrix (3, 3), bias (3,): F and b.
+    - reference (3,): v_ref in table coordinates.
+    - second_order (3,): φ, the diagonal of F̄ in 1/unit, or None.
+    - covariance (15, 15) or (18, 18): of the rows of F, v_ref, b, φ.
+    - residuals (N, 3): reading less model.
+    - rank, condition: of the scaled X; the full rank is 15 (18), one less if ‖v_ref‖ is given.
+    - iterations: number of linear solutions or Gauss-Newton steps.
+    - attitude_error: by the method "attitude_weighted", else None.
+    - observations: N.
+    - warnings: sentences for people.
     """
 
     method: Method

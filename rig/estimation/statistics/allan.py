@@ -39,7 +39,7 @@ ENOUGH_FOR_A_FLOOR_S = 600.0  # few gyroscopes reach their least deviation soone
 class AllanCurve:
     """Overlapping Allan deviation: `tau_s` (T,), `deviation`, `low`, `high` (T, 3) in the unit of the readings.
 
-    `low` and `high` bound the true value with a probability of 95 %; `freedom` (T, 3): equivalent degrees of freedom.
+    `low` and `high` bound the true value with a probability of 95 %; `dof` (T, 3): equivalent degrees of freedom.
     `total_s` is the total duration.
     """
 
@@ -47,13 +47,13 @@ class AllanCurve:
     deviation: Array
     low: Array
     high: Array
-    freedom: Array
+    dof: Array
     total_s: float
 
     @property
     def relative_std(self) -> Array:
         """The standard deviation (T, 3) of each deviation, as a fraction of it."""
-        std: Array = 1 / np.sqrt(2 * self.freedom)
+        std: Array = 1 / np.sqrt(2 * self.dof)
         return std
 
 
@@ -92,14 +92,14 @@ def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
     squares = np.array([_average_squares(phases, factor) for factor in chosen])
     points = [len(phase) for phase in phases]
     tau_s, deviation = chosen * interval_s, np.sqrt(squares)
-    freedom = np.array(
+    dof = np.array(
         [
-            [_freedom(points, int(factor), _classify_noise(slope)) for slope in slopes]
+            [_dof(points, int(factor), _classify_noise(slope)) for slope in slopes]
             for factor, slopes in zip(chosen, _slopes(tau_s, deviation), strict=True)
         ]
     )
-    low, high = _bounds(deviation, freedom)
-    return AllanCurve(tau_s, deviation, low, high, freedom, interval_s * sum(map(len, used)))
+    low, high = _bounds(deviation, dof)
+    return AllanCurve(tau_s, deviation, low, high, dof, interval_s * sum(map(len, used)))
 
 
 def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
@@ -113,16 +113,16 @@ def too_short(what: str, enough_s: float = ENOUGH_S) -> Fault:
     return Fault("recording_too_short", what, f"Record at rest for {enough_s:.0f} s or more, in one stretch")
 
 
-def equivalent_freedom(points: int, factor: int, noise: Noise) -> float:
+def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
     """Return the equivalent dof (at least 1) of σ² from `points` phases (readings + 1) at τ = `factor` τ₀."""
     n, m = float(points), float(factor)
     if noise == "white":
-        freedom = (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m**2 / (4 * m**2 + 5)
+        dof = (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m**2 / (4 * m**2 + 5)
     elif noise == "flicker":
-        freedom = 2 * (n - 2) ** 2 / (2.3 * n - 4.9) if factor == 1 else 5 * n**2 / (4 * m * (n + 3 * m))
+        dof = 2 * (n - 2) ** 2 / (2.3 * n - 4.9) if factor == 1 else 5 * n**2 / (4 * m * (n + 3 * m))
     else:
-        freedom = (n - 2) / m * ((n - 1) ** 2 - 3 * m * (n - 1) + 4 * m**2) / (n - 3) ** 2 if points > 3 else 1.0
-    return max(freedom, 1.0)
+        dof = (n - 2) / m * ((n - 1) ** 2 - 3 * m * (n - 1) + 4 * m**2) / (n - 3) ** 2 if points > 3 else 1.0
+    return max(dof, 1.0)
 
 
 def _average_squares(phases: Sequence[Array], factor: int) -> Array:
@@ -137,11 +137,11 @@ def _average_squares(phases: Sequence[Array], factor: int) -> Array:
     return variance
 
 
-def _freedom(points: Sequence[int], factor: int, noise: Noise) -> float:
+def _dof(points: Sequence[int], factor: int, noise: Noise) -> float:
     """Return the dof of all intervals together, independent and weighted by their pairs (Satterthwaite)."""
     reach = [n for n in points if n > 2 * factor]
     pairs = np.array([n - 2 * factor for n in reach], dtype=np.float64)
-    of_interval = np.array([equivalent_freedom(n, factor, noise) for n in reach])
+    of_interval = np.array([equivalent_dof(n, factor, noise) for n in reach])
     return float(pairs.sum() ** 2 / np.sum(pairs**2 / of_interval))
 
 
@@ -161,14 +161,12 @@ def _classify_noise(slope: float) -> Noise:
     return "flicker" if slope < 0.25 else "random_walk"
 
 
-def _bounds(deviation: Array, freedom: Array) -> tuple[Array, Array]:
+def _bounds(deviation: Array, dof: Array) -> tuple[Array, Array]:
     """Return the lower and upper confidence bounds (T, 3) of the deviation by χ²."""
     from scipy.special import chdtri
 
     tail = (1 - COVERAGE) / 2
-    return deviation * np.sqrt(freedom / chdtri(freedom, tail)), deviation * np.sqrt(
-        freedom / chdtri(freedom, 1 - tail)
-    )
+    return deviation * np.sqrt(dof / chdtri(dof, tail)), deviation * np.sqrt(dof / chdtri(dof, 1 - tail))
 
 
 def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:

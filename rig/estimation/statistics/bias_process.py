@@ -28,12 +28,12 @@ Chosen = Callable[[Array, Array], Array]
 class BiasProcess:
     """A drifting bias: `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero if only noise was detected.
 
-    `freedom`: the number of contrasts used, `instability_rad_s`: the given Allan deviation of its flicker.
+    `dof`: the number of contrasts used, `instability_rad_s`: the given Allan deviation of its flicker.
     """
 
     walk_rad_s_sqrt_s: float
     scatter_rad_s: float
-    freedom: int
+    dof: int
     instability_rad_s: float = 0.0
 
     @property
@@ -160,9 +160,9 @@ def bias_process(
     their noise, `instability_rad_s` is that of the data sheet, zero if unknown. `chosen` selects walk and scatter.
     """
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
-    freedom = 3 * (len(z) - z.shape[1])
-    if freedom < 3:
-        return BiasProcess(0.0, 0.0, max(freedom, 0), instability_rad_s)
+    dof = 3 * (len(z) - z.shape[1])
+    if dof < 3:
+        return BiasProcess(0.0, 0.0, max(dof, 0), instability_rad_s)
     free = np.linalg.qr(z, mode="complete")[0][:, z.shape[1] :].T  # contrasts, free of the parameters
     unit = walk_covariance(windows_s)
     flicker = _flicker(instability_rad_s, windows_s) if instability_rad_s else np.zeros(unit.shape)
@@ -177,7 +177,7 @@ def bias_process(
         covariances = free @ noise @ free.T + walks[:, None, None] * (free @ unit @ free.T)
         likelihood += _likelihood(free @ means[:, axis], covariances, grid).ravel()
     walk, scatter = chosen(np.sqrt(squares), likelihood).tolist()
-    return BiasProcess(walk, scatter, freedom, instability_rad_s)
+    return BiasProcess(walk, scatter, dof, instability_rad_s)
 
 
 def _likelihood(contrasts: Array, noise: Array, scatters: Array) -> Array:

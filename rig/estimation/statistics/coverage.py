@@ -18,9 +18,9 @@ PROBABILITY = math.erf(COVERAGE_FACTOR / math.sqrt(2))
 ROUNDING = 1e-9  # of ν, which may be a whole number but for rounding
 
 
-def coverage_factors(freedom: ArrayLike) -> Array:
+def coverage_factors(dof: ArrayLike) -> Array:
     """Return k for degrees of freedom of any shape, infinite ones included."""
-    whole_dof, factors = _round_down(freedom), np.full(np.shape(freedom), COVERAGE_FACTOR)
+    whole_dof, factors = _round_down(dof), np.full(np.shape(dof), COVERAGE_FACTOR)
     if np.isfinite(whole_dof).any():
         from scipy.special import stdtrit
 
@@ -29,14 +29,14 @@ def coverage_factors(freedom: ArrayLike) -> Array:
     return factors
 
 
-def covered(factors: ArrayLike, freedom: ArrayLike) -> Array:
+def covered(factors: ArrayLike, dof: ArrayLike) -> Array:
     """Return the probability that value ± k u contains the true value, for k and ν of one shape."""
-    return 1 - 2 * beyond(factors, freedom)
+    return 1 - 2 * beyond(factors, dof)
 
 
-def beyond(distances: ArrayLike, freedom: ArrayLike) -> Array:
+def beyond(distances: ArrayLike, dof: ArrayLike) -> Array:
     """Return the probability that the true value is farther than this on one side, in standard uncertainties."""
-    distance, whole_dof = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _round_down(freedom))
+    distance, whole_dof = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _round_down(dof))
     tails = np.array([math.erfc(value / math.sqrt(2)) / 2 for value in distance.ravel()]).reshape(distance.shape)
     if np.isfinite(whole_dof).any():
         from scipy.special import stdtr
@@ -54,14 +54,14 @@ def false_alarm_of_each(of_all: float, tests: int) -> float:
     return of_all / tests
 
 
-def joint_factors(values: int, freedom: ArrayLike, probability: float) -> Array:
+def joint_factors(values: int, dof: ArrayLike, probability: float) -> Array:
     """Return the simultaneous coverage factor: k so that all of `values` intervals ± k u contain their true values.
 
-    With that `probability` at least, by Bonferroni's inequality. `freedom`: degrees of freedom of any shape; for one
+    With that `probability` at least, by Bonferroni's inequality. `dof`: degrees of freedom of any shape; for one
     value and `PROBABILITY` it is `coverage_factors`.
     """
-    whole_dof, tail = _round_down(freedom), false_alarm_of_each(1 - probability, values) / 2
-    factors = np.full(np.shape(freedom), -NormalDist().inv_cdf(tail))
+    whole_dof, tail = _round_down(dof), false_alarm_of_each(1 - probability, values) / 2
+    factors = np.full(np.shape(dof), -NormalDist().inv_cdf(tail))
     if np.isfinite(whole_dof).any():
         from scipy.special import stdtrit
 
@@ -70,7 +70,7 @@ def joint_factors(values: int, freedom: ArrayLike, probability: float) -> Array:
     return factors
 
 
-def freedom_of(factor: float) -> float:
+def find_dof_by_factor(factor: float) -> float:
     """Return the whole number of degrees of freedom with this coverage factor: infinite for 2."""
     if factor <= COVERAGE_FACTOR:
         return math.inf
@@ -79,19 +79,19 @@ def freedom_of(factor: float) -> float:
     return float(round(stdtridf((1 + PROBABILITY) / 2, factor)))
 
 
-def effective_freedom(variances: ArrayLike, freedom: ArrayLike) -> Array:
-    """Return ν (…) of sums of independent `variances` (n, …) with `freedom` (n, …): Welch–Satterthwaite.
+def effective_dof(variances: ArrayLike, dof: ArrayLike) -> Array:
+    """Return ν (…) of sums of independent `variances` (n, …) with `dof` (n, …): Welch–Satterthwaite.
 
     JCGM 100, G.4.1; infinite if all are exact.
     """
-    parts, degrees = np.asarray(variances, dtype=np.float64), np.asarray(freedom, dtype=np.float64)
+    parts, degrees = np.asarray(variances, dtype=np.float64), np.asarray(dof, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         effective = parts.sum(axis=0) ** 2 / np.sum(parts**2 / degrees, axis=0)
-    freedom_of_sums: Array = np.where(np.isnan(effective), np.inf, effective)  # 0/0 without variances
-    return freedom_of_sums
+    dof_of_sums: Array = np.where(np.isnan(effective), np.inf, effective)  # 0/0 without variances
+    return dof_of_sums
 
 
-def _round_down(freedom: ArrayLike) -> Array:
+def _round_down(dof: ArrayLike) -> Array:
     """Return ν as tabulated: the next lower whole number (JCGM 100, G.6.4), at least one."""
-    rounded: Array = np.floor(np.maximum(np.asarray(freedom, dtype=np.float64) * (1 + ROUNDING), 1.0))
+    rounded: Array = np.floor(np.maximum(np.asarray(dof, dtype=np.float64) * (1 + ROUNDING), 1.0))
     return rounded

@@ -92,7 +92,7 @@ class MixedModel:
 
         return propagate(sizes.scattered**2 * self._spread), propagate(np.full_like(variances, sizes.walked**2))
 
-    def freedom(self, sizes: VarianceComponents, wanted: Array) -> Array:
+    def dof(self, sizes: VarianceComponents, wanted: Array) -> Array:
         """Return the degrees of freedom (q,) of the variances of `wanted` (q, p) combinations of θ.
 
         ½ (u/Δu)² of JCGM 100, G.4.2, with Δu from the curvature of the log-likelihood at its maximum (Satterthwaite):
@@ -116,8 +116,8 @@ class MixedModel:
                 curvature[i, j] = curvature[j, i] = curvature[i, j] - sum(corners) / (4 * STEP**2)
         values, directions = np.linalg.eigh(curvature)
         variances = (directions.T @ slopes) ** 2 / np.maximum(values, SPREAD**-2)[:, None]
-        freedom: Array = 2 / np.maximum(variances.sum(axis=0), 1e-9)
-        return freedom
+        dof: Array = 2 / np.maximum(variances.sum(axis=0), 1e-9)
+        return dof
 
     def estimate_components(
         self, expected: VarianceComponents, spread: Array | float = SPREAD, start: VarianceComponents | None = None
@@ -180,14 +180,14 @@ class MixedModel:
         )
 
 
-def inflate_to_student(covariance: Array, freedom: Array) -> Array:
-    """Return a covariance (q, q) inflated to that of Student's t of `freedom` (q,): twice its root is then t's 95 %.
+def inflate_to_student(covariance: Array, dof: Array) -> Array:
+    """Return a covariance (q, q) inflated to that of Student's t of `dof` (q,): twice its root is then t's 95 %.
 
     The variance of t is ν/(ν − 2), and infinite below ν = 2: there t's coverage factor is used (JCGM 100, G.3).
     """
-    bounded = np.maximum(freedom, FEWEST_FREEDOM)
-    by_coverage = coverage_factors(np.clip(freedom, 1.0, FEWEST_FREEDOM)) / COVERAGE_FACTOR
-    ratio = np.where(freedom >= FEWEST_FREEDOM, np.sqrt(bounded / (bounded - 2)), by_coverage)
+    bounded = np.maximum(dof, FEWEST_FREEDOM)
+    by_coverage = coverage_factors(np.clip(dof, 1.0, FEWEST_FREEDOM)) / COVERAGE_FACTOR
+    ratio = np.where(dof >= FEWEST_FREEDOM, np.sqrt(bounded / (bounded - 2)), by_coverage)
     inflated: Array = covariance * ratio[:, None] * ratio
     return inflated
 

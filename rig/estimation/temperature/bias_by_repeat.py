@@ -41,14 +41,14 @@ class BiasByRepeat:
     - `bias` (R, 3), with the standard deviation `std` (R, 3) of its differences; its steps are `moves`.
     - `excess` (3,): the scatter of means in an attitude over their standard deviation, 1 at least (Birge ratio). The
       arm does not repeat its attitudes exactly, or the bias drifts within a repeat. `std` includes it.
-    - `freedom` (3,): degrees of freedom of the excess if there is one, else infinite.
+    - `dof` (3,): degrees of freedom of the excess if there is one, else infinite.
     """
 
     bias: Array
     std: Array
     excess: Array
     moves: tuple[BiasStep, ...]
-    freedom: Array
+    dof: Array
 
     @property
     def largest_change(self) -> Array:
@@ -106,10 +106,10 @@ def _residual_dof(errors: Array) -> int:
 def _excess(errors: Array, variances: Array) -> Array:
     """Return the Birge ratio (3,), 1 at least, of residuals after an error per attitude and a bias per repeat."""
     residuals = errors - errors.mean(axis=0) - errors.mean(axis=1, keepdims=True) + errors.mean(axis=(0, 1))
-    freedom = _residual_dof(errors)
-    if freedom == 0:
+    dof = _residual_dof(errors)
+    if dof == 0:
         return np.ones(3)
-    scatter = np.sum(residuals**2, axis=(0, 1)) / freedom
+    scatter = np.sum(residuals**2, axis=(0, 1)) / dof
     excess: Array = np.sqrt(np.maximum(scatter / variances.mean(axis=(0, 1)), 1.0))
     return excess
 

@@ -22,7 +22,7 @@ FEWEST = 4  # repeats, for three parameters
 class BiasOverTemperature:
     """`slope` (3,) per °C, its standard deviation (3,), and the range of temperatures in which it holds.
 
-    `freedom` (3,): degrees of freedom of the deviations, finite if they come from residuals. `correlation` is that of
+    `dof` (3,): degrees of freedom of the deviations, finite if they come from residuals. `correlation` is that of
     temperature and time, which are estimated together.
     """
 
@@ -30,7 +30,7 @@ class BiasOverTemperature:
     std: Array
     range_c: tuple[float, float]
     correlation: float
-    freedom: Array
+    dof: Array
 
 
 def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s: Array) -> BiasOverTemperature:
@@ -63,7 +63,7 @@ def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s:
             "two parts of it (`rig resume`)",
         )
     columns = np.column_stack([np.ones(len(bias)), _standardise(temperature_c), _standardise(time_s)])
-    slope, slope_std, freedom = np.empty(3), np.empty(3), np.full(3, np.inf)
+    slope, slope_std, dof = np.empty(3), np.empty(3), np.full(3, np.inf)
     residual_dof = len(bias) - columns.shape[1]
     for axis in range(3):
         weights = 1 / std[:, axis]
@@ -71,10 +71,10 @@ def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s:
         coefficients, *_ = np.linalg.lstsq(design, bias[:, axis] * weights, rcond=None)
         residuals = bias[:, axis] * weights - design @ coefficients
         excess = max(1.0, float(np.sqrt(np.sum(residuals**2) / residual_dof)))
-        freedom[axis] = residual_dof if excess > 1.0 else np.inf
+        dof[axis] = residual_dof if excess > 1.0 else np.inf
         slope[axis] = coefficients[1] / float(np.std(temperature_c))
         slope_std[axis] = excess * float(np.sqrt(np.linalg.inv(design.T @ design)[1, 1]) / np.std(temperature_c))
-    return BiasOverTemperature(slope, slope_std, (low, high), correlation, freedom)
+    return BiasOverTemperature(slope, slope_std, (low, high), correlation, dof)
 
 
 def _standardise(values: Array) -> Array:

@@ -24,7 +24,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_finite
 from rig.estimation.statistics.bias_process import BiasProcess, average_walks, bias_process
-from rig.estimation.statistics.coverage import coverage_factors, effective_freedom
+from rig.estimation.statistics.coverage import coverage_factors, effective_dof
 
 HIGHEST = 3  # order: that of the autopilots
 FEWEST = 4  # repeats of each pose
@@ -66,7 +66,7 @@ class TemperatureLine:
     kind: Literal["A", "B"]
     distribution: Literal["normal", "rectangular"]
     source: str
-    freedom: float
+    dof: float
     covariance: Array
 
 
@@ -120,8 +120,8 @@ class OverTemperature:
         rows = powers_at(temperature_c - self.reference_c)
         variances = np.array([np.einsum("qi,ij,qj->q", rows, line.covariance, rows) for line in self.lines])
         std = np.sqrt(variances.sum(axis=0).clip(min=0.0))
-        freedom = effective_freedom(variances, np.array([[line.freedom] for line in self.lines]))
-        return ValuesAtTemperature(rows @ self.coefficients, std, coverage_factors(freedom) * std)
+        dof = effective_dof(variances, np.array([[line.dof] for line in self.lines]))
+        return ValuesAtTemperature(rows @ self.coefficients, std, coverage_factors(dof) * std)
 
     def correct_to_reference(self, readings: Array, temperature_c: Array) -> Array:
         """Return readings (N, 3) corrected from their temperatures (N,) to the reference."""
@@ -189,7 +189,7 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
     by_lag = fits.covariance(chosen.covariance - without_lag, centre)
     scatter = fits.covariance(without_lag, centre)
     lines = [
-        TemperatureLine(NOISE, "A", "normal", "scatter of the repeats", float(fits.process.freedom), scatter),
+        TemperatureLine(NOISE, "A", "normal", "scatter of the repeats", float(fits.process.dof), scatter),
         TemperatureLine(LAG, "A", "normal", "readings of warming against cooling", np.inf, by_lag),
         TemperatureLine(ORDER, "A", "normal", "weights of the other orders", np.inf, fits.rescale(among_orders)),
     ]

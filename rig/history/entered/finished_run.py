@@ -39,12 +39,16 @@ class EnteredRecording:
 class FinishedRun:
     """A finished run.
 
-    - `text`: result.json in compact form; `document`: its content.
-    - `rig`: the rig's name. `computer`, `path`: the location of the folder. `simulated`: whether the laboratory is.
-    - `check_standards`: serial numbers of the sensors that monitor the rig.
-    - `recordings`, `documents`: files in the folder; a document has its name and SHA-256, for result.json that of its
-      content.
-    - `operator`, `note`: statements of the configuration. `certificate`: that in the folder.
+    - text: result.json in compact form.
+    - document: its content.
+    - rig: the rig's name.
+    - check_standards: serial numbers of the sensors that monitor the rig.
+    - simulated: whether the laboratory is.
+    - computer, path: location of the folder.
+    - recordings: the recordings in the folder.
+    - operator, note: statements of the configuration.
+    - certificate: the one in the folder, if any.
+    - documents: name and SHA-256 of each document; for result.json the hash of its content.
     """
 
     text: str

@@ -13,13 +13,13 @@ CONFIDENCE = 0.95
 class Fitted:
     """`coefficients` (p,) and their `covariance` (p, p); `between_std` is the scatter beyond the values' stated stds.
 
-    `freedom` is n − p.
+    `dof` is n − p.
     """
 
     coefficients: Array
     covariance: Array
     between_std: float
-    freedom: int
+    dof: int
 
     @property
     def std(self) -> Array:
@@ -31,13 +31,13 @@ class Fitted:
         """Student's t for 95 %."""
         from scipy.special import stdtrit
 
-        return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2))
+        return float(stdtrit(self.dof, (1 + CONFIDENCE) / 2))
 
     def p_value(self, index: int) -> float:
         """Return the probability of a coefficient at least as far from 0 if the true one is 0."""
         from scipy.special import stdtr
 
-        return float(2 * stdtr(self.freedom, -abs(self.coefficients[index]) / self.std[index]))
+        return float(2 * stdtr(self.dof, -abs(self.coefficients[index]) / self.std[index]))
 
     def predict(self, row: Array) -> tuple[Array, Array]:
         """Return the model's value and its std at rows (…, p) of a design."""

@@ -20,7 +20,7 @@ class Jitter:
     """Scatter of the times of the arm's states: standard deviation in s, and its degrees of freedom."""
 
     std_s: float
-    freedom: float
+    dof: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class ClockRate:
 
     error: float
     std: float
-    freedom: float
+    dof: float
 
 
 def compare_with_computer(motion: ArmMotion) -> ClockRate:

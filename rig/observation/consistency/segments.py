@@ -165,7 +165,7 @@ def _segment_revolution(
     )
     vibrating = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
     noise_alone = residual - vibrating
-    noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.freedom)
+    noise = MeanNoise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.dof)
     segments = _average(
         division,
         motion,

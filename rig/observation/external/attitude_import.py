@@ -57,7 +57,7 @@ NORM_TOLERANCE = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """A gyroscope's averages in N rows: `means` (N, 3), their `variances` (N, 3) and the `freedom` (N, 3) of these.
+    """A gyroscope's averages in N rows: `means` (N, 3), their `variances` (N, 3) and the `dof` (N, 3) of these.
 
     No variances if rows hold too few samples to show their noise. `samples` (N,); `attitudes` (N, 3, 3), body to table;
     `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if they were given.
@@ -65,7 +65,7 @@ class Rows:
 
     means: Array
     variances: Array | None
-    freedom: Array | None
+    dof: Array | None
     samples: Array
     attitudes: Array
     rates_rad_s: Array | None

@@ -51,13 +51,13 @@ def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
     variance = readings.var(axis=0, ddof=1)
     residuals = (readings - readings.mean(axis=0)).T
     inflation = np.array([correlation_inflation(axis) for axis in residuals])
-    freedom = np.array([fit_autoregression(axis).freedom for axis in residuals])
-    return variance * inflation / len(readings), freedom, np.sqrt(variance)
+    dof = np.array([fit_autoregression(axis).dof for axis in residuals])
+    return variance * inflation / len(readings), dof, np.sqrt(variance)
 
 
 def average_of(readings: Array, window: Window) -> Average:
     """Return the average of a window's readings (n, 3); their temperature is unknown."""
-    variance, freedom, noise = scatter_of(readings)
+    variance, dof, noise = scatter_of(readings)
     return Average(
         mean_rad_s=readings.mean(axis=0),
         variance_rad2_s2=variance,
@@ -66,7 +66,7 @@ def average_of(readings: Array, window: Window) -> Average:
         start_s=window.start_s,
         end_s=window.end_s,
         temperature_c=float("nan"),
-        freedom=freedom,
+        dof=dof,
     )
 
 

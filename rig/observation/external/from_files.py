@@ -102,7 +102,7 @@ def build_recording(
         turner=None,
         states=np.empty(0, ARM_STATE_DTYPE),
         events=(),
-        elsewhere=read_elsewhere,
+        external=read_elsewhere,
     )
 
 

@@ -34,14 +34,14 @@ MOSTLY = 0.5  # of a dwell: if the body lies still for as long, only the remaind
 
 @dataclass(frozen=True, slots=True)
 class Rested:
-    """Averages in N rests: `means` (N, 3) of every quantity, their `variances` (N, 3), the `freedom` (N, 3) of these.
+    """Averages in N rests: `means` (N, 3) of every quantity, their `variances` (N, 3), the `dof` (N, 3) of these.
 
     `windows` reach from the first to the last of the `samples` (N,) of each rest.
     """
 
     means: Mapping[Quantity, Array]
     variances: Mapping[Quantity, Array]
-    freedom: Mapping[Quantity, Array]
+    dof: Mapping[Quantity, Array]
     windows: tuple[Window, ...]
     samples: tuple[int, ...]
 
@@ -49,21 +49,21 @@ class Rested:
         """Return the mean reading in one of them."""
         variance, samples = self.variances[quantity][rest], self.samples[rest]
         noise = np.sqrt(variance * samples)
-        return Mean(self.means[quantity][rest], variance, noise, samples, self.freedom[quantity][rest])
+        return Mean(self.means[quantity][rest], variance, noise, samples, self.dof[quantity][rest])
 
 
 @dataclass(frozen=True, slots=True)
 class Placements:
     """N placements: the averages `read`, `attitudes` (N, 3, 3), body to table, and `attitude_std_rad` (N,) as stated.
 
-    `elsewhere` are rests without an attitude; `left_out` is the number of rows without a placement, in which the body
+    `unplaced` are rests without an attitude; `left_out` is the number of rows without a placement, in which the body
     moved. `omitted` holds what else is left out.
     """
 
     read: Rested
     attitudes: Array
     attitude_std_rad: Array | None
-    elsewhere: Rested
+    unplaced: Rested
     left_out: int
     omitted: tuple[Omitted, ...] = ()
 
@@ -202,7 +202,7 @@ def _read(
     time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]
 ) -> tuple[Rested, NDArray[np.intp]]:
     """Return the means of the rests, and the samples that were knocked; rests of few samples take the others' noise."""
-    means, variances, freedom = {}, {}, {}
+    means, variances, dof = {}, {}, {}
     knocked = np.zeros(0, dtype=np.intp)
     for quantity, values in readings.items():
         axes = values.shape[1]
@@ -214,9 +214,9 @@ def _read(
         noise, dofs = np.array(estimates).reshape(-1, 2, axes).swapaxes(0, 1)
         variances[quantity] = _fill_variances(noise, np.array([len(cut) for cut in kept]), values, quantity)
         fewest = len(values) - 1.0 if np.isnan(dofs).all() else np.nanmin(dofs)
-        freedom[quantity] = np.where(np.isnan(dofs), fewest, dofs)
+        dof[quantity] = np.where(np.isnan(dofs), fewest, dofs)
     windows = tuple(Window(float(time_s[cut[0]]), float(time_s[cut[-1]])) for cut in cuts)
-    return Rested(means, variances, freedom, windows, tuple(map(len, cuts))), knocked
+    return Rested(means, variances, dof, windows, tuple(map(len, cuts))), knocked
 
 
 def _fill_variances(variances: Array, counts: NDArray[np.intp], readings: Array, quantity: Quantity) -> Array:

@@ -30,15 +30,15 @@ BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 class TurnedData:
     """The input of a solution by increments: the gyroscope, the turns, the numbers of their rows, and the means.
 
-    `noise_freedom`, `bias_freedom`: degrees of freedom of its noise, and of its bias' change between rests.
+    `noise_dof`, `bias_dof`: degrees of freedom of its noise, and of its bias' change between rests.
     """
 
     gyroscope: Gyroscope
     turns: tuple[Turn, ...]
     rows: tuple[int, ...]
     means: tuple[RateMean, ...]
-    noise_freedom: int
-    bias_freedom: int
+    noise_dof: int
+    bias_dof: int
 
 
 @dataclass(frozen=True, slots=True)

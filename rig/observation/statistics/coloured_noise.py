@@ -19,7 +19,7 @@ class VarianceInflation:
     """The `factor` on the variance of a mean of residuals, and the degrees of freedom of that variance."""
 
     factor: float
-    freedom: float
+    dof: float
 
 
 def correlation_inflation(residuals: Array) -> float:

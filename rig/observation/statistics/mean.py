@@ -21,7 +21,7 @@ class Mean:
     """Mean of readings in any unit.
 
     - `mean` (3,), its `variance` (3,), the `noise` (3,) of one reading, and the number of `samples`.
-    - `freedom` (3,): degrees of freedom of the variance, fewer than samples if these are not independent.
+    - `dof` (3,): degrees of freedom of the variance, fewer than samples if these are not independent.
     - `cycles` (k,): cycles in the window of the spectral lines that were removed from the mean.
     - `rounding` (3,): the part of the variance by rounding to steps.
     - `weights` (n,): those of the readings, for averaging other data of the same samples; empty if they are not kept.
@@ -31,7 +31,7 @@ class Mean:
     variance: Array
     noise: Array
     samples: int
-    freedom: Array | float = np.inf
+    dof: Array | float = np.inf
     cycles: Array = field(default_factory=partial(np.zeros, 0))
     rounding: Array | float = 0.0
     weights: Array = field(default_factory=partial(np.zeros, 0))
@@ -41,13 +41,13 @@ class Mean:
 class MeanNoise:
     """Noise of single readings in any unit, by axis.
 
-    `scatter` (3,) is the variance of one reading, `in_a_mean` (3,) the part of it that counts in a long mean, `freedom`
+    `scatter` (3,) is the variance of one reading, `in_a_mean` (3,) the part of it that counts in a long mean, `dof`
     (3,) the degrees of freedom of the latter.
     """
 
     scatter: Array
     in_a_mean: Array
-    freedom: Array | float
+    dof: Array | float
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ def _average_group(
         variance=noise.in_a_mean * float(weights @ weights) + rounding,
         noise=np.sqrt(noise.scatter),
         samples=int(np.count_nonzero(group)),
-        freedom=noise.freedom,
+        dof=noise.dof,
         rounding=rounding,
         weights=weights,
     )
@@ -138,7 +138,7 @@ def even_mean(readings: Array, steps: Steps) -> Mean:
     noise = MeanNoise(
         scatter=variance,
         in_a_mean=variance * np.array([axis.factor for axis in coloured]),
-        freedom=np.array([axis.freedom for axis in coloured]),
+        dof=np.array([axis.dof for axis in coloured]),
     )
     groups = whole(readings)
     still = np.zeros(readings.shape)
@@ -167,7 +167,7 @@ def average_tapered(readings: Array, time_s: Array, window: Window, steps: Steps
     """
     variance = np.maximum(np.var(readings, axis=0, ddof=1), steps.variance)
     at_zero = np.minimum(noise_at_zero(readings), variance)
-    noise = MeanNoise(scatter=variance, in_a_mean=at_zero, freedom=np.full(3, dof_at_zero(len(readings))))
+    noise = MeanNoise(scatter=variance, in_a_mean=at_zero, dof=np.full(3, dof_at_zero(len(readings))))
     tapered = weights(time_s, window.start_s, window.end_s)[None]
     still = np.zeros(readings.shape)
     (mean,) = weighted_means(readings, whole(readings), tapered, smooth=still, noise=noise, steps=steps)

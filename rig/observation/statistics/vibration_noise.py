@@ -61,5 +61,5 @@ def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Se
     return MeanNoise(
         scatter=scatter,
         in_a_mean=scatter * np.array([axis.factor for axis in inflations]),
-        freedom=np.array([min(axis.freedom, len(residuals) - parameters) for axis in inflations]),
+        dof=np.array([min(axis.dof, len(residuals) - parameters) for axis in inflations]),
     )

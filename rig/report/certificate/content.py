@@ -108,7 +108,7 @@ class Certificate:
     reversals: Mapping[str, ReversalEntry]
 
     @property
-    def elsewhere(self) -> bool:
+    def external(self) -> bool:
         """Whether the readings are external, with the motion given by a file."""
         return self.provenance.readings_file is not None
 

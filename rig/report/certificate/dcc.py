@@ -143,7 +143,7 @@ def _item(key: str, name: str, part: str, serial: str, c: Certificate) -> Elemen
         text("description", " ".join([*(f"{mark}." for mark in c.marks), condition])),
         words("model", kind_of_part(part)),
         dcc("identifications", _identification("manufacturer", serial, "serial number"),
-            None if c.elsewhere or has_own_port(part)
+            None if c.external or has_own_port(part)
             else _identification("other", c.provenance.board_unique_id, "board it is on")),
         id=key,
     )  # fmt: skip
@@ -159,7 +159,7 @@ def _statements(c: Certificate) -> Iterator[Element]:
     time = c.stated.where.time_reference
     chain = f"The unit of time is traceable to {time}." if c.traceable else "No metrological traceability is claimed."
     if c.gyroscopes:
-        angles = "as a file states them" if c.elsewhere else _angles(c)
+        angles = "as a file states them" if c.external else _angles(c)
         yield _chain("gyroscopes", f"{chain} Angles are {angles}.", c.traceable)
     for sensors in c.held_still:
         origin = f"{sensors.standard.size} is stated by the laboratory, its origin: {sensors.origin or UNSAID}."

@@ -14,7 +14,7 @@ def method_in_words(certificate: Certificate) -> str:
     """Return how the items were moved and with what their readings were compared, then the procedure."""
     if certificate.by_hand:
         sentences = [_describe_hand(certificate)]
-    elif certificate.elsewhere:
+    elif certificate.external:
         sentences = [*_describe_file(certificate)]
     else:
         sentences = [*_describe_turner(certificate)]
@@ -28,7 +28,7 @@ def method_in_short(certificate: Certificate) -> str:
     """Return the same in a few words, for the digital certificate."""
     if certificate.by_hand:
         return "by hand: turned on a flat table between rests"
-    if certificate.elsewhere:
+    if certificate.external:
         return "external readings, of a motion stated by a file"
     return certificate.words.briefly.format(turns=certificate.turns)
 

@@ -22,10 +22,10 @@ def in_budget(budget: BudgetEntry | None, name: str) -> bool:
     return budget is not None and any(name in line.name for line in budget.contributors)
 
 
-def list_omitted_rates(sensor: GyroscopeEntry, *, elsewhere: bool = False) -> str:
+def list_omitted_rates(sensor: GyroscopeEntry, *, external: bool = False) -> str:
     """Return what a gyroscope's U does not include; for external motion also errors that the readings do not show."""
     bent = ALWAYS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *ALWAYS)
-    return ", ".join(("the effect of gravity", *OF_THE_FILE, *bent) if elsewhere else bent)
+    return ", ".join(("the effect of gravity", *OF_THE_FILE, *bent) if external else bent)
 
 
 def list_omitted_accelerations(entry: AccelerometerEntry) -> str:

@@ -21,9 +21,7 @@ HOUR_S = 3600.0
 def budget_entry(budget: Budget) -> BudgetEntry:
     """Return the combined uncertainty and its contributors."""
     lines = [
-        entry(
-            ContributorEntry, contributor, variance_fraction=fraction, degrees_of_freedom=_finite(contributor.freedom)
-        )
+        entry(ContributorEntry, contributor, variance_fraction=fraction, degrees_of_freedom=_finite(contributor.dof))
         for contributor, fraction in zip(budget.contributors, budget.shares, strict=True)
     ]
     factors = budget.coverage_factors
@@ -32,8 +30,8 @@ def budget_entry(budget: Budget) -> BudgetEntry:
         budget,
         contributors=lines,
         coverage_factor=float(factors.max()),
-        degrees_of_freedom=[_finite(dof) for dof in budget.freedom.tolist()],
-        coverage_probabilities=covered(factors, budget.freedom),
+        degrees_of_freedom=[_finite(dof) for dof in budget.dof.tolist()],
+        coverage_probabilities=covered(factors, budget.dof),
     )
 
 
@@ -54,5 +52,5 @@ def clock_entry(check: ClockCheck) -> ClockEntry:
     )
 
 
-def _finite(freedom: float) -> float | None:
-    return freedom if np.isfinite(freedom) else None
+def _finite(dof: float) -> float | None:
+    return dof if np.isfinite(dof) else None

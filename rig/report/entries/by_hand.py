@@ -39,7 +39,7 @@ def by_hand_entry(solution: "HandSolution") -> ByHandEntry:
             for name, (size, stated, limit) in solution.stds.items()
         ),
         chi_square=solution.chi_square,
-        degrees_of_freedom=solution.freedom,
+        degrees_of_freedom=solution.dof,
         session_std=tuple(np.sqrt(np.diag(solution.covariance))[:3].tolist()),
     )
 

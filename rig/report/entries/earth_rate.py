@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def earth_rate_entry(earth_rate: "EarthRate") -> EarthRateEntry:
     """Return the entry of the Earth's rate; infinite degrees of freedom are null."""
-    dof = earth_rate.freedom if np.isfinite(earth_rate.freedom) else None
+    dof = earth_rate.dof if np.isfinite(earth_rate.dof) else None
     return entry(EarthRateEntry, earth_rate, degrees_of_freedom=dof)
 
 
@@ -28,7 +28,7 @@ def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]
     if isinstance(earth, ErrorEntry):
         yield f"Earth's rate not found: {earth.error}"
         return
-    (k,), words = expanded([1.0], earth.freedoms(1)).factors, factor_words(earth.freedoms(1))
+    (k,), words = expanded([1.0], earth.dofs(1)).factors, factor_words(earth.dofs(1))
     rate = " ".join(f"{component:+.3f}" for component in np.divide(earth.rate_rad_s, DEG_H))
     std = k * np.sqrt(np.diag(earth.covariance_rad2_s2)).max() / DEG_H
     yield (

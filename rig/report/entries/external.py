@@ -74,8 +74,8 @@ def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
 def unsolved_entries(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
     """Return why recorded quantities have no solution, by sensor and quantity; solved sensors are left out."""
     reasons: dict[str, dict[str, ErrorEntry]] = {}
-    faults = [(name, *failure) for name, sensor in outcome.elsewhere.items() for failure in sensor.unsolved.items()]
-    faults += [(kind.name, kind.quantity, kind.fault) for kind in outcome.of_kinds if kind.fault is not None]
+    faults = [(name, *failure) for name, sensor in outcome.external.items() for failure in sensor.unsolved.items()]
+    faults += [(kind.name, kind.quantity, kind.fault) for kind in outcome.installed_kinds if kind.fault is not None]
     for name, quantity, fault in faults:
         reasons.setdefault(name, {})[quantity.name] = ErrorEntry(error=str(fault))
     return reasons
@@ -145,7 +145,7 @@ def _attitude_results(outcome: Outcome, quantity: Quantity) -> list[tuple[str, I
     site = outcome.settings.site
     return [
         (name, sensor.item, site, sensor.at_rest[quantity])
-        for name, sensor in outcome.elsewhere.items()
+        for name, sensor in outcome.external.items()
         if quantity in sensor.at_rest
     ]
 
@@ -155,7 +155,7 @@ def _placement(attitudes: InAttitudes) -> PlacementEntry:
     return PlacementEntry(
         placement_std=None if laid is None else laid.placement_std,
         placement_uncertainty=None if laid is None else laid.placement_uncertainty,
-        rests_without_attitude=attitudes.elsewhere,
+        rests_without_attitude=attitudes.unplaced_rests,
         rows_omitted=attitudes.moving,
         covariance=solution.covariance.tolist(),
         covariance_order=ORDER[: len(solution.covariance)],

@@ -18,7 +18,7 @@ def omitted_entries(outcome: Outcome) -> dict[str, tuple[OmittedEntry, ...]]:
     """Return the omitted parts of the recording, by sensor; sensors without any are left out."""
     by_sensor = {
         name: [entry(OmittedEntry, part, quantity=quantity and quantity.name) for quantity, part in sensor.omitted]
-        for name, sensor in outcome.elsewhere.items()
+        for name, sensor in outcome.external.items()
     }
     for name, result in outcome.results.items():
         if result.by_hand is not None:
@@ -28,7 +28,7 @@ def omitted_entries(outcome: Outcome) -> dict[str, tuple[OmittedEntry, ...]]:
 
 def notes(outcome: Outcome) -> dict[str, tuple[str, ...]]:
     """Return remarks on how recordings were read and solved, by sensor; the usual way has none."""
-    return {name: sensor.notes for name, sensor in outcome.elsewhere.items() if sensor.notes}
+    return {name: sensor.notes for name, sensor in outcome.external.items() if sensor.notes}
 
 
 def omitted_lines(result: ResultDocument, sensor: str | None = None) -> Iterator[str]:

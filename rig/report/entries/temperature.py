@@ -29,7 +29,7 @@ def temperature_entry(
         covariance=np.outer(of_coefficients, of_coefficients) * polynomials.covariance,
         contributors=[
             entry(TemperatureContributorEntry, line,
-                  degrees_of_freedom=counted(np.array([line.freedom]))[0],  # type: ignore[index]  # of an array there are some
+                  degrees_of_freedom=counted(np.array([line.dof]))[0],  # type: ignore[index]  # of an array there are some
                   std=np.sqrt(np.diag(powers @ line.covariance @ powers.T).clip(min=0.0)))
             for line in polynomials.lines
         ],

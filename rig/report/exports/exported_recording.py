@@ -128,7 +128,7 @@ class ReadingsAlone:
     def time_s(self, sensor: str) -> Array:
         """Return the times (n,) of all samples of a sensor, s; those of a file as it states them."""
         samples = self.run.samples[sensor]
-        if self.run.elsewhere is not None:
+        if self.run.external is not None:
             times_of_file: Array = samples["host_time_s"]
             return times_of_file
         times_s: Array = microsecond_of(self.run.sensors[sensor]) * samples["board_time_us"].astype(np.float64)
@@ -145,7 +145,7 @@ class ReadingsAlone:
 
     def tables(self) -> Iterator[ExportTable]:
         """Yield the readings of each sensor in one table, as `rig solve` reads them, and the motion of a file."""
-        external = self.run.elsewhere
+        external = self.run.external
         remark = f"Times are seconds of {self.clock}. {LOST if external is None else LOST_OF_FILES}"
         for name, sensor in self.run.sensors.items():
             more = UPWARDS if sensor.measures(ACCELERATION) else ""

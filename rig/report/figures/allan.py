@@ -117,7 +117,7 @@ def _entry(quantity: Quantity, result: AtRest) -> dict[str, Any]:
         quantity.named("deviation"): result.curve.deviation.tolist(),
         quantity.named("deviation_low"): result.curve.low.tolist(),
         quantity.named("deviation_high"): result.curve.high.tolist(),
-        "degrees_of_freedom": result.curve.freedom.tolist(),
+        "degrees_of_freedom": result.curve.dof.tolist(),
     }
 
 

@@ -78,7 +78,7 @@ def _plots(outcome: Outcome, document: ResultDocument) -> Iterator[tuple[str, At
 
 def _mounting(outcome: Outcome, sensor: str) -> Array:
     """Return the rotation from the flange to the sensor's nominal axes; attitudes of a file are the sensor's own."""
-    if sensor in outcome.elsewhere:
+    if sensor in outcome.external:
         return np.eye(3)
     return np.array(outcome.recordings[0].run.sensors[sensor].mounting)
 

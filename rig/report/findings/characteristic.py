@@ -21,7 +21,7 @@ class UncertainNumbers:
 
     values: Sequence[float]
     stds: Sequence[float]
-    freedom: Sequence[Freedom] | None = None
+    dof: Sequence[Freedom] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +52,8 @@ class Characteristic:
 
     - `units`: the units, by the quantity that the sensor measures.
     - `read`: reads the numbers from an entry; None if it has none.
-    - `series`: the names in a history; None if it stores none, which `elsewhere` explains.
-    - `elsewhere`: the outlets that do not take it from here, each with the reason in a line.
+    - `series`: the names in a history; None if it stores none, which `exempt` explains.
+    - `exempt`: the outlets that do not take it from here, each with the reason in a line.
     - `remark`: the digital certificate's remark before ± U, by the entry.
     """
 
@@ -62,7 +62,7 @@ class Characteristic:
     units: Callable[[Quantity], Units]
     read: Callable[[Any], UncertainNumbers | None]
     series: Series | None
-    elsewhere: Mapping[Outlet, str] = field(default_factory=dict)
+    exempt: Mapping[Outlet, str] = field(default_factory=dict)
     remark: Callable[[Any], str] = lambda _: ""
 
     def term_of(self, finding: Finding[Any]) -> "Term":
@@ -110,7 +110,7 @@ class Term:
     @property
     def expanded(self) -> Expanded:
         """U of the numbers in SI units, with its coverage factors."""
-        return expanded(self.numbers.stds, self.numbers.freedom)
+        return expanded(self.numbers.stds, self.numbers.dof)
 
     @property
     def printed(self) -> Iterator[tuple[str, float, float]]:
@@ -125,7 +125,7 @@ def terms(
 ) -> Iterator[Term]:
     """Yield the characteristics that an entry states, or those of them that `outlet` takes."""
     for characteristic in characteristics:
-        if outlet not in characteristic.elsewhere and characteristic.read(finding.entry) is not None:
+        if outlet not in characteristic.exempt and characteristic.read(finding.entry) is not None:
             yield characteristic.term_of(finding)
 
 
@@ -140,9 +140,9 @@ def read_fields(what: str, suffix: str, sign: int = 1) -> Callable[[Any], Uncert
         for part in (entry, getattr(entry, "vector_model", None)):
             values, stds = (getattr(part, f"{name}_{suffix}", None) for name in (what, f"{what}_std"))
             if values is not None and stds is not None:
-                freedom = getattr(part, f"{what}_degrees_of_freedom", None)
-                dof = None if freedom is None else _flat(freedom)
-                return UncertainNumbers([sign * value for value in _flat(values)], _flat(stds), dof)
+                dof = getattr(part, f"{what}_degrees_of_freedom", None)
+                numbers = [sign * value for value in _flat(values)]
+                return UncertainNumbers(numbers, _flat(stds), None if dof is None else _flat(dof))
         return None
 
     return read

@@ -68,14 +68,14 @@ def _earths_rate(entry: Any) -> UncertainNumbers | None:
     rate = entry.earth_rate
     if not isinstance(rate, EarthRateEntry):
         return None
-    return UncertainNumbers(rate.rate_rad_s, np.sqrt(np.diag(rate.covariance_rad2_s2)).tolist(), rate.freedoms(3))
+    return UncertainNumbers(rate.rate_rad_s, np.sqrt(np.diag(rate.covariance_rad2_s2)).tolist(), rate.dofs(3))
 
 
 def _size_of_earths_rate(entry: Any) -> UncertainNumbers | None:
     rate = entry.earth_rate
     if not isinstance(rate, EarthRateEntry):
         return None
-    return UncertainNumbers([rate.norm_rad_s], [rate.norm_std_rad_s], rate.freedoms(1))
+    return UncertainNumbers([rate.norm_rad_s], [rate.norm_std_rad_s], rate.dofs(1))
 
 
 LINES: Final = "its kind prints it in a line of its own"

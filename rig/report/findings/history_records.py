@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.statistics.coverage import COVERAGE_FACTOR, freedom_of
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR, find_dof_by_factor
 
 if TYPE_CHECKING:
     from rig.data.entries.budget import BudgetEntry
@@ -49,9 +49,9 @@ class Parameter:
         return self.coverage_factor * self.std
 
     @property
-    def freedom(self) -> float:
+    def dof(self) -> float:
         """The degrees of freedom of the standard uncertainty, by its coverage factor."""
-        return freedom_of(self.coverage_factor)
+        return find_dof_by_factor(self.coverage_factor)
 
     @property
     def nominal(self) -> float:

@@ -41,16 +41,17 @@ class AxisValues:
 
 @dataclass(frozen=True, slots=True)
 class DisplayRow:
-    """A row of page and notebook: numbers under a `name`, in `unit`, with scale factors if there are any.
+    """A row of page and notebook: numbers, with scale factors if there are any.
 
-    - `sensor`, `quantity`: the sensor and what it measures.
-    - `name`, `unit`, `numbers`: the row's name, its unit, and its values with U.
-    - `combined`: whether U includes all contributors; else it is two standard deviations of the noise.
-    - `scale`: the scale factors with U.
-    - `held_at`: the conditions of validity at the end of a run ("at ±60.0 °/s").
-    - `model`: the model there ("g = K (m + b)").
-    - `noun`: the name of numbers without scale factors.
-    - `labels`: the labels of the numbers.
+    - sensor, quantity: the sensor and what it measures.
+    - name, unit: of the row.
+    - numbers: the values with U.
+    - combined: whether U includes all contributors; else it is two standard deviations of the noise.
+    - scale: the scale factors with U.
+    - held_at: the conditions of validity at the end of a run ("at ±60.0 °/s").
+    - model: the model there ("g = K (m + b)").
+    - noun: the name of numbers without scale factors.
+    - labels: the labels of the numbers.
     """
 
     sensor: str
@@ -103,20 +104,24 @@ class Standard:
 class ResultKind(Generic[EntryT]):
     """A kind of result, by its outlets or the reasons why it has none.
 
-    - `name`: its name for people. `key`: its key in `result.json`. `entries`: builds the entries there, none if the run
-      has none. `find`: finds them in a document.
-    - `printed`: yields tables and lines for the terminal. `unsolved`: yields why sensors have no solution. `in_short`:
-      yields lines for the end of a run, if the kind has no row.
-    - `shown`: builds the row of page and notebook. `followed`: builds the record of a history.
-    - `figures`: the writer of its pictures in a run folder (`module:function`). `header`: yields the lines of
-      `calibration.h`, by the g-sensitivities (3, 3) of the gyroscopes.
-    - `block`: the macro of the certificate's page (`template:macro`) that prints one; the template is in `templates`.
-    - `measured`: the content of the digital certificate, with reversals by sensor. `standard`: the statement of
-      traceability in both certificates.
-    - `characteristics`: quantities other than scale and bias, which terminal, page, notebook, both certificates,
-      history and exports walk after the kind's own output.
-    - `corrected`: the correction of readings for exports; None for a reference. `unexplained`: the residuals of its
-      means for pictures; None if it has none.
+    - name: its name for people.
+    - key: its key in result.json.
+    - entries: builds the entries there, none if the run has none.
+    - find: finds them in a document.
+    - printed: yields tables and lines for the terminal.
+    - shown: builds the row of page and notebook.
+    - followed: builds the record of a history.
+    - header: yields the lines of calibration.h, by the g-sensitivities (3, 3) of the gyroscopes.
+    - figures: the writer of its pictures in a run folder ("module:function").
+    - block: the macro of the certificate's page that prints one ("template:macro").
+    - measured: builds the content of the digital certificate, with reversals by sensor.
+    - standard: the statement of traceability in both certificates.
+    - corrected: builds the correction of readings for exports; None for a reference.
+    - unexplained: builds the residuals of its means for pictures; None if it has none.
+    - templates: the folder of the block's template.
+    - unsolved: yields the reasons why sensors have no solution.
+    - in_short: yields lines for the end of a run, if the kind has no row.
+    - characteristics: quantities other than scale and bias, which all outlets walk after the kind's own output.
     """
 
     name: str

@@ -39,7 +39,7 @@ def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
     entries = {}
     for name, result in outcome.results.items():
         role: Role = "calibrate" if name in outcome.settings.to_calibrate else "reference"
-        if (external := outcome.elsewhere.get(name)) is not None:
+        if (external := outcome.external.get(name)) is not None:
             entries[name] = sensor_entry(
                 result, role, in_attitudes=rates_in_attitudes(external), by_angles=angles_entry(external)
             )

@@ -34,8 +34,8 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, OverTemperatureEntry
 
 
 def _sensor(outcome: Outcome, name: str) -> RecordedSensor | Item:
-    if name in outcome.elsewhere:
-        return outcome.elsewhere[name].item
+    if name in outcome.external:
+        return outcome.external[name].item
     return outcome.recordings[0].run.sensors[name]
 
 

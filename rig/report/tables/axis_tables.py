@@ -60,7 +60,7 @@ def decimals(uncertainties: Sequence[float], fewest: int = FEWEST_DECIMALS) -> i
 def line_of(term: Term, lead: str, form: str, width: str = ".2g") -> str:
     """Return a characteristic's numbers in a line behind `lead`, with the largest U."""
     _, values, widths = zip(*term.printed, strict=True)
-    unit, words = term.units.shown.name, factor_words(term.numbers.freedom)
+    unit, words = term.units.shown.name, factor_words(term.numbers.dof)
     return f"{lead}: {triple(values, form)} {unit} (± {max(widths):{width}}, {words})"
 
 

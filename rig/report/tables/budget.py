@@ -42,8 +42,8 @@ def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit)
         table.add_column(heading, justify="left" if heading in ("contributor", "type") else "right")
     for line in printed.lines:
         cells = (cell for part in line.parts for cell in part)
-        table.add_row(plain(_label(line)), line.kind, line.freedom, *cells, end_section=line is printed.lines[-1])
-    table.add_row("combined u", "", "", k.combined, f"ν {k.freedom}", b.combined, f"ν {b.freedom}")
+        table.add_row(plain(_label(line)), line.kind, line.dof, *cells, end_section=line is printed.lines[-1])
+    table.add_row("combined u", "", "", k.combined, f"ν {k.dof}", b.combined, f"ν {b.dof}")
     table.add_row("expanded U", "", "", k.expanded, f"× {k.factor}", b.expanded, f"× {b.factor}")
     return table
 

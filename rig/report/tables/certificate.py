@@ -132,7 +132,7 @@ def pairs(term: Term) -> list[tuple[str, Pair]]:
 
 def earth_rate_rows(entry: EarthRateEntry) -> list[tuple[str, str, Pair]]:
     """Return name, unit, and value with U."""
-    (k,) = expanded([1.0], entry.freedoms(1)).factors
+    (k,) = expanded([1.0], entry.dofs(1)).factors
     std = np.sqrt(np.diag(entry.covariance_rad2_s2))
     rows = [("size", "rad/s", pair(entry.norm_rad_s, k * entry.norm_std_rad_s))]
     rows += [(axis, "rad/s", pair(entry.rate_rad_s[i], k * float(std[i]))) for i, axis in enumerate(AXES)]

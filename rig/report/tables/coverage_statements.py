@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from rig.data.entries.budget import BudgetEntry
 from rig.estimation.statistics.coverage import PROBABILITY
 from rig.report.tables.certificate import AXES
-from rig.report.words.printed_budget import freedom_text
+from rig.report.words.printed_budget import dof_text
 
 QUANTITIES = ("scale factors", "biases")
 
@@ -38,7 +38,7 @@ def coverage_sentence(budget: BudgetEntry) -> str:
             f"approximately {_percent(covers)}."
         )
     return (
-        f"{begins}\u00a0=\u00a0{k}, which for a t-distribution with ν_eff\u00a0=\u00a0{freedom_text(fewest)} effective "
+        f"{begins}\u00a0=\u00a0{k}, which for a t-distribution with ν_eff\u00a0=\u00a0{dof_text(fewest)} effective "
         f"degrees of freedom, the fewest of any value here, corresponds to a coverage probability of approximately "
         f"{_percent(covers)}."
     )
@@ -48,8 +48,8 @@ def _group(budget: BudgetEntry, factors: Sequence[str], first: int, name: str) -
     """Return k of the three axes, once if they are the same."""
     axis_factors, dofs = factors[first : first + 3], budget.effective_dof[first : first + 3]
     if len(set(axis_factors)) == 1:
-        return f"{name} k\u00a0=\u00a0{axis_factors[0]} (ν_eff\u00a0≥\u00a0{freedom_text(min(dofs))})"
-    texts = (f"{axis} {k} ({freedom_text(dof)})" for axis, k, dof in zip(AXES, axis_factors, dofs, strict=True))
+        return f"{name} k\u00a0=\u00a0{axis_factors[0]} (ν_eff\u00a0≥\u00a0{dof_text(min(dofs))})"
+    texts = (f"{axis} {k} ({dof_text(dof)})" for axis, k, dof in zip(AXES, axis_factors, dofs, strict=True))
     return f"{name} k (ν_eff): {', '.join(texts)}"
 
 

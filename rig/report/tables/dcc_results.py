@@ -68,7 +68,7 @@ def further_results(characteristics: Iterable[Term]) -> Iterator[Element]:
         characteristic, numbers = term.characteristic, term.numbers
         remark = characteristic.remark(term.finding.entry)
         statement = f"{remark} {SOLUTION}" if remark else SOLUTION
-        values = numbers.values, numbers.stds, numbers.freedom
+        values = numbers.values, numbers.stds, numbers.dof
         yield _wide_result(term.name, statement, characteristic.labels, values, term.units.d_si)
 
 
@@ -107,8 +107,8 @@ def bias_drift(entry: DriftEntry, quantity: Quantity) -> Iterator[Element]:
             f"Bias of the reading, scale and axes fixed; all repeats have a common standard deviation of "
             f"{entry.common_std[i]!r} {entry.unit} in addition. ± U of the differences"
         )
-        freedom = [entry.degrees_of_freedom[i]] * len(labels)
-        yield _wide_result(f"bias along {axis} by repeat", remark, labels, (values, stds, freedom), quantity.d_si)
+        dof = [entry.degrees_of_freedom[i]] * len(labels)
+        yield _wide_result(f"bias along {axis} by repeat", remark, labels, (values, stds, dof), quantity.d_si)
 
 
 def over_temperature(entry: OverTemperatureEntry, quantity: Quantity) -> Iterator[Element]:
@@ -142,12 +142,12 @@ def earth_rate(entry: EarthRateEntry) -> Iterator[Element]:
         "latitude by that rate",
         SOLUTION,
         ["latitude"],
-        ([entry.latitude_rad], [entry.latitude_std_rad], entry.freedoms(1)),
+        ([entry.latitude_rad], [entry.latitude_std_rad], entry.dofs(1)),
         ANGLE,
     )
     if entry.heading_rad is not None and entry.heading_std_rad is not None:
         statement = f"Direction of the x axis of the arm's base, from north over east. {SOLUTION}"
-        heading = [entry.heading_rad], [entry.heading_std_rad], entry.freedoms(1)
+        heading = [entry.heading_rad], [entry.heading_std_rad], entry.dofs(1)
         yield _wide_result("heading by that rate", statement, ["heading"], heading, ANGLE)
 
 
@@ -208,9 +208,9 @@ def _wide_result(
     name: str, statement: str, labels: Sequence[str], values_and_stds: ValuesAndStds, unit: str
 ) -> Element:
     """Return values with U, by their standard deviations and degrees of freedom."""
-    numbers, stds, freedom = values_and_stds
-    words = f"{statement}, {factor_words(freedom)}."
-    return _result(name, words, real_list(labels, numbers, [unit], expanded=expanded(stds, freedom)))
+    numbers, stds, dof = values_and_stds
+    words = f"{statement}, {factor_words(dof)}."
+    return _result(name, words, real_list(labels, numbers, [unit], expanded=expanded(stds, dof)))
 
 
 def _result(name: str, statement: str, quantity: Element) -> Element:

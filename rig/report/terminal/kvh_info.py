@@ -11,13 +11,17 @@ from rig.station.plain_text import plain
 
 @dataclass(frozen=True, slots=True)
 class KvhInfo:
-    """A KVH 1775 at `port`.
+    """A KVH 1775 and its stream.
 
-    - `sensor`, `port`, `baud`, `serial_number`: the instrument and its line.
-    - `settings`: the settings in its memory. `built_in_test`: the result, None without one.
-    - `messages`, `lost`, `status`: a look at its stream.
-    - `rotation`, `acceleration_g`: means over `messages`, in the instrument's units.
-    - `problem`: what prevented the look.
+    - sensor: its name.
+    - port, baud: its line.
+    - serial_number: the instrument's.
+    - settings: those in its memory.
+    - built_in_test: the result, None without one.
+    - messages, lost: numbers of received and lost messages.
+    - rotation, acceleration_g (3,): means over the messages, in the instrument's units.
+    - status: of the messages, None without one.
+    - problem: what prevented the reception of a stream.
     """
 
     sensor: str

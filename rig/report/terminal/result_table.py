@@ -96,7 +96,7 @@ def _term_line(term: Term) -> str:
     """Return a characteristic in a line: each of its numbers ± U."""
     unit = "" if term.units.shown.name == "1" else f" {term.units.shown.name}"
     numbers = "  ".join(f"{label} {plus_minus(value, u)}".lstrip() for label, value, u in term.printed)
-    return f"{term.name}: {numbers}{unit} (U, {factor_words(term.numbers.freedom)})"
+    return f"{term.name}: {numbers}{unit} (U, {factor_words(term.numbers.dof)})"
 
 
 def print_checks(result: ResultDocument, console: Console, sensor: str | None = None) -> None:

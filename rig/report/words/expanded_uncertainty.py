@@ -18,17 +18,17 @@ class Expanded:
     probabilities: Sequence[float]
 
 
-def expanded(stds: Sequence[float], freedom: Sequence[Freedom] | None) -> Expanded:
+def expanded(stds: Sequence[float], counted: Sequence[Freedom] | None) -> Expanded:
     """Return U = k u by Student's t; two standard deviations if the degrees of freedom are unknown."""
-    dofs = [np.inf if dof is None else dof for dof in freedom or [None] * len(stds)]
+    dofs = [np.inf if dof is None else dof for dof in counted or [None] * len(stds)]
     factors = coverage_factors(dofs)
     return Expanded((factors * np.array(stds)).tolist(), factors.tolist(), covered(factors, dofs).tolist())
 
 
-def factor_words(freedom: Sequence[Freedom] | None) -> str:
+def factor_words(dof: Sequence[Freedom] | None) -> str:
     """Return k in print: one for all, or the smallest and the largest."""
-    if freedom is None:
+    if dof is None:
         return f"k = {COVERAGE_FACTOR:g}, degrees of freedom not counted"
-    factors = expanded([1.0] * len(freedom), freedom).factors
+    factors = expanded([1.0] * len(dof), dof).factors
     low, high = f"{min(factors):.3g}", f"{max(factors):.3g}"
     return f"k = {low}" if low == high else f"k = {low} to {high}"

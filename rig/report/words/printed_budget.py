@@ -25,7 +25,7 @@ class BudgetColumn:
     index: int
     unit: str
     combined: str
-    freedom: str
+    dof: str
     factor: str
     expanded: str
 
@@ -43,7 +43,7 @@ class Line:
     kind: str
     distribution: str
     assumed: str
-    freedom: str
+    dof: str
     parts: tuple[tuple[str, str], tuple[str, str]]
 
 
@@ -107,7 +107,7 @@ def _column(budget: BudgetEntry, index: int, size: _Size) -> BudgetColumn:
         index,
         size.unit,
         size.text(budget.std[index]),
-        freedom_text(budget.effective_dof[index]),
+        dof_text(budget.effective_dof[index]),
         f"{budget.coverage_factors[index]:.2f}",
         size.text(budget.expanded[index]),
     )
@@ -117,13 +117,13 @@ def _line(line: ContributorEntry, indices: tuple[int, int], sizes: Sequence[_Siz
     stated = " (k = 2)" if line.distribution == "normal" else ""
     source = "evaluated" if line.kind == "A" else "–"
     assumed = source if line.half_width is None else f"±{figures(line.half_width)} {line.unit}{stated}"
-    freedom = _explain_missing_dof(line) if line.degrees_of_freedom is None else freedom_text(line.degrees_of_freedom)
+    dof = _explain_missing_dof(line) if line.degrees_of_freedom is None else dof_text(line.degrees_of_freedom)
     return Line(
         line.name,
         line.kind,
         line.distribution,
         assumed,
-        freedom,
+        dof,
         _parts(line.std, line.variance_fraction, indices, sizes),
     )
 
@@ -144,8 +144,8 @@ def _parts(
     return first, second
 
 
-def freedom_text(freedom: float) -> str:
+def dof_text(dof: float) -> str:
     """Return degrees of freedom, rounded down to whole ones; large ones with two digits."""
-    if not math.isfinite(freedom):
+    if not math.isfinite(dof):
         return "∞"
-    return f"{math.floor(freedom)}" if freedom < 1e4 else small(freedom)
+    return f"{math.floor(dof)}" if dof < 1e4 else small(dof)

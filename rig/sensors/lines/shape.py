@@ -41,12 +41,12 @@ class TimedLine:
 class Shape:
     """The pattern of a sample's line, and the samples.
 
-    - `separator`, `prefix`, `keys`, `checksum`: as in a section `lines`.
-    - `names`: the columns' names in a header.
-    - `values` (n, columns): the numbers, NaN if missing or text.
-    - `arrived_s` (n,): their times of arrival.
-    - `decimals` (columns,): the decimals of a column, -1 if they vary.
-    - `others`: the number of other lines.
+    - separator, prefix, keys, checksum: as in a section `lines`.
+    - names: the columns' names in a header.
+    - values (n, columns): the numbers, NaN if missing or text.
+    - arrived_s (n,): their times of arrival.
+    - decimals (columns,): the decimals of a column, -1 if they vary.
+    - others: the number of other lines.
     """
 
     separator: str

@@ -29,14 +29,15 @@ STILL_RAD = 6.5 * PULSE_RAD  # range of its angles: a shaft at rest dithers by �
 class ServoState:
     """One reply of the servo. The field names are those of `SERVO_STATE_DTYPE`.
 
-    - `time_s`: the reference time (`clock.Clock`) in the middle of the transaction.
-    - `host_time_s`: `time.monotonic()` when the reply was read.
-    - `q_rad` (1,): the shaft's angle by its encoder, revolutions included, ccw positive.
-    - `qd_rad_s` (1,): the servo's own coarse rate, in steps of 1.4 °/s.
-    - `took_s`: the duration of the transaction; the position was measured within it.
-    - `tick`: the servo's clock, ms.
-    - `load`: a current in A, or a fraction of full load (`ServoModel.load_unit`).
-    - `moving`, `moving_status`, `hardware_error`, `voltage_v`, `temperature_c`: the registers of these names.
+    - time_s: the reference time in the middle of the transaction.
+    - host_time_s: `time.monotonic()` when the reply was read.
+    - q_rad (1,): the shaft's angle by its encoder, revolutions included, ccw positive.
+    - qd_rad_s (1,): the servo's own coarse rate, in steps of 1.4 °/s.
+    - took_s: the duration of the transaction; the position was measured within it.
+    - tick: the servo's clock, ms.
+    - moving, moving_status, hardware_error: the registers of these names.
+    - load: a current in A, or a fraction of full load (`ServoModel.load_unit`).
+    - voltage_v, temperature_c: the registers of supply voltage and temperature.
     """
 
     time_s: float

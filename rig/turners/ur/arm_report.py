@@ -21,16 +21,19 @@ class ArmSetup:
 class ArmReport:
     """The arm's report of itself, a `Report`; None for items that the controller does not report.
 
-    - `host`: its address.
-    - `version`, `polyscope`: its software (major, minor, bugfix, build), and the same in its own words.
-    - `serial_number`: the arm's, or "not told".
-    - `remote_control`, `program_running`: the pendant's control mode, and the controller's program.
-    - `state`: the state at that time.
-    - `kinematics`: the arm's geometry as measured in the factory.
-    - `tcp_offset`: the pose of its tool centre point in the flange's frame.
-    - `setup`, `called`: the arm it is set up for, and the dashboard's name for it.
-    - `model`: the maker's name of the arm that these items mean.
-    - `registers_free`: whether a half of the registers is free for the client's script.
+    - host: its address.
+    - version: its software (major, minor, bugfix, build).
+    - polyscope: the software in its own words.
+    - serial_number: the arm's, or "not told".
+    - remote_control: whether the pendant's mode is remote control.
+    - program_running: whether the controller runs a program.
+    - state: the state at that time.
+    - kinematics: the arm's geometry as measured in the factory.
+    - tcp_offset: the pose of its tool centre point in the flange's frame.
+    - setup: the arm it is set up for.
+    - called: the dashboard's name for it.
+    - model: the maker's name of the arm that these items mean.
+    - registers_free: whether a half of the registers is free for the client's script.
     """
 
     host: str

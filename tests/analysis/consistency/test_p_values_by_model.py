@@ -106,6 +106,6 @@ def test_what_shakes_a_quiet_gyroscope_beside_its_encoders_contradicts_nothing(s
 def test_a_p_value_is_what_the_limit_is_set_by() -> None:
     from scipy.special import chdtri
 
-    for freedom in (1, 3, 9, 90):
-        limit = float(chdtri(freedom, LARGER))
+    for dof in (1, 3, 9, 90):
+        limit = float(chdtri(dof, LARGER))
         assert probability(fitness("gyro", "rate", "residuals", limit, limit), LARGER) == pytest.approx(LARGER)

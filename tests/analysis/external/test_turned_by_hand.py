@@ -80,10 +80,8 @@ def test_real_turns_by_hand_tell_as_much_as_they_can(
     assert (np.abs(np.array(found["scale"]) - [0.9728, 1.0179, 1.0017]) < 0.5 * expanded).all()
     assert (expanded > 1e-3).all() and (expanded < 5e-3).all()
     assert (found["estimator"], found["by_angles"]["rows"]) == ("increments", [7, 8, 9])
-    freedom = {
-        line["name"]: line["degrees_of_freedom"] for line in found["budget"]["contributors"] if line["kind"] == "A"
-    }
-    assert freedom["bias from rest to rest"] >= 3 and freedom["noise"] > 1000
+    dof = {line["name"]: line["degrees_of_freedom"] for line in found["budget"]["contributors"] if line["kind"] == "A"}
+    assert dof["bias from rest to rest"] >= 3 and dof["noise"] > 1000
     by_means = document(capsys, *files, "--estimator", "vector")
     assert (2 * np.sqrt(np.diag(by_means["covariance"]))[:3] > 0.1).all(), "how it was before"
     assert main(["solve", *map(str, files), "--all"]) == 0

@@ -63,7 +63,7 @@ def accelerometer(seed: int, site: Site = SITE, lag_s: float = LAG_S) -> Session
     solution = solve_imu(dwells, sweeps, gravity_m_s2=GRAVITY)
     readings = dwells.readings_m_s2.size + sweeps.harmonics_m_s2.size
     many = np.full(readings, np.inf)  # degrees of freedom
-    budget = accelerometer_budget(solution, Movement(dwells, sweeps), site, lag_s, noise_freedom=many)
+    budget = accelerometer_budget(solution, Movement(dwells, sweeps), site, lag_s, noise_dof=many)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     off = np.concatenate([scale - 1 / np.linalg.norm(truth.matrix, axis=1), solution.bias_m_s2 - truth.bias_m_s2])
     return off / budget.std, budget, off / own_spread(budget)
@@ -91,7 +91,7 @@ def magnetometer(seed: int, site: Site = SITE) -> Session:
         field_drift(tests, np.full((2, 3), TEST_NOISE_T**2 / 2), 0.0),
     )
     seen, many = Dwells(readings, variances, told), np.full(readings.size, np.inf)
-    budget = magnetometer_budget(solution, seen, tested, site, field_t=FIELD_T, noise_freedom=many)
+    budget = magnetometer_budget(solution, seen, tested, site, field_t=FIELD_T, noise_dof=many)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     off = np.concatenate([scale - 1 / np.linalg.norm(matrix, axis=1), solution.bias - bias])
     return off / budget.std, budget, off / own_spread(budget)
@@ -176,7 +176,7 @@ def test_how_far_a_sensor_bends_is_in_its_budget_where_attitudes_do_not_tell() -
     assert stated == BY_SHEET
     for line in budget.contributors:
         if line.name in BY_SHEET:
-            assert (line.kind, line.distribution, line.freedom) == ("B", "rectangular", np.inf)
+            assert (line.kind, line.distribution, line.dof) == ("B", "rectangular", np.inf)
     whole = scale_and_bias_covariance(solution.matrix, 1 / np.linalg.norm(solution.matrix, axis=1), solution.covariance)
     readings = {"noise", "arm's attitudes", "bias instability", "flicker of the bias", *BY_SHEET}
     parts = sum(line.covariance for line in budget.contributors if line.name in readings)

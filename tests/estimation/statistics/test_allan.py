@@ -5,7 +5,7 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.statistics.allan import AllanCurve, AllanReading, Noise, allan_curve, equivalent_freedom, read_axis
+from rig.estimation.statistics.allan import AllanCurve, AllanReading, Noise, allan_curve, equivalent_dof, read_axis
 
 RATE_HZ = 25.0
 HOUR = round(3600 * RATE_HZ)
@@ -51,7 +51,7 @@ def test_degrees_of_freedom_equal_allantools(noise: Noise, exponent: int) -> Non
     ci = pytest.importorskip("allantools.ci")
     for points, factor in ((101, 2), (1001, 16), (90_001, 25), (90_001, 10_000)):
         theirs = ci.edf_simple(points, factor, exponent)
-        assert equivalent_freedom(points, factor, noise) == pytest.approx(max(theirs, 1.0), rel=1e-12)
+        assert equivalent_dof(points, factor, noise) == pytest.approx(max(theirs, 1.0), rel=1e-12)
 
 
 def test_stretches_are_never_joined() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.estimation.gyroscope.budget import Budget, Contributor
-from rig.estimation.statistics.coverage import PROBABILITY, beyond, coverage_factors, covered, effective_freedom
+from rig.estimation.statistics.coverage import PROBABILITY, beyond, coverage_factors, covered, effective_dof
 
 # EA-4/02 M:2022, annex E, table E1: k for a coverage probability of 95.45 %.
 TABLE = {1: 13.97, 2: 4.53, 3: 3.31, 4: 2.87, 5: 2.65, 6: 2.52, 7: 2.43, 8: 2.37, 10: 2.28, 20: 2.13, 50: 2.05}
@@ -36,8 +36,8 @@ def test_beyond_is_a_tail_of_the_normal_distribution_where_all_is_known() -> Non
 
 
 def test_of_two_equal_parts_the_one_that_is_known_counts_by_nothing() -> None:
-    assert effective_freedom([[1.0], [1.0]], [[10.0], [np.inf]]) == pytest.approx([40.0])
-    assert effective_freedom([[0.0], [0.0]], [[10.0], [3.0]]) == np.inf  # of nothing at all
+    assert effective_dof([[1.0], [1.0]], [[10.0], [np.inf]]) == pytest.approx([40.0])
+    assert effective_dof([[0.0], [0.0]], [[10.0], [3.0]]) == np.inf  # of nothing at all
 
 
 def test_each_value_of_a_budget_has_its_own_coverage_factor() -> None:

@@ -46,7 +46,7 @@ def test_the_freedom_of_a_variance_is_what_its_scatter_shows(
     draws = [made(rng, 1428) for _ in range(DRAWS)]
     found = [fit_autoregression(each - each.mean()) for each in draws]
     scatter = shown([left.factor * float(np.var(each)) for left, each in zip(found, draws, strict=True)])
-    assert 1 / within < np.median([left.freedom for left in found]) / scatter < within
+    assert 1 / within < np.median([left.dof for left in found]) / scatter < within
 
 
 def test_a_rest_in_which_the_arm_vibrates_tells_its_noise_from_few_frequencies() -> None:
@@ -59,8 +59,8 @@ def test_white_readings_have_one_less_than_there_are_and_a_vibration_costs_most_
     rng, time_s = np.random.default_rng(3), np.arange(1428) / RATE_HZ
     quiet = rng.normal(size=(1428, 3))
     alone, _ = mean_at_rest(quiet, time_s, Window(0.0, 6.0), Steps(1e-6))
-    np.testing.assert_array_equal(alone.freedom, 1427)
+    np.testing.assert_array_equal(alone.dof, 1427)
     shaking = np.column_stack([shaken(rng, 1428) for _ in range(3)])
     assert vibrates(shaking)
     found, _ = mean_at_rest(shaking, time_s, Window(0.0, 6.0), Steps(1e-6))
-    assert np.all(found.freedom < 100)
+    assert np.all(found.dof < 100)

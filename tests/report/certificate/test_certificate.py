@@ -79,10 +79,10 @@ def kinds() -> dict[str, ResultDocument]:
     }
 
 
-def budget_of(freedom: float) -> BudgetEntry:
+def budget_of(dof: float) -> BudgetEntry:
     """Of one contributor that tells scale factors with so much freedom, and biases with no end of it."""
     scale, bias = (np.diag([size] * 3 + [other] * 3) for size, other in ((1e-8, 0.0), (0.0, 1e-6)))
-    lines = (Contributor("noise", "A", "normal", None, "", "", freedom, scale),
+    lines = (Contributor("noise", "A", "normal", None, "", "", dof, scale),
              Contributor("offset", "B", "rectangular", 1e-3, "rad/s", "", np.inf, bias))  # fmt: skip
     return budget_entry(Budget(lines))
 
@@ -413,7 +413,7 @@ def test_scarce_freedom_widens_u_and_is_said() -> None:
     sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
     assert "normal distribution" in coverage_sentence(sensor.budget)
-    scarce = budget_of(freedom=8.0)
+    scarce = budget_of(dof=8.0)
     assert "scale factors k\u00a0=\u00a02.37 (ν_eff\u00a0≥\u00a08); biases k\u00a0=\u00a02.00" in coverage_sentence(
         scarce
     )

@@ -212,8 +212,8 @@ def test_values_uncertainties_and_covariance_are_the_result_s() -> None:
     assert skew == [*sensor.vector_model.non_orthogonality_rad]
     vector = sensor.vector_model
     stds = [*vector.non_orthogonality_std_rad, *np.ravel(vector.g_sensitivity_std_rad_s_per_m_s2)]  # type: ignore[arg-type]
-    freedom = [*vector.non_orthogonality_degrees_of_freedom, *np.ravel(vector.g_sensitivity_degrees_of_freedom)]  # type: ignore[arg-type,misc]
-    factors = coverage_factors([np.inf if each is None else each for each in freedom])
+    dof = [*vector.non_orthogonality_degrees_of_freedom, *np.ravel(vector.g_sensitivity_degrees_of_freedom)]  # type: ignore[arg-type,misc]
+    factors = coverage_factors([np.inf if each is None else each for each in dof])
     assert len(felt) == 9 and min(factors) > 2
     np.testing.assert_allclose(expanded, [*sensor.budget.expanded, *(factors * stds)], rtol=1e-12)
     covariance = np.array([float(each.text or "") for each in found(xml, "si:covariance/si:value")]).reshape(6, 6).T

@@ -174,9 +174,9 @@ def test_exports_say_that_they_have_no_place_for_it(name: str, document: ResultD
 
 @pytest.mark.parametrize("characteristic", characteristics.every_characteristic(), ids=lambda each: each.name)
 def test_a_characteristic_is_in_every_outlet_or_says_in_a_line_why_not(characteristic: Characteristic) -> None:
-    assert set(characteristic.elsewhere) <= set(OUTLETS)
-    assert all(len(why.split()) > 3 and "\n" not in why for why in characteristic.elsewhere.values())
-    assert (characteristic.series is None) == ("history" in characteristic.elsewhere)
+    assert set(characteristic.exempt) <= set(OUTLETS)
+    assert all(len(why.split()) > 3 and "\n" not in why for why in characteristic.exempt.values())
+    assert (characteristic.series is None) == ("history" in characteristic.exempt)
     assert not set(characteristic.parameters) & {*SCALES, *BIASES}
 
 
@@ -191,4 +191,4 @@ def test_no_two_characteristics_of_a_kind_share_a_name(kind: ResultKind[Any]) ->
 def test_an_outlet_that_a_kind_has_not_tells_none_of_its_characteristics(kind: ResultKind[Any]) -> None:
     through = {"certificate": kind.block, "digital certificate": kind.measured, "history": kind.followed}
     for outlet in [outlet for outlet, of in through.items() if isinstance(of, NoOutlet)]:
-        assert all(outlet in each.elsewhere for each in kind.characteristics)
+        assert all(outlet in each.exempt for each in kind.characteristics)

@@ -29,7 +29,7 @@ from rig.report.certificate.statements import StatedFacts
 from rig.report.document import document_of
 from rig.report.tables.coverage_statements import coverage_sentence
 from rig.report.terminal.result_table import print_outcome
-from rig.report.words.printed_budget import freedom_text
+from rig.report.words.printed_budget import dof_text
 from rig.report.words.printed_values import figures
 from support.documents.certified import certificate, everything, result
 from support.documents.dcc_rules import schema_faults
@@ -97,9 +97,9 @@ def at_the_terminal(text: str) -> list[list[list[str]]]:
         if cells[:1] == ["contributor"]:
             found.append([])
         if found and len(cells) == 7 and (not found[-1] or found[-1][-1][0] != "expanded U"):
-            name, kind, freedom, *parts = cells
+            name, kind, dof, *parts = cells
             summed = name in ("combined u", "expanded U")
-            found[-1].append([name, *parts] if summed else [name, kind, "", "", freedom, *parts])
+            found[-1].append([name, *parts] if summed else [name, kind, "", "", dof, *parts])
     return found
 
 
@@ -114,7 +114,7 @@ def check_adds_up(rows: list[list[str]], budget: BudgetEntry) -> None:
         factor, rounding = float(k.removeprefix("× ")), 0.005 * float(u) + 0.5 * step
         assert float(big_u) == pytest.approx(factor * float(u), abs=rounding + 0.5 * factor * step)
         axis = "xyz".index(re.findall(r"[kb]([xyz])", heading[column])[0])
-        known = " ".join(freedom_text(budget.effective_dof[quantity][axis]).split())
+        known = " ".join(dof_text(budget.effective_dof[quantity][axis]).split())
         assert combined[column - 3] == f"ν {known}"
 
 
@@ -181,9 +181,9 @@ def test_a_budget_of_readings_made_elsewhere_adds_up_and_every_scatter_is_counte
     for rows, budget in zip(tables, stated, strict=True):
         check_adds_up(rows, budget)
         np.testing.assert_allclose(budget.coverage_factors, coverage_factors(budget.effective_dof))
-        freedom = {line[0]: (line[1], line[4]) for line in rows[1:-2]}
-        assert all(number == "∞" for kind, number in freedom.values() if kind == "B")
-        assert all(number == "in u" or float(number) >= 1 for kind, number in freedom.values() if kind == "A")
+        dof = {line[0]: (line[1], line[4]) for line in rows[1:-2]}
+        assert all(number == "∞" for kind, number in dof.values() if kind == "B")
+        assert all(number == "in u" or float(number) >= 1 for kind, number in dof.values() if kind == "A")
 
 
 def test_a_budget_with_counted_freedom_adds_up_and_every_scatter_has_a_number() -> None:
@@ -195,8 +195,8 @@ def test_a_budget_with_counted_freedom_adds_up_and_every_scatter_has_a_number() 
     (rows,) = printed(result())
     of_type = {line[0]: (line[1], line[4]) for line in rows[1:-2]}
     assert of_type["noise"][0] == "A" and re.fullmatch(r"\d+(\.\d)?( × 10[⁰¹²³⁴⁵⁶⁷⁸⁹]+)?", of_type["noise"][1])
-    assert all(freedom == "∞" for kind, freedom in of_type.values() if kind == "B")
-    assert not any(freedom == "∞" for kind, freedom in of_type.values() if kind == "A")
+    assert all(dof == "∞" for kind, dof in of_type.values() if kind == "B")
+    assert not any(dof == "∞" for kind, dof in of_type.values() if kind == "A")
 
 
 def scarce(document: ResultDocument) -> ResultDocument:
@@ -253,17 +253,17 @@ def test_each_value_has_the_coverage_factor_of_its_degrees_of_freedom() -> None:
     """A KVH 1775 that was at rest for little time: what its bias does is known from fifteen differences."""
     run = open_run(RECORDINGS / "kvh1775")
     document = document_of(judged(run, DEFAULT_ESTIMATOR))
-    by_freedom = document.gyroscopes["kvh"].budget
-    assert by_freedom is not None
-    np.testing.assert_allclose(by_freedom.expanded, np.multiply(by_freedom.coverage_factors, by_freedom.std), rtol=1e-9)
-    assert by_freedom.coverage_factors == pytest.approx(coverage_factors(by_freedom.effective_dof))
-    assert 2.0 < by_freedom.coverage_factors[0] < 2.01 and by_freedom.coverage_factors[4] > 2.1
-    noise = {each.name: each.degrees_of_freedom for each in by_freedom.contributors}["noise"]
+    by_dof = document.gyroscopes["kvh"].budget
+    assert by_dof is not None
+    np.testing.assert_allclose(by_dof.expanded, np.multiply(by_dof.coverage_factors, by_dof.std), rtol=1e-9)
+    assert by_dof.coverage_factors == pytest.approx(coverage_factors(by_dof.effective_dof))
+    assert 2.0 < by_dof.coverage_factors[0] < 2.01 and by_dof.coverage_factors[4] > 2.1
+    noise = {each.name: each.degrees_of_freedom for each in by_dof.contributors}["noise"]
     assert noise is not None and 20 < noise < 1e6
     for rows, (budget, _) in zip(printed(document), budgets(document), strict=True):
         check_adds_up(rows, budget)
     bias = next(check for check in document.checks if check.name == "kvh.bias")
-    assert bias.uncertainty in by_freedom.expanded[3:] and bias.coverage_factor in by_freedom.coverage_factors[3:]
+    assert bias.uncertainty in by_dof.expanded[3:] and bias.coverage_factor in by_dof.coverage_factors[3:]
 
 
 def listed(found, name: str) -> list[float]:  # type: ignore[no-untyped-def]

@@ -126,8 +126,8 @@ def _budgeted(fields: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
         np.eye(6),
         exact,
         chi_square=0.0,
-        freedom=0,
-        noise_freedom=np.full(6, np.inf),
+        dof=0,
+        noise_dof=np.full(6, np.inf),
     )
     budget = reference_budget(spread, size)
     return {**fields, "covariance_combined": budget.covariance.tolist(), "budget": budget_entry(budget)}

@@ -106,7 +106,7 @@ def _line(rise: Array, means: Array, variances: Array) -> tuple[Array, Array]:
 
 def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
     made = {}
-    for kind in outcome.of_kinds:
+    for kind in outcome.installed_kinds:
         if kind.quantity == INCLINATION and kind.solved is not None and isinstance(kind.solved.solution, Solution):
             found = {key: np.asarray(value).tolist() for key, value in vars(kind.solved.solution).items()}
             of = kind.sensor.part, kind.sensor.serial_number

@@ -221,7 +221,7 @@ def _status(world: WorldHandle) -> BoardStatus:
 class Course:
     """One parameter over the runs: its mean, slope per run with its standard uncertainty, and its spread.
 
-    `chi2` is the sum of squared distances from the mean in stated standard uncertainties; of `freedom` degrees.
+    `chi2` is the sum of squared distances from the mean in stated standard uncertainties; of `dof` degrees.
     """
 
     name: str
@@ -229,7 +229,7 @@ class Course:
     slope: float
     slope_std: float
     chi2: float
-    freedom: int
+    dof: int
 
 
 def courses(runs: Sequence[Calibration]) -> list[Course]:
@@ -255,11 +255,11 @@ def complaints(life: Life, warm_up: int, sigma: float = 3.0) -> list[str]:
         return found
     tail = float(stats.norm.sf(sigma))
     for course in courses(life.runs):
-        if abs(course.slope) > stats.t.isf(tail, course.freedom - 1) * course.slope_std:
+        if abs(course.slope) > stats.t.isf(tail, course.dof - 1) * course.slope_std:
             found.append(f"{course.name} drifts by {course.slope:.2g} ± {course.slope_std:.2g} a run")
-        low, high = stats.chi2.isf(1 - tail, course.freedom), stats.chi2.isf(tail, course.freedom)
+        low, high = stats.chi2.isf(1 - tail, course.dof), stats.chi2.isf(tail, course.dof)
         if not low < course.chi2 < high:
-            found.append(f"{course.name} scatters by χ² = {course.chi2:.0f} of {course.freedom} about its mean")
+            found.append(f"{course.name} scatters by χ² = {course.chi2:.0f} of {course.dof} about its mean")
     found += [
         f"run {run.number} is {run.error_u:.1f} U (k = {COVERAGE:g}) from the truth"
         for run in life.runs

@@ -147,7 +147,7 @@ def write_files(
 def external(means: Array, of: Session, noise: float) -> ExternalData:
     """Return the same as `averaged` makes of files."""
     averages = [
-        Average(mean, np.full(3, noise**2), np.full(3, noise), 100, start_s, end_s, warm, freedom=np.full(3, 99.0))
+        Average(mean, np.full(3, noise**2), np.full(3, noise), 100, start_s, end_s, warm, dof=np.full(3, 99.0))
         for mean, (start_s, end_s), warm in zip(means, of.windows_s.tolist(), of.temperature_c.tolist(), strict=True)
     ]
     sweeps = [
@@ -180,7 +180,7 @@ def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemp
             contributor.kind,
             contributor.distribution,
             contributor.source,
-            contributor.freedom,
+            contributor.dof,
             sign @ contributor.covariance @ sign,
         )
         for contributor in budget_of(solution, moved).contributors

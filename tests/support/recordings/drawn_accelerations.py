@@ -149,10 +149,8 @@ def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
         arm_turns=movement.arm_turns,
         own_shares=OWN_SHARES,
     )
-    freedom = np.full(movement.readings().size, AVERAGED)
-    budget = accelerometer_budget(
-        solution, movement, SITE, 0.0, datasheet=sheet_of(session.part), noise_freedom=freedom
-    )
+    dof = np.full(movement.readings().size, AVERAGED)
+    budget = accelerometer_budget(solution, movement, SITE, 0.0, datasheet=sheet_of(session.part), noise_dof=dof)
     found = np.concatenate([1 / np.linalg.norm(solution.matrix, axis=1), solution.bias_m_s2])
     return solution, budget, found - session.parameters
 
