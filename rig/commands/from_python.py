@@ -111,8 +111,7 @@ def write_certificate(
 
 
 def export(run: Run | str | Path, format: str, *, out: str | Path | None = None) -> list[Path]:
-    """Write readings or calibrations of a run in the formats of other programs, as `rig export` does; print the file
-    names.
+    """Write readings or calibrations of a run in other programs' formats, as `rig export`; print the file names.
 
     `format` is one of csv, parquet, mat, ros2, imucal, px4, ardupilot, kalibr; `out` is a folder, by default one in the
     run's. Return the files. Raise Refused `bad_option` for another format, and as `rig export` does.

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Result(Mapping[str, Calibration]):
-    """A run's result: `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` that of another
-    quantity.
+    """A run's result.
 
-    If a sensor has only one, its own name is enough. `document` is the complete `result.json`.
+    `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` that of another quantity; for a sensor
+    with one quantity its name is enough. `document` is the complete `result.json`.
     """
 
     document: ResultDocument

@@ -30,8 +30,7 @@ SectionT_contra = TypeVar("SectionT_contra", bound=ProcedureSection, contravaria
 
 
 class Planner(Protocol[SectionT_contra]):
-    """A function that plans the steps; pure. `start_q_rad` is the turner's pose (home if None), `done` the steps to
-    leave out.
+    """A pure function that plans the steps from the turner's pose `start_q_rad` (home if None) without those in `done`.
 
     The `index` of sweeps and dwells, by which `done` names them, counts through the whole procedure. Raise Refused by
     name if the movement is impossible.

@@ -59,10 +59,9 @@ def installed_script(name: str) -> ScriptFile:
 
 
 def load_script(path: Path) -> ScriptFile:
-    """Execute a file and return the procedure that it defines as `PROCEDURE`; its neighbours in the folder do not
-    matter.
+    """Execute a file and return its `PROCEDURE`.
 
-    Raise Refused `no_script`, `script_failed`, `not_a_script`.
+    Its neighbours in the folder do not matter. Raise Refused `no_script`, `script_failed`, `not_a_script`.
     """
     return _execute(path, path.name, _text(path))
 

@@ -29,8 +29,7 @@ def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tu
 
 
 def g_sensitivity(result: SensorResult) -> Array | None:
-    """Return the g-sensitivity (3, 3), rad/s per m/s² of gravity in the frame of the corrected rates, or None if
-    unknown.
+    """Return the g-sensitivity (3, 3) in the frame of the corrected rates, rad/s per m/s²; None if unknown.
 
     The vector model has it for gravity in the flange frame. Its `mounting` R rotates that into the sensor's: G Rᵀ.
     """

@@ -74,11 +74,10 @@ class Connector:
 
     @contextmanager
     def open(self) -> Iterator[Rig]:
-        """Connect everything and start recording; on the way out stop the turner and close the file. Nothing has moved
-        yet.
+        """Connect everything and start recording; at the end stop the turner and close the file.
 
-        Raise `Refused` by name if the turner, the board or a sensor differs from the configuration or from the
-        recording so far, or has no calibration to correct by.
+        Nothing moves meanwhile. Raise `Refused` by name if the turner, the board or a sensor differs from the
+        configuration or from the recording so far, or has no calibration to correct by.
         """
         whole_plan = self.phase.plan()
         if self.resumed.earlier and not self.phase.agreed:  # a stage that follows resumes nothing

@@ -36,10 +36,9 @@ class _Watched:
     at_rest_counts: list[float] = field(default_factory=list)
 
     def scatter_counts(self, before: int = 0) -> float | None:
-        """Return the RMS over the axes of the standard deviation of the newest span, or of the one `before` spans
-        earlier.
+        """Return the RMS over the axes of the newest span's standard deviations; None if there are too few readings.
 
-        None if there are too few readings.
+        `before` counts spans back from the newest one.
         """
         if len(self.recent) < (before + 1) * self.enough:
             return None

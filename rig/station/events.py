@@ -78,11 +78,11 @@ class PreflightPassed:
 
 @dataclass(frozen=True, slots=True)
 class Prompt:
-    """A question to the operator: the `announcement`, and the agreement `to_do` it, which a page shows with a box
-    `to_tick`.
+    """A question to the operator.
 
-    A question `for_a_person` cannot be agreed to in advance. Before a stage with a new mounting, `mounts` is the number
-    of the stage, from 0.
+    It has an `announcement`, and the agreement `to_do` it, which a page shows with a box `to_tick`. A question
+    `for_a_person` cannot be agreed to in advance. Before a stage with a new mounting, `mounts` is the number of the
+    stage, from 0.
     """
 
     announcement: tuple[str, ...]

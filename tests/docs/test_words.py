@@ -5,10 +5,12 @@ import re
 import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[2]
 WORDS = tomllib.loads((REPOSITORY / "rig/report/words/words.toml").read_text("utf-8"))
+FIELD_TERMS = {old: term["new"] for term in WORDS["terms"] for old in term["old"]}
 NEVER_BOUND = frozenset(WORDS["never_bound"])
 # Keys of configuration and column files, which are named by their readers.
 PUBLIC_KEYS = {("HistorySection", "off"), ("SiteSection", "place"), ("AxisSection", "along")}
@@ -16,38 +18,19 @@ PUBLIC_KEYS = {("HistorySection", "off"), ("SiteSection", "place"), ("AxisSectio
 SHARED_CLASSES = {"RobotMode", "Run", "RuntimeState", "SafetyMode"}
 # A function's name begins with a verb. So many do not yet; whoever renames one lowers the number, and none is added.
 NAMES_WITHOUT_VERB = 180
-PREPOSITIONS = {
-    "of",
-    "at",
-    "by",
-    "in",
-    "on",
-    "to",
-    "with",
-    "without",
-    "from",
-    "beside",
-    "along",
-    "between",
-    "beyond",
-    "against",
-    "for",
-    "as",
-    "into",
-    "near",
-}
+PREPOSITIONS = frozenset(WORDS["prepositions"])
 NOT_PARTICIPLES = {"feed", "speed", "seed", "need", "read", "embed"}
 RELATIVE_CLAUSE = re.compile(
     r"(\([^)]*\)[,:]? ?)?(what|whether|how|where|who|whom|which|when|why|that)\b", re.IGNORECASE
 )
+WIDE, IN_PROSE = 8, 10  # fields of a class, and names in the prose of its docstring
+CAPABILITIES = frozenset(WORDS["capabilities"])
 DOCUMENTED = ast.FunctionDef | ast.AsyncFunctionDef
-
-Room = tuple[str, list[tuple[str, ast.Module]]]
 
 
 def test_a_name_says_what_it_is_bound_to() -> None:
     assert [
-        f"{file}:{node.lineno}: {name} says nothing of the thing: name it by what it holds (words.toml, never_bound)"
+        f"{file}:{node.lineno}: {name}: {term_for(name)}"
         for file, tree in modules()
         for node, name, owner in bindings(tree)
         if name.strip("_").lower() in NEVER_BOUND and (owner, name) not in PUBLIC_KEYS
@@ -76,12 +59,48 @@ def test_a_class_has_a_name_of_its_own() -> None:
 
 def test_the_name_of_a_function_begins_with_a_verb() -> None:
     without = [
-        f"{file}:{node.lineno}: {node.name}"
+        f"{file}:{node.lineno}: {node.name}: begin with a verb, such as find, fit or average; {term_for(node.name)}"
         for file, tree in modules()
         for node in ast.walk(tree)
         if isinstance(node, DOCUMENTED) and not is_property(node) and not begins_with_verb(node.name)
     ]
     assert len(without) <= NAMES_WITHOUT_VERB, without
+
+
+def test_a_module_has_a_name_of_its_own_unless_it_names_a_capability() -> None:
+    files = defaultdict(set)
+    for file, _ in modules():
+        if not file.endswith("__init__.py"):
+            files[Path(file).stem].add(file)
+    shared = {name for name, of in files.items() if len(of) > 1}
+    assert [
+        f"{', '.join(sorted(files[name]))}: say more, as arm_driver for driver, or name a capability of words.toml"
+        for name in sorted(shared - CAPABILITIES)
+    ] == []
+    assert len(CAPABILITIES) <= 25 and shared >= CAPABILITIES, CAPABILITIES - shared
+
+
+def test_a_wide_class_lists_its_fields() -> None:
+    """A line each: "- name (shape): meaning". Names in a running sentence are in backticks, so these are counted."""
+    assert [
+        f"{file}:{node.lineno}: {node.name} has {fields} fields in running sentences: one line a field, - name: meaning"
+        for file, tree in modules()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+        if (fields := sum(isinstance(item, ast.AnnAssign) for item in node.body)) >= WIDE
+        if len(re.findall(r"`\w+`", ast.get_docstring(node) or "")) >= IN_PROSE
+    ] == []
+
+
+def test_the_summary_of_a_docstring_is_one_line() -> None:
+    """PEP 257."""
+    assert [
+        f'{file}:{getattr(node, "lineno", 1)}: "{summary[0]}" goes on: end the sentence, then a blank line'
+        for file, tree in modules()
+        for node in ast.walk(tree)
+        if isinstance(node, DOCUMENTED | ast.ClassDef | ast.Module)
+        if len(summary := (ast.get_docstring(node) or "").split("\n\n")[0].splitlines()) > 1
+    ] == []
 
 
 def test_the_house_has_few_words_of_its_own() -> None:
@@ -94,10 +113,17 @@ def test_every_term_replaces_words_and_names_its_source() -> None:
     assert all(term["new"] and term["source"] for term in WORDS["terms"])
 
 
-def modules() -> Iterator[tuple[str, ast.Module]]:
-    """Yield every module of rig as its file's name and its tree."""
-    for file in sorted((REPOSITORY / "rig").rglob("*.py")):
-        yield file.relative_to(REPOSITORY).as_posix(), ast.parse(file.read_text("utf-8"))
+def term_for(name: str) -> str:
+    """Return the term to use for the private words of a name, by words.toml."""
+    words = [word for word in name.strip("_").lower().split("_") if word in FIELD_TERMS]
+    return "; ".join(f"for {word}: {FIELD_TERMS[word]}" for word in words) or "name it by what it holds"
+
+
+@cache
+def modules() -> tuple[tuple[str, ast.Module], ...]:
+    """Return every module of rig as its file's name and its tree."""
+    files = sorted((REPOSITORY / "rig").rglob("*.py"))
+    return tuple((file.relative_to(REPOSITORY).as_posix(), ast.parse(file.read_text("utf-8"))) for file in files)
 
 
 def begins_with_verb(name: str) -> bool:

@@ -17,8 +17,11 @@ from rig.observation.consistency.raw_readings import REST
 
 @dataclass(frozen=True, slots=True)
 class Means:
-    """N mean readings: `felt_rad_s` (N, 3) are the rates along the sensor's axes by the arm, `times_s` (N, 2) start and
-    end, `sweep` (N,) the index of their sweep, negative for none.
+    """The mean readings of N sweeps and rests.
+
+    - felt_rad_s (N, 3): rates along the sensor's axes by the arm.
+    - times_s (N, 2): start and end.
+    - sweep (N,): the index of their sweep, negative for none.
     """
 
     felt_rad_s: Array

@@ -84,8 +84,7 @@ def judge_readings(
     digits: Digits = COUNTS,
     frozen: int = 0,
 ) -> Statistics:
-    """Return each check's statistic and limit by its name, from all readings (n, 3) of each recording and from the
-    windows.
+    """Return statistic and limit by the check's name, from all readings (n, 3) and the windows of each recording.
 
     Each has at most that false-alarm probability. The noise is the median of the windows': a window with a stuck axis
     does not make a sensor without noise. `frozen`: the longest run of equal readings of an axis that moved meanwhile.
@@ -191,10 +190,9 @@ def _is_one_bit(powers: Array) -> bool:
 
 
 def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_value: float) -> tuple[float, float]:
-    """Return the largest skewness of the noise of these axes (3,), as a bit with occasional errors makes it, and its
-    limit.
+    """Return the largest skewness of these axes' noise (3,) at rest, by occasional errors of a bit, and its limit.
 
-    At rest only: the arm's vibration may be skewed.
+    In motion the arm's vibration may be skewed.
     """
     parts = [window.residual_counts / np.maximum(window.residual_counts.std(axis=0), 0.5) for window in windows]
     noise = np.concatenate(parts)

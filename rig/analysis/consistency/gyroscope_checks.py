@@ -218,8 +218,7 @@ def _detection_limits(
 def _test_bias_jump(
     segments: Segments, axis_rates: Array, scatter: Scatter, false_alarm_probability: float
 ) -> Statistic | None:
-    """Return the χ² of the largest jump of the bias between two rests, beside its drift; None with fewer than three
-    rests.
+    """Return the χ² of the bias' largest jump between two rests, drift included; None with fewer than three rests.
 
     The process is re-estimated with the best jump in the model, which would otherwise count as drift. Few rests
     determine the process poorly, most of all beside the jump that fits best: simulated random walks exceed the critical

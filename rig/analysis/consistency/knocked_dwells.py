@@ -16,8 +16,7 @@ FEWEST_IN_HALF = 20  # readings: fewer do not tell how their mean scatters
 def compare_dwell_halves(
     dwells: Sequence[RawDwell], flicker_counts: float, false_alarm_probability: float, steps: Steps
 ) -> Mapping[str, Statistic]:
-    """Return the largest difference between the halves of a dwell, as χ² of three axes, and its limit; none of short
-    dwells.
+    """Return the largest difference between a dwell's halves, as χ² of three axes, and its limit; skip short dwells.
 
     The limit is that of F, as the noise is estimated from the dwells' readings. Flicker with the Allan deviation
     `flicker_counts` makes the halves differ by √2 times as much. A slow swing that no encoder sees is in every dwell, a

@@ -233,11 +233,10 @@ def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
 
 
 def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
-    """Return the sweeps and transfers from one move of a joint to its next; a transfer with a move belongs to those
-    after it.
+    """Return the sweeps and transfers between successive moves of a joint; one with a move belongs to the later part.
 
-    The joint is counted from the end of the chain. If a transfer is missing, a changed angle or recording shows the
-    move.
+    The joint is counted from the end of the chain. A changed angle, or another recording, shows the move of a missing
+    transfer.
     """
     sweeps, firsts = np.unique(segments.sweep, return_index=True)
     patterns_by_mark: list[list[int]] = []

@@ -21,8 +21,11 @@ from rig.estimation.statistics.bias_process import BiasProcess
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """The errors of means, apart from bias drift: independent `variances_rad2_s2` (N, 3), and shared errors, the
-    independent patterns `shared_rad_s` (P, N, 3); `instability_rad_s` is the bias' Allan deviation, if known.
+    """The errors of means, apart from bias drift.
+
+    - variances_rad2_s2 (N, 3): of independent errors.
+    - shared_rad_s (P, N, 3): independent patterns of shared errors.
+    - instability_rad_s: the bias' least Allan deviation, if known.
     """
 
     variances_rad2_s2: Array

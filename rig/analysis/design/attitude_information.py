@@ -48,8 +48,7 @@ class AttitudeAccount:
 
 
 def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
-    """Return the account of a plan's attitudes, for the nominal arm and its parts' noise; None without such a
-    procedure.
+    """Return the expected accuracy of a plan's attitudes, by nominal arm and noise; None for other procedures.
 
     A repeated attitude has the same error of the arm every time, so only its noise is averaged. Raise Refused
     `rank_deficient`, `ill_conditioned`.

@@ -123,8 +123,7 @@ def append_transfers(
 
 
 def _vibration_changes(windows: Sequence[SegmentedAverage], explained: Explained, times_s: Array) -> Array:
-    """Return the variance (M, 3) in rad² of a vibration's change from start to end of M transfers, by the nearest
-    rests.
+    """Return the variances (M, 3), rad², of the vibration's change in M transfers, by the nearest rests.
 
     times_s (M, 2): start and end of the transfers on the clock of the first recording.
     """

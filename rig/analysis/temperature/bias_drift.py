@@ -1,6 +1,4 @@
-"""The bias of every sensor by repeat, in a run that visits the same attitudes several times: TRIAX, sections III-A and
-III-B, Figs. 4 and 6. Pure.
-"""
+"""Biases by repeat, in a run that visits attitudes several times: TRIAX, III-A and III-B, Figs. 4 and 6. Pure."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence

@@ -20,10 +20,9 @@ def refuse_existing(path: Path) -> None:
 
 
 def write_checked(path: Path, answers: "Answers") -> int:
-    """Write the configuration of the answers to a new file and check it; return 0, or 1 if values remain to be filled
-    in.
+    """Write the configuration of the answers to a new file, and check it.
 
-    Raise Refused `configuration_not_written`.
+    Return 0, or 1 if values remain to be filled in. Raise Refused `configuration_not_written`.
     """
     from rig.config.files.safe_writing import write_new
     from rig.config.files.supplied_files import supplied

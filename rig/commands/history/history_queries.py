@@ -245,10 +245,10 @@ def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
 
 
 def _recompute_finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
-    """Return the run as its recordings give it, as result.json alone is only a claim. A run in the history is not
-    solved.
+    """Return the run with its results recomputed from its recordings, unless the history has it.
 
-    Raise Refused `no_recording`, `result_not_of_recording`, and as the recordings' solution.
+    Its result.json alone proves nothing. Raise Refused `no_recording`, `result_not_of_recording`, and as the
+    recordings' solution.
     """
     claimed = None if solve and not (folder / RESULT).exists() else read_finished_run(folder)
     if claimed is not None:

@@ -1,6 +1,4 @@
-"""`rig history recompute`: solve all recordings of a history by today's method, and report what changes. Overwrites
-nothing.
-"""
+"""`rig history recompute`: solve a history's recordings by today's method, report changes, overwrite nothing."""
 
 import sys
 from argparse import Namespace

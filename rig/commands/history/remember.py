@@ -73,8 +73,7 @@ def _is_usual(address: "HistoryAddress") -> bool:
 
 
 def remember_certificate(folder: Path, result: str, certificate: "Issued", history: str | None = None) -> str | None:
-    """Note a certificate of the run in `folder`, whose result.json is `result`. Return why it is in no history, or
-    None.
+    """Enter the certificate of the run in `folder`, whose result.json is `result`; return why it is not entered.
 
     The history is `history`, else the user's own. It never connects to the one that the folder's configuration names,
     as the folder may come from anywhere.

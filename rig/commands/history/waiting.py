@@ -8,11 +8,10 @@ T = TypeVar("T")
 
 
 def await_answer(work: Callable[[], T], within_s: float | None = None) -> T:
-    """Return what `work` returns, or raise what it raises, from a thread of its own. Raise TimeoutError if it takes
-    longer.
+    """Return the result of `work`, from a thread of its own; pass on its exception.
 
-    Ctrl-C thus takes effect at once, whatever the thread waits for. A late thread is abandoned and ends with the
-    process, as a library that waits for its server cannot be interrupted.
+    Raise TimeoutError if it takes longer. Ctrl-C thus takes effect at once, whatever the thread waits for. A late
+    thread is abandoned and ends with the process, as a library that waits for its server cannot be interrupted.
     """
     from concurrent.futures import Future  # here, as `rig --help` does not need it
 

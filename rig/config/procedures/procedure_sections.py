@@ -336,8 +336,7 @@ class StaticAttitudesSection(AttitudesSection):
 
 
 class BiasDriftSection(AttitudesSection):
-    """The arm goes through the attitudes again and again, for hours: how the bias drifts. By default ten hours, as in
-    TRIAX."""
+    """The arm visits the attitudes again and again: how the bias drifts. By default ten hours, as in TRIAX."""
 
     name: Literal["bias_drift"] = Field(default="bias_drift", description="this procedure")
     dwell_s: float = Field(default=200.0, ge=0.1, le=3600, description="time of standing still in each attitude")
@@ -379,8 +378,7 @@ class ImuSection(SixSweepsSection, AttitudesSection):
 
 
 class ThermalSection(SixSweepsSection, AttitudesSection):
-    """Sweeps, and attitudes if accelerometers are calibrated too, in sets that are repeated while the sensors warm and
-    cool."""
+    """Sweeps, and attitudes for accelerometers, in sets that are repeated while the sensors warm and cool."""
 
     name: Literal["thermal"] = Field(default="thermal", description="this procedure")
     from_c: float = Field(

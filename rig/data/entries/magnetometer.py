@@ -57,8 +57,7 @@ class FieldDwellEntry(Entry):
 
 
 class UniformityEntry(Entry):
-    """A test that the field was the same in all attitudes: χ² of the residuals, and `limit`, which noise rarely
-    exceeds.
+    """A test that the field is the same in all attitudes: χ² of the residuals, with a limit that noise rarely exceeds.
 
     `attitude_error_rad` is the assumed error of the attitudes about each axis, by the accelerometer.
     """

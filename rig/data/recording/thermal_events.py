@@ -26,10 +26,10 @@ class TemperatureWanted:
 
 @dataclass(frozen=True, slots=True)
 class SetMeasured:
-    """The sweeps and dwells with the indices from `first` up to, not including, `end` are finished, on the way up or
-    down.
+    """The end of a set, in the warming or the cooling direction.
 
-    `temperatures_c` are the means of the sensors' own thermometers meanwhile, by the sensor's name.
+    Its sweeps and dwells have the indices from `first` up to, not including, `end`. `temperatures_c` are the mean
+    temperatures of the sensors' own thermometers, by sensor name.
     """
 
     first: Index

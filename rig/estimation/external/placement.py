@@ -44,8 +44,9 @@ NOISE, ATTITUDES, PLACEMENTS = "noise", "attitudes", "placements"
 
 @dataclass(frozen=True, slots=True)
 class _Linear:
-    """The linearised readings of N placements: `residuals` (N, 3), `design` (N, 3, q), noise (N, 3), E, stated std
-    (N,).
+    """The linearised readings of N placements.
+
+    They are residuals (N, 3), design (N, 3, q), noise (N, 3), E and the stated standard deviations (N,).
     """
 
     residuals: Array

@@ -1,5 +1,4 @@
-"""The initial values of the fit of sweeps and attitudes: the linear problem of TRIAX, Eqs. (4), (5), with the lever
-arm.
+"""The initial values of the fit of sweeps and attitudes: TRIAX, Eqs. (4) and (5), with the lever arm; linear.
 
     F⁻¹ m − A v_ref − L (p + r) − b* = 0,   b* = F⁻¹ b
 

@@ -83,8 +83,7 @@ def raise_alarms(deviation: Array, average: Array, limit: float | Array) -> Alar
 
 
 def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
-    """Return the last result's deviation (…) from the `counted` (…, i) before it, as a normal deviate of equal
-    probability.
+    """Return the last result's deviation (…) from those before it (…, i) as a normal deviate of equal probability.
 
     With equal stds it is (x − x̄)/(s √(1 + 1/n)) for any std; otherwise the weights include the variance between runs
     (as in `random_effects.fit`).

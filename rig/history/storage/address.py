@@ -43,10 +43,9 @@ def choose_history_address(
 
 
 def own_history_address(address: str | None) -> HistoryAddress | None:
-    """Return the user's history: by the command's `address`, else `RIG_HISTORY`, else the own file; None if switched
-    off.
+    """Return the user's history; None if it is switched off.
 
-    Raise Refused `history_address`.
+    It is the command's `address`, else `RIG_HISTORY`, else the user's own file. Raise Refused `history_address`.
     """
     address = address or os.environ.get(ENVIRONMENT)
     return None if address == SWITCHED_OFF else resolve_address(address)

@@ -29,8 +29,7 @@ class PlannedAverage:
 
 
 def drift_effect(steps: Sequence[Step]) -> float:
-    """Return the change of the calibration, in rad/s, if the bias rises by 1 rad/s from the first sweep to the last
-    step.
+    """Return the change of the calibration, rad/s, for a bias that rises by 1 rad/s from first sweep to last step.
 
     The vector model of sweeps and rests, m = F ω + c (+ G a, with rests: `rig.estimation.gyroscope.vector_model`), is
     fitted to that ramp about its middle: the changes of the scale, at the mean speed of the sweeps, and of the bias are

@@ -17,11 +17,10 @@ def plan_imu(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Plan all sweeps as in `plan_six_observation`, home, then all attitudes as in `plan_static_attitudes`, and home
-    again.
+    """Plan all sweeps, home, all attitudes, and home again.
 
-    Sweeps are counted first, dwells after them; `done` holds the indices of either to leave out. Raise Refused
-    `axes_do_not_span`.
+    Sweeps (`plan_six_observation`) are counted first, dwells (`plan_static_attitudes`) after them; `done` holds the
+    indices of either to leave out. Raise Refused `axes_do_not_span`.
     """
     sweeps = plan_six_observation(arm, procedure, start_q_rad, done)
     first = len(plan_six_observation(arm, procedure).sweeps)

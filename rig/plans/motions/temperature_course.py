@@ -19,10 +19,9 @@ REMEMBERS_S = 30.0  # integral time of the controller
 
 @dataclass(slots=True)
 class TemperatureCourse:
-    """The course through the range from `from_c` to `to_c` with gaps of at most `max_step_k`; `sets` are the measured
-    ones.
+    """The course through a range of temperatures with gaps of at most `max_step_k`.
 
-    `warming` is its present direction, None before a temperature is known.
+    `sets` are the measured ones. `warming` is its present direction, None before a temperature is known.
     """
 
     from_c: float
