@@ -246,7 +246,7 @@ def run_guarded(command: Callable[[], int]) -> int:
             raise Unprinted("output_lost", what, "Free some space, or redirect the output to another disk")
         return status
     except RigError as error:
-        return _print_ending(str(error), error.exit_status)
+        return _print_ending("\n".join([str(error), *getattr(error, "__notes__", ())]), error.exit_status)
     except KeyboardInterrupt as interrupt:
         ignore_endings()  # all is stopped: an impatient second Ctrl-C has nothing to end
         return _print_ending(str(interrupt) or "interrupted", INTERRUPTED)

@@ -43,10 +43,10 @@ from rig.station.events import (
     ObservationMade,
     PhaseSkipped,
     PhaseStarted,
-    RunEvent,
     VerdictReached,
 )
 from rig.station.operator_station import Station
+from rig.station.words import line
 from rig.turners.turner_registry import kind_of
 
 
@@ -223,32 +223,34 @@ class Run:
                 raise
             fault = Fault(error.name, _add_notes(error.what, error), error.remedy)
             fault.__cause__ = error
-            self._report(Failed(fault), advice)
+            self._report_failure(fault, advice)
             raise fault from error
         except OSError as error:
             remedy = f"Correct that, then go on with: {self._next_command}"
             fault = Fault("system", f"{self.folder} cannot be used ({error})", remedy)
-            self._report(Failed(fault))
+            self._report_failure(fault)
             raise fault from error
         except SystemExit as ended:
             what = _add_notes(f"the script {self.script.name} ended the program (SystemExit: {ended})", ended)
             fault = Fault("script_failed", what, ENDING)
             fault.__cause__ = ended
-            self._report(Failed(fault), advice)
+            self._report_failure(fault, advice)
             raise fault from ended
         except KeyboardInterrupt as interrupt:
             stopped = _add_notes(str(interrupt) or "interrupted", interrupt)
             text = f"{stopped}; the data are kept in {self.folder}. Go on with: {self._next_command}"
-            self._report(Interrupted(text))
+            self.station.event(Interrupted(text))
             raise KeyboardInterrupt(text) from None
         except Exception:
-            self._report(Crashed(traceback.format_exc()))
+            self.station.event(Crashed(traceback.format_exc()))
             raise
 
-    def _report(self, event: RunEvent, advice: Advice | None = None) -> None:
-        self.station.event(event)
+    def _report_failure(self, fault: Fault, advice: Advice | None = None) -> None:
+        """Report a fault, then `advice`, which becomes a note of the fault: the command prints it after the error."""
+        self.station.event(Failed(fault))
         if advice is not None and self.folder.exists():
             self.station.event(advice)
+            fault.add_note(line(advice) or "")
 
 
 def _add_notes(what: str, error: BaseException) -> str:

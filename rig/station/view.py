@@ -16,7 +16,7 @@ from rig.data.quantity import select_displayed
 from rig.data.recording.hand_events import HandAsked
 from rig.errors.quoting import printable_lines
 from rig.station.by_hand_words import live_rows
-from rig.station.events import HandSeen, Progress, RunEvent, SamplesTaken, SensorSamples
+from rig.station.events import Advice, HandSeen, Progress, RunEvent, SamplesTaken, SensorSamples
 from rig.station.operator_station import Listener
 from rig.station.plain_text import for_file, plain
 from rig.station.words import line
@@ -29,8 +29,7 @@ class PlainView:
 
     def event(self, event: RunEvent) -> None:
         """Print an event's line; progress within a step has none."""
-        text = line(event)
-        if text is not None:
+        if (text := _text(event)) is not None:
             print(printable_lines(text), file=sys.stderr, flush=True)
 
 
@@ -59,8 +58,7 @@ class LiveView:
                 self._line(event)
 
     def _line(self, event: RunEvent) -> None:
-        text = line(event)
-        if text is not None:
+        if (text := _text(event)) is not None:
             # A path has no markup, and a command must stay in one line to be copied.
             shown = for_file(printable_lines(text), sys.stderr)
             self._live.console.print(shown, highlight=False, markup=False, emoji=False, soft_wrap=True)
@@ -70,6 +68,11 @@ class LiveView:
         if now_s - self._shown_at_s >= REFRESH_S:
             self._shown_at_s = now_s
             self._live.update(panel, refresh=True)
+
+
+def _text(event: RunEvent) -> str | None:
+    """Return the line of an event; None for advice, which the command prints after the error."""
+    return None if isinstance(event, Advice) else line(event)
 
 
 def _panel(progress: Progress, samples: SamplesTaken) -> Table:
