@@ -282,7 +282,8 @@ class Board:
         return BoardError(
             "board_error",
             f"the board on {self._link.port} restarted while streaming (reset by: {reset_cause(identity)})",
-            "Check its supply; a fault or watchdog is an error in the firmware: keep the run folder and report it",
+            "Check its supply. If the cause is fault or watchdog, the firmware has an error: keep the run folder and "
+            "report it",
         )
 
     def _refusal(self, frame: Frame) -> BoardError:

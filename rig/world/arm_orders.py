@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 from rig.world.laboratory import Laboratory
 from rig.world.ur10e.interfaces import dashboard_server, script_socket
-from rig.world.ur10e.modes import RobotMode
+from rig.world.ur10e.modes import RobotMode, SafetyMode
 from rig.world.ur10e.robot import Robot
 
 FIELDBUS = "fieldbus"  # the owner of registers that `register_in_use` claims
@@ -43,6 +43,7 @@ def build_arm_orders(world: ArmWorld) -> Mapping[str, Callable[..., Reply | None
         "emergency_stop": robot.emergency_stop,
         "safeguard_stop": robot.safeguard_stop,
         "release": robot.release,
+        "unlock": lambda: _unlock(robot),
         "power_off": robot.power_off,
         "power_on": robot.power_on,
         "brake_release": robot.brake_release,
@@ -60,6 +61,7 @@ def build_arm_orders(world: ArmWorld) -> Mapping[str, Callable[..., Reply | None
         "register_in_use": lambda name="input_int_register_0": robot.claims.update({name: FIELDBUS}),
         "register_free": lambda name="input_int_register_0": _drop(robot, name),
         "registers_in_use": claim,
+        "registers_free": lambda: _free(robot),
         "close_arm": lambda listen=True: world.close_arm(listen=bool(listen)),
         "close_dashboard": lambda: world.close_arm_port(dashboard_server.PORT),
         "close_primary": lambda: world.close_arm_port(script_socket.PRIMARY_PORT),
@@ -87,6 +89,19 @@ def robot_state(robot: Robot) -> Reply:
         "claims": sorted(robot.claims),
         "messages": [message.text for message in robot.messages.after(0)],
     }
+
+
+def _unlock(robot: Robot) -> None:
+    """Unlock a protective stop on the pendant. Raise ValueError before the controller permits it."""
+    if robot.safety_mode == SafetyMode.PROTECTIVE_STOP and robot.stopped_for_s < dashboard_server.UNLOCK_AFTER_S:
+        raise ValueError(dashboard_server.TOO_EARLY)
+    robot.unlock_protective_stop()
+
+
+def _free(robot: Robot) -> None:
+    """Give back what a fieldbus claims; what the rig claims stays."""
+    for name in [name for name, owner in robot.claims.items() if owner is FIELDBUS]:
+        del robot.claims[name]
 
 
 def _drop(robot: Robot, name: str) -> None:

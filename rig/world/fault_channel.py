@@ -1,4 +1,4 @@
-"""The control channel: JSON lines with which tests make the world misbehave. The rig never uses it.
+"""The control channel: JSON lines with which tests make the world misbehave. No run of the rig uses it.
 
 A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s": …, …}` or `{"ok": false, "error": …}`.
 
@@ -6,6 +6,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     hold · run · advance duration_s             the virtual clock; `advance` is answered when the time has passed
     pace time_scale                             from now on the clock's greatest speed, in multiples of real time
     protective_stop · emergency_stop · safeguard_stop · release · power_off · power_on · brake_release
+    unlock                                      the protective stop, on the pendant, 5 s after it at the earliest
     pause · play · stop_program · speed_slider fraction · remote_control on · robot_mode name
     safety_limit fraction                       a safety limit that slows the arm down
     payload mass_kg · payload_stays on          a payload set on the pendant; programs cannot change it
@@ -14,6 +15,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     step_clock seconds · encoder joint error_rad   the controller's clock steps; a joint's reported angle has an error
     register_in_use name · register_free name   an RTDE input that a fieldbus claims
     registers_in_use first last                 all integer and double inputs from number `first` to number `last`
+    registers_free                              all that a fieldbus has claimed
     close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)
     close_dashboard · close_primary             only this one of the controller's sockets
     sensor_fault sensor fault   absent, other_part (its identity), damaged (occasional bit errors), silent (no
@@ -33,7 +35,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     servo_power on · servo_torque on            the servo's supply; its torque, as written by another program
     servo_fault held_fast dumb denies voltage_v temperature_c lose spoil   as above; `lose`, `spoil`: replies
     servo_line silent listen                    a line that carries nothing; its port, that closes
-    unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
+    unplug_board · plug_in_board · reset_board · power_dip · silence_board on · host_baud baud (null: the board's own)
 """
 
 import json
@@ -108,6 +110,7 @@ class ControlSession:
             "unplug_board": world.unplug_board,
             "plug_in_board": world.plug_in_board,
             "reset_board": self._reset_board,
+            "power_dip": self._power_dip,
             "sensor_fault": self._sensor_fault,
             "silence_board": self._silence_board,
             "host_baud": self._host_baud,
@@ -235,6 +238,11 @@ class ControlSession:
     def _reset_board(self) -> None:
         if self._world.laboratory.board is not None:
             self._world.laboratory.board.reset()
+
+    def _power_dip(self) -> None:
+        """Take the board's power away for a moment; its port stays open, as of an adapter with its own supply."""
+        self._world.laboratory.unplug()
+        self._world.laboratory.plug_in()
 
     def _sensor_fault(self, sensor: str, fault: str | None) -> None:
         self._world.laboratory.set_sensor_fault(sensor, fault)

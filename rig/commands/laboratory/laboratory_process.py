@@ -8,12 +8,13 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from rig.commands.laboratory.only_on_linux import refuse_unless_linux
 from rig.errors import Problem, Refused
 
 STOP_TIMEOUT_S = 5.0
-MOUNT_TIMEOUT_S = 30.0
+CONTROL_TIMEOUT_S = 30.0
 
 
 @contextmanager
@@ -54,24 +55,26 @@ def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator
                 process.kill()
 
 
-def make_mounter(control: str) -> Callable[[int], None]:
+def make_mounter(control: str) -> Callable[[int], object]:
     """Return the function that mounts the item for a stage, counted from 0: the simulated operator does it.
 
-    `control` is the laboratory's control channel. The function raises OSError if the laboratory is gone.
+    `control` is the laboratory's control channel. The function raises OSError or ValueError if the laboratory is gone.
     """
-    return lambda stage: _send_request(control, {"do": "mount", "stage": stage})
+    return lambda stage: send_request(control, {"do": "mount", "stage": stage})
 
 
-def make_fitter(control: str) -> Callable[[str], None]:
+def make_fitter(control: str) -> Callable[[str], object]:
     """Return the function that fits the part of a serial number: the simulated operator does it. As `make_mounter`."""
-    return lambda part: _send_request(control, {"do": "fit", "part": part})
+    return lambda part: send_request(control, {"do": "fit", "part": part})
 
 
-def _send_request(control: str, request: Mapping[str, str | int]) -> None:
+def send_request(control: str, request: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Send a request to the control channel and return the reply. Raise OSError or ValueError if there is none."""
     host, _, port = control.rpartition(":")
-    with socket.create_connection((host, int(port)), MOUNT_TIMEOUT_S) as channel:
-        channel.sendall(json.dumps(request).encode() + b"\n")
-        channel.makefile("rb").readline()
+    with socket.create_connection((host, int(port)), CONTROL_TIMEOUT_S) as channel:
+        channel.sendall(json.dumps(dict(request)).encode() + b"\n")
+        reply: Mapping[str, Any] = json.loads(channel.makefile("rb").readline())
+        return reply
 
 
 @contextmanager

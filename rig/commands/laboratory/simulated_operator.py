@@ -1,9 +1,6 @@
 """The simulated operator, to whom the instructions of a run by hand are passed on."""
 
-import json
-import socket
-
-from rig.commands.laboratory.laboratory_process import MOUNT_TIMEOUT_S
+from rig.commands.laboratory.laboratory_process import send_request
 from rig.data.recording.hand_events import HandAsked
 from rig.station.events import RunEvent
 
@@ -16,15 +13,12 @@ class OperatorListener:
 
     def __init__(self, control: str) -> None:
         """Connect to the laboratory's control channel `control` for each instruction."""
-        host, _, port = control.rpartition(":")
-        self._address = host, int(port)
+        self._control = control
 
     def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does. Raise OSError if the laboratory is gone."""
+        """Take an event, as a Listener does. Raise OSError or ValueError if the laboratory is gone."""
         if isinstance(event, HandAsked):
             instruction = event.instruction
             request = {"do": "instruct", "say": instruction.say, "face": instruction.face, "turns": instruction.turns}
             request["again"] = event.again is not None
-            with socket.create_connection(self._address, MOUNT_TIMEOUT_S) as channel:
-                channel.sendall(json.dumps(request).encode() + b"\n")
-                channel.makefile("rb").readline()
+            send_request(self._control, request)

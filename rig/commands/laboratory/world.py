@@ -5,22 +5,45 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from rig.commands.config_arguments import add_config
-from rig.commands.laboratory.laboratory_process import write_temporary
+from rig.commands.laboratory.laboratory_process import simulated_laboratory, write_temporary
 from rig.commands.laboratory.only_on_linux import refuse_unless_linux
 
 
 def add(parser: ArgumentParser) -> None:
     """Add the arguments of `rig world`."""
     add_config(parser)
+    parser.add_argument(
+        "--faults",
+        action="store_true",
+        help="let happen in it what is typed in this terminal, to practise faults: unplug, slider 50, …",
+    )
 
 
 def run(options: Namespace) -> int:
     """Run only the world of a configuration, until Ctrl-C; return its exit status.
 
-    Raise Refused `only_on_linux`, and as `load`.
+    Raise Refused `only_on_linux`, as `load`, and with `--faults` as `simulated_laboratory`; Fault `world_ended`.
     """
     refuse_unless_linux("the simulated laboratory")
     from rig.config.load import load
 
-    with write_temporary(load(options.config, options.overrides, sections=None).text) as config_path:
+    text = load(options.config, options.overrides, sections=None).text
+    if options.faults:
+        with simulated_laboratory(text) as control:
+            return _practise(control)
+    with write_temporary(text) as config_path:
         return subprocess.call([sys.executable, "-P", "-m", "rig.world", str(config_path)])
+
+
+def _practise(control: str) -> int:
+    """Let happen what is typed, until the end of the input; return 0."""
+    from rig.commands.laboratory.practice import HELP, practise
+
+    print(f"The laboratory is ready. {HELP}\nAn empty line shows this again; Ctrl-D ends the laboratory.")
+    while True:
+        try:
+            words = input("laboratory> ")
+        except EOFError:
+            print()
+            return 0
+        print(practise(control, words), flush=True)

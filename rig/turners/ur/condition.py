@@ -13,7 +13,9 @@ LIMITED_REMEDY = (
     "or lower procedure.speed_deg_s and arm.transfer_speed_deg_s"
 )
 
-_UNLOCK = "Find out what stopped the arm, clear it, unlock on the pendant (not before 5 s), then start again"
+_UNLOCK = (
+    "Find out what stopped the arm, clear it, unlock on the pendant (5 s after the stop or later), then start again"
+)
 _SWITCH_ON = "Switch the arm on and release its brakes on the pendant"
 _WAIT = (
     "Wait until the pendant shows the arm ready, which takes some minutes where firmware is updated; then switch it on"
@@ -79,19 +81,19 @@ def readiness(state: ArmState) -> Problem | None:
     if state.target_speed_fraction < FULL_SPEED_FRACTION:
         return Problem(
             "speed_slider",
-            f"the speed slider is at {100 * state.target_speed_fraction:.0f} %, so sweeps run slower than planned",
+            f"the speed slider is at {100 * state.target_speed_fraction:.0f} %, and the plan needs 100 %",
             "Set the speed slider on the pendant to 100 %",
         )
     return None
 
 
-def local_control_during_run(host: str, how: str) -> Problem:
-    """Describe a pendant that was switched to local control while the rig controls the arm."""
+def local_control_during_run(what: str) -> Problem:
+    """Describe a pendant that was switched to local control while the rig controls the arm; `what` shows it."""
     return Problem(
         "switched_to_local_control",
-        f"of the arm at {host} {how}, in which it takes no stop but the client's",
-        "Leave the pendant in remote control while a run goes on, or lock its mode by a password (Settings, Password, "
-        "Mode); look at the arm, switch it back to remote control, then start again",
+        what,
+        "Look at the arm, switch its pendant back to remote control, then start again. Leave it there during a run: in "
+        "local control the controller accepts no independent stop. A password locks it (Settings, Password, Mode)",
     )
 
 

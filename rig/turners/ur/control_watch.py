@@ -85,12 +85,12 @@ class ControlWatch:
     def _problem(self, remote: ControlMode) -> Problem | None:
         """Return the problem that the control mode shows, or None."""
         if remote is False:
-            return local_control_during_run(self._host, "its pendant was switched to local control")
+            return local_control_during_run(f"the pendant of the arm at {self._host} was switched to local control")
         if self._is_x and remote is None and self._has_lost_primary_alone():
-            how = (
-                "the controller closed its primary interface, as it does when the pendant is switched to local control"
+            return local_control_during_run(
+                f"the arm at {self._host} closed its primary interface, as it does when its pendant is switched to "
+                "local control"
             )
-            return local_control_during_run(self._host, how)
         if self._primary is not None or not (self._is_x or remote == "gone"):
             self._gone_since_s = None
             return None

@@ -1,0 +1,75 @@
+"""What a person can let happen in a running laboratory, by words: the faults to practise, and their remedies."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from rig.commands.laboratory.laboratory_process import send_request
+from rig.errors import Fault
+
+SLIDER = re.compile(r"slider (\d{1,3}) ?%?")
+Request = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Incident:
+    """Something that happens in the laboratory: the request to the control channel, and what a person sees of it."""
+
+    request: Request
+    text: str
+
+
+def _incident(text: str, do: str, **arguments: Any) -> Incident:
+    return Incident(MappingProxyType({"do": do, **arguments}), text)
+
+
+def _slider(percent: int) -> Incident:
+    return _incident(f"the speed slider on the pendant is at {percent} %", "speed_slider", fraction=percent / 100)
+
+
+INCIDENTS: Mapping[str, Incident] = MappingProxyType(
+    {
+        "unplug": _incident("the board's cable is pulled out", "unplug_board"),
+        "plug in": _incident("the board's cable is plugged in again", "plug_in_board"),
+        "power dip": _incident("the board loses its power for a moment, and starts again", "power_dip"),
+        "slider 50": _slider(50),
+        "slider 100": _slider(100),
+        "protective stop": _incident("the arm has touched something, and stops", "protective_stop"),
+        "unlock": _incident("the protective stop is unlocked on the pendant", "unlock"),
+        "local control": _incident("the pendant is switched to local control", "remote_control", on=False),
+        "remote control": _incident("the pendant is switched to remote control", "remote_control", on=True),
+        "other client": _incident(
+            "a gripper's program takes the input registers", "registers_in_use", first=0, last=47
+        ),
+        "other client gone": _incident("the gripper's program gives the input registers back", "registers_free"),
+    }
+)
+HELP = "\n".join(["What can happen here:", *(f"  {words:18}{item.text}" for words, item in INCIDENTS.items())])
+
+
+def find_incident(words: str) -> Incident | None:
+    """Return the incident that `words` name, None if there is none. `slider` takes any whole percentage up to 100."""
+    words = " ".join(words.lower().split())
+    if (slider := SLIDER.fullmatch(words)) is not None and int(slider[1]) <= 100:
+        return _slider(int(slider[1]))
+    return INCIDENTS.get(words)
+
+
+def practise(control: str, words: str) -> str:
+    """Let happen what `words` name in the laboratory at its control channel, and return what a person sees of it.
+
+    Raise Fault `world_ended` if the laboratory is gone.
+    """
+    incident = find_incident(words)
+    if incident is None:
+        return HELP if words.strip() in ("", "help", "?") else f"{words.strip()!r} is unknown. {HELP}"
+    try:
+        reply = send_request(control, incident.request)
+    except (OSError, ValueError) as error:
+        raise Fault("world_ended", f"the simulated laboratory has ended ({error})", "Start it again") from error
+    if not reply["ok"]:
+        reason = str(reply["error"]).removeprefix(f"{incident.request['do']}: ")
+        return f"not now: {reason}"
+    return incident.text

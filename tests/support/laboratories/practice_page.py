@@ -1,0 +1,57 @@
+"""The page `practise-a-fault`, taken for a script: what is typed in which terminal, and what each shows then."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from support.paths import DOCS
+
+PAGE = DOCS / "how-to" / "at-the-rig" / "practise-a-fault.md"
+LABORATORY, RIG = "laboratory> ", "$ "
+MASKS = (
+    (re.compile(r"\S*runs/[^\s;]+"), "RUN"),
+    (re.compile(r"127(\.\d+){3}"), "HOST"),
+    (re.compile(r"during \w+ [^;,]+;"), "during a step;"),  # in which one depends on how fast the computer is
+    (re.compile(r"wrist_\d c?cw"), "a sweep"),
+    (re.compile(r"\d+(\.\d+)?"), "N"),
+    (re.compile(r"\s+"), " "),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What is typed after `prompt`, and the texts shown after it in their order. No prompt: of the run on its way."""
+
+    prompt: str
+    typed: str
+    shown: tuple[str, ...]
+
+
+def masked(text: str) -> str:
+    """Return a text without numbers, addresses, folders and line breaks."""
+    for pattern, name in MASKS:
+        text = pattern.sub(name, text)
+    return text.strip()
+
+
+def exercises() -> dict[str, list[Step]]:
+    """Return the steps of each section by its title; what stands before the first has the title ''."""
+    first, *others = re.split(r"^## ", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    sections = {"": first, **{title: text for title, _, text in (other.partition("\n") for other in others)}}
+    blocks = {title: re.findall(r"```console\n(.*?)```", text, re.DOTALL) for title, text in sections.items()}
+    return {title: [step for block in texts for step in _steps(block)] for title, texts in blocks.items()}
+
+
+def _steps(block: str) -> Iterator[Step]:
+    """Yield the steps of a block of console text: each prompt begins one."""
+    for part in re.split(r"^(?=\$ |laboratory> )", block, flags=re.MULTILINE):
+        prompt = next((known for known in (LABORATORY, RIG) if part.startswith(known)), "")
+        typed, _, shown = part.removeprefix(prompt).partition("\n") if prompt else ("", "", part)
+        if part.strip():
+            yield Step(prompt, typed, _texts(shown))
+
+
+def _texts(shown: str) -> tuple[str, ...]:
+    """Return the texts that a block shows: a line each, but one that goes on over lines, or has a gap `…`."""
+    lines = re.split(r"\n(?=[a-z]+: |the data are|done: |not ready|Type yes|PASS|An empty| )", shown)
+    return tuple(masked(text) for line in lines for text in line.split(" … ") if text.strip())
