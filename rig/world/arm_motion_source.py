@@ -8,12 +8,14 @@ from rig.config.models import RigConfig
 from rig.config.world.laboratory import SimulatedArmSection, WorldSection
 from rig.world.magnetic_field import Frames
 from rig.world.site import build_site
+from rig.world.ur10e.faults import AtProgramStart
 from rig.world.ur10e.motion.arm_models import select_model
 from rig.world.ur10e.motion.flange_motion import BodyMotion, Components
 from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.ripple import draw_ripple
 from rig.world.ur10e.motion.true_arm import TrueArm, build_calibrated_links
 from rig.world.ur10e.motion.vibration import WRISTS, Vibration
+from rig.world.ur10e.pose_log import PoseLog
 from rig.world.ur10e.robot import Robot, RobotIdentity
 
 JOINTS = 6
@@ -50,6 +52,13 @@ class OnArm:
             tool_rotation_rad=(radians(about_x), radians(about_y), radians(about_z)),
         )
 
+        self._log = None if arm.log is None else PoseLog(arm.log, world.seed)
+        if arm.fieldbus is not None:
+            stop = self.robot.protective_stop
+            if arm.fieldbus.stop == "program":
+                stop = partial(self.robot.stop_program, "stopped by the fieldbus")
+            self.robot.faults.at_program_start = AtProgramStart(stop, arm.fieldbus.after_s)
+
     @property
     def time_s(self) -> float:
         """The world's time at the end of the last tick, s."""
@@ -74,6 +83,8 @@ class OnArm:
         """Simulate one tick."""
         self.robot.step()
         self.arm.step(self.robot.time_s)
+        if self._log is not None and self._log.is_due(self.time_s):
+            self._log.write(self.time_s, self.robot.tcp_pose(self.robot.motion.actual_q_rad))
 
     def rate_at(self, time_s: float) -> Components:
         """Return the flange's angular rate in its own frame, rad/s, if `ideal`."""

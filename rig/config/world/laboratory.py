@@ -12,6 +12,7 @@ from rig.config.procedures.servo_section import ServoSection
 from rig.config.procedures.stage_section import StageMountSection
 from rig.config.ranges import ModelName
 from rig.config.section import RATIO, Section, SensorName, Vector3
+from rig.config.world.arm_clients import SimulatedFieldbusSection, SimulatedPoseLogSection
 from rig.config.world.autopilot import SimulatedAutopilotSection
 from rig.config.world.by_hand import SimulatedHandSection
 from rig.config.world.faulty import SimulatedFaultySection
@@ -216,6 +217,8 @@ class SimulatedArmSection(Section):
         le=0.001,
         description="RMS of the time between a state's time stamp and the reading of the encoders",
     )
+    fieldbus: SimulatedFieldbusSection | None = None
+    log: SimulatedPoseLogSection | None = None
     calibration: CalibrationSection = CalibrationSection()
     iron: dict[SensorName, IronSection] = Field(default={}, max_length=20)
     unmodelled: ResidueSection = ResidueSection()
