@@ -47,8 +47,8 @@ class Terminals:
     def _start(self, command: str, *more: str) -> "subprocess.Popen[str]":
         name, *words = [str(ROOT / word) if word.startswith("configs/") else word for word in command.split()]
         assert name == "rig"
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        return started(*words, *more, **pipes)
+        pipe = subprocess.PIPE
+        return started(*words, *more, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
 
     def _read(self) -> None:
         assert self._laboratory.stdout is not None

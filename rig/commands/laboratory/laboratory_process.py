@@ -55,17 +55,25 @@ def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator
                 process.kill()
 
 
-def make_mounter(control: str) -> Callable[[int], object]:
+def make_mounter(control: str) -> Callable[[int], None]:
     """Return the function that mounts the item for a stage, counted from 0: the simulated operator does it.
 
     `control` is the laboratory's control channel. The function raises OSError or ValueError if the laboratory is gone.
     """
-    return lambda stage: send_request(control, {"do": "mount", "stage": stage})
+
+    def mount(stage: int) -> None:
+        send_request(control, {"do": "mount", "stage": stage})
+
+    return mount
 
 
-def make_fitter(control: str) -> Callable[[str], object]:
+def make_fitter(control: str) -> Callable[[str], None]:
     """Return the function that fits the part of a serial number: the simulated operator does it. As `make_mounter`."""
-    return lambda part: send_request(control, {"do": "fit", "part": part})
+
+    def fit(part: str) -> None:
+        send_request(control, {"do": "fit", "part": part})
+
+    return fit
 
 
 def send_request(control: str, request: Mapping[str, Any]) -> Mapping[str, Any]:

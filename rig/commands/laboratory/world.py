@@ -38,12 +38,13 @@ def run(options: Namespace) -> int:
 def _practise(control: str) -> int:
     """Let happen what is typed, until the end of the input; return 0."""
     from rig.commands.laboratory.practice import HELP, practise
+    from rig.station.plain_text import for_file
 
-    print(f"The laboratory is ready. {HELP}\nAn empty line shows this again; Ctrl-D ends the laboratory.")
+    print(f"The laboratory is ready. {HELP}\nAn empty line shows this again; Ctrl-D ends the laboratory.", flush=True)
     while True:
         try:
             words = input("laboratory> ")
         except EOFError:
             print()
             return 0
-        print(practise(control, words), flush=True)
+        print(for_file(practise(control, words), sys.stdout), flush=True)

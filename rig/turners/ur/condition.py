@@ -133,7 +133,8 @@ def program_interruption(state: ArmState) -> Problem | None:
         return Problem(
             "program_stopped",
             "the control program on the arm was stopped (pendant, dashboard or another client)",
-            "Make sure nobody else drives the arm, then start again",
+            "Make sure that nobody else drives the arm, and that no fieldbus without a connection stops programs; then "
+            "start again",
         )
     return None
 
