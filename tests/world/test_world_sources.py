@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rig.sensors.mavlink.readings import ImuReading, decode_reading
 
 from rig.analysis.consistency.converter_tests import judge_readings
 from rig.config.load import load
@@ -18,6 +17,7 @@ from rig.sensors.lines.decoding import LineReader
 from rig.sensors.lines.stamping import Stamper
 from rig.sensors.lines.time_steps import find_time_step_s
 from rig.sensors.mavlink.dialect import dialect
+from rig.sensors.mavlink.imu_readings import ImuReading, decode_reading
 from rig.world.board.serial_line import SerialLine
 from rig.world.laboratory import Laboratory
 from rig.world.world_section import read_world_section

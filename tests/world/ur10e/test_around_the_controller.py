@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig.world.ur10e.interfaces.primary import PrimarySession
 from scipy.spatial.transform import Rotation
 
 from rig.errors import Refused
 from rig.observation.external.attitude_import import read_attitudes
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.laboratory import Laboratory
+from rig.world.ur10e.interfaces.primary_server import PrimarySession
 from rig.world.ur10e.modes import RuntimeState, SafetyMode
 from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal
