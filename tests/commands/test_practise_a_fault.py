@@ -10,9 +10,9 @@ import pytest
 
 from rig.commands.laboratory.laboratory_process import send_request
 from rig.commands.laboratory.practice import HELP, INCIDENTS, find_incident
-from support.laboratories.practice_page import LABORATORY, RIG, Step, exercises, masked
 from support.laboratories.worlds import fresh_host
 from support.paths import ROOT
+from support.practice_page import LABORATORY, RIG, Step, exercises, masked
 from support.processes.waiting import PATIENCE_S, alive, wait_for
 from support.processes.warm import started
 
@@ -38,7 +38,7 @@ class Terminals:
         self._settings = [word for value in (*places, *QUICK) for word in ("--set", value)]
         self.run: subprocess.Popen[str] | None = None
         start = SECTIONS[""][0]
-        self._laboratory = self._start(start.typed, *self._settings, "--set", f"world.time_scale={PACE}")
+        self._laboratory = self._start(start.typed, *self._settings)
         self._shown: Queue[str] = Queue()
         self._reader = threading.Thread(target=self._read)
         self._reader.start()

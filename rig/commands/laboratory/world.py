@@ -5,7 +5,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from rig.commands.config_arguments import add_config
-from rig.commands.laboratory.laboratory_process import simulated_laboratory, write_temporary
+from rig.commands.laboratory.laboratory_process import send_request, simulated_laboratory, write_temporary
 from rig.commands.laboratory.only_on_linux import refuse_unless_linux
 
 
@@ -15,7 +15,7 @@ def add(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--faults",
         action="store_true",
-        help="let happen in it what is typed in this terminal, to practise faults: unplug, slider 50, …",
+        help="as fast as a real one, with the faults that are typed in this terminal: unplug, slider 50, …",
     )
 
 
@@ -36,10 +36,11 @@ def run(options: Namespace) -> int:
 
 
 def _practise(control: str) -> int:
-    """Let happen what is typed, until the end of the input; return 0."""
+    """Let happen what is typed, at the pace of a real laboratory, until the end of the input; return 0."""
     from rig.commands.laboratory.practice import HELP, practise
     from rig.station.plain_text import for_file
 
+    send_request(control, {"do": "pace", "time_scale": 1.0})  # a servo's has no other
     print(f"The laboratory is ready. {HELP}\nAn empty line shows this again; Ctrl-D ends the laboratory.", flush=True)
     while True:
         try:

@@ -20,10 +20,7 @@ class SimulatedFieldbusSection(Section):
 
 
 class SimulatedPoseLogSection(Section):
-    """A log of the tool's attitudes, as a robot's logger writes it: a file that `rig solve --attitudes` reads.
-
-    The controller computes the attitudes from its encoders, so `unmodelled` has their errors.
-    """
+    """The tool's attitudes as a logger writes them, for `rig solve --attitudes`; `unmodelled` has their errors."""
 
     path: Path = Field(description="the file, CSV, which is written anew")
     rate_hz: float = Field(default=14.0, gt=0, le=500, description="rows a second")
