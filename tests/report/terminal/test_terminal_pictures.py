@@ -15,7 +15,7 @@ from rig.data.run_folder import resuming
 from rig.errors import Fault, Problem, refuse
 from rig.report.terminal.result_table import print_kept
 from rig.station.events import Advice
-from rig.station.view import PlainView
+from rig.station.words import line
 from support.documents.ended_runs import ONE, failed, of_three_parts
 from support.paths import ROOT
 
@@ -38,15 +38,16 @@ def verdict(result: ResultDocument) -> Callable[[], int]:
 
 
 def stopped(names: Sequence[str]) -> Callable[[], int]:
-    """As the phases of a run tell it: where the data are, then the fault."""
+    """As the phases of a run end it: the fault, then where the data are and how to go on."""
 
     def command() -> int:
-        PlainView().event(Advice(RUN, resuming(RUN), repeats=False))
-        raise Fault(
+        fault = Fault(
             "no_samples",
             f"no sample from {', '.join(names)} within 2 s of the start",
             "Check the sensor's wiring and its data-ready line, then run `rig check`",
         )
+        fault.add_note(line(Advice(RUN, resuming(RUN), repeats=False)) or "")
+        raise fault
 
     return command
 
@@ -103,7 +104,8 @@ def test_how_a_run_ends_is_kept_as_a_picture(
     assert max(map(len, rows)) <= width
     lines = Text.from_ansi(said).plain.split("\n")
     if how in ("stopped", "refused"):
-        error = lines[next(i for i, line in enumerate(lines) if line.startswith("rig: ")) :]
+        assert lines[0].startswith("rig: ")
+        error = [row for row in lines if not row.startswith(COPYABLE) and "rig resume" not in row]
         said_as_error = " ".join(" ".join(error).split())
         assert "Check the sensor's" in said_as_error and "verdict" not in said
         assert all(name in said_as_error for name in NAMES[sensors])
