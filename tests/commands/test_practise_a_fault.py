@@ -8,10 +8,12 @@ from queue import Queue
 
 import pytest
 
-from rig.commands.laboratory.laboratory_process import send_request
-from rig.commands.laboratory.practice import HELP, INCIDENTS, find_incident
+from rig.commands.laboratory.laboratory_process import send_request, simulated_laboratory
+from rig.commands.laboratory.practice import HELP, INCIDENTS, find_incident, practise
+from rig.config.load import load
+from rig.errors import Fault
 from support.laboratories.worlds import fresh_host
-from support.paths import ROOT
+from support.paths import CONFIGS, ROOT
 from support.practice_page import LABORATORY, RIG, Step, exercises, masked
 from support.processes.waiting import PATIENCE_S, alive, wait_for
 from support.processes.warm import started
@@ -150,6 +152,17 @@ def _unlocked(terminals: Terminals) -> str:
 def test_the_laboratory_shows_first_what_can_happen_in_it(terminals: Terminals) -> None:
     check_shown(SECTIONS[""][0], "\n".join([*terminals.shown_first, LABORATORY]))
     assert "unknown" in terminals.type_in_laboratory("unplugg")
+
+
+@pytest.mark.slow
+def test_what_a_laboratory_does_not_have_cannot_happen_in_it() -> None:
+    host = fresh_host()
+    by_hand = load(CONFIGS / "by_hand.yaml", [f"board.port=socket://{host}:7321"], sections=None)
+    with simulated_laboratory(by_hand.text) as control:
+        assert practise(control, "slider 50") == "this cannot happen in this laboratory"
+        assert practise(control, "Unplug") == INCIDENTS["unplug"].text
+    with pytest.raises(Fault, match="world_ended"):
+        practise(control, "unplug")
 
 
 def test_the_page_has_six_exercises_with_every_word_that_can_be_typed() -> None:

@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -168,7 +167,15 @@ def test_an_autopilot_without_a_temperature_has_none_and_all_else(
     assert all(np.array_equal(one.rate_rad_s, other.rate_rad_s) for one, other in zip(heard, usual, strict=True))
 
 
-def test_an_autopilots_frozen_axis_and_repeated_readings_are_those_of_its_part() -> None:
-    rates: Any = np.array([each.rate_rad_s for each in readings(HIGHRES_IMU, f"{FAULTY}frozen_axis=x")[1]])
-    settled = rates[len(rates) // 2 :]
-    assert np.ptp(settled[:, 0]) == 0 and np.ptp(settled[:, 1]) > 0
+def rates_of(override: str) -> np.ndarray:
+    """Return the rates (n, 3) of an autopilot's messages, once its filter has settled."""
+    rates = np.array([reading.rate_rad_s for reading in readings(HIGHRES_IMU, f"{FAULTY}{override}")[1]])
+    return rates[len(rates) // 2 :]
+
+
+def test_an_autopilots_frozen_axis_and_repeated_readings_come_with_its_messages() -> None:
+    frozen = rates_of("frozen_axis=x")
+    assert np.ptp(frozen[:, 0]) == 0 and np.ptp(frozen[:, 1]) > 0
+    repeated, usual = (rates_of(f"repeated={share}") for share in (0.5, 0.0))
+    assert len(np.unique(usual, axis=0)) == len(usual)
+    assert len(np.unique(repeated, axis=0)) < 0.9 * len(repeated)
