@@ -140,8 +140,8 @@ def readings(message: int, *overrides: str) -> tuple[set[int], list[ImuReading]]
     order = mavlink.MAVLink_command_long_message(1, 1, SET_INTERVAL, 0, message, 1e4, 0, 0, 0, 0, 0).pack(asks)
     _, blocks = sent(AUTOPILOT, 0.5, [f"world.sensors.imu1.{override}" for override in overrides], order)
     messages = mavlink.MAVLink(None).parse_buffer(b"".join(blocks)) or []
-    heard = [decode_reading(each) for each in messages if each.get_msgId() == message]
-    return {each.get_msgbuf()[0] for each in messages}, heard
+    heard = [decode_reading(sample) for sample in messages if sample.get_msgId() == message]
+    return {sample.get_msgbuf()[0] for sample in messages}, heard
 
 
 SCALED_IMU, RAW_IMU, HIGHRES_IMU = 26, 27, 105
@@ -162,8 +162,8 @@ def test_an_autopilot_without_a_temperature_has_none_and_all_else(
     starts, heard = readings(message, override)
     starts_usually, usual = readings(message)
     assert (starts, starts_usually) == ({begins_with}, {0xFD})
-    assert all(math.isnan(each.temperature_c) and {"rate", "force"} <= each.provided for each in heard)
-    assert all(each.temperature_c > 20 for each in usual) and len(heard) == len(usual) > 40
+    assert all(math.isnan(reading.temperature_c) and {"rate", "force"} <= reading.provided for reading in heard)
+    assert all(reading.temperature_c > 20 for reading in usual) and len(heard) == len(usual) > 40
     assert all(np.array_equal(one.rate_rad_s, other.rate_rad_s) for one, other in zip(heard, usual, strict=True))
 
 
