@@ -295,7 +295,7 @@ def _suggest_choice(message: str) -> str:
 
 
 def _build_parser(meant: str | None) -> argparse.ArgumentParser:
-    """Return a parser of every command by its name, and of the arguments of the `meant` one."""
+    """Return a parser of all commands; only the `meant` one has its arguments."""
     parser = _Parser(prog="rig", description="Calibrate inertial sensors on a robot arm, a servomotor or by hand.")
     parser.add_argument("--version", action="version", version=f"rig {VERSION}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")

@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
 @solvable()
 def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
-    """Solve and judge the recordings of a calibration, at least one, of a run that just ended or from files.
+    """Solve and judge the recordings of a calibration.
 
-    If `drifting`, a bias drift is no contradiction. Raise Fault or Refused if the recordings lack something.
+    There is at least one, from a run that just ended or from files. If `drifting`, a bias drift is no contradiction.
+    Raise Fault or Refused if the recordings lack something.
     """
     from rig.analysis import judging
     from rig.analysis.external import external_outcome as external_judging
@@ -31,7 +32,7 @@ def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, 
 
 @solvable()
 def estimate_bias_drift(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
-    """Return the outcome as `calibrate` does, with the bias by repeat of attitudes that were visited several times.
+    """Return the outcome of `calibrate` with the bias in each repeat of the same attitudes.
 
     Raise Fault as `calibrate` and `estimate_bias_drifts` do.
     """
@@ -64,9 +65,9 @@ def verify_calibration(outcome: Outcome, repeated: "Sequence[RunData]") -> Outco
 
 @solvable()
 def verify_stored_calibrations(repeated: "Sequence[RunData]") -> Outcome:
-    """Verify the calibrations that the board had stored before, by recordings of calibrated readings, at least one.
+    """Verify the calibrations stored on the board, by recordings of readings that it corrected.
 
-    Raise Fault as `verify_calibration` does.
+    There is at least one recording. Raise Fault as `verify_calibration` does.
     """
     from rig.analysis import judging
 

@@ -64,9 +64,9 @@ def fitness(
     sweep: int | None = None,
     dwell: int | None = None,
 ) -> Check:
-    """Return a check whether a sensor's quantity is measured well enough, by a `limit` without a row of its own.
+    """Return a check of a sensor's quantity with a `limit` of its own.
 
-    The index of the plan's `sweep` or `dwell` that it is about is part of its name.
+    The name includes the index of the plan's `sweep` or `dwell` that the check is about.
     """
     means, index = Meaning("fitness", sensor, quantity, parameter, sweep, what), dwell if sweep is None else sweep
     name = name_check(sensor, quantity, what)
@@ -74,10 +74,9 @@ def fitness(
 
 
 def list_unsolved(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
-    """Yield the failing checks of sensors without a solution, by name, quantity and Fault.
+    """Yield a failing check for each sensor without a solution, from name, quantity and Fault.
 
-    Sensors that were only recorded have none: sweeps do not calibrate a magnetometer, for which the size of the field
-    is stated.
+    Sensors that are only recorded have none, as a magnetometer in sweeps.
     """
     for sensor, quantity, fault in faults:
         if fault.name not in ONLY_RECORDED:

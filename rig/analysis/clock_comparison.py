@@ -72,7 +72,10 @@ class ClockCheck:
     half_width: float
 
     def differences(self) -> Iterator[ClockDifference]:
-        """Yield the difference of every two clocks; half-widths add up: all values within are equally likely."""
+        """Yield the difference of each pair of clocks.
+
+        Half-widths add up, as all values within them are equally likely.
+        """
         clocks = [("controller", 0.0, self.half_width, 0.0)]
         clocks += [
             (SHORT[comparison.by], comparison.error, comparison.half_width, comparison.noise_std)
@@ -106,7 +109,7 @@ def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
 
 
 def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
-    """Return the difference of every two compared clocks, in the recording in which they agree least."""
+    """Return the difference of each pair of clocks, from the recording in which they agree least."""
     worst: dict[tuple[str, str], ClockDifference] = {}
     for one in (difference for check in clocks for difference in check.differences()):
         worst[one.clocks] = max(worst.get(one.clocks, one), one, key=lambda difference: difference.limit_fraction)

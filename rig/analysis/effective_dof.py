@@ -68,7 +68,7 @@ def of_field_angles(result: MagnetometerResult) -> Array:
 def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
-    The latter are the fewest of any run's bias: a sum of independent parts never has fewer.
+    The latter are the fewest of any run's bias, a lower bound for a sum of independent parts.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # (Σ u_i²)² / ν of each run is Σ u_i⁴ / ν_i: what the runs share is known, and adds nothing to it.
@@ -91,15 +91,15 @@ def _in_attitudes(budget: Budget, response: Array, noise: Array, std: Array) -> 
 
 
 def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
-    """Return the parts of a gyroscope's variances by the contributors whose degrees of freedom they have.
+    """Return the parts of a gyroscope's variances, by the contributor that determines their degrees of freedom.
 
-    If the readings show no bias drift, it is the flicker of the data sheet, and counts as known.
+    If the readings show no bias drift, it is the flicker of the data sheet, whose degrees of freedom are infinite.
     """
     return {NOISE: noise, **({WANDERING: walk} if explained.bias.is_drifting else {})}
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
-    """Return the degrees of freedom (…) of variances (…) from their `parts` by contributor; the rest counts as known.
+    """Return the degrees of freedom (…) of variances (…) from their `parts` by contributor; the rest has infinite ones.
 
     Raise KeyError if the budget has no such contributor.
     """

@@ -48,7 +48,7 @@ class _WeightedReadings:
 
 
 def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeConditions:
-    """Return when a gyroscope's scale and bias were read: in its sweeps, and in sweeps and rests."""
+    """Return the times of a gyroscope's readings: for the scale in sweeps, for the bias in sweeps and rests."""
     parts = [(recording.sensors[name], recording.clock_offset_s) for recording in recordings]
     turns = [_read_average(turn.average, offset_s) for part, offset_s in parts for turn in part.revolutions]
     rests = [_read_average(rest, offset_s) for part, offset_s in parts for rest in part.rests]
@@ -58,7 +58,7 @@ def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeCondi
 
 
 def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """Return when an accelerometer was read: in the dwells of these indices, and its sweeps."""
+    """Return the times of an accelerometer's readings: in the dwells of these indices, and in its sweeps."""
     wanted, read = frozenset(dwells), []
     for recording in recordings:
         part, offset_s = recording.sensors[name], recording.clock_offset_s
@@ -77,7 +77,7 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
 
 
 def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """Return when a magnetometer, which has no thermometer, was read: in the last dwells of these indices."""
+    """Return the times of a magnetometer's readings in the last dwells of these indices; it has no thermometer."""
     wanted = frozenset(dwells)
     times_s = {
         index: (start_s + recording.clock_offset_s, end_s + recording.clock_offset_s)

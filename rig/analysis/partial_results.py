@@ -63,7 +63,7 @@ class _RecordedPart:
 
 
 def so_far(runs: Sequence[RunData]) -> SoFar:
-    """Return the partial results of raw readings; a sweep or dwell in several recordings counts in the last one."""
+    """Return the partial results of raw readings; of a repeated sweep or dwell the last one counts."""
     sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
     at_rest: Attempts[QuantityInDwell, ReadAtRest] = Attempts()

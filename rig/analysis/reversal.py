@@ -83,7 +83,7 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
 
 
 def _scale_std(results: Sequence[MagnetometerResult]) -> Array:
-    """Return the standard deviations (3,) of mean scale factors: the field's uncertainty is common to the runs."""
+    """Return the standard deviations (3,) of mean scale factors; the field's uncertainty is common to all runs."""
     shared = results[0].budget.std_of(SIZE_OF_FIELD)[:3]
     independent = [result.budget.std[:3] ** 2 - result.budget.std_of(SIZE_OF_FIELD)[:3] ** 2 for result in results]
     std: Array = np.sqrt(np.sum(independent, axis=0) / len(results) ** 2 + shared**2)

@@ -49,7 +49,7 @@ class _LimitSet:
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of that one of three values which is nearest to its limit by the decision rule."""
+        """Return the check of the value nearest to its limit, of three, by the decision rule."""
         check = self.check(what, _largest(values))
         if uncertainty is None or check.value is None:
             return check
@@ -92,9 +92,10 @@ def judge(
     budgets: Mapping[str, Budget] = MappingProxyType({}),
     rule: DecisionRule = "simple",
 ) -> tuple[Check, ...]:
-    """Return the checks of every gyroscope, by its name.
+    """Return the checks of every gyroscope by name.
 
-    With a sensor's budget its combined uncertainties are judged, and values by the decision rule; else the noise alone.
+    If a sensor has a budget, its combined uncertainties are judged, and values by the decision rule; otherwise the
+    noise alone.
     """
     checks: list[Check] = []
     for name, solution in solutions.items():
@@ -111,8 +112,8 @@ def judge(
 def verification_checks(sensor: str, verification: Verification | None, limits: Limits | None) -> tuple[Check, ...]:
     """Return the checks of calibrated readings: the worst axis, and the worst mean over a revolution.
 
-    The reference itself is compared with the arm, by the limit of those means: its own error may be the cause. None
-    stands for a verification that did not happen.
+    The reference is compared with the arm too, by the limit of those means, because its own error may be the cause.
+    None stands for a verification that did not take place.
     """
     rms = mean = verified = None
     if verification is not None:
@@ -128,9 +129,9 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
 
 
 def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
-    """Return the checks that the clocks of a run agree, within what is stated and measured of them.
+    """Return the checks that the clocks of a run agree within their stated and measured uncertainty.
 
-    Of several recordings the one in which a pair agrees least counts.
+    For each pair, the recording with the largest difference counts.
     """
     means = Meaning("fitness", what=CLOCKS)
     return tuple(

@@ -52,9 +52,10 @@ def store_calibrations(
 
 
 def calibration_of(solved: SensorSolution, entry: OverTemperatureEntry | None = None) -> Calibration:
-    """Return a sensor's solution as a record for the board, dated now, with polynomials if `entry` is over temperature.
+    """Return a sensor's solution as a record for the board, with the present time.
 
-    Raise Refused `not_in_result` if the temperature is missing.
+    It includes the polynomials if `entry` is a calibration over temperature. Raise Refused `not_in_result` if the
+    temperature is missing.
     """
     if solved.temperature_c is None:
         raise Refused(

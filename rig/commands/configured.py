@@ -56,7 +56,7 @@ def change_configured(configured: Configured, overrides: Sequence[str]) -> Confi
 def open_configured(
     config_path: Path, overrides: Sequence[str] = (), script: ScriptFile | Path | None = None
 ) -> Iterator[Configured]:
-    """Load as `load_configured`, with the simulated laboratory at an address of its own for the length of the block."""
+    """Load as `load_configured`; for the length of the block the simulated laboratory has an address of its own."""
     configured = load_configured(config_path, overrides, script)
     with find_own_address(configured.loaded.config, configured.loaded.laboratory) as moved:
         yield load_configured(config_path, [*overrides, *moved], script and configured.script) if moved else configured

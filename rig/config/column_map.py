@@ -91,7 +91,7 @@ class ColumnMap(Section):
 
     @model_validator(mode="after")
     def fits_together(self) -> Self:
-        """Refuse a column whose unit is of another quantity than the unit in its name."""
+        """Refuse a column if its unit and the unit in its name are of different quantities."""
         for section in (self.samples, self.motion):
             for name, column in section.items():
                 _fit(name, column, next((what for suffix, what in SUFFIXES if name.endswith(suffix)), NUMBER))

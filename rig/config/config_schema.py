@@ -78,7 +78,10 @@ def _with_kind(section: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _chosen(key: str, sections: Mapping[str, Mapping[str, Any]], text: str) -> dict[str, Any]:
-    """Return the schema of a section that is another by the value of a key; under an unknown value all is allowed."""
+    """Return the schema of a section whose keys depend on the value of one key.
+
+    With an unknown value of that key all other keys are allowed.
+    """
     names = {"anyOf": [{"enum": [*sections]}, {"type": "string"}], "description": f"one of {', '.join(sections)}"}
     branches = [
         {"if": {"properties": {key: {"const": name}}, "required": [key], "type": "object"}, "then": section}
@@ -88,7 +91,7 @@ def _chosen(key: str, sections: Mapping[str, Mapping[str, Any]], text: str) -> d
 
 
 def _as_written(schema: Any) -> Any:
-    """Return a model's schema as files write it: no key is asked for, null leaves a key out, text may be a number."""
+    """Return a model's schema for files: no key is required, null omits a key, text may be a number."""
     if isinstance(schema, list):
         return [_as_written(item) for item in schema]
     if not isinstance(schema, dict):

@@ -57,7 +57,7 @@ class Loaded:
 
     @property
     def laboratory(self) -> str | None:
-        """The file as used if it has a `world:` section, else None."""
+        """The file with all defaults if it has a `world:` section, else None."""
         return self.text if self.simulated else None
 
 
@@ -82,15 +82,15 @@ def load(
 ) -> Loaded:
     """Read, override and validate a configuration file.
 
-    `overrides` are `path.to.key=value` with the value in YAML. `sections` are the procedures the file may name, each
-    with what its `procedure:` section holds, `turners` the same of the kinds of turners. Raises `ConfigurationRefused`
-    listing every error with its path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
+    `overrides` are `path.to.key=value` with the value in YAML. `sections` are the procedures by name, with the model of
+    each one's `procedure:` section; `turners` the kinds of turners likewise. Raise `ConfigurationRefused` listing every
+    error with its path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
     """
     return _validate_all(_read(path, overrides), str(path), sections, turners)
 
 
 def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
-    """Read the sensors' part of a configuration, and the file as used if it has a `world:` section, else None.
+    """Read the sensors' part of a configuration, and the file with defaults if it has a `world:` section, else None.
 
     A file with that section must be complete, as the laboratory simulates all of it. Raise `ConfigurationRefused`.
     """
@@ -179,7 +179,7 @@ def _dump(document: Mapping[str, Any]) -> str:
 def _validate_rig(
     document: Mapping[str, Any], sections: Sections, turners: Turners, layered: Layered
 ) -> tuple[RigConfig | None, list[str]]:
-    """Validate all but the world: procedure and turner by the models that name and kind choose, and the rest."""
+    """Validate all but the world: procedure and turner by the models that their name and kind select."""
     procedure, problems = _validate_procedure(document.get("procedure", {}), sections, layered)
     turner, turner_problems = _validate_turner(document, turners, layered)
     rest = {**document, "procedure": procedure or ProcedureSection(name=""), "turner": turner or TurnerSection()}
@@ -285,7 +285,7 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
 
 
 def _hint_at_override(section: Location, layered: Layered) -> str:
-    """Return the names a misspelt `--set sensors.NAME.…` may have meant, if no file has this section; else ""."""
+    """Return the sensors that a misspelt `--set sensors.NAME.…` may mean; empty if a file has this section."""
     if layered.places.get(section) != SET:
         return ""
     siblings: Any = layered.document
@@ -362,7 +362,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _is_loopback(host: str) -> bool:
-    """Return whether a host is this machine. Its beginning does not tell: 127.example.org is another host."""
+    """Return whether a host is this machine. Its beginning is no proof: 127.example.org is another host."""
     try:
         return host == "localhost" or ipaddress.IPv4Address(host).is_loopback
     except ValueError:

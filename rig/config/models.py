@@ -42,22 +42,22 @@ class TurnerSection(Section):
 
     @property
     def address(self) -> str:
-        """Where it answers, a host or a port; empty where nothing is connected to."""
+        """The address at which it answers, a host or a port; empty if nothing is connected to."""
         return ""
 
     @property
     def address_key(self) -> str:
-        """The key of this section that says the address; empty where nothing is connected to."""
+        """The key of this section with the address; empty if nothing is connected to."""
         return ""
 
     @property
     def extension_m(self) -> Vector3:
-        """Where the extension ends on which the sensors sit, x y z in the frame of what it turns, m."""
+        """The end of the extension that carries the sensors, x y z, m, in the frame of the body that turns."""
         return (0.0, 0.0, 0.0)
 
     @property
     def simulated_at(self) -> str | None:
-        """The host at which a simulated one would answer; None where none can be simulated."""
+        """The host at which a simulated one would answer; None if none can be simulated."""
         return None
 
     def moved_to(self, host: str) -> Mapping[str, str]:
@@ -195,12 +195,12 @@ class ProcedureSection(Section):
 
     @property
     def accelerometer_order(self) -> AccelerometerOrder:
-        """Order of the accelerometer's model that the attitudes must tell; 0 where they need not tell one."""
+        """The order of the accelerometer's model that the attitudes must determine; 0 without a model."""
         return 0
 
     @property
     def finds_earth_rate(self) -> bool:
-        """Whether the Earth's rate is found from what the gyroscopes read; else it is known by the site, or unknown."""
+        """Whether the Earth's rate is estimated from readings; else the site gives it, or it is unknown."""
         return False
 
     def problems(self, config: "RigConfig") -> Iterable[str]:
@@ -249,7 +249,7 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def sensors_fit_together(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
-        """Refuse two sensors on one select line, port or IMU, name clashes, and more than one reference."""
+        """Refuse sensors that share a select line, port, IMU or name, and more than one reference."""
         sensor_at: dict[str, str] = {}
         for name, sensor in sensors.items():
             if sensor.mavlink is not None:
@@ -311,7 +311,7 @@ class SensorsConfig(Section):
 
     @property
     def on_board(self) -> Mapping[str, SensorSection]:
-        """The gyroscopes the board reads, by name; the others have a port of their own."""
+        """The gyroscopes that the board reads, by name; others have a port of their own."""
         return {name: sensor for name, sensor in self.sensors.items() if sensor.on_board}
 
     @property
@@ -326,7 +326,7 @@ class SensorsConfig(Section):
 
     @property
     def reference(self) -> tuple[str, SensorSection] | None:
-        """The sensor whose calibration is known, with its name, if there is one."""
+        """The sensor with a given calibration and its name, if there is one."""
         return next(((name, s) for name, s in self.sensors.items() if s.role == "reference"), None)
 
 
@@ -342,14 +342,14 @@ class RigConfig(SensorsConfig):
 
     @property
     def arm(self) -> ArmSection:
-        """The robot arm that turns the sensors. Raises TypeError where something else does."""
+        """The robot arm that turns the sensors. Raise TypeError if another turner does."""
         if not isinstance(self.turner, ArmSection):
             raise TypeError(f"no arm turns the sensors: the configuration has a {type(self.turner).__name__}")
         return self.turner
 
 
 def _bundled_names(sensors: Mapping[str, SensorSection]) -> list[str]:
-    """Return the names of further sensors that come by the ports of these: magnetometers, and scalars."""
+    """Return the names of further sensors at the ports of these: magnetometers, and scalars."""
     return [bundled for name, sensor in sensors.items() for bundled in sensor.brings(name)]
 
 

@@ -14,7 +14,7 @@ _LIST_MAX_BYTES = 1_000_000
 
 
 def note_run(folder: Path) -> None:
-    """Note that this user runs something in a folder. A run that cannot be noted goes on all the same."""
+    """Note the folder of a run of this user. Failure to note it is ignored."""
     with suppress(OSError, Refused):
         path = _list()
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -24,7 +24,7 @@ def note_run(folder: Path) -> None:
 
 
 def latest_run() -> Path:
-    """Return the newest noted run folder that is still there, relative to the working folder if it lies in it.
+    """Return the newest noted run folder that still exists, relative to the working folder if it lies in it.
 
     Raise Refused `no_latest_run`.
     """
@@ -35,7 +35,7 @@ def latest_run() -> Path:
 
 
 def meant_run(path: str | Path) -> Path:
-    """Return the run that a user names: `latest`, unless something here is called so, or a path.
+    """Return the run that a user names: a path, or `latest` unless a file or folder here has that name.
 
     Raise Refused as `latest_run`.
     """

@@ -84,7 +84,7 @@ class Quantity:
         return "" if self.name == RATE.name else f"{self.name}_"
 
     def full_label(self, sensor: str) -> str:
-        """Return the label of a sensor's readings among others of that sensor."""
+        """Return the label of a sensor's readings, distinct from its other quantities."""
         return f"{sensor}, {self.sensor}"
 
     @property
@@ -104,7 +104,7 @@ class Quantity:
 
     @property
     def parameter_signs(self) -> tuple[float, ...]:
-        """Factors from scale factors, then biases, to those of a model with the biases in the reading, and back."""
+        """The factors between scale factors and biases and those of a model whose bias is part of the reading."""
         return (1.0,) * len(self.axes) + (float(self.offset),) * len(self.axes)
 
 

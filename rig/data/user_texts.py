@@ -12,7 +12,7 @@ from rig.errors import Refused
 
 
 def note_own(*texts: str) -> None:
-    """Note that this user has run these texts. A text that cannot be noted is asked about later."""
+    """Note that this user has run these texts; on failure the user is asked again later."""
     with suppress(OSError, Refused):
         folder = _folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -57,7 +57,7 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
 
 
 def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
-    """Return the value of JSON from any source, with its texts made printable.
+    """Return the value of a JSON text from any source, with printable texts.
 
     Raise ValueError for a number that cannot be measured, a duplicate key, or more than `most` values; RecursionError.
     """
@@ -75,7 +75,7 @@ def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
 
 
 def refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object of a JSON file. Raise ValueError for a duplicate key: readers would take different ones."""
+    """Return an object of a JSON file. Raise ValueError for a duplicate key, of which readers use different values."""
     document = dict(pairs)
     if len(document) < len(pairs):
         keys = [key for key, _ in pairs]

@@ -37,7 +37,7 @@ class Unprinted(RigError):
 
 
 def or_fault(solve: Callable[[], Result]) -> Result | Fault:
-    """Return the result of `solve`, or the Fault in which it ends: for a result among others."""
+    """Return the result of `solve`, or the Fault that it raises, so that other results are unaffected."""
     try:
         return solve()
     except Fault as fault:
@@ -46,7 +46,7 @@ def or_fault(solve: Callable[[], Result]) -> Result | Fault:
 
 @contextmanager
 def raised_as(kind: type[RigError]) -> Iterator[None]:
-    """Raise problems inside the block, of board or recording, as `kind`; a refusal stays one."""
+    """Raise problems of board or recording inside the block as `kind`; a Refused stays one."""
     try:
         yield
     except ProblemError as error:

@@ -9,7 +9,7 @@ TABLE = Path(__file__).with_name("remedies_by_method.txt")
 
 
 def remedies_by_method(name: str) -> Mapping[CalibrationMethod, str]:
-    """Return what to do about an error by each way that has a remedy of its own; none if all ways have the same.
+    """Return an error's remedy by method of calibration; empty if all methods share one.
 
     Raise ValueError for a line of another form than `name | way | what to do`.
     """

@@ -31,7 +31,7 @@ def rotation_vectors(matrices: Array) -> Array:
 
 
 def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
-    """Return values over sizes ≥ 0 of one shape; infinite if a value is not zero and its size is negligible."""
+    """Return values over sizes ≥ 0 of one shape; infinite for a nonzero value over a negligible size."""
     value, size = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
     none = np.where(value == 0, 0.0, np.copysign(np.inf, value))
     ratio: Array = np.divide(value, size, out=none, where=size > SMALLEST_SIZE)

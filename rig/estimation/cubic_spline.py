@@ -76,17 +76,18 @@ def _slopes(step: Array, secants: Array) -> Array:
 
 
 def _end(step: float, following: float, secant: Array, next_secant: Array) -> Array:
-    """Return what `following` s₀ + (step + following) s₁ is at an end: not-a-knot."""
+    """Return the right side of a not-a-knot end condition: `following` s₀ + (step + following) s₁."""
     both = step + following
     end: Array = ((step + 2 * both) * following * secant + step**2 * next_secant) / both
     return end
 
 
 def _solve_tridiagonal(lower: Array, upper: Array, right: Array) -> Array:
-    """Return s (n, k) of lower s₋ + s + upper s₊ = right, lower and upper (n, 1): parallel cyclic reduction.
+    """Return s (n, k) of lower s₋ + s + upper s₊ = right, with lower and upper (n, 1).
 
-    After each pass (R. W. Hockney 1965) a row knows of rows twice as far away. What it knows of them falls with the
-    square, as the rows of a spline are diagonally dominant: six passes, whatever n is.
+    Parallel cyclic reduction (R. W. Hockney 1965): each pass eliminates the neighbours of a row, so that it contains
+    rows twice as far away, with squared coefficients. The rows of a spline are diagonally dominant, so six passes
+    suffice for any n.
     """
     apart = 1
     while apart < len(right) and max(np.abs(lower).max(), np.abs(upper).max()) > NEGLIGIBLE:

@@ -116,7 +116,7 @@ def check_duplicates(means: Array) -> None:
 
 
 def check_reads(matrix: Array) -> None:
-    """Raise Fault `stuck_sensor` if an axis, a row of F (3, 3), is much less sensitive than the others."""
+    """Raise Fault `stuck_sensor` if one row of F (3, 3), an axis, is much less sensitive than the others."""
     sizes = np.linalg.norm(matrix, axis=1)
     least = int(np.argmin(sizes))
     if sizes[least] < STUCK * sizes.max():
@@ -185,7 +185,7 @@ def check_axes(axes: Array, nominal: Array | None) -> None:
 
 
 def _is_left_handed(matrix: Array) -> bool:
-    """Return whether the determinant of a matrix (3, 3) is negative: of so few numbers plain Python is the quickest."""
+    """Return whether the determinant of a matrix (3, 3) is negative; plain Python is the fastest for nine numbers."""
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     return bool(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0)
 
@@ -249,7 +249,7 @@ class Conditioning:
 
 
 def condition_of(design: Array, needed: int, noise: float = 0.0) -> Conditioning:
-    """Return the conditioning of a design (n, p) with columns in comparable units, `needed` of them to be determined.
+    """Return the conditioning of a design (n, p) with columns in comparable units and a rank of `needed`.
 
     Singular values at rounding, or within three times `noise` (the norm of measurement noise in a measured design), do
     not count towards the rank.

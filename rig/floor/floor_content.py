@@ -44,7 +44,7 @@ def _card(station: StationState) -> dict[str, Any]:
 
 
 def _age(age_s: float | None) -> str:
-    """Return the age in about two digits: a text that changes every second would be sent every second."""
+    """Return the age in about two digits, so that the text is not sent anew every second."""
     if age_s is None:
         return "at an implausible time"
     size, unit = next((unit for unit in UNITS_OF_AGE if age_s >= 2 * unit[0]), UNITS_OF_AGE[-1])
@@ -71,7 +71,7 @@ def todays(pasts: Iterable[Past], today: date) -> list[dict[str, Any]]:
 
 
 def standards(pasts: Sequence[Past]) -> list[dict[str, Any]]:
-    """Return each rig with check standards: whether it is in control, and the parameters that are not."""
+    """Return each rig with check standards, whether it is in control, and the parameters out of control."""
     rows = []
     for state in rig_states(pasts):
         out = [name for name, chart in state.charts.items() if chart.alarm.size and chart.out_of_control]

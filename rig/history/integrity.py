@@ -86,7 +86,7 @@ def _record(past: Past) -> HistoryRecord:
 
 
 def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
-    """Return the entered files by the path of their folder: a resumed run was entered again there."""
+    """Return the entered files by folder; a resumed run was entered again from the same one."""
     by_folder: dict[str, set[tuple[str, str]]] = {}
     for path, name, sha256 in history.files():
         by_folder.setdefault(path, set()).add((name, sha256))
@@ -143,7 +143,7 @@ def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Itera
 
 
 def _names(run: Kept, folder: Path) -> set[str]:
-    """Return the entered files; of those that may have been written elsewhere, the present ones."""
+    """Return the entered files; of those possibly written on another computer, the present ones."""
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
 

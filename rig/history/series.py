@@ -130,7 +130,7 @@ class Change:
 
     @property
     def limit(self) -> float:
-        """The E_n that no compared value exceeds by chance in `UNCHANGED` of comparisons.
+        """The limit of E_n: unchanged values all stay below it in a fraction `UNCHANGED` of comparisons.
 
         It uses Student's t for the effective degrees of freedom of the difference, and Bonferroni's inequality, because
         a history does not store the correlations between parameters of one calibration.
@@ -156,7 +156,7 @@ def subjects(pasts: Iterable[Past]) -> dict[Subject, list[Past]]:
 
 
 def trends(pasts: Sequence[Past]) -> dict[str, Trend]:
-    """Return the trend of every parameter that the newest of one subject's calibrations has."""
+    """Return the trend of every parameter in the newest calibration of one subject."""
     by_name = {}
     for name in pasts[-1].parameters if pasts else ():
         having = [past for past in pasts if name in past.parameters]
@@ -169,7 +169,7 @@ Parameters = Mapping[str, Parameter]
 
 
 def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Change, ...], ...]:
-    """Return the changes within each pair, before and now, of the parameters that both have.
+    """Return the changes of the parameters common to each pair of calibrations, before and now.
 
     All pairs belong to one comparison, as those of all sensors of a run: the number of all values counts.
     """
@@ -182,7 +182,7 @@ def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Ch
 
 
 def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject, tuple[Change, ...]]:
-    """Return the changes of all subjects that both runs have, as one comparison.
+    """Return the changes of all subjects common to two runs, as one comparison.
 
     `before` and `now` are the calibrations of one run each; the last of a subject counts.
     """
@@ -193,7 +193,7 @@ def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
-    """Return the state of every rig with check standards; a sensor is one if it was ever marked as one."""
+    """Return the state of every rig with check standards: sensors that were ever marked as such."""
     # Drifts and curves are not standards, and external readings have no rig.
     by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
     standards = {key: series for key, series in by_subject.items() if any(past.check_standard for past in series)}

@@ -178,7 +178,7 @@ class History:
     def calibrations(self, selection: Selection = Selection(), *, replaced_too: bool = False) -> list[Past]:
         """Calibrations in the order of time, voided ones too.
 
-        One that a later one of its run replaced is left out, unless it is asked for.
+        One that a later calibration of its run replaced is included on request only.
         """
         question = select(*_COLUMNS).select_from(_ROWS).order_by(*_IN_TIME)
         return self._pasts(chosen(question if replaced_too else question.where(~replaced()), selection))

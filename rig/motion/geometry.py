@@ -70,9 +70,9 @@ NOMINAL = DenavitHartenberg(  # a UR10e's (maker's article 45257), the arm of re
 
 
 def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """Return the change of a wrist axis' direction in the flange's frame per radian of `AXIS_ERRORS`, (…, 13, 3).
+    """Return the change (…, 13, 3) of a wrist axis' direction in the flange's frame, per radian of `AXIS_ERRORS`.
 
-    For joint angles `q_rad` (…, n). A rotation of the whole flange is part of a sensor's mounting. The wrists of
+    The joint angles are `q_rad` (…, n). A rotation of the whole flange is part of a sensor's mounting. The wrists of
     another chain are its last three joints; the errors of joints that it does not have are zero.
     """
     q = np.asarray(q_rad, dtype=np.float64)
@@ -91,10 +91,10 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
 
 
 def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """Return the flange's small rotations in the base's frame per radian of each wrist's errors, (3, 6, 3).
+    """Return the flange's rotations (3, 6, 3) in the base's frame, per radian of each wrist's errors.
 
-    For joint angles `q_rad` (n,). Errors of a wrist: its twist, its zero, and the `WAVES` of its angle. The wrists of
-    another chain are its last three joints; the errors of joints that it does not have are zero.
+    The joint angles are `q_rad` (n,). Errors of a wrist are its twist, its zero, and the `WAVES` of its angle. The
+    wrists of another chain are its last three joints; the errors of joints that it does not have are zero.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = np.array(_frames(q, arm))[:, :3, :3]
@@ -120,7 +120,7 @@ def angle_waves(angle_rad: Array | float) -> Array:
 
 @lru_cache
 def _twists(arm: DenavitHartenberg) -> tuple[Array, Array]:
-    """Return cosines and sines (n,) of the links' twists; those of quarter turns are exact, although π/2 is rounded."""
+    """Return cosines and sines (n,) of the links' twists, exact for quarter turns."""
     waves = np.cos(arm.alpha_rad), np.sin(arm.alpha_rad)
     cos, sin = (np.where(np.abs(wave) < ROUNDING, 0.0, wave) for wave in waves)
     return cos, sin
@@ -128,9 +128,9 @@ def _twists(arm: DenavitHartenberg) -> tuple[Array, Array]:
 
 @lru_cache
 def _link_coefficients(arm: DenavitHartenberg) -> Array:
-    """Return the coefficients of cosine, sine and 1 of a joint's angle in its link's transform, (n, 3, 4, 4).
+    """Return the coefficients (n, 3, 4, 4) of cosine, sine and 1 of a joint's angle in its link's transform.
 
-    A link rotates about z, goes along z and along x, rotates about x.
+    A link rotates about z, translates along z and x, and rotates about x.
     """
     (cos, sin), terms = _twists(arm), np.zeros((arm.joints, 3, 4, 4))
     terms[:, 0, 0, 0], terms[:, 0, 1, 1], terms[:, 0, 1, 2], terms[:, 0, 0, 3] = 1.0, cos, -sin, arm.a_m
@@ -164,7 +164,7 @@ def distance_to_forearm(
 ) -> Array:
     """Return distances (…,), m, from a point of the flange's frame to the line from elbow to wrist 1.
 
-    For joint angles `q_rad` (…, 6) and points (…, 3), by default the flange's centre. The line may be offset by
+    The joint angles are `q_rad` (…, 6), the points (…, 3), by default the flange's centre. The line may be offset by
     `offset_m` on the side of wrist 1.
     """
     frames = _frames(q_rad, arm)
@@ -197,7 +197,7 @@ def lengths_m(arm: DenavitHartenberg) -> Array:
 
 
 def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
-    """Return shoulder, elbow and wrist 1, (…, 3) m, each in the plane of the one before.
+    """Return shoulder, elbow and wrist 1, (…, 3) m, each in the plane of the previous one.
 
     The axes of these three are parallel but for the factory's calibration, and meet hundreds of metres away: the
     origins of a calibrated arm's frames lie anywhere along them.

@@ -92,7 +92,7 @@ def _clearance_m(radius_m: float, room_m: float) -> float:
 def _measure_to_forearm(
     q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
-    """Return name and distance, m, of the part of the load that comes nearest to the forearm in the poses (N, 6)."""
+    """Return name and smallest distance, m, to the forearm of any part of the load in the poses (N, 6)."""
     names, points = _list_load_points(carried)
     offset_m, lengths = model.forearm.offset_m, arm or model.drawing
     return _find_nearest(names, distance_to_forearm(q_rad, points, lengths, offset_m=offset_m))
@@ -101,7 +101,7 @@ def _measure_to_forearm(
 def _measure_to_upper_arm(
     q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
-    """Return name and distance, m, of the part of the load that comes nearest to the upper arm in the poses (N, 6)."""
+    """Return name and smallest distance, m, to the upper arm of any part of the load in the poses (N, 6)."""
     names, points = _list_load_points(carried)
     offset_m, lengths = model.upper_arm.offset_m, arm or model.drawing
     return _find_nearest(names, distance_to_upper_arm(q_rad, points, lengths, offset_m=offset_m))

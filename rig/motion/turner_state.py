@@ -29,9 +29,9 @@ class StateField:
 
 
 def state_dtype(joints: int, more: Sequence[StateField] = ()) -> np.dtype[Any]:
-    """Return the type of the rows in which states of a number of joints, with `more` fields, are recorded.
+    """Return the type of the rows of states, for a number of joints and `more` fields.
 
-    Without joints there are no columns of them: HDF5 has no arrays of length 0.
+    Without joints there are no columns of them, because HDF5 has no arrays of length 0.
     """
     angles = [(name, "<f8", (joints,)) for name in ("q_rad", "qd_rad_s")] if joints else []
     others = [(field.name, f"<{field.type}" if field.type[1] != "1" else field.type) for field in more]

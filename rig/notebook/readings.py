@@ -125,7 +125,7 @@ class Readings:
         return Signal(self.name, channel.measures, self._time_s, values, self._windows)
 
     def on_arm_clock(self) -> tuple[Array, Array]:
-        """Return controller times (n,) in s and readings (n, 3) in SI units: rates in rad/s if it has any.
+        """Return controller times (n,) in s and readings (n, 3) in SI units: rates if there are any.
 
         Raise Fault as `estimate_time_base`.
         """
@@ -176,7 +176,7 @@ class Readings:
         return np.concatenate([times_s(run, self.name, self._bases(run)) for run in self.recordings])
 
     def _bases(self, run: RunData) -> Mapping[str, Any]:
-        """Return the time base by the sensor's own rates, else by a gyroscope on its clock; {} without any."""
+        """Return the time base by the sensor's own rates, else by a gyroscope on its clock; empty without either."""
         gyroscopes = run.measuring(RATE)
         others = (name for name in gyroscopes if one_clock(run, self.name, name))
         source = self.name if self.name in gyroscopes else next(others, None)

@@ -88,9 +88,9 @@ class Run(Mapping[str, Readings]):
 
 
 def load(path: str | Path, script: str | Path | None = None) -> Run:
-    """Load a run folder or a run file; no foreign code in the folder is executed.
+    """Load a run folder or a run file without executing foreign code in the folder.
 
-    `script` names the script of the recording if it is another's: it is executed. Raise Refused `no_run`, and as
-    `read_run` and `load_script`.
+    `script` is executed: the script of another user's recording. Raise Refused `no_run`, and as `read_run` and
+    `load_script`.
     """
     return Run(open_run(Path(path), None if script is None else Path(script)))

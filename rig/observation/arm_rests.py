@@ -22,7 +22,7 @@ MIN_RESTS = 3  # the fewest that show a drift of the bias
 def average_rests(
     run: RunData, stream: Stream, motion: ArmMotion, response: Array, superseded: Collection[int] = ()
 ) -> tuple[Average, ...]:
-    """Average the rests in which the arm stood still for long enough, except those next to a step in `superseded`.
+    """Average all sufficiently long rests of the arm, except those next to a step in `superseded`.
 
     An arm that oscillates at rest does so in its encoders and, by `response` (3, 3), in the sensor's readings. The
     means are corrected for this oscillation.
@@ -57,9 +57,10 @@ def add_attitude(average: Average, motion: ArmMotion) -> Average:
 
 
 def estimate_bias_drift(rests: Sequence[Average]) -> Array:
-    """Return the variance (3,) of the bias from rest to rest, (rad/s)², beyond what the noise of a rest explains.
+    """Return the variance (3,) of the bias from rest to rest, (rad/s)², beyond the noise of a rest.
 
-    Zero unless it is significant over all axes together (χ² at 0.999): a steady sensor's variance is not raised.
+    Zero unless it is significant over all axes together (χ² at 0.999), so that a steady sensor's variance is not
+    raised.
     """
     from scipy.special import chdtri
 

@@ -5,12 +5,12 @@ from rig.observation.windows import dwelt, swept
 
 
 def finished_sweeps(run: RunData) -> frozenset[int]:
-    """Return the indices of the sweeps a recording holds from start to end."""
+    """Return the indices of the sweeps that a recording contains from start to end."""
     return frozenset(finished.sweep.index for finished in swept(run))
 
 
 def finished_dwells(run: RunData) -> frozenset[int]:
-    """Return the indices of the dwells a recording holds from start to end."""
+    """Return the indices of the dwells that a recording contains from start to end."""
     return frozenset(finished.dwell.index for finished in dwelt(run))
 
 

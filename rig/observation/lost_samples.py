@@ -25,9 +25,10 @@ ON_OWN_PORT: Mapping[str, str] = MappingProxyType(
 
 
 def lost_samples(sensor: RecordedSensor, samples: NDArray[Any], where: str, what: str, then: str) -> Fault:
-    """Return the Fault `lost_samples` for samples (n,) of a sensor: `where` and `what` is missing, what to do `then`.
+    """Return the Fault `lost_samples` for samples (n,) of a sensor: `where`, `what` is missing, and the remedy `then`.
 
-    If only every k-th sample is there, the source sent fewer, and nothing was lost on its path. The message says so.
+    If only every k-th sample is present, the message says that the source sent fewer, and that none was lost in
+    transfer.
     """
     steps = np.diff(samples["sequence"].astype(np.int64))
     stride = int(np.median(steps)) if len(steps) else 1

@@ -97,11 +97,11 @@ def observe_sensor(
 ) -> SensorObservations:
     """Average every finished sweep of a recording in which the arm moved by `motion`.
 
-    An interrupted sweep is left out. So are sweeps and dwells whose index is in `superseded`, and the rests next to
-    them: a later recording of the same run repeats them. Raise Fault as `dwell_readings` does, and
-    `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_not_constant`, `other_joint_moved`,
-    `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`, `wrong_unit`, `not_finite`,
-    `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`, `impossible_times`.
+    Interrupted sweeps are left out. So are sweeps and dwells whose index is in `superseded`, which a later recording of
+    the run repeats, and the rests next to them. Raise Fault as `dwell_readings` does, and `incomplete_revolution`,
+    `arm_states_lost`, `speed_slider`, `speed_not_constant`, `other_joint_moved`, `lost_samples`, `saturation`,
+    `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`, `wrong_unit`, `not_finite`, `time_base_not_found`,
+    `board_clock_restarted`, `duplicated_samples`, `impossible_times`.
     """
     stream = synchronize_stream(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = list[Observation]()
@@ -241,7 +241,7 @@ def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: ND
 
 
 def _count_lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:
-    """Return the number of missing samples: by sequence number, and by time for those that the board itself missed.
+    """Return the number of missing samples: lost ones by sequence number, and by time those that the board missed.
 
     Raise Fault `lost_samples` if there are too many.
     """
@@ -271,7 +271,7 @@ def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
 
 
 def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
-    """Raise Fault `stuck_sensor` if all axes repeat one reading, although the noise exceeds one count."""
+    """Raise Fault `stuck_sensor` if no reading of any axis changes although the noise exceeds one count."""
     counts = stream.sensor.channel(RATE).counts(stream.raw)
     if np.median(np.abs(np.diff(counts, axis=0)), axis=0).min() < 1:
         return
@@ -286,7 +286,7 @@ def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
 
 
 def _check_frozen(readings: Array, rate_read: Array, expected_rad_s: Array, where: str) -> None:
-    """Raise Fault `stuck_axis` if an axis repeats one reading that differs from its expected rate.
+    """Raise Fault `stuck_axis` if all readings of an axis are equal and differ from its expected rate.
 
     Coarse steps alone do not raise it.
     """

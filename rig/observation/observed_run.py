@@ -59,7 +59,7 @@ class ObservedRun:
         return times_s(self.run, sensor, bases, gyroscope)
 
     def delay(self, sensor: str, behind: str) -> Delay | None:
-        """Return how much `sensor` lags the sensor `behind`; None if no single clock stamps the samples of both.
+        """Return the delay of `sensor` against the sensor `behind`; None if no single clock stamps the samples of both.
 
         Both must be on the board: then their time bases differ only by their filters.
         """
@@ -104,7 +104,7 @@ def observe_run(
 
 
 def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
-    """Observe each recording of a run that adds a finished sweep or dwell; a repeated one counts in the last recording.
+    """Observe each recording of a run with a finished sweep or dwell; of repeated ones the last counts.
 
     The thresholds are those of the first recording; `corrections` are as in `observe_run`, by the stage of the
     procedure. Raise as `turner_of`, and Fault as `observe_run`.
@@ -125,7 +125,7 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_
 
 
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """Return the offset of each recording's clock against the first's: the controller may have been off in between.
+    """Return the offset of each recording's clock against the first's; the controller may restart in between.
 
     No recording begins before the last one has ended, whatever the computer's clock says: it may have been set, and an
     accelerated laboratory's time passes faster.

@@ -30,9 +30,9 @@ def revolution_on_the_board(
 ) -> tuple[int, int, float]:
     """Return a revolution's start and end on the board's clock, µs, and its speed by the arm's joints, rad/s.
 
-    `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) should reach further back than the sweep, which began
-    after the state `first`: a slow sweep alone may not stand out from the noise or hold too few samples, but the fast
-    motion to its start fixes the time base. Raise Fault as `estimate_time_base` and `ArmMotion.turn` do.
+    `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) should begin before the sweep, which began after the
+    state `first`: a slow sweep alone may have too few samples or too little signal, but the fast motion to its start
+    determines the time base. Raise Fault as `estimate_time_base` and `ArmMotion.turn` do.
     """
     names = [f"joint {number}" for number in range(kinematics.joints)]
     motion = ArmMotion(states, kinematics, names, reading_std_rad=reading_std_rad)
@@ -44,7 +44,7 @@ def revolution_on_the_board(
 
 
 def find_averaged_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
-    """Return the sweeps for which the board has an average for each of the sensors that is on it."""
+    """Return the sweeps that the board has averaged for each of its sensors."""
     sweeps = finished_sweeps(run)
     on_board = [sensor for sensor in sensors if run.sensors[sensor].on_board]
     return sweeps.intersection(*(find_board_averages([run], sensor, sweeps) for sensor in on_board))

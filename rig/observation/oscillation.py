@@ -11,10 +11,10 @@ FEWEST_OF_SWING = 8  # angles; the oscillation itself takes three parameters in 
 
 
 def remove_oscillation(q_rad: Array) -> Array:
-    """Return angles (n, k) of joints, evenly spaced, without the one sine about a mean that explains most of them.
+    """Return angles (n, k) of joints, evenly spaced, without the dominant sine about a mean.
 
     All joints oscillate at one frequency, each with its own amplitude and phase: least squares over a grid of
-    frequencies (Lomb's periodogram with a floating mean). A step stays in, and so does a creep.
+    frequencies (Lomb's periodogram with a floating mean). Steps and creep are preserved.
     """
     time = np.arange(len(q_rad)) / len(q_rad)
     fastest = min(FASTEST, len(q_rad) / 4)

@@ -64,7 +64,7 @@ class Sampling:
     def gaps(self, time_s: Array, fewest: int = 1) -> NDArray[np.bool_]:
         """Return the steps (n − 1,) between readings at times (n,) over which at least `fewest` readings are missing.
 
-        With bad stamps: the steps that are as long, and those from or to a late reading.
+        With bad stamps: the steps of that length, and those from or to a late reading.
         """
         if self.late is None:
             return np.asarray(self.missing >= fewest)
@@ -111,9 +111,9 @@ def find_sampling(time_s: Array) -> Sampling:
 
 
 def even_times(time_s: Array, sampling: Sampling) -> Array:
-    """Return the times (n,) at which readings that were stamped on arrival were taken; others unchanged.
+    """Return the sampling times (n,) of readings that were stamped on arrival; others unchanged.
 
-    The latency that all readings have in common stays in: no stamp shows it.
+    The latency common to all readings remains, because no stamp shows it.
     """
     if not sampling.on_arrival:
         return time_s
@@ -177,10 +177,10 @@ def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
 
 
 def _estimate_unlocated_losses(time_s: Array) -> Sampling:
-    """Return the sampling if the stamps are too bad, or too many are missing, to locate the losses.
+    """Return the sampling if bad stamps, or too many missing readings, prevent locating the losses.
 
     Random losses of a fraction p of all readings give the lateness the variance p m T² over m readings. It grows
-    fourfold from m to 4 m; errors that do not add up stay constant, and the wander of a clock grows much more.
+    fourfold from m to 4 m; errors that do not accumulate stay constant, and the random walk of a clock grows much more.
     """
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
     apart = min(len(time_s) // SEGMENTS, FARTHEST)
@@ -199,7 +199,7 @@ def _estimate_unlocated_losses(time_s: Array) -> Sampling:
 def _walk_variance(walk: Array, apart: int) -> float:
     """Return the variance that a random walk (k,) gains over `apart` steps, without trend (overlapping Allan variance).
 
-    Only the smaller second differences count: a buffer that is emptied at first makes a large one.
+    Only the smaller second differences count, because a buffer that is emptied at first causes a large one.
     """
     bends = (walk[2 * apart :] - 2 * walk[apart:-apart] + walk[: -2 * apart]) ** 2
     if not len(bends):
@@ -227,7 +227,7 @@ def _slope(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
 
 
 def _resolution_s(time_s: Array) -> float:
-    """Return the power of ten of a second that all stamps are multiples of; 0 without one."""
+    """Return the largest power of ten, s, that divides all stamps; 0 without one."""
     for decimals in range(DECIMALS):
         scaled = (time_s - time_s[0]) * 10**decimals
         if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
@@ -236,7 +236,7 @@ def _resolution_s(time_s: Array) -> float:
 
 
 def _least(values: Array, width: int) -> Array:
-    """Return the least (n,) of the values around each: the larger of the least ahead and behind, if there are both."""
+    """Return the least (n,) of the values around each: the larger of the minima ahead and behind, if both exist."""
     ahead, behind = _least_ahead(values, width), _least_behind(values, width)
     least = np.maximum(ahead, behind)
     least[:width], least[-width:] = ahead[:width], behind[-width:]

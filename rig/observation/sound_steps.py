@@ -39,7 +39,10 @@ def _find_sound_steps(run: RunData, settings: ObservationThresholds) -> frozense
 def _find_sound_steps_of(
     run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds
 ) -> frozenset[int]:
-    """Return one sensor's sound sweeps and dwells; none if it once did not follow the arm: its onset is unknown."""
+    """Return one sensor's sound sweeps and dwells.
+
+    None if the sensor once did not follow the arm, because the onset of that fault is unknown.
+    """
     try:
         stream = synchronize_stream(run.samples[sensor], run.sensors[sensor], motion)
         dwells = read_each_dwell(run, stream, motion, settings)
@@ -56,7 +59,7 @@ def _find_sound_steps_of(
 
 
 def _has_spike(stream: Stream, window: Window) -> bool:
-    """Return whether a reading at a constant rate is a spike, by which the verdict would fail whatever the mean."""
+    """Return whether a sweep has a spike, which fails the verdict regardless of the mean."""
     inside = between(stream, window.start_s, window.end_s)
     counts = stream.sensor.channel(RATE).counts(stream.raw)[inside].astype(np.float64)
     if not len(counts):

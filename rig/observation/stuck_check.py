@@ -21,7 +21,7 @@ REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
 def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
-    """Raise Fault `stuck_sensor` if rests read as if the sensor turned; `stuck_axis` if one axis alone has no noise."""
+    """Raise Fault `stuck_sensor` if readings at rest show rotation; `stuck_axis` if only one axis has no noise."""
     if len(rests) < 2:
         return
     apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0)
@@ -39,7 +39,7 @@ def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
 
 
 def check_other_direction(sweep: Sweep, valid_joints: Collection[str | None], fault: Fault) -> None:
-    """Raise Fault `stuck_sensor` if an earlier sweep of the joint read correctly: the mounting is not wrong then."""
+    """Raise Fault `stuck_sensor` if an earlier sweep of the joint read correctly, which excludes a wrong mounting."""
     if sweep.joint_name in valid_joints:
         raise Fault("stuck_sensor", f"{fault.what}; in the other direction it read correctly", REMEDY) from fault
 

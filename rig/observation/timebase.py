@@ -119,7 +119,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
 
 
 def _turns_every_axis(motion: KnownMotion) -> bool:
-    """Return whether every axis of a sensor turned, however it is mounted: one that does not may repeat one reading."""
+    """Return whether every axis of a sensor turned, however mounted; one that did not may repeat its reading."""
     rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
     return bool(np.linalg.eigvalsh(rates.T @ rates).min() > TURNED_RAD_S**2 * len(rates))
 
@@ -147,10 +147,10 @@ def check_readings(board_time_s: Array, readings: Array) -> None:
 
 
 def _find_first_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:
-    """Return the coarse clock of the first samples in which one is found, and their number.
+    """Return the coarse clock by the first samples that determine one, and their number.
 
-    All samples of a recording of ordinary length; of one of hours a part, from which the fine clock extrapolates to
-    twice its length, and so on.
+    These are all samples of a recording of ordinary length. In one of hours they are a part, from which the fine clock
+    extrapolates to twice its length, repeatedly.
     """
     span_s = LONG_RUN_S
     while True:
@@ -175,7 +175,7 @@ def _count_until(board_time_s: Array, span_s: float) -> int:
 
 
 def _search_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Return the clock to within the fine fit's reach: the offset and drift under which most is explained."""
+    """Return the clock within the fine fit's range of convergence: the offset and drift that explain most."""
     reference, half_s = (board_time_s[0] + board_time_s[-1]) / 2, (board_time_s[-1] - board_time_s[0]) / 2
     spacing = 2 * COARSE_REACH_S / half_s
     count = round(max(min(MAX_DRIFT, MAX_DRIFT_STEPS * spacing), MAX_DRIFT_LONG_RUN) / spacing)
@@ -191,7 +191,7 @@ def _search_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> 
 
 
 def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
-    """Return the start of the motion, and from there in such steps its rate (3, n) less its mean."""
+    """Return the start of the motion, and from there in steps its rate (3, n) less its mean."""
     grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
     rate = motion.rate(grid).T
     return float(grid[0]), rate - rate.mean(axis=1, keepdims=True)
@@ -202,8 +202,8 @@ def _coarse_offset(
 ) -> tuple[float, float]:
     """Return the fraction of the variance explained, and the offset (controller − `time_s`) to within a step.
 
-    Cross-correlates each axis with each (not magnitudes, in which a bias can hide the turning) and judges its peaks by
-    the vector fit. A step holds at least one sample.
+    Every pair of axes is cross-correlated (magnitudes could hide a rotation in a bias); the vector fit judges the
+    peaks. A step contains at least one sample.
     """
     step_s = max(COARSE_STEP_S, 1.1 * float(np.median(np.diff(time_s))))
     bins = ((time_s - time_s[0]) / step_s).astype(np.intp)
@@ -228,7 +228,7 @@ def _coarse_offset(
 
 
 def _fast_length(least: int) -> int:
-    """Return the next number without prime factors beyond 5: of such lengths a Fourier transform is fast."""
+    """Return the next number without prime factors beyond 5, a length for which a Fourier transform is fast."""
     threes = (3**power for power in range(least.bit_length()))
     odd = (three * 5**power for three in threes for power in range(least.bit_length()) if three * 5**power < 2 * least)
     length: int = min(number << (-(-least // number) - 1).bit_length() for number in odd)
@@ -277,10 +277,10 @@ def _average_samples(time_s: Array, readings: Array, count: int) -> tuple[Array,
 
 
 def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Return the clock under which readings and motion fit best, first by their slow parts.
+    """Return the clock with the best fit of readings and motion, first by their slow parts.
 
-    A ripple looks alike one period earlier and later, and a fast one is not the same in readings and states, each of
-    which has a filter of its own.
+    A ripple shifted by a period looks the same, and a fast ripple differs between readings and states, which have
+    different filters.
     """
     start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
     step_s = float(np.median(np.diff(board_time_s)))
@@ -310,7 +310,7 @@ def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion
 
 
 def _remaining_steps(ratio: float) -> float:
-    """Return how many times the last step remains if each is shorter by that ratio (Aitken's Δ²); else 0."""
+    """Return the number of last steps that remain if steps shrink by that ratio (Aitken's Δ²); 0 if they do not."""
     return min(ratio / (1 - ratio), FARTHEST) if 0 < ratio < 1 else 0.0
 
 

@@ -76,7 +76,7 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) in these steps, and its weights (n,), for averaging the arm's rate as well.
+    """Return the mean of readings (n, 3) in these steps, and its weights (n,), to average the arm's rate as well.
 
     A line slower than `SLOW` is poorly determined: its effect on the mean, or that of one of its size, adds variance.
     """
@@ -105,8 +105,8 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
 def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     """Return the variance (3,) that slow columns (n, k) fitted to residuals (n, 3) cause in a mean by weights (n,).
 
-    By their size alone: a line may come with any phase, and the phase of one turn may change the mean by little
-    although the line is large.
+    Only their amplitude is used: the phase is arbitrary, and a large line may by chance of phase change this mean
+    little.
     """
     powers = (fit_columns(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
     kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
@@ -122,7 +122,7 @@ def _fit_residuals(columns: Array, values: Array) -> Array:
 
 
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
-    """Find the vibrations in readings (n, 3), apart from steady columns (n, k) and what the encoders measure.
+    """Find the vibrations in readings (n, 3), apart from steady columns (n, k) and the rates by the encoders.
 
     Fast lines of the arm's rate are in the readings too, at the same frequency. The residuals show the others.
     """
@@ -156,21 +156,21 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
 
 
 def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
-    """Return columns (n, 2) that a lagging sensor reads of the slow part of a rate (n,), apart from columns (n, k)."""
+    """Return columns (n, 2) of a sensor's lag behind the slow part of a rate (n,), apart from columns (n, k)."""
     residuals = rate[:, None] - columns @ fit_columns(columns, rate[:, None])
     return _changes(slow_part(residuals, share))
 
 
 def _changes(slow: Array) -> Array:
-    """Return the first and second differences (n, 2) of a rate (n, 1): a lag shows the first, a filter the second."""
+    """Return the first and second differences (n, 2) of a rate (n, 1): the effects of a lag, and of a filter."""
     change = np.gradient(slow, axis=0)
     return np.column_stack([change, np.gradient(change, axis=0)])
 
 
 def slow_part(rates: Array, share: Array) -> Array:
-    """Return the part of rates (n, m) that comes less often than `SLOW` times in a turn; `share` (n,) is elapsed time.
+    """Return the part of rates (n, m) with less than `SLOW` cycles per turn; `share` (n,) is elapsed time.
 
-    Waves of half a turn describe it, for a vibration does not end with the turn.
+    Waves of half a turn describe it, because a vibration is not periodic in the turn.
     """
     halves = harmonics(np.pi * share, int(2 * SLOW))
     slow: Array = halves @ fit_columns(halves, rates)

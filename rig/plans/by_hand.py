@@ -41,7 +41,7 @@ class WantedMoves:
 
     @property
     def about(self) -> tuple[tuple[str, int], ...]:
-        """Whole turns: axis and direction, +1 or -1; a second one about an axis goes back."""
+        """Whole turns: axis and direction, +1 or -1; a second turn about an axis goes back."""
         return tuple((AXES[index % 3], -1 if index // 3 % 2 else 1) for index in range(self.turns))
 
 
@@ -57,12 +57,12 @@ class Open:
 
     @property
     def done(self) -> bool:
-        """Whether all is made: the flips of the list, or as many others, over all six faces."""
+        """Whether the session is complete: the flips of the list, or as many others, over all six faces."""
         return not self.turns and (not self.pairs or (self.flips == 0 and not self.faces))
 
 
 def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequence[Face]) -> Open:
-    """Return the remainder of a list after these moves; `faces_up` lay up at rest."""
+    """Return the moves that remain of a list; `faces_up` are the faces that were up at rest."""
     pairs, turns, flips = list(wanted.pairs), list(wanted.about), wanted.flips
     for move in moves:
         if move.kind == "flip":
@@ -79,7 +79,7 @@ def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequenc
 
 
 def next_instruction(remaining: Open, face: Face | None) -> Instruction | None:
-    """Return the next request for an item with side `face` up, None if unknown; None when all is made."""
+    """Return the next request for an item with side `face` up (None if unknown); None at the end."""
     if remaining.done or face is None:
         return None if remaining.done else Instruction("lay", ROUND[0])
     turn = next((candidate for candidate in remaining.turns if candidate[0] == face[1]), None)
@@ -92,7 +92,7 @@ def next_instruction(remaining: Open, face: Face | None) -> Instruction | None:
 
 
 def simulate_session(wanted: WantedMoves) -> Iterator[Instruction]:
-    """Yield the requests to an operator who follows all of them and begins with +z up."""
+    """Yield the requests to an operator who follows all of them, beginning with +z up."""
     moves, faces_up = list[HandMove](), list[Face](["+z"])
     while (instruction := next_instruction(still_open(wanted, moves, faces_up), faces_up[-1])) is not None:
         yield instruction

@@ -79,12 +79,12 @@ class Procedure(Generic[SectionT]):
 
     @property
     def reads_corrected(self) -> bool:
-        """Whether the board corrects what the sensors to calibrate stream, by the calibrations it has stored."""
+        """Whether the board corrects the readings of the sensors to calibrate, by its stored calibrations."""
         return self.readings == "calibrated"
 
     @property
     def calibrates_along(self) -> bool:
-        """Whether the board averages and solves while the host records: it can from raw readings alone."""
+        """Whether the board averages and solves while the host records, which requires raw readings."""
         return self.readings == "raw"
 
     def following(self, procedures: "Procedures") -> "AnyProcedure | None":

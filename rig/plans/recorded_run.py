@@ -55,8 +55,8 @@ def open_run(
 ) -> RecordedRun:
     """Return the recordings in a run folder, or a run file; `script` is executed, if it is named.
 
-    Of a folder `only` those of these names, if any are given: later recordings are left out. Raise Refused `no_run`,
-    and as `read_run` and `load_script`.
+    `only` selects recordings of a folder by name; without it later recordings are included. Raise Refused `no_run`, and
+    as `read_run` and `load_script`.
     """
     named = None if script is None else load_script(script)
     if not path.is_dir():
@@ -78,10 +78,10 @@ def open_run(
 
 
 def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
-    """Return the outcome of a run, phase after phase; one that was to follow and is missing has not passed.
+    """Return the outcome of a run, phase by phase; a missing phase that was to follow has not passed.
 
-    By the procedure's own estimator, unless another is requested; of a single recording the outcome of that recording.
-    Raise Fault and Refused by name as the procedure's analysis does.
+    The estimator is the procedure's own unless another is requested; a single recording has its own outcome. Raise
+    Fault and Refused by name as the procedure's analysis does.
     """
     procedure = _procedure_of(run, run.movement[0])
     estimator = estimator or procedure.estimator
@@ -95,7 +95,7 @@ def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
 
 
 def left_out(run: RecordedRun) -> str | None:
-    """Return the sentence that a script's analysis is missing in the solution, because it is not executed here."""
+    """Return the sentence that the solution lacks a script's analysis, which is not executed here."""
     for recording in (*run.raw, *run.corrected):
         if recording.external is None and _script_of(run, recording) is None and not _is_by_installed(recording):
             return (
@@ -113,7 +113,7 @@ def _is_corrected(run: RunData) -> bool:
 def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
     """Return the procedure of a recording: an installed one, or that of a script of the user's own.
 
-    If neither is known here, an installed one for the kind of readings: a solution needs no script. Raise Refused
+    If neither is available, an installed one for the kind of readings: a solution needs no script. Raise Refused
     `another_script` if the script is not the one of the recording, and as `kept_script`.
     """
     if _is_by_installed(recording):
@@ -128,7 +128,7 @@ def _is_by_installed(recording: RunData) -> bool:
 
 
 def _script_of(run: RecordedRun, recording: RunData) -> ScriptFile | None:
-    """Return the script of a recording if it may be executed: named by the user, or known from an own run."""
+    """Return the script of a recording if it may be executed: named by the user, or executed before."""
     folder = run.path if run.path.is_dir() else run.path.parent
     if _is_by_installed(recording) or (run.script is None and not (folder / SCRIPT).exists()):
         return None

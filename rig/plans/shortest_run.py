@@ -151,12 +151,12 @@ def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
 
 
 def _change(section: SectionT, **keys: object) -> SectionT:
-    """Return the section with other values of these keys. Raise ValidationError if the file may not have them."""
+    """Return the section with other values of these keys. Raise ValidationError for values that a file may not have."""
     return type(section).model_validate({**dict(section), **keys})
 
 
 def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:
-    """Return the run with these keys of its procedure, which end it when the target is reached."""
+    """Return the run with these keys of its procedure, by which it ends at the target."""
     procedure = planned.candidate.procedure
     with suppress(ValidationError):  # the target is larger than a file may have
         procedure = _change(procedure, **keys)
@@ -212,7 +212,7 @@ class _Swept:
         return candidates
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return those of each family with the largest angle and dwell, at most two repeats, short rests and long."""
+        """Return each family's candidates with the largest angle and dwell, up to two repeats, and extreme rests."""
         selected = {
             (candidate.family, candidate.rests_s): candidate
             for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)
@@ -282,7 +282,7 @@ class _ByHand:
         return [self._candidate(*numbers) for numbers in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return the candidate of most flips and least rests: without noise, more adds nothing."""
+        """Return the candidate with the most flips and fewest rests, the best one without noise."""
         return [max(candidates, key=lambda candidate: (candidate.sizes[0], -candidate.sizes[1], -candidate.sizes[2]))]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:
@@ -302,7 +302,7 @@ class _ByHand:
             return None
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
-        """Return the target's key for a session, less the part of U that no session shows."""
+        """Return the target of a session under its key, less the part of U that no session reduces."""
         remaining = wanted.scale**2 - (2 * REAL_HANDS) ** 2
         return {"target_scale_u": round(remaining**0.5, 7)} if 0 < remaining < inf else {}
 
@@ -312,7 +312,7 @@ class _ByHand:
 
 
 def _session(procedure: ProcedureSection) -> tuple[ByHandSection, Sequence[Instruction], float]:
-    """Return the section of a session by hand, its instructions, and the rest between two of them, s."""
+    """Return the section of a session by hand, its instructions, and the duration of a rest, s."""
     assert isinstance(procedure, ByHandSection)
     return procedure, list(simulate_session(Asked(procedure.flips, procedure.turns))), procedure.rest_s
 

@@ -11,7 +11,7 @@ class Verbs(Protocol):
 
     @property
     def plan(self) -> Plan:
-        """Steps to be done; less than the whole when an interrupted run is resumed."""
+        """The steps to be done; fewer than the complete plan if an interrupted run is resumed."""
         ...
 
     def preflight(self) -> None:
@@ -23,7 +23,7 @@ class Verbs(Protocol):
         ...
 
     def move(self, transfer: Transfer) -> None:
-        """Bring the arm somewhere; nothing is measured. It must be the plan's next motion, as a sweep must."""
+        """Move the arm without a measurement. The motion must be the plan's next, as a sweep must."""
         ...
 
     def sweep(self, sweep: Sweep) -> None:

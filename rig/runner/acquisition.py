@@ -99,7 +99,7 @@ class Acquisition:
     _heard: "SimpleQueue[tuple[str, NDArray[Any]]] | None" = None
 
     def expect(self, name: str, sensor: RecordedSensor) -> None:
-        """Count the samples of a sensor, before its stream begins. If it measures rates, watch whether it settles."""
+        """Count the samples of a sensor, before its stream begins; watch the settling of one with rates."""
         self.counts[name] = SensorCount(name, sensor)
         if sensor.measures(RATE):
             self.settling.expect(name, sensor)
@@ -127,9 +127,9 @@ class Acquisition:
 
     @contextmanager
     def thin_states(self) -> Iterator[None]:
-        """Record few of the arm's states inside the `with` block, after its first seconds, as the arm stands still.
+        """Record few of the arm's states inside the `with` block, after its first seconds, while the arm stands still.
 
-        The page and the watch over the arm still get all of them.
+        Page and supervision still receive all of them.
         """
         self._thinning = _Thinning()
         try:
@@ -150,8 +150,8 @@ class Acquisition:
     def collect_kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
         """Return the kept samples (n,) of one sensor, the kept arm states, and the number of new states among these.
 
-        New are those since the latest `keep`. The older ones reach back by `REACHES_BACK_S` from there at most, however
-        long the run has waited.
+        New are those since the latest `keep`. Older ones extend `REACHES_BACK_S` before it at most, however long the
+        run has waited.
         """
         with self._lock:
             batches = [batch for part in self._kept for batch in part.batches[sensor]]
@@ -177,7 +177,7 @@ class Acquisition:
             return tuple(count.summary for count in self.counts.values())
 
     def find_newest_readings(self, quantity: Scalar) -> dict[str, tuple[float, float]]:
-        """Return when each sensor that measures `quantity` was last read, s, and the reading, by name."""
+        """Return time, s, and value of the latest reading of each sensor of `quantity`, by name."""
         with self._lock:
             heard = {name: (count.read_s, count.latest.get(quantity.name)) for name, count in self.counts.items()}
         return {name: (read_s, value[0]) for name, (read_s, value) in heard.items() if value is not None}

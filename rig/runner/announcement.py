@@ -38,12 +38,12 @@ def mounting(plan: Plan, number: int, words: Wording) -> Prompt:
 def announcement(
     plan: Plan, report: Report, words: Wording, repeated: Plan | None, mounted: Iterable[str], *, early: bool = False
 ) -> Prompt:
-    """Return the question before the first motion, which depends on the pose that the turner reports.
+    """Return the question before the first motion, which depends on the turner's pose.
 
-    - `words`: the names of the turner.
-    - `repeated`: the movement that follows without another question if the calibration passes.
-    - `mounted`: lines that name the sensors that are turned.
-    - `early`: whether the movement may end before its last repeat.
+    - words: the names of the turner.
+    - repeated: the movement that follows without another question if the calibration passes.
+    - mounted: lines that name the sensors on the turner.
+    - early: whether the movement may end before its last repeat.
     """
     at_most = " at most, until the uncertainty is what is wanted" if early else ""
     home_rad = find_travel_to_home(plan, report.state.q_rad)

@@ -119,7 +119,7 @@ class Connector:
             )
 
     def _build_early_end(self, plan: Plan, sweeps: int) -> EndingEarly | None:
-        """Return the condition to end before the last repeat; None without a target, or if readings are compared."""
+        """Return the condition to end before the last repeat; None without a target, or for a verification."""
         section, procedure = self.loaded.config.procedure, self.phase.procedure
         if procedure.reads_corrected or not isinstance(section, SixObservationSection):
             return None
@@ -175,7 +175,7 @@ class Connector:
         return turner, report, kind.describe_connected(section, report)
 
     def _last_seen(self, turner: Turner) -> None:
-        """Report the turner's last state, as the page has last shown it moving."""
+        """Report the turner's last state again, as the page's last one shows it moving."""
         self.station.event(ArmSeen(turner.latest, turner.missed_states))
 
     def _build_provenance(

@@ -66,7 +66,7 @@ class _Connection:
         self._on_state(state)
 
     def hand_over(self, stack: ExitStack, on_state: OnState) -> Turner | None:
-        """Return the turner if it is connected and without fault, else None; `stack` closes it then."""
+        """Return the turner if it is connected without fault, else None; `stack` closes it later."""
         self._thread.join()
         if self._turner is None:
             return None
@@ -84,7 +84,7 @@ class _Connection:
         return self._turner
 
     def _let_go(self) -> None:
-        """Drop the references to the run, which would keep all of its readings in memory."""
+        """Drop the references to the run, which would retain all of its readings in memory."""
         self._on_state, self._turner = _forget, None
 
     def close(self) -> None:

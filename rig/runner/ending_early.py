@@ -90,7 +90,7 @@ class EndingEarly:
         return UncertaintySoFar(reached.scale, reached.bias_rad_s, self._repeats_left, self.ended)
 
     def skips(self, motion: Motion) -> bool:
-        """Return whether to skip the next motion of the plan: after the end, all but the way home."""
+        """Return whether to skip the next motion of the plan: after the end of the run, all but the way home."""
         index, self._motions = self._motions, self._motions + 1
         return self.ended and index != self._home
 
@@ -107,7 +107,7 @@ class EndingEarly:
         return self.sweeps // self.repeats
 
     def _stands_at(self, pose: Joints, sweeps_left: int) -> None:
-        """Note that an assessment is due if the remaining plan has a motion home from this pose."""
+        """Note that an assessment is due if the remaining plan has a motion home from the present pose."""
         self._repeats_left = -(-sweeps_left // self._per_repeat)
         self._home = next(
             (

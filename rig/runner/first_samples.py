@@ -23,7 +23,7 @@ class FirstSamples:
     _clock_began_s: float | None = None
 
     def wait_on(self, silent: Collection[str], clock_s: float | None = None) -> None:
-        """Count one more look, at which the sensors `silent` have sent nothing. Raise Fault `no_samples`.
+        """Count one more poll without data of the sensors `silent`. Raise Fault `no_samples`.
 
         `clock_s` is the reading of the turner's clock.
         """

@@ -91,7 +91,7 @@ class Run:
         return bool(planned - self._resume(phase).done)
 
     def _resume(self, phase: Phase) -> Resumption:
-        """Return the steps of earlier recordings that count: none with corrected readings, which are compared whole."""
+        """Return the steps of earlier recordings that count; none of corrected readings, which are compared whole."""
         if phase.procedure.reads_corrected:
             return Resumption()
         with self.report_end(self._advice, moved=False):
@@ -211,7 +211,7 @@ class Run:
 
     @contextmanager
     def report_end(self, advice: Advice | None = None, *, moved: bool = False) -> Iterator[None]:
-        """Report whatever ends a run early into its log too, followed by `advice` after a fault.
+        """Report the early end of a run, in its log too, followed by `advice` after a fault.
 
         A refusal means that nothing has moved; after a motion of the run (`moved`) it becomes a fault.
         """
@@ -259,7 +259,7 @@ def _add_notes(what: str, error: BaseException) -> str:
 
 
 def _notes(error: BaseException | None) -> Iterator[str]:
-    """Yield the notes of an error and of those it interrupted: a second Ctrl-C arrives while the first is handled."""
+    """Yield the notes of an error and of errors that it interrupted, such as a second Ctrl-C during the first."""
     while error is not None:
         yield from getattr(error, "__notes__", ())
         error = None if error.__suppress_context__ else error.__context__

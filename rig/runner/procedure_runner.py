@@ -151,8 +151,8 @@ class Rig:
     def preflight(self) -> None:
         """Check every condition of a movement, ask the operator, and take control of the arm.
 
-        A movement that was agreed to before begins without a question, unless the arm has moved since. Raise `Refused`
-        with every problem; nothing has moved then.
+        A movement agreed to before begins without a question, unless the arm has moved since. Raise `Refused` with
+        every problem; nothing has moved then.
         """
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
         refuse(kind.problems([self.whole_plan, self.plan], section, report))
@@ -272,7 +272,7 @@ class Rig:
         self._done.add(sweep.index)
 
     def _refuse_unplanned(self, motion: Motion) -> None:
-        """Raise `unplanned_motion` unless the motion is the plan's next: pre-flight has judged no other."""
+        """Raise `unplanned_motion` unless the motion is the plan's next, the only one that pre-flight has judged."""
         what = f"the script orders {motion.name}"
         remedy = "Let the script make the motions of `plan.steps`, each once, in their order, after `preflight()`"
         if self._motions is None:
@@ -407,7 +407,7 @@ class Rig:
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from its averages, for comparison with the host's.
 
-        Only after the last stage, from the sweeps of all: it uses speeds alone, whatever axis of the item is turned.
+        Only after the last stage, from the sweeps of all stages: it uses speeds alone, for any axis of rotation.
         """
         if self.onboard is not None and self.last:
             self.onboard.solve()
@@ -422,7 +422,7 @@ class Rig:
 
     @contextmanager
     def _step(self, step: Step, then: Callable[[], None] = lambda: None) -> Iterator[None]:
-        """Report the start and the end of a step; `then` is part of the step, but not of its time."""
+        """Report the start and the end of a step; `then` is part of the step, but not of its recorded time."""
         self._number += 1
         position = self._number, len(self.plan.steps), step
         turner = self.devices.turner

@@ -100,6 +100,6 @@ class Settling:
             return all(len(watched.at_rest_counts) >= SPANS_AT_REST for watched in self._watched.values())
 
     def find_unsettled(self) -> dict[str, float | None]:
-        """Return the sensors that have not settled: name → scatter over that at rest, None with too few readings."""
+        """Return the unsettled sensors: by name the scatter over that at rest, None with too few readings."""
         with self._lock:
             return {watched.name: watched.over_rest() for watched in self._watched.values() if not watched.settled}

@@ -80,7 +80,7 @@ class Warming:
 
     @property
     def _rate_k_s(self) -> float:
-        """The rate of a ramp: below the limit, and so slow that a set ends within a part of a gap."""
+        """The rate of a ramp: below the limit, and slow enough that a set takes only a part of a gap."""
         allowed_k_s = RAMP_SHARE * self.section.max_rate_k_per_min / 60
         return min(allowed_k_s, SET_SHARE * self.section.max_step_k / max(self.set_s, 1.0))
 
@@ -110,11 +110,11 @@ class Warming:
         return readings_c if len(readings_c) == len(self.names) else {}
 
     def find_missing(self) -> str | None:
-        """Return the part of the range that is not covered yet, in words; None if there is none."""
+        """Return the remaining part of the range, in words; None if it is covered."""
         return self.course.missing()
 
     def begin_waiting(self) -> None:
-        """Report the temperature that is waited for; the operator or the heater changes it."""
+        """Report the temperature to wait for, which the operator or the heater brings about."""
         now_c = self.now_c()
         nearest = self._nearest(now_c)
         if self.course.warming is None:
@@ -152,7 +152,7 @@ class Warming:
             self.heater.keep_heating(0.0)
 
     def _nearest(self, now_c: Mapping[str, float]) -> float:
-        """Return the temperature of the sensor that lags most in the direction of the course."""
+        """Return the temperature of the sensor that is last in the direction of the course."""
         return max(now_c.values()) if self.course.warming is False else min(now_c.values())
 
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:

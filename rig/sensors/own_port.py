@@ -77,12 +77,12 @@ class OwnPort:
         return self._most_silent_s is not None
 
     def stream(self, more_s: float = 0.0) -> None:
-        """Treat a silence from now on as a fault, if it is longer than `Patience.silent_s` plus `more_s`."""
+        """From now on treat a silence longer than `Patience.silent_s` plus `more_s` as a fault."""
         with self.news:
             self._most_silent_s, self.silence = self._patience.silent_s + more_s, PortSilence()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise the fault of the meantime, also a silence of a stream.
+        """Raise the fault since the last call, also a silence of a stream.
 
         `clock_s` is the present time of another instrument's clock, if any: a silence must also be as long by that.
         """
@@ -94,7 +94,7 @@ class OwnPort:
             raise _complete_error(self._faults.silent, f" for {silent_s:.1f} s")
 
     def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until a condition holds; return whether it did in time. Raise the fault of the meantime."""
+        """Wait until a condition is true; return whether it was in time. Raise a fault that occurs meanwhile."""
         with self.news:
             done = self.news.wait_for(lambda: until() or self.fault is not None, timeout_s)
             if self.fault is not None:

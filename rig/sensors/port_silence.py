@@ -15,7 +15,7 @@ class Patience:
     silent_s: float = 2.0
 
     def attempts(self, more_s: float = 0.0) -> list[float]:
-        """Return the time-outs, s, of repeated requests: `first_s` plus `more_s` in all, each twice the one before."""
+        """Return the time-outs, s, of repeated requests, each twice the previous, `first_s` plus `more_s` in sum."""
         return [(self.first_s + more_s) * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
 
 
@@ -23,9 +23,9 @@ USUAL = Patience()
 
 
 class PortSilence:
-    """The duration without data: the reader reports data, the supervisor the time of another clock, if any.
+    """The duration without data, s, in time spent reading, so that a delayed reader does not make a device silent.
 
-    It has no lock of its own: both lock `OwnPort.news` meanwhile.
+    Another instrument's clock that stands still, as a simulated one may, does not count either.
     """
 
     def __init__(self) -> None:
@@ -46,9 +46,9 @@ class PortSilence:
 
     @property
     def lasts_s(self) -> float:
-        """The duration without data, s, in time spent reading: a delayed reader does not make a device silent.
+        """The duration without data, s, in time spent reading, so that a delayed reader does not make a device silent.
 
-        Nor does another instrument's clock that stands still, if there is one: it may be a simulated one's.
+        Another instrument's clock that stands still, as a simulated one may, does not count either.
         """
         silent_s = self._idle_reads * READ_TIMEOUT_S
         if self._clock_s is None:

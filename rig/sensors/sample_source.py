@@ -24,5 +24,5 @@ class SampleSource(Protocol):
         ...
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors of the meantime; a silence must also be as long by the clock that shows `clock_s`, if any."""
+        """Raise errors since the last call; a silence must also be as long by the clock that shows `clock_s`."""
         ...

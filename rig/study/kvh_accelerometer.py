@@ -93,7 +93,7 @@ def _solve(means: Array, attitudes: Array, *, second_order: bool) -> TriaxialSol
 
 
 def _simulate_drift(seed: int) -> list[dict[str, Any]]:
-    """Return TRIAX, Fig. 6: a jump after the first repeat, then hardly any change."""
+    """Return the repeats of TRIAX, Fig. 6: a jump after the first repeat, then almost no change."""
     sensor = rt.DriftingSensor(
         rt.ACCELEROMETER_MATRIX,
         rt.ACCELEROMETER_REFERENCE_M_S2,

@@ -104,11 +104,11 @@ def draw_mean_readings(rng: np.random.Generator, F: Array, bias_rad_s: Array, sw
 def draw_means_and_squares(
     rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: SimulatedSweep
 ) -> tuple[Array, Array]:
-    """Draw averaged readings and averages of squared readings, both (…, 6, 3), of the same samples, exactly.
+    """Draw averages of readings and of their squares, both (…, 6, 3), of the same samples, exactly.
 
-    With d = n + c v the deviation of a sample from the mean, n noise and v the vibration common to the axes: v enters
-    through Σ(v − v̄)² ~ χ²(N − 1), the noise along v through one Gaussian z, and its rest through χ²(N − 2), so that
-    Σ(d − d̄)² = (σ z + c √Σ(v − v̄)²)² + σ² χ²(N − 2).
+    Let d = n + c v be the deviation of a sample from the mean, with noise n and the vibration v common to the axes. v
+    enters through Σ(v − v̄)² ~ χ²(N − 1), the noise along v through one Gaussian z, and its rest through χ²(N − 2), so
+    that Σ(d − d̄)² = (σ z + c √Σ(v − v̄)²)² + σ² χ²(N − 2).
     """
     mean, per_vibration = _draw_means(rng, F, bias_rad_s, sweep)
     shape, count = mean.shape, sweep.samples

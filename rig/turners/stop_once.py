@@ -41,7 +41,7 @@ class StopOnce:
                 self._thread.start()
 
     def outcome(self) -> StopOutcome:
-        """Stop unless that has begun, and wait for the outcome, less than 1 s.
+        """Stop, unless that has begun; wait for the outcome, less than 1 s.
 
         Raise an interrupt of the meantime once the outcome is there. (An event, because after an interrupt `join` takes
         the thread for ended in Python 3.11.)

@@ -94,7 +94,7 @@ def _sample_rotation(lasting_s: float, face: Face, rotation: Array) -> tuple[Arr
 
 
 def _rotation(face: Face, move: Instruction) -> Array:
-    """Return the rotation vector (3,) of a move in the item's axes, from the face above to the next one."""
+    """Return the rotation vector (3,) of a move in the item's axes, from the face that is up to the next one."""
     up, target = axis_of(face), axis_of(move.face)
     if move.turns:
         return 2 * np.pi * move.turns * up

@@ -173,7 +173,7 @@ def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: Run
 
 
 def false_alarm_per_check(kinds: int, *, of_all: float = FALSE_ALARMS) -> float:
-    """Return the false-alarm probability of each statistic of so many kinds of readings."""
+    """Return the false-alarm probability of each statistic, for a number of kinds of readings."""
     return coverage.false_alarm_of_each(of_all, len(CHECKS) * kinds)
 
 

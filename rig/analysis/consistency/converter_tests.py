@@ -62,10 +62,10 @@ COUNTS = Digits(True, Steps(1.0))
 
 
 def find_digits(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[NDArray[Any]]) -> Digits:
-    """Return the digits of a sensor's quantity, from all its samples (n,) of each recording.
+    """Return the digits of a sensor's quantity, from all samples (n,) of each recording.
 
-    A board records the counts of the part's converter. Other sources send computed or printed numbers: if their steps
-    are several recorded counts, they have no bits to test.
+    A board records the counts of the part's converter. Other sources send computed or printed numbers, which have no
+    bits to test if their steps are several recorded counts.
     """
     channel = sensor.channel(quantity)
     steps = channel.steps(
@@ -149,9 +149,9 @@ def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_va
 
 
 def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[float, int]:
-    """Return the largest deviation in units of the noise, and the number of axes whose spikes are one power of two.
+    """Return the largest deviation over the noise, and the number of axes whose spikes are one power of two.
 
-    The noise includes vibration and is half a step at least; such spikes come from one bit. The first readings are
+    Such spikes come from one bit. The noise includes vibration and is half a step at least. The first readings are
     omitted, as the filter of a quiet sensor has not settled.
     """
     half = step_counts / 2
@@ -219,7 +219,7 @@ def _count_repeated(counts: NDArray[np.int64]) -> int:
 
 
 def _count_heaped(counts: NDArray[np.int64], critical_value: float) -> int:
-    """Count the readings at the very end of an axis' range if they are more than next to it; else 0."""
+    """Count the readings at the limit of an axis' range; 0 unless they exceed those of the adjacent value."""
     heaped = 0
     for axis in counts.T:
         values, often = np.unique(axis, return_counts=True)

@@ -13,9 +13,9 @@ MOVED_STEPS, MOVED_RAD_S = 10.0, 0.02  # by which the rate along the axis must h
 
 
 def find_longest_frozen(recording: ObservedRun, name: str) -> int:
-    """Return the longest run of equal readings of one axis of a gyroscope during which its rate changed.
+    """Return the longest run of equal readings of a gyroscope's axis while the true rate changed.
 
-    The nominal mounting is accurate enough: a tilted axis, or a wrong scale factor, changes a change of rate by a
+    The nominal mounting is accurate enough: a tilted axis, or a wrong scale factor, alters a change of rate by a small
     fraction.
     """
     stream = recording.stream(name)
@@ -38,7 +38,7 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
 def _rate_change(recording: ObservedRun, time_s: Array, axis: Array) -> float:
     """Return the change of the rate along an axis (3,) of the flange over times (n,), rad/s.
 
-    Of means over `SMOOTHED_S`, as the rate between two states is as noisy as their times.
+    Rates are averaged over `SMOOTHED_S`, because the rate between two states has the noise of their times.
     """
     covered_s = time_s[recording.motion.covered(time_s)] if len(time_s) else time_s
     if len(covered_s) < FEWEST:

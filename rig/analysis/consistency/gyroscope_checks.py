@@ -142,10 +142,9 @@ def predict_detection_limits(
 
 
 def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:
-    """Return `_test_transfers` with the unexplained variance inflated as the transfers contradict each other.
+    """Return `_test_transfers` with the variance of the transfers inflated until their χ² equals their number.
 
-    The χ² of all segments less that of those without transfers is the transfers': it is to equal their number. The
-    factor is at most `MOST`.
+    Their χ² is that of all segments less that of the segments without transfers. The factor is at most `MOST`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     for ratio in np.geomspace(1.0, MOST, TRIED):
@@ -160,7 +159,7 @@ def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPa
 
 
 def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
-    """Return the χ² of segments beside all possible changes, and its degrees of freedom."""
+    """Return the χ² of segments with all possible changes in the model, and its degrees of freedom."""
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     nuisance = [apply_whitener(tested.model.whitener, columns) for columns in changed if columns is not None]
     return chi_square_of(tested.model.readings, np.concatenate([tested.model.model, *nuisance], axis=1), None)

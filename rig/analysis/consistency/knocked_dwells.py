@@ -43,7 +43,7 @@ def compare_dwell_halves(
 
 
 def _swing_variances(differences: Array, noise: Array) -> Array:
-    """Return the mean square (N,) by which the halves of the other dwells differ beyond their noise (3,)."""
+    """Return the mean square (N,) of the differences between halves of the other dwells, less their noise (3,)."""
     beyond = (differences**2 - noise).mean(axis=1)
     others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)
     return others

@@ -78,7 +78,7 @@ def _time(model: ReferenceModel) -> Array:
 
 
 def _half_step(model: ReferenceModel) -> Array:
-    """Return (K, 1): ½ in the second half of the time, −½ in the first: a change half-way, about its mean."""
+    """Return a step (K, 1) half-way through the recording, about its mean: −½ before, ½ after."""
     middle = (model.times_s.min() + model.times_s.max()) / 2
     return repeat_by_segment(np.where(model.times_s > middle, 0.5, -0.5), model.movement)[:, None]
 
@@ -96,7 +96,7 @@ def _axis_components(model: ReferenceModel) -> Array:
 
 
 def _bend_pattern(change: Callable[[Array], Array]) -> Callable[[ReferenceModel], Array]:
-    """Return the patterns of a nonlinear `change` of the specific force, both relative to the reference."""
+    """Return the patterns of a nonlinear `change` of the specific force, which is relative to the reference."""
 
     def patterns(model: ReferenceModel) -> Array:
         size = float(np.linalg.norm(model.theta[REFERENCE]))

@@ -48,7 +48,7 @@ class WhitenedReference:
     growth: Array
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative, with the δ beside the largest of them: see `WhitenedModel`."""
+        """Return the χ² of each alternative, with the δ estimated together with the largest: see `WhitenedModel`."""
         model = self._extend_model(nuisance)
         rotated = [self.rotation @ columns for columns in alternatives]
         delta_rad = self._estimate_delta(model)
@@ -61,11 +61,11 @@ class WhitenedReference:
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
-        """Return twice the log likelihood ratio with and without the columns, χ² if δ is known, and its limit.
+        """Return the likelihood-ratio statistic of the columns, and its limit.
 
-        Both have their restricted maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is
-        estimated, the limit is that of F, in proportion to δ's part in the variance. For None as columns it is the χ²
-        of all residuals.
+        It is twice the logarithm of the ratio, χ² if δ is given. Both likelihoods have their restricted
+        maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is estimated, the limit is
+        that of F, in proportion to δ's part in the variance. For None as columns it is the χ² of all residuals.
         """
         from scipy.special import chdtri
 
@@ -140,7 +140,7 @@ class WhitenedReference:
         return 2 * information(self.growth, delta_rad, model) * delta_rad**4
 
     def _delta_fraction(self, model: Array, columns: Array, delta_rad: float) -> float:
-        """Return the fraction of δ in the variance along columns, from 0 to 1."""
+        """Return the fraction (0 to 1) of the variance along columns that δ causes."""
         variance = 1 + delta_rad**2 * self.growth
         model_basis, _ = self._whiten_residuals(model, delta_rad)
         projections = remaining_directions(model_basis, columns / np.sqrt(variance)[:, None])

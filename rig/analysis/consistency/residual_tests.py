@@ -57,7 +57,7 @@ class WhitenedModel(Protocol):
     """Readings and their model, whitened by all modelled errors."""
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative, beside the model and the `nuisance` columns."""
+        """Return the χ² of each alternative, with the model and the `nuisance` columns fitted too."""
 
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
@@ -71,7 +71,7 @@ class WhitenedModel(Protocol):
 def test_alternatives(
     model: WhitenedModel, alternatives: Alternatives, false_alarm_probability: float
 ) -> dict[str, Statistic]:
-    """Return the statistic of every alternative that the model does not span, at that false-alarm probability each."""
+    """Return the statistic of every alternative outside the model, each with that false-alarm probability."""
     test = {name: model.test(columns, (), false_alarm_probability) for name, columns in alternatives.items()}
     return {name: statistic for name, statistic in test.items() if statistic is not None}
 
@@ -79,9 +79,9 @@ def test_alternatives(
 def find_outliers(
     model: WhitenedModel, segments: Iterable[int], columns: Callable[[int], Array], false_alarm_probability: float
 ) -> list[tuple[int, Statistic]]:
-    """Return the segment least like the others, then the next without it, until they agree or half are out.
+    """Return the outlier segments: the worst one, then the worst without it, until the rest agree or half are out.
 
-    If only two segments determine something, either may be the outlier: then both are returned.
+    If only two segments determine a parameter, either may be the outlier: then both are returned.
     """
     remaining, nuisance = list(segments), list[Array]()
     per_segment, most, outliers = (

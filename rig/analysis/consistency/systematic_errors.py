@@ -80,11 +80,10 @@ class KnownErrors:
 def collect_known_errors(
     surroundings: Surroundings, name: str, result: SensorResult, stamp_std_s: float | None = None
 ) -> KnownErrors:
-    """Return the known errors of a gyroscope and the arm, from the configuration and the recording.
+    """Return the standard uncertainties of gyroscope and arm, from the configuration and the recording.
 
-    A solve with several speeds estimates the nonlinearity, so nothing of it is known. A solve with one speed states one
-    scale factor for both directions, which an even part would split: it covers no more than the stated even part.
-    `stamp_std_s` is as in `RecordedSensor`.
+    A solve with several speeds estimates the nonlinearity, so it has no prior here. A solve with one speed states one
+    scale factor for both directions, so only the stated even part is allowed. `stamp_std_s` is as in `RecordedSensor`.
     """
     sensor, explained = result.sensor, result.explained
     return build_known_errors(
@@ -185,7 +184,7 @@ def patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> Ar
 
 
 def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
-    """Return the patterns of the arm's angles, and of those that do not repeat, for each sweep and transfer."""
+    """Return the patterns of the arm's angles, and for each sweep and transfer those that do not repeat."""
     by_angle = np.zeros((len(ANGLES), *segments.means_rad_s.shape))
     repeats = []
     for row, (sweep, interval) in enumerate(zip(segments.sweep, segments.intervals, strict=True)):
@@ -209,9 +208,9 @@ def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
 
 
 def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
-    """Return the patterns of encoder errors at each angle where parts of sweeps begin or end.
+    """Return the patterns of encoder errors at each angle where arcs begin or end.
 
-    Marks within a quarter of a part are one mark: a sweep back passes the same ones.
+    Angles within a quarter of an arc count as one mark, because a sweep back passes the same marks.
     """
     marks: list[tuple[int, float]] = []
     patterns_by_mark: list[Array] = []
@@ -275,7 +274,7 @@ def _wave_indices(motion: ArmMotion) -> dict[int, int]:
 
 
 def _end_patterns(interval: MotionInterval) -> list[Array]:
-    """Return (3,) rad/s per radian by which one moved joint was elsewhere before or after a transfer, for each."""
+    """Return a transfer's rate error (3,), rad/s per radian of one moved joint's error before or after it."""
     q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
     moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]
@@ -283,7 +282,7 @@ def _end_patterns(interval: MotionInterval) -> list[Array]:
 
 
 def _time_patterns(segments: Segments, jitter_s: float) -> Array:
-    """Return the patterns of the times between parts of a sweep: one part gains what the next loses."""
+    """Return the patterns of the times between parts of a sweep: an error lengthens one part and shortens the next."""
     edges = [
         (sweep, time_s)
         for sweep in np.unique(segments.sweep[segments.sweep > REST])

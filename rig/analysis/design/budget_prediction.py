@@ -53,7 +53,7 @@ STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real ti
 
 
 def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
-    """Return the budget that a run of the plan will have, for each sensor to calibrate.
+    """Return the predicted budget of each sensor to calibrate.
 
     It is that of the solution by which the turner's runs are judged: of the speeds alone if single readings of its
     angle scatter. Raise Fault as the estimators do if the plan determines too little, Refused as `settings_of`.
@@ -97,14 +97,14 @@ def _mounting_rotation(angle_deg: float) -> Array:
 
 
 def _simulate_readings(inputs: VectorInputs, matrix: Array) -> Array:
-    """Return the readings (N, 3) of a sensor of F (3, 3), with the same noise each time: no two readings are equal."""
+    """Return simulated readings (N, 3) of a sensor of F (3, 3), by a fixed draw of noise, so that no two are equal."""
     noise = np.random.default_rng(len(inputs.windows_s)).standard_normal((len(inputs.windows_s), 3))
     readings: Array = inputs.rates_rad_s @ matrix.T + np.sqrt(inputs.variances_rad2_s2) * noise
     return readings
 
 
 def _clock(uncertainty: Uncertainty, *, on_board: bool) -> ClockCheck:
-    """Return the comparison of the controller's clock with the computer's and the board's crystal, as a run has it."""
+    """Return the clock comparison of a run: the controller's clock, the computer's and the board's crystal."""
     stated = {
         BY_COMPUTER: uncertainty.computer_clock_ppm,
         **({BY_CRYSTAL: uncertainty.crystal_ppm} if on_board else {}),

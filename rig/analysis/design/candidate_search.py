@@ -151,17 +151,17 @@ class Shortest:
 
     @property
     def at_any_length(self) -> ReachedUncertainty:
-        """The smallest U of all runs, of each name: these may be different runs."""
+        """The smallest U by name, each from any of the runs."""
         return ReachedUncertainty(*(getattr(self.least(size).reached, size) for size in SIZES))
 
 
 def find_shortest(
     candidates: Sequence[Candidate], predict: Callable[[Candidate], Budgets | None], target: TargetUncertainty
 ) -> Searched:
-    """Return the shortest candidate whose predicted U meets the target, without evaluating all of them.
+    """Return the shortest candidate whose predicted U meets the target.
 
-    One that does excludes all longer ones; one that does not excludes those contained in it. `predict` returns None for
-    a candidate that cannot be run, which excludes no other.
+    A candidate that meets it excludes all longer ones; one that does not excludes those contained in it. `predict`
+    returns None for a candidate that cannot be run, which excludes no other.
     """
     remaining = sorted(
         (candidate for candidate in candidates if candidate.duration_s <= target.at_most_s),

@@ -24,7 +24,7 @@ class PlannedSegments:
     with_transfers: Segments
 
     def read_with(self, matrix: Array, angle_random_walk_rad_sqrt_s: float, rate_hz: float) -> "PlannedSegments":
-        """Return the segments read by a sensor of F (3, 3) with that angle random walk.
+        """Return the segments as a sensor of F (3, 3) with that angle random walk reads them.
 
         Samples that are too far apart do not resolve transfers.
         """

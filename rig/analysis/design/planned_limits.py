@@ -35,7 +35,7 @@ class DetectionLimits:
 def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> DetectionLimits:
     """Predict the detection limits of the gyroscopes to calibrate and, on an arm, of the accelerometers.
 
-    Assumes a nominal `turner` and the data sheet's noise, with flicker as the only bias drift. Of a plan over
+    The `turner` is nominal, the noise is the data sheet's, and flicker is the only bias drift. For a plan over
     temperature one set is evaluated.
     """
     if turner.joints == 0:

@@ -53,7 +53,7 @@ class Timed(Generic[StepT_co]):
 
     @property
     def window_s(self) -> tuple[float, float]:
-        """The start and end of its measurement: of a sweep the revolution, or its arc, at constant speed."""
+        """The start and end of the measurement; for a sweep the revolution, or arc, at constant speed."""
         if not isinstance(self.step, Sweep):
             return self.start_s, self.end_s
         middle, half = (self.start_s + self.end_s) / 2, self.step.angle_rad / 2 / self.step.speed_rad_s
@@ -84,7 +84,7 @@ def measuring_steps(plan: Plan) -> Iterator[Timed[Step]]:
 
 
 def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
-    """Return the revolution of a sweep, or its arc, as `ArmMotion.turn` will find it, with a mount (3, 3)."""
+    """Return a sweep's revolution, or arc, as `ArmMotion.turn` finds it in a recording, with a mount (3, 3)."""
     sweep, start_q_rad = timed_step.step, timed_step.step.first_q_rad
     return Revolution(
         *timed_step.window_s,
@@ -99,7 +99,7 @@ def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: 
 
 
 def predict_attitude(timed_step: Timed[Step], arm: DenavitHartenberg, mount: Array) -> Array:
-    """Return the mean attitude (3, 3) of a revolution, a rest or a dwell, as `ArmMotion.attitude` will find it."""
+    """Return the mean attitude (3, 3) of a revolution, rest or dwell, as `ArmMotion.attitude` finds it."""
     if not isinstance(timed_step.step, Sweep):
         return mount @ _attitude(timed_step.q_rad, arm)
     return mount @ _mean_attitude(

@@ -49,9 +49,9 @@ def list_accelerometers(config: RigConfig, run: PlannedRun) -> list[PlannedAccel
 
 
 def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
-    """Return an accelerometer's readings, with noise as its data sheet has it.
+    """Return an accelerometer's predicted readings, with the noise of its data sheet.
 
-    Of attitudes that are repeated the last one is held out, as in a run.
+    As in a run, the last repeat of the attitudes is held out.
     """
     run, mounting, second_order = (
         accelerometer.run,

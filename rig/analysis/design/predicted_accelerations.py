@@ -25,7 +25,7 @@ from rig.motion.steps import Plan
 
 
 def predict_accelerometer_budgets(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> dict[str, Budget]:
-    """Return the budget that a run of the plan will have, for each accelerometer to calibrate, on an `arm`.
+    """Return the predicted budget of each accelerometer to calibrate on an `arm`.
 
     Raise LinAlgError if the plan determines too little.
     """
@@ -61,6 +61,6 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
 
 
 def _new_fraction(dof: Uncertainty) -> float:
-    """Return the stated fraction of δ² that is new in each dwell, within the range of a solve."""
+    """Return the stated fraction of δ² that is independent between dwells, within the range of a solve."""
     fraction = dof.repeatability_deg**2 / max(dof.repeatability_deg**2 + dof.axis_deg**2, np.finfo(np.float64).tiny)
     return float(np.clip(fraction, OWN_SHARES[0], OWN_SHARES[-1]))

@@ -128,10 +128,10 @@ def solve_observed(
     estimator: str = DEFAULT_ESTIMATOR,
     matrix_corrected: Collection[str] = (),
 ) -> dict[str, SensorResult]:
-    """Calibrate `sensors` from all recordings, which were made in these `surroundings`.
+    """Calibrate `sensors` from all recordings, which share these `surroundings`.
 
     The sensors in `matrix_corrected` are corrected by the whole matrix if the estimator is the vector model; the others
-    as if their axes were orthogonal. With every estimator the sweeps must suffice for the six-observation solution: a
+    as if their axes were orthogonal. Every estimator requires sweeps that suffice for the six-observation solution: a
     plan that lacks a direction is refused. Raise Refused `unknown_estimator`; Fault `duplicated_observation` and as the
     estimators do.
     """
@@ -198,7 +198,7 @@ def _solve_sensor(
 def _budget_of(
     solution: Estimate, explained: Explained, surroundings: Surroundings, unknown: Unknown, name: str
 ) -> Budget | None:
-    """Return the budget of the chosen solution of the sensor `name`; two estimators have one."""
+    """Return the budget of the chosen solution of the sensor `name`; None by an estimator without budget."""
     if isinstance(solution, VectorSolution):
         return budget(explained, unknown)
     if isinstance(solution, Solution) and solution.estimator == "newton":

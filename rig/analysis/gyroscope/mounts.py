@@ -80,8 +80,8 @@ def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -
 def _rotation_in_stage(fit: Explained, index: int) -> tuple[Array, Array]:
     """Return the item's rotation (3,) in a stage relative to the first, and its standard deviations.
 
-    Both are in units of the stated standard deviation. If the item is rotated one way, all rates that it senses are
-    rotated the other way.
+    Both are in units of the stated standard deviation. A rotation of the item rotates all sensed rates the opposite
+    way.
     """
     size = len(fit.mounts)
     pick = np.zeros((3, size))

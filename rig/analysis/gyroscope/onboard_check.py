@@ -43,7 +43,7 @@ class Agreement:
     bias_difference_rad_s: float | None
 
     def checks(self, sensor: str) -> tuple[Check, ...]:
-        """Return the two checks of the verdict: unconfirmed arithmetic of a board does not pass."""
+        """Return the two checks of the verdict; a board whose arithmetic is unconfirmed does not pass."""
         scale, bias = self.scale_difference, self.bias_difference_rad_s
         return (
             fitness(sensor, "rate", "board_scale", scale, SCALE_LIMIT, parameter="scale"),
@@ -98,7 +98,7 @@ class _BoardObservation:
 
 
 def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObservation]:
-    """Return every observation that the board solved from, by the recorded samples."""
+    """Return every observation of the board's solution, by the recorded samples."""
     observations: list[_BoardObservation] = []
     for event in _events(runs[-1], sensor):
         if isinstance(event, BoardObserved):
@@ -109,7 +109,7 @@ def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObser
 
 
 def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _BoardObservation:
-    """Return a recalled observation from the newest recording that has it; not-a-number if none has."""
+    """Return a recalled observation from the newest recording that has it; NaN if none has."""
     for run in reversed(earlier):
         if earlier_observations := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
             return _average_observation(run, earlier_observations[recalled.sweep])

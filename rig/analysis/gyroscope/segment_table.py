@@ -46,7 +46,7 @@ class Segments:
 
 
 def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, site: Site) -> Segments:
-    """Return the segments of a gyroscope's windows, in the order in which `explained` was made from them.
+    """Return the segments of a gyroscope's windows, in the order of the means of `explained`.
 
     The Earth's rate is that of `explained`: given by the site, or estimated.
     """
@@ -84,9 +84,9 @@ def append_transfers(
     windows: Sequence[SegmentedAverage],
     explained: Explained,
 ) -> Segments:
-    """Return the segments with each transfer as one more; their sweeps count down from below `REST`.
+    """Return the segments with the transfers appended, numbered downwards from below `REST`.
 
-    Their noise is that of the other segments over their duration, or their own if that is more, plus the effect of
+    A transfer's noise is that of the other segments over its duration, or its own if that is more, plus the effect of
     vibration, estimated in the rests at either end. `windows` are those of the segments.
     """
     if not transfers:

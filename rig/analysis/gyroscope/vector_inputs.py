@@ -41,9 +41,9 @@ class RecordingPart:
 
 
 def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> VectorInputs:
-    """Return the arm's motion in each average of a sensor, in all recordings of a run, with the readings.
+    """Return the arm's motion and the readings in each average of a sensor, from all recordings of a run.
 
-    A controller's clock that runs too fast makes its speeds too small; they are corrected.
+    Speeds are corrected for the controller's clock: if it runs too fast, they are too small.
     """
     run = recordings[0].run
     parts = [
@@ -106,7 +106,7 @@ def _describe_recorded(
 def describe_sensor(
     uncertainty: Uncertainty, name: str, full_scale_rad_s: float, temperature_c: Array, temperature_step_k: float
 ) -> KnownSensor:
-    """Return what is stated of the sensor `name` with that range, and its temperature in each average (N,)."""
+    """Return the stated properties of the sensor `name` with that range, and its temperature in each average (N,)."""
     return KnownSensor(
         nonlinearity=uncertainty.stated_size("nonlinearity_percent", name) / 100,
         full_scale_rad_s=full_scale_rad_s,
@@ -147,10 +147,10 @@ def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncert
 
 
 def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array | None:
-    """Return the errors (P, N, 3) as in `VectorInputs` of a joint's encoder at each angle where arcs begin or end.
+    """Return the errors (P, N, 3) of `VectorInputs` by a joint's encoder at each angle where arcs begin or end.
 
-    Sweeps in both directions have the same ends, so the same errors: these are no noise, and repeats do not average
-    them out. None if all sweeps are whole revolutions, which end at the angle where they began.
+    Sweeps in both directions share these angles, so repeats do not average the errors out. None if all sweeps are whole
+    revolutions, which end where they began.
     """
     arcs = [None if turn.arc_rad is None else (turn.joint_name, *turn.arc_rad) for turn in turns]
     marks = list(dict.fromkeys((arc[0], end) for arc in arcs if arc is not None for end in arc[1:]))
@@ -167,7 +167,7 @@ def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncer
 
 
 def list_mount_rotations(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
-    """Return the rotations (3 S, N, 3) as in `VectorInputs` of an item off its mount by `mount_deg` about any axis.
+    """Return the rotations (3 S, N, 3) of `VectorInputs`: mounts that are wrong by `mount_deg` about any axis.
 
     None with one stage.
     """
@@ -192,7 +192,7 @@ def _group_by_axis(turns: Sequence[Observation]) -> list[list[int]]:
 
 
 def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
-    """Return what is stated of surroundings and sensor before the Earth's rate is estimated."""
+    """Return the stated values of surroundings and sensor, before the Earth's rate is estimated."""
     site, uncertainty = surroundings.site, surroundings.uncertainty
     return EarthRatePrior(
         up=np.array(site.up),
@@ -206,9 +206,9 @@ def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
 def list_uncertainties(
     surroundings: Surroundings, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> Unknown:
-    """Return the uncertainties that no recording of the sensor `name` shows, and that of the estimated Earth's rate.
+    """Return the uncertainties that no recording of the sensor `name` shows, with that of the estimated Earth's rate.
 
-    `stamp_std_s` as in `RecordedSensor`.
+    `stamp_std_s` is as in `RecordedSensor`.
     """
     uncertainty, clock = surroundings.uncertainty, surroundings.clock
     return Unknown(

@@ -86,7 +86,7 @@ def fit_mounting(
 ) -> RelativeRotation:
     """Return the rotation from reference to sensor by the revolutions of these recordings.
 
-    No `calibration` is for readings that are calibrated. Raise Fault as `fit_rotation` does.
+    `calibration` is None for readings that are calibrated already. Raise Fault as `fit_rotation` does.
     """
     described = recordings[0].run.sensors
     return fit_rotation(

@@ -86,8 +86,8 @@ class AccelerometerResult:
     def correction_matrix(self) -> Array:
         """The matrix M (3, 3) of s = M (a − b).
 
-        It leads to the orthogonal frame nearest to the gyroscope's axes, if the alignment is known, so that corrected
-        rates and accelerations are in one frame. Else to that nearest to the accelerometer's own.
+        It leads to the orthogonal frame nearest to the gyroscope's axes, so that corrected rates and accelerations
+        share a frame; without an alignment, to the frame nearest to the accelerometer's own axes.
         """
         matrix = self.triad.correction_matrix
         return matrix if self.alignment is None else self.alignment.rotation.T @ matrix
@@ -105,7 +105,7 @@ class AccelerometerResult:
 
     @property
     def lever_arm_std_m(self) -> Array | None:
-        """The standard deviations (3,) of the lever arm: a nominal mounting permutes the axes."""
+        """The standard deviations (3,) of the lever arm, in the flange's axes: a nominal mounting permutes them."""
         if self.solution.lever_arm_m is None:
             return None
         std: Array = np.abs(np.array(self.sensor.mounting)).T @ np.sqrt(np.diag(self.solution.covariance)[LEVER])
@@ -204,7 +204,7 @@ def _calibrate(
 
 
 def _select_planned(dwells: Sequence[DwellReading], settings: RunSettings) -> tuple[PlannedDwell, ...]:
-    """Return the planned dwells; over temperature only those that the run reached before its range was covered."""
+    """Return the planned dwells; over temperature only those that the run reached."""
     if settings.reference_c is None:
         return settings.planned_dwells
     last = max((dwell.index for dwell in dwells), default=-1)

@@ -50,7 +50,7 @@ def list_arm_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, moun
 
 
 def _error_fractions() -> Array:
-    """Return the part (18,) that each of the wrists' errors has of the arm's error."""
+    """Return the fraction (18,) of each wrist error in the arm's error."""
     return np.tile(np.where(np.arange(ERRORS) < STEADY, 1.0, WAVE_FRACTION), 3)
 
 
@@ -59,7 +59,7 @@ def _stack_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounti
 
 
 def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Array:
-    """Return the sizes (18, 3 or 10) of errors in a dwell or a sweep, as in `effects`, by radian of each wrist's."""
+    """Return the sizes (18, 3 or 10) of errors in a dwell or a sweep, as in `effects`, per radian of wrist error."""
     in_base = flange_errors(posture.q_rad, arm)
     in_flange = in_base @ (mounting @ flange_attitude(posture.q_rad, arm)).T
     if posture.wrist is None:
@@ -75,7 +75,7 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
 
 
 def _waves_from(angle_rad: float) -> Array:
-    """Return the waves of an angle (4, 4) by those of its change from here."""
+    """Return the matrix (4, 4) from the waves of an angle's change to those of the angle."""
     cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
     waves: Array = np.zeros((4, 4))
     waves[:2, :2] = [[cos, -sin], [sin, cos]]

@@ -50,12 +50,18 @@ class Datasheet:
 
     @property
     def even_s2_m(self) -> float:
-        """The half-width of φ without an odd part: the best line over ± V misses φ v² by φ V²/2."""
+        """The half-width of φ if there is no odd part.
+
+        Within ± V the best straight line deviates from φ v² by at most φ V²/2.
+        """
         return 0.02 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2)
 
     @property
     def odd_s4_m2(self) -> float:
-        """The half-width of χ without an even part: the best line misses χ v³ by χ V³/4."""
+        """The half-width of χ if there is no even part.
+
+        Within ± V the best straight line deviates from χ v³ by at most χ V³/4.
+        """
         return 0.04 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2) ** 2
 
 
@@ -89,7 +95,7 @@ class ReferenceWindow:
 
 
 def list_windows(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[DwellReading]) -> list[ReferenceWindow]:
-    """Return the windows that the sensor `name` is calibrated from: these dwells, then all sweeps."""
+    """Return the windows of the calibration of sensor `name`: these dwells, then all sweeps."""
     used = {dwell.index for dwell in dwells}
     return [
         *(
@@ -153,9 +159,10 @@ def add_errors(
 def separate_sensor_errors(
     spread: Spread, theta: Array, movement: Movement, datasheet: Datasheet
 ) -> tuple[Spread, list[Contributor]]:
-    """Return the `spread` by noise and arm, and the contributors by the sensor itself in this `movement`.
+    """Return the `spread` by noise and arm, and the contributors of the sensor itself in this `movement`.
 
-    The response is that of a solution which estimates all of them, so a nonlinear sensor's noise counts for more.
+    The response is that of a solution which estimates all of them, so the noise of a nonlinear sensor has a larger
+    effect.
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T for shared in (wandering(movement), flickering(movement))

@@ -122,7 +122,10 @@ def _calibrate(
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
-    """Return the drift by the tests at home of all recordings, None with one. Raise Fault `field_drifts`."""
+    """Return the drift by the tests at home of all recordings; None with only one test.
+
+    Raise Fault `field_drifts`.
+    """
     tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
     if len(tests) < 2:
         return None

@@ -131,7 +131,7 @@ def _field(site: Site, field_t: float) -> KnownSize:
 
 
 def lag_pattern(movement: Movement, lag_s: float) -> Array:
-    """Return the pattern (1, 3 K) of the sensor's filter: it reduces a sweep's wave by (ω τ)²/2, which no model has."""
+    """Return the pattern (1, 3 K) of the sensor's filter: it reduces a sweep's wave by (ω τ)²/2, outside the model."""
     dwells, sweeps = movement.dwells, movement.sweeps
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean is not reduced
@@ -141,8 +141,8 @@ def lag_pattern(movement: Movement, lag_s: float) -> Array:
 def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
     """Return the patterns (3, 3 N) of a field that changes linearly over the attitudes, and its change in T.
 
-    One pattern for each axis of the base: by one standard uncertainty if the `drift` was tested, else by half of all
-    that is possible.
+    Each axis of the base has one pattern: one standard uncertainty if the `drift` was tested, else half of the largest
+    possible drift.
     """
     change_t = UNTESTED_DRIFT_T
     if drift is not None:

@@ -92,7 +92,7 @@ def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData,
 
 
 def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> tuple[SensorResult, OverTemperature]:
-    """Return a gyroscope's calibration with the uncertainty by the polynomials, and these with its whole budget."""
+    """Return a gyroscope's calibration and polynomials, each with the uncertainty of both."""
     parameters = np.r_[result.scale, result.bias_rad_s]
     if result.uncertainty is None:
         return result, combine_with_reference(polynomials, np.diag(RATE.parameter_signs) @ parameters, ())
@@ -103,7 +103,7 @@ def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> 
 def add_acceleration_polynomials(
     result: AccelerometerResult, polynomials: OverTemperature
 ) -> tuple[AccelerometerResult, OverTemperature]:
-    """Return an accelerometer's calibration and polynomials as `add_rate_polynomials` does."""
+    """Return an accelerometer's calibration and polynomials, each with the uncertainty of both."""
     budget, combined = _combine(ACCELERATION, polynomials, np.r_[result.triad.scale, result.bias_m_s2], result.budget)
     return replace(result, budget=budget), combined
 
@@ -111,7 +111,7 @@ def add_acceleration_polynomials(
 def _combine(
     quantity: Quantity, polynomials: OverTemperature, parameters: Array, budget: Budget
 ) -> tuple[Budget, OverTemperature]:
-    """Return a budget of scale factors and biases (6,) with the polynomials' part, and these with the budget's."""
+    """Return a budget (6,) of scale factors and biases, and polynomials, each with the uncertainty of both."""
     sign = np.diag(quantity.parameter_signs)
     values = sign @ parameters
     lines = tuple(

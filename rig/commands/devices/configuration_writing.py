@@ -53,7 +53,7 @@ def write_checked(path: Path, answers: "Answers") -> int:
 
 
 def _schema_from(schema: Path, path: Path) -> str:
-    """Return the path of the schema from the file: relative if both lie below one folder, else a URL."""
+    """Return the schema's path relative to the file if both lie below one folder, else its URL."""
     folder = path.resolve().parent
     if schema.is_relative_to(folder) or folder.is_relative_to(schema.parent.parent):
         return Path(os.path.relpath(schema, folder)).as_posix()

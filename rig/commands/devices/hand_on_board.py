@@ -44,7 +44,7 @@ UNCHECKED = "the board's own result: its readings are gone, so double precision 
 
 
 def hand(options: Namespace) -> int:
-    """Let the board calibrate, or fetch its last result; print it, and how far double precision differs.
+    """Let the board calibrate, or fetch its last result; print it with its difference from double precision.
 
     Raise Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and as
     `calibrate_by_board` and `read_kept_solution`; Fault as the first of them.

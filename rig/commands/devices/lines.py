@@ -44,7 +44,7 @@ def add_stated(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the section on stdout, or write the file, and report on stderr what the lines show and what they do not.
+    """Print the section on stdout, or write the file; report on stderr what the lines do and do not show.
 
     Return 0, or 1 if the file needs more values. Raise Refused as `look_at_device`, `ask_stated` and `write_checked`.
     """
@@ -88,7 +88,7 @@ def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
 
 
 def positive_number(text: str) -> str:
-    """Return a number as it was written. Raise ValueError if it is none above 0."""
+    """Return the text of a number above 0. Raise ValueError for any other text."""
     try:
         value = float(text)
     except ValueError:

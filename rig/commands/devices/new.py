@@ -49,7 +49,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Ask what no option says, write the file and check it; return 0, or 1 if values remain to be filled in.
+    """Ask for values without an option, write the file and check it; return 0, or 1 if values remain to be filled in.
 
     Raise Refused `not_answered`, `bad_option`, `configuration_not_written`.
     """
@@ -104,7 +104,7 @@ def _turner_answers(turner: str, options: Namespace) -> dict[str, object]:
 
 
 def _lines_answers(options: Namespace, port: str, *, by_hand: bool) -> dict[str, object]:
-    """Return what the device shows; if it is not inspected or does not answer, the answers of the user."""
+    """Return the values that the device shows; without inspection or answer, those that the user gives."""
     choices = {"yes": "yes: ten seconds, and nothing is left to look up", "no": "no: write an example, to be edited"}
     user_values = ask_stated(options, by_hand=by_hand)
     if ask_choice("Look at the device now?", "--listen", choices, options.listen) == "yes":

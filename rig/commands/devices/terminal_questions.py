@@ -15,10 +15,10 @@ def ask(
     usual: str | None = None,
     value: str | None = None,
 ) -> str:
-    """Return the answer to a question: the option's value, or the typed text, asked again until it is valid.
+    """Return the answer to a question: the option's value, or typed text, asked for until it is valid.
 
-    `valid` returns an answer as it is used, and raises ValueError for an invalid one. `usual` is the meaning of Enter.
-    Raise Refused `not_answered`, and `bad_option` for an invalid option.
+    `valid` converts an answer and raises ValueError for an invalid one. `usual` is the meaning of Enter. Raise Refused
+    `not_answered`, and `bad_option` for an invalid option.
     """
     if value is not None:
         try:

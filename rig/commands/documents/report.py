@@ -141,7 +141,7 @@ def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path
 def _make_digital(
     certificate: "Certificate", by: "Signatory | None", reason: "Reason", left_out: list[Refused] | None
 ) -> dict[str, bytes]:
-    """Return the digital certificate by its name, signed if there is a signatory, or nothing if it cannot be made.
+    """Return the digital certificate by name, signed if there is a signatory; empty if it cannot be made.
 
     The reason is appended to `left_out`, or only printed if that is None.
     """

@@ -59,7 +59,7 @@ def _list_sensors(result: "ResultDocument") -> list[str]:
 
 
 def _describe_scalars(run: Path) -> dict[str, str]:
-    """Return the channels without axes in words by sensor name, from the recording, as the result has none of them.
+    """Return the channels without axes in words, by sensor name; only the recording has them.
 
     Raise Refused as `read_run`.
     """

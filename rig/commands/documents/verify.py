@@ -133,7 +133,7 @@ def _look_up(
 def _judge(
     file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: "FileEntries | None"
 ) -> VerifiedFile:
-    """Judge one file; if it has no signature, a signed file that holds it or the history vouches for it."""
+    """Judge one file; without a signature, by a signed file that contains it, or by the history."""
     look, attached_to = looks[file], None
     problems = look.problems
     if not look.signatures:
@@ -153,7 +153,7 @@ def _judge(
 def _find_signed_holder(
     name: str, content: bytes, look: "FileInspection", looks: "Mapping[Path, FileInspection]"
 ) -> tuple[str | None, tuple[Refused, ...]]:
-    """Return the signed file that holds an unsigned one, and its problems: if held, those of the signer."""
+    """Return the signed file that contains an unsigned one; if there is one, also the problems of its signer."""
     from rig.report.signatures.findings import not_as_signed
 
     holders = {other: signed for other, signed in looks.items() if name in signed.attached}

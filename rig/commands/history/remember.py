@@ -63,7 +63,7 @@ def _enter_run(
 
 
 def _is_usual(address: "HistoryAddress") -> bool:
-    """Return whether this is the history of a command that names none."""
+    """Return whether this history is the default one, which commands use if none is named."""
     from rig.history.storage.address import own_history_address
 
     try:
@@ -97,7 +97,7 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
 
 
 def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | None:
-    """Return number and SHA-256 of the last entry in the journal in which `remember_certificate` notes a certificate.
+    """Return number and SHA-256 of the last entry in the journal to which `remember_certificate` would add.
 
     None if there is no history, if it does not answer, or if it is empty.
     """

@@ -34,7 +34,7 @@ def recall_sensors(config: RigConfig, moved: frozenset[str]) -> Memory:
 def find_other_board(
     config: RigConfig, board: str, parts: Collection[str], own_serial_numbers: Collection[str], *, simulated: bool
 ) -> str | None:
-    """Return the serial number, in words, that the history has of one of these `parts` on that board.
+    """Return another serial number, in words, that the history has of one of these `parts` on that board.
 
     None if it is one of `own_serial_numbers`. The newest calibration decides. A history that does not answer gives
     None.

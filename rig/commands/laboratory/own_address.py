@@ -22,8 +22,8 @@ CANDIDATES = 250
 def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[str]]:
     """Yield the overrides that give a configuration's laboratory an address of its own for the length of the block.
 
-    `laboratory` is the file as used if it has a simulated one, else None. There are no overrides if its address is
-    free, if it is real, or if no candidate is free: whichever device needs the address then reports it.
+    `laboratory` is the file with defaults if it simulates one, else None. There are no overrides if its address is
+    free, if it is real, or if no candidate is free: then the device that needs the address reports it.
     """
     if laboratory is None or not isinstance(config, RigConfig):
         yield []

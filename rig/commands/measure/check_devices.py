@@ -135,7 +135,7 @@ def _check_turner(configured: "Configured", tell: Tell) -> list[Problem]:
 def _find_other_claims(host: str) -> list[Problem]:
     """Return a problem if another rig has claimed the arm.
 
-    The claim lasts no longer than this call, as to check the arm disturbs no other rig.
+    The claim lasts no longer than this call, because a check of the arm disturbs no other rig.
     """
     from rig.commands.laboratory.claims import claim_arm
 

@@ -43,9 +43,9 @@ def _sha256(file: Path) -> str:
 
 
 def _list_addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
-    """Yield what a run would connect to, and its address.
+    """Yield each device that a run would connect to, with its address.
 
-    A simulated laboratory is on this computer and answers there itself, but may keep its board's flash in a file.
+    A simulated laboratory answers on this computer itself, but may store its board's flash in a file.
     """
     config = loaded.config
     if loaded.flash_file is not None:

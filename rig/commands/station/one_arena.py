@@ -11,7 +11,7 @@ M_ARENA_MAX = -8  # malloc.h
 
 
 def keep_to_one_arena() -> None:
-    """Make all threads of this process share freed memory; do nothing on another C library than glibc."""
+    """Make all threads of this process share freed memory, with the C library glibc; else do nothing."""
     if sys.platform == "linux":
         mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
         if mallopt is not None:

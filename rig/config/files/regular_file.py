@@ -17,7 +17,7 @@ class UnfitFile(Exception):
 
 
 def file_identity(path: Path) -> FileIdentity | None:
-    """Identify what lies at that path, a link itself; None where nothing does. Raises OSError."""
+    """Return the identity of the file or link at that path; None if there is none. Raise OSError."""
     try:
         status = path.lstat()
     except FileNotFoundError:
@@ -27,9 +27,9 @@ def file_identity(path: Path) -> FileIdentity | None:
 
 @contextmanager
 def shut_files(identities: Callable[[], Iterable[FileIdentity]]) -> Iterator[None]:
-    """Have nothing here open these files for the length of the block, as a database of this process works on them.
+    """Prevent this process from opening these files during the block, while a database of it uses them.
 
-    Opening and closing one would take that database's locks away.
+    Opening and closing such a file would release the database's locks.
     """
     _shut.append(identities)
     try:

@@ -15,9 +15,9 @@ NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 
 @contextmanager
 def replace_together() -> Iterator[None]:
-    """Hold the files back that this block writes: at its end all take their places, the one written last first.
+    """Put all files that this block writes in place at its end, the one written last first.
 
-    If it ends in an error, or a file cannot take its place, those that have none are removed.
+    If the block ends in an error, or a file cannot be put in place, new files without a predecessor are removed.
     """
     parts: dict[Path, Path] = {}
     token = _held_back.set(parts)
@@ -37,10 +37,8 @@ def replace_together() -> Iterator[None]:
 def new_file(path: Path) -> Iterator[BinaryIO]:
     """Open a file to be written in this block, which then replaces `path` completely or not at all.
 
-    Within `replace_together` it does so at the end of that.
-
-    What lies at `path` is replaced, a link itself and not what it leads to. Raises OSError as writing does, and where
-    somebody lays something beside it at the same moment.
+    Within `replace_together` that happens at the end of its block. A link at `path` is replaced itself, not its target.
+    Raise OSError as writing does, also if another process creates a file of that name at the same moment.
     """
     part = path.with_name(path.name + PART)
     part.unlink(missing_ok=True)

@@ -11,9 +11,9 @@ from rig.config.files.yaml_text import Location
 
 
 def take_text_as_written(model: type[BaseModel], data: Any, prefix: Location, written: Mapping[Location, str]) -> None:
-    """Put into `data`, a section of `model` that stands at `prefix`, the words that were `written` where it holds text.
+    """Restore texts in `data`, a section of `model` at `prefix`, as they were `written`.
 
-    YAML makes 15 of a serial number 0017, and a date of 2026-11-20.
+    YAML reads a serial number 0017 as 15, and 2026-11-20 as a date.
     """
     if isinstance(data, dict):
         for key, field in model.model_fields.items():
@@ -22,7 +22,7 @@ def take_text_as_written(model: type[BaseModel], data: Any, prefix: Location, wr
 
 
 def _restore_text(annotation: Any, value: Any, location: Location, written: Mapping[Location, str]) -> Any:
-    """Return the `value` of a key of type `annotation`, its texts as they were written in the file."""
+    """Return the `value` of a key of type `annotation`, with its texts as the file has them."""
     kinds = _kinds(annotation)
     if str in kinds and not isinstance(value, (str, dict, list)) and location in written:
         return written[location]

@@ -31,7 +31,7 @@ OfSensors = TypeVar("OfSensors")  # a size that a configuration states of all se
 
 
 def _the_parts(what: str, unit: str | None = None) -> Any:
-    """Return a figure of each sensor from its part's row in the catalogue."""
+    """Return the value of a property for each sensor, from its part's row in the catalogue."""
     extra: dict[str, Any] | None = None if unit is None else {"unit": unit}
     return Field(default=None, description=f"{what}; if left out, the part's value", json_schema_extra=extra)
 

@@ -95,7 +95,7 @@ class SixSweepsSection(ProcedureSection):
 
     @model_validator(mode="after")
     def every_direction_is_swept(self) -> Self:
-        """Six parameters need all six directions (SIX, section II-B); refuse before anything moves, not after."""
+        """Refuse an order that lacks one of the six directions, which six parameters need (SIX, section II-B)."""
         order, directions = self.order or get_args(Wrist), self.directions or ("cw", "ccw")
         if len(set(order)) < 3 or len(order) > 3 or set(directions) != {"cw", "ccw"}:
             raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
@@ -122,7 +122,7 @@ class SixSweepsSection(ProcedureSection):
 
     @property
     def mountings(self) -> tuple[StageSection, ...]:
-        """The stages, in which the item is mounted anew; none where it stays as it is."""
+        """The stages with their mountings of the item; empty if it stays as it is."""
         return ()
 
     @property
@@ -460,7 +460,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @property
     def accelerometer_order(self) -> AccelerometerOrder:
-        """Order of the accelerometer's model where a set has attitudes; else 0."""
+        """The order of the accelerometer's model if a set has attitudes; else 0."""
         return (2 if self.second_order else 1) if self.with_attitudes else 0
 
     def problems(self, config: RigConfig) -> Iterator[str]:

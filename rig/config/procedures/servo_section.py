@@ -69,7 +69,7 @@ class ServoSection(TurnerSection):
 
     @property
     def simulated_at(self) -> str | None:
-        """The host of its port; None of a serial port, at which none can be simulated."""
+        """The host of its port; None for a serial port, which cannot be simulated."""
         return urlsplit(self.port).hostname if self.port.startswith("socket://") else None
 
     def moved_to(self, host: str) -> Mapping[str, str]:

@@ -248,12 +248,12 @@ class LinesSection(Section):
 
     @property
     def prefix_pattern(self) -> re.Pattern[bytes] | None:
-        """What finds the prefix at the start of a line, of one with digits that change; None of any other."""
+        """The pattern of a prefix with changing digits; None for any other prefix."""
         if "*" not in self.prefix:
             return None
         return re.compile(b"^" + rb"\d+".join(map(re.escape, self.prefix.encode().split(b"*"))), re.MULTILINE)
 
     @property
     def least_bytes(self) -> int:
-        """The shortest a line can be: a digit and a separator a column, and what always stands there."""
+        """The length of the shortest line: a digit and a separator for each column, and the fixed text."""
         return 2 * len(self.columns) + len(self.prefix) + sum(map(len, self.keys)) + 3 * (self.checksum == "nmea")

@@ -69,7 +69,7 @@ class MavlinkSection(Section):
 
     @property
     def wired(self) -> bool:
-        """Whether bytes need time on the way, as over a serial port."""
+        """Whether transfer takes time, as over a serial port."""
         return not self.port.startswith(("udp:", "tcp:", "socket://"))
 
 

@@ -73,11 +73,11 @@ class PartSpec:
 
     @property
     def angle_random_walk_rad_sqrt_s(self) -> float:
-        """Standard deviation of what white noise alone makes of an angle in a second, rad/√s."""
+        """The standard deviation of the angle after 1 s by white noise alone, rad/√s."""
         return radians(self.angle_random_walk_deg_sqrt_h) / 60
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's own rate that `rate_hz` means. Raise ValueError with the nearest if there is none."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError with the nearest if there is none."""
         if self.any_rate:
             return positive(rate_hz)
         return nearest_rate(rate_hz, self.rates_hz, self.rates_rule)
@@ -96,7 +96,7 @@ class MagnetometerPart:
     default_rate_hz: float
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's own rate that `rate_hz` means. Raise ValueError with the nearest if there is none."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError with the nearest if there is none."""
         return nearest_rate(rate_hz, self.rates_hz, list_numbers(self.rates_hz))
 
     def accept_range(self, range_gauss: float) -> float:
@@ -105,7 +105,7 @@ class MagnetometerPart:
 
 
 def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
-    """Return the rate that `rate_hz` means. Raise ValueError with the nearest if there is none."""
+    """Return the exact rate for a nominal `rate_hz`. Raise ValueError with the nearest if there is none."""
     nearest = min(rates_hz, key=lambda rate: abs(rate - rate_hz))
     if abs(nearest - rate_hz) > RATE_TOLERANCE * nearest:
         raise ValueError(f"not available; the nearest is {nearest:.6g}; allowed: {rule}")

@@ -204,7 +204,7 @@ class SensorSection(Section):
         return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)
 
     def brings(self, name: str) -> set[str]:
-        """Return the names of the other sensors whose readings come by the port of this one, called `name`."""
+        """Return the names of the other sensors at the port of this one, called `name`."""
         if self.lines is None:
             return {field_name(name)} if self.serial is not None and self.serial.message == "C" else set()
         field = {field_name(name)} if self.lines.field is not None else set()
@@ -247,7 +247,7 @@ class SensorSection(Section):
 
     @model_validator(mode="after")
     def its_own_port_carries_it(self) -> Self:
-        """Refuse a port for a part on the board, and a part with a port of its own without one."""
+        """Refuse a port of its own for a part on the board, and a part that needs one without it."""
         if self.part == "mavlink" or self.mavlink is not None:
             return self._is_in_autopilot()
         own_port = PARTS[self.part].own_port

@@ -47,14 +47,14 @@ class Interrupts:
         self.allow()
 
     def allow(self) -> None:
-        """Let the next signal raise, however soon it comes after the last."""
+        """Permit the next signal to raise, however soon it follows the last one."""
         self._raised_s = float("-inf")
         self._first_s: float | None = None  # when the signal came that waits for a lock
 
     def hear(self, number: int, frame: FrameType | None, text: str = "") -> None:
-        """Raise, as the handler of a signal; not in a burst of them, and a moment later while a lock is being taken.
+        """Handle a signal by an exception, except within a burst; while a thread takes a lock, a moment later.
 
-        For a lock that another thread does not return it waits no longer than for a burst.
+        It waits for that lock no longer than a burst lasts.
         """
         now_s = time.monotonic()
         if now_s - self._raised_s < BURST_S:
@@ -69,7 +69,7 @@ class Interrupts:
 
 
 def _takes_a_lock(frame: FrameType | None) -> bool:
-    """Return whether the code of a frame, or one of its callers, takes or leaves a lock."""
+    """Return whether a frame, or one of its callers, is acquiring or releasing a lock."""
     while frame is not None:
         if frame.f_code.co_filename == threading.__file__ and frame.f_code.co_name in _LOCK_METHODS:
             return True

@@ -37,9 +37,9 @@ class Silence:
         self.ticks = self._all_ticks = 0
 
     def tick(self, unheard: bool = False) -> None:
-        """Count one more interval without a sign of life: call this at even intervals.
+        """Count one more interval without a sign of life; to be called at even intervals.
 
-        `unheard`: an answer has arrived and was not read yet; that is not the process' silence.
+        `unheard`: an answer has arrived but was not read yet, so the process was not silent.
         """
         self._all_ticks += 1
         # The first tick of a silence means nothing yet; from the second on the process' threads are examined.
@@ -47,9 +47,9 @@ class Silence:
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Return whether there were more than `limit` silent ticks, or far more on a machine too busy to judge.
+        """Return whether there were more than `limit` silent ticks, or far more on an overloaded machine.
 
-        The limit is for a machine with a processor for every program; the machine's `crowding` stretches it.
+        The limit applies to a machine with a processor for every program; the machine's `crowding` extends it.
         """
         if max(self.ticks, self._all_ticks / self._spared) <= limit:
             return False
@@ -57,13 +57,13 @@ class Silence:
         return self.ticks > stretched or self._all_ticks > self._spared * stretched
 
     def _is_stopped(self) -> bool:
-        """Return whether the process was stopped by a signal: then the machine is not the cause of its silence."""
+        """Return whether a signal has stopped the process, so that the machine is not the cause of its silence."""
         return _state(self._tasks / self._main) == "T"
 
     def _is_starved(self, has_previous: bool) -> bool:
-        """Return whether the process waited for a processor since the last call; False if there was none before.
+        """Return whether the process waited for a processor since the last call; False at the first call.
 
-        A thread that still waits is not counted as waiting by the system, but as ready to run without having run.
+        The system does not count a thread that still waits as waiting, but as ready to run without having run.
         """
         now_s = time.monotonic()
         elapsed_s, before = now_s - self._looked_s, self._times

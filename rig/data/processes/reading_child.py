@@ -47,7 +47,7 @@ def _main() -> NoReturn:
 
 
 def _output() -> BinaryIO:
-    """Return the former stdout, and redirect stdout to nowhere: libraries print their comments on a file."""
+    """Return the original stdout, and redirect stdout to nowhere, because libraries print comments."""
     out = os.fdopen(os.dup(1), "wb")
     with Path(os.devnull).open("wb") as nowhere:
         os.dup2(nowhere.fileno(), 1)
@@ -101,7 +101,7 @@ def _lower(what: int, limit: int) -> int:
 
 
 def _end(status: Status, why: str = "") -> NoReturn:
-    """End without closing what is open: HDF5 may not close what it could not open."""
+    """End without closing files, because HDF5 may fail to close a file that it failed to open."""
     sys.stderr.write(why + "\n" if why else "")
     sys.stderr.flush()
     os._exit(status)

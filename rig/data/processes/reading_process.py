@@ -117,7 +117,7 @@ def _file_size_on_disk(path: Path, name: str = "it") -> int:
 
 
 def size_without_holes(file: BinaryIO) -> int:
-    """Return the size of an open file without its holes, which take no space; its size if the system cannot say."""
+    """Return the size of an open file without its holes; the full size if the system does not tell."""
     size = os.fstat(file.fileno()).st_size
     if not hasattr(os, "SEEK_DATA"):
         return size
@@ -170,7 +170,7 @@ class ReadingTask:
         self._ending.close()
 
     def parts(self) -> list[Part]:
-        """Return the parts that the reader yields, once it has ended.
+        """Return the parts that the reader yields, after it has ended.
 
         Raise `UnreadableFile` for a file that cannot be read, `CostlyFile` for one beyond the limits; Refused
         `temporary_folder_full`, and as the reader does.
@@ -210,7 +210,7 @@ def _wait_for(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
 
 
 def _end(reading: "subprocess.Popen[bytes]") -> None:
-    """End the process and wait for its end, if a dead disk delays it no longer than a signal may take."""
+    """End the process; wait for its end no longer than a signal may take, because a dead disk may delay it."""
     reading.kill()
     with suppress(subprocess.TimeoutExpired):
         reading.wait(GONE_S)

@@ -69,7 +69,7 @@ class Channel:
         return counts
 
     def convert(self, counts: NDArray[Any] | float) -> Array:
-        """Return numbers of the column, of any shape, in the quantity's unit."""
+        """Return numbers of the column, of any shape, converted to the quantity's unit."""
         readings: Array = np.asarray(counts * self.unit_per_count + self.offset, dtype=np.float64)
         return readings
 

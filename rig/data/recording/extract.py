@@ -68,7 +68,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
 
 
 def reason(error: Exception) -> str:
-    """Return why a file cannot be read, in one line; HDF5 buries the system's words in several lines of its own."""
+    """Return the reason why a file cannot be read, in one line; HDF5 wraps the system's message in several."""
     if isinstance(error, OSError) and error.filename is not None:
         error = OSError(error.strerror)  # whoever tells it names the file
     text = " ".join(str(error).split())
@@ -120,7 +120,7 @@ def _check(dataset: Any, name: str) -> None:
 
 
 def _refuse_endless(path: Path, unpacked: int) -> None:
-    """Raise ValueError for contents too large for a computer in a small file: packed, or full of holes."""
+    """Raise ValueError for contents that a small file expands to by compression or holes, too large for memory."""
     with path.open("rb") as file:
         stored = size_without_holes(file)
     for what, size in (("its rows unpack", unpacked), ("it swells", path.stat().st_size)):

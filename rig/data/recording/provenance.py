@@ -88,7 +88,7 @@ class Provenance:
 
 
 def calls_itself_simulated(software: str) -> bool:
-    """Return whether a controller of this version drives no arm: its seconds may have any length."""
+    """Return whether a controller of this version drives no arm, so that its seconds may have any length."""
     return software.endswith(SIMULATED)
 
 

@@ -63,7 +63,7 @@ class RecordedSensor:
 
     @property
     def unseen_change_k(self) -> float:
-        """Possible change of its temperature, K, while the recorded one stays the same."""
+        """The possible change of its temperature, K, within one recorded step."""
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property

@@ -193,10 +193,9 @@ class RunRecorder:
 def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask | None = None) -> RunData:
     """Read a run file: finished, still being written, or left behind by a killed process.
 
-    `begun` is its `begin_reading`, if that has been called already. Rows that the kill left unwritten or torn at the
-    end are dropped. Raise Refused: `no_run_file` without a file, `not_a_run_file` if it is something else, damaged, of
-    another schema, or cannot be read within `timeout_s` (None: by its size), not counting the time in which the machine
-    is too busy to read; `temporary_folder_full`.
+    `begun` is its `begin_reading`, if that was called before. Rows that the kill left unwritten or incomplete are
+    dropped. Raise Refused: `no_run_file` without a file; `not_a_run_file` if it is damaged, of another kind or schema,
+    or takes longer than `timeout_s` (None: by its size) on a machine that is not overloaded; `temporary_folder_full`.
     """
     contents = _contents(path, timeout_s, begun)
     try:
@@ -326,7 +325,7 @@ def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
 def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
     """Raise ValueError for numbers that overflow in calculations, and for a host time that is not finite.
 
-    Readings and angles that are not finite are found where they are used, for some may never be.
+    Readings and angles that are not finite are reported where they are used, as some are never used.
     """
     if not np.isfinite(rows["host_time_s"]).all():
         raise ValueError(f"a host time of {name} is not a number")

@@ -26,7 +26,7 @@ def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
 
 
 def _limits(stored_bytes: int, time_s: float) -> ReadingLimits:
-    """Return what may be taken to read a run file: a packed piece need not be as long as it says."""
+    """Return the resources for reading a run file; a compressed part may state any length."""
     rows_bytes = MAX_UNPACKED * stored_bytes + MAX_UNWRITTEN_BYTES
     return ReadingLimits(LIBRARIES_BYTES + 3 * rows_bytes, time_s, time_s, 2 * rows_bytes)  # rows, and their copies
 
@@ -46,9 +46,9 @@ def _stored_bytes(path: Path) -> int:
 
 @contextmanager
 def reading_ahead(run: Path) -> Iterator[dict[Path, ReadingTask]]:
-    """Read the first recording of a run folder, or a run file, for the length of the block; yield it by its path.
+    """Read the first recording of a run folder, or a run file, during the block; yield the reading by its path.
 
-    Nothing of a folder in which there is none. Raises as `begin_reading`.
+    Nothing is read from a folder without a recording. Raise as `begin_reading`.
     """
     first = run / FIRST_RECORDING if run.is_dir() else run
     if first != run and not first.exists():

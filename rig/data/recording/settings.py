@@ -110,7 +110,7 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
 
     @property
     def repeatability_std_rad(self) -> float:
-        """Standard deviation of an angle of the arm's, each time that it comes back."""
+        """The standard deviation with which the arm returns to an angle."""
         return float(np.radians(self.repeatability_deg) / np.sqrt(3))
 
     def knows(self, name: str) -> bool:
@@ -243,16 +243,15 @@ class RunSettings:
 
     @property
     def movement(self) -> tuple[object, ...]:
-        """What two recordings must have in common for their sweeps and dwells to be those of one run."""
+        """The settings that two recordings must share for their sweeps and dwells to form one run."""
         steps = self.planned_sweeps, self.planned_dwells
         return self.procedure, self.then_verify, self.home_q_rad, *steps, self.mounts, self.by_hand
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """Return the settings with other thresholds or limits: `limits.scale_std=0.001`.
 
-        Or with encoders of arcs that are better or worse than was stated: `uncertainty.angle_std_deg=0.02`.
-
-        Raise Refused `unknown_setting` or `wrong_setting`, which say what can be set.
+        The encoders of arcs can be changed, too: `uncertainty.angle_std_deg=0.02`. Raise Refused `unknown_setting` or
+        `wrong_setting`, which list the possible settings.
         """
         changed = self
         for item in overrides:

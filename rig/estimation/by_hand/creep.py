@@ -18,7 +18,7 @@ MOST = 0.125  # of the rests: if more stand out, the bias itself jumps
 
 
 def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
-    """Return the fewest rests without which the bias' random walk is much smaller; none if that needs too many.
+    """Return the fewest rests whose omission greatly reduces the bias' random walk; none if that needs too many.
 
     Each has a used rest on either side: at the first or last rest, or at two in a row, a creep looks like a jump of the
     bias.

@@ -153,7 +153,7 @@ class Graph:
 
     @cached_property
     def stamp_std_s(self) -> float:
-        """The standard deviation of time stamps, by their second differences except the largest, which gaps make.
+        """The standard deviation of time stamps, by their second differences without the largest, which gaps cause.
 
         Correct but uneven stamps look the same as even but wrong ones.
         """
@@ -202,7 +202,7 @@ def reading_noise(session: HandRecording) -> float:
 
 
 def _hand_held_std(scatter: Array, quiet: float, lasting_s: float) -> float:
-    """Return the standard deviation of a rest's mean by a hand that holds the body: extra scatter, at low frequency."""
+    """Return the standard deviation of a rest's mean while a hand holds the body, by its scatter at low frequency."""
     beyond = float(np.mean(scatter**2)) - (AS_QUIET * quiet) ** 2
     return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_HZ * lasting_s, 1.0)))
 

@@ -44,9 +44,9 @@ class SessionProgress:
 
 
 def assess_progress(session: HandRecording, conditions: SessionConditions) -> SessionProgress:
-    """Assess a session from its first rest on; too few rests are no error.
+    """Assess an unfinished session of one rest or more; too few rests are no error.
 
-    Raise Fault  `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_not_told`.
+    Raise Fault `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_not_told`.
     """
     unknown = np.full(3, UNKNOWN)
     if not session.rests:
@@ -79,7 +79,7 @@ def assess_progress(session: HandRecording, conditions: SessionConditions) -> Se
 
 
 def _check_last_move(session: HandRecording) -> Fault | None:
-    """Return the fault that the last move shows without any other, or None."""
+    """Return the fault that the last move alone shows, or None."""
     if not session.moves:
         return None
     move: Move = session.moves[-1]

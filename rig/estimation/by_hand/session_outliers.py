@@ -82,7 +82,7 @@ def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
 
 
 def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
-    """Return every hypothesis with its drop of χ², less what leaving out as many equations explains by chance.
+    """Return every hypothesis with its drop of χ², beyond that of omitting as many equations at random.
 
     The columns are projected off the model's, so the graph is not solved for each hypothesis.
     """
@@ -103,7 +103,7 @@ def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
 
 
 def _drop_with_new_stds(fit: GraphFit, name: str, index: int) -> float:
-    """Return the drop of χ² by standard deviations estimated without the fault; 0 if none is much smaller."""
+    """Return the drop of χ² with standard deviations re-estimated without the fault; 0 if none shrinks much."""
     columns = _fault_columns(fit, name, index)
     ends = np.cumsum([len(row.residual) for row in fit.factors])[:-1]
     parts = zip(fit.factors, np.split(columns, ends), strict=True)
@@ -133,7 +133,7 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
 def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
     """Return the columns (r, 2) of a factor for a table that tilts at rest `index`, and for the move before it.
 
-    The last rest has none: there a body that does not lie flat looks the same.
+    The last rest has none: there a body that does not lie flat has the same effect.
     """
     other = np.zeros((len(row.design), 2))
     if row.kind == ACCELERATION and row.index >= index:
@@ -198,7 +198,7 @@ def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
 
 
 def _find_excessive_std(fit: GraphFit) -> Fault | None:
-    """Return the fault of a standard deviation that no hand or sensor makes so large, or None."""
+    """Return the fault of an impossibly large standard deviation of hand or sensor, or None."""
     stds = fit.stds
     if stds.repeat_rad >= NEARLY * LARGEST.repeat_rad:
         what = f"the faces do not lie as they lay before, by {1e3 * stds.repeat_rad:.1f} mrad or more"

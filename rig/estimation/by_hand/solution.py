@@ -229,7 +229,7 @@ def _check_precision(fit: GraphFit) -> Fault | None:
 
 
 def _looseness(fit: GraphFit) -> float:
-    """Return the larger ratio of found to stated standard deviation, of faces and of moves."""
+    """Return the larger ratio of estimated to stated standard deviation, for faces and for moves."""
     stds = fit.stds
     return max(stds.repeat_rad / STATED.repeat_rad, stds.of_angle / STATED.of_angle)
 

@@ -77,10 +77,10 @@ def assess_identifiability(attitudes: Array, up: Array, order: Order = 1) -> Ide
 
 
 def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
-    """Return the number of parameters over the worst prediction variance in any orientation: 1 at best, 0 if singular.
+    """Return the G-efficiency: the number of parameters over the worst prediction variance; 1 at best, 0 if singular.
 
-    For exact attitudes and equal noise. The variance is the trace over the three axes, times N, in units of one
-    reading's; its mean over the design's own attitudes is the number of parameters (Kiefer and Wolfowitz).
+    For exact attitudes, equal noise and any orientation. The variance is the trace over the three axes, times N, in
+    units of one reading's; its mean over the design's own attitudes is the number of parameters (Kiefer and Wolfowitz).
     """
     from scipy.optimize import minimize
     from scipy.spatial.transform import Rotation

@@ -14,7 +14,7 @@ from rig.estimation.sensor_axes import parameter_jacobian
 
 
 def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the bound (6, 6) for kx ky kz bx by bz of g = K (m + b) if only ‖g‖ of each sweep is known: SIX (1)–(4).
+    """Return the bound (6, 6) for kx ky kz bx by bz if only ‖g‖ of each sweep is given: SIX (1)–(4).
 
     `scale` (3,); `rates_rad_s` (N, 3): true g in the sensor frame; `variances_rad2_s2` (N, 3) of the mean readings. The
     two unknowns of each sweep's direction use up two of its three readings; the third determines ‖g‖², with the

@@ -115,7 +115,7 @@ def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitude
 
 
 def _relative(fixes: Fixes) -> Array:
-    """Return the stated standard deviation (k,) of each sample relative to the usual one."""
+    """Return the stated standard deviation (k,) of each sample over the median one."""
     if fixes.std_rad is None or not fixes.std_rad.any():
         return np.ones(len(fixes.at_s))
     usual = float(np.median(fixes.std_rad[fixes.std_rad > 0]))
@@ -123,7 +123,7 @@ def _relative(fixes: Fixes) -> Array:
 
 
 def find_inliers(recorded: AttitudeSamples, fixes: FixedAttitudes) -> NDArray[np.bool_]:
-    """Return the samples (k,) near the median of their fix: a mistaken marker is an outlier."""
+    """Return the samples (k,) near the median of their fix, without outliers such as a mistaken marker."""
     fix = recorded.fixes.fix
     deviations = np.linalg.norm(rotation_vectors(np.swapaxes(fixes.attitudes[fix], -1, -2) @ fixes.samples), axis=1)
     order = np.lexsort((deviations, fix))

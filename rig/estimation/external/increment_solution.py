@@ -168,9 +168,9 @@ def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
 
 
 def _find_priors(model: MixedModel, fixes: Fixes) -> tuple[VarianceComponents, Array]:
-    """Return prior standard deviations that divide the residuals evenly, and the std of their logarithms.
+    """Return prior standard deviations that share the residuals evenly, and the stds of their logarithms.
 
-    If the reference's error is stated, that of a fix is about it, or smaller by the mean over samples.
+    If the reference's error is stated, that of a fix is about as large, or smaller by the mean over samples.
     """
     mixed = model.mixed
     common = mixed.design[:, :, :COMMON].reshape(-1, COMMON)
@@ -189,7 +189,7 @@ def _find_priors(model: MixedModel, fixes: Fixes) -> tuple[VarianceComponents, A
 
 
 def _find_outliers(settled: _Settled) -> NDArray[np.bool_]:
-    """Return the increments (n,) far beyond the ninth decile of errors, which few outliers cannot inflate."""
+    """Return the increments (n,) far beyond the ninth decile of errors, a quantile that few outliers do not change."""
     mixed, sizes = settled.model.mixed, settled.sizes
     variances = sizes.scattered**2 * np.diag(mixed.scattered) + sizes.walked**2 * np.diag(mixed.walked)
     errors, expected = np.abs(settled.solved.residuals).max(axis=1), np.sqrt(variances)
@@ -294,7 +294,7 @@ def _causes(settled: _Settled) -> dict[str, Array]:
 
 
 def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:
-    """Return the Earth's rate by the increments alone, without the prior of its norm; the Fault if undetected."""
+    """Return the Earth's rate by the increments without the prior of its norm, or the Fault if it is not detected."""
     information = np.linalg.inv(covariance)
     data_information: Array = information - EARTH_PRECISION * np.eye(3)
     data_information = data_information + 1e-9 * EARTH_PRECISION * np.eye(3)

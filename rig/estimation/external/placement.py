@@ -139,7 +139,7 @@ def _find_log_prior(grid: Array, size: float) -> Array:
 
 
 def _add_unplaced(theta: Array, placed: Placed, unplaced: Array, variances: Array) -> Placed:
-    """Return the rests with those without an attitude, each turned to the attitude nearest to its reading."""
+    """Return all rests; those without an attitude get the one nearest to their reading."""
     if not len(unplaced) or not placed.norm_known:
         return placed
     forces = (unplaced - theta[BIAS]) @ np.linalg.inv(theta[F].reshape(3, 3)).T

@@ -78,9 +78,9 @@ class Accumulator:
     ) -> Self:
         """Return the sums with one more revolution.
 
-        `mean_rad_s` (3,) with its `variance_rad2_s2` (3,), the mean speed 2π/T with its standard deviation. The default
-        weight is the inverse variance of ω² − ‖m + b‖² at k = 1 with equal noise on all axes; SIX uses 1. Raise Fault
-        `not_finite`, `bad_speed`, `zero_reading`, `bad_variance`.
+        Its mean reading is `mean_rad_s` (3,) with `variance_rad2_s2` (3,), its mean speed 2π/T with a standard
+        deviation. The default weight is the inverse variance of ω² − ‖m + b‖² at k = 1 with equal noise on all axes;
+        SIX uses 1. Raise Fault `not_finite`, `bad_speed`, `zero_reading`, `bad_variance`.
         """
         mean = np.asarray(mean_rad_s, dtype=np.float64)
         variance = np.asarray(variance_rad2_s2, dtype=np.float64)

@@ -166,7 +166,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         return covariance
 
     def evaluate_b(name: str, half_width: float, unit: str, source: str, patterns: Array) -> Contributor:
-        """Return a contributor of type B whose `patterns` are for the half-width."""
+        """Return a contributor of type B from `patterns` of its half-width."""
         spread = propagate(patterns / np.sqrt(3))
         return Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, spread)
 
@@ -220,7 +220,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
 
 
 def _evaluate_mounts(explained: Explained, unknown: Unknown, propagate: Propagate) -> Iterator[Contributor]:
-    """Yield the contributors of the ends of arcs and of the mountings; `propagate` as in `_contributors`."""
+    """Yield the contributors of the ends of arcs and of the mountings; `propagate` is that of `_contributors`."""
     inputs, matrix = explained.inputs, explained.solution.matrix
     if inputs.encoder_errors_rad_s is not None:
         spread = propagate(inputs.encoder_errors_rad_s @ matrix.T)
@@ -275,7 +275,7 @@ def _evaluate_readings(explained: Explained) -> Iterator[Contributor]:
 
 
 def _split_bias_covariance(explained: Explained) -> tuple[Array, Array]:
-    """Return the covariances (6, 6) by flicker and by the rest of the bias drift."""
+    """Return the two parts (6, 6) of the bias drift's covariance: flicker, and the rest."""
     bias, response, windows_s = explained.bias, explained.solution.response, explained.inputs.windows_s
 
     def propagate(part: BiasProcess) -> Array:
@@ -287,7 +287,7 @@ def _split_bias_covariance(explained: Explained) -> tuple[Array, Array]:
 
 
 def _tilt_axes(inputs: VectorInputs, angle_rad: float) -> Array:
-    """Return the rates' errors (2 per axis, N, 3) by an axis tilted about two perpendicular directions."""
+    """Return the rate errors (2 per axis, N, 3) of an axis tilted about two perpendicular directions."""
     patterns: list[Array] = []
     for joint in sorted(set(inputs.joints) - {None}, key=str):
         swept = np.array([name == joint for name in inputs.joints])

@@ -86,12 +86,12 @@ class EarthRate:
 
     @property
     def latitude_rad(self) -> float:
-        """The latitude by the rate's angle to the vertical; if that part is fixed, by the size of the level part."""
+        """The latitude by the angle of the rate to the vertical, or by its level part if the vertical part is fixed."""
         return float(np.arcsin(self.up @ self.rate_rad_s / self.norm_rad_s))
 
     @property
     def latitude_std_rad(self) -> float:
-        """The standard deviation of the latitude without that of `up`: a tilt of the base counts as latitude."""
+        """The standard deviation of the latitude, apart from that of `up`: a tilt of the base counts as latitude."""
         latitude = self.latitude_rad
         slope = self.up - np.sin(latitude) * self.rate_rad_s / self.norm_rad_s
         return self._std(slope / (self.norm_rad_s * np.cos(latitude)))
@@ -168,7 +168,7 @@ class _EarthRateFit:
 def _fit(
     inputs: VectorInputs, mounting: Array, directions: Array, gravity: Array | None, prior: EarthRatePrior
 ) -> _EarthRateFit:
-    """Fit F, c, G, the arm's errors and, last of these, the Earth's rate along `directions` (d, 3) of the base."""
+    """Fit F, c, G, the arm's errors and the Earth's rate along `directions` (d, 3) of the base, in this order."""
     speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
     durations = np.diff(inputs.windows_s).T[0]
     speed_std = np.hypot(inputs.speed_std_rad_s, np.sqrt(2) * prior.state_jitter_s / durations * speeds)
@@ -208,7 +208,7 @@ def _find_birge_ratio(fit: _EarthRateFit, dof: int) -> float:
 
 
 def _tilt_sweeps(turns_rad_s: Array) -> Array:
-    """Return the effects (2 M, N, 3) on the rates of tilts by 1 rad of each of M sweeps about two directions."""
+    """Return the rate effects (2 M, N, 3) of tilts by 1 rad of each of M sweeps about two directions."""
     patterns: list[Array] = []
     for index in np.flatnonzero(turns_rad_s.any(axis=1)):
         rate = turns_rad_s[index]

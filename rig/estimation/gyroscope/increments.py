@@ -163,7 +163,7 @@ class _IncrementSteps:
     lasting_s: Array
 
     def middle(self, inverse: Array) -> Array:
-        """Return the rotation of the steps per rate error, (k, 3, 3) in body coordinates of their start.
+        """Return the rotation (k, 3, 3) of each step per rate error, in body coordinates of its start.
 
         The attitude half-way represents the whole step: that is the exponential's derivative to φ²/24.
         """
@@ -185,7 +185,7 @@ def _whole_steps(interval: _Interval) -> _IncrementSteps:
 
 
 def _steps(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_IncrementSteps, Array]:
-    """Return steps from readings `start` (k,) by a `fraction` (k,) of their interval, and the rates (k, 3) there."""
+    """Return steps from readings `start` (k,) for a `fraction` (k,) of an interval, and their initial rates (k, 3)."""
     u = fraction[:, None]
     h = np.diff(interval.time_s)[start][:, None]
     w0, w1, d0, d1 = (values[index] for values in (interval.rates, interval.slopes) for index in (start, start + 1))

@@ -27,7 +27,7 @@ class Nonlinearity:
 
 
 def distinct_speeds(speeds_rad_s: Array) -> tuple[float, ...]:
-    """Return the mean of each group of speeds (n,) that are equal but for the arm's timing, slowest first."""
+    """Return the mean of each group of speeds (n,) that differ by the arm's timing only, slowest first."""
     ordered = np.sort(speeds_rad_s)
     steps = np.flatnonzero(ordered[1:] > DISTINCT * ordered[:-1]) + 1
     return tuple(float(group.mean()) for group in np.split(ordered, steps))
@@ -45,7 +45,7 @@ def curvature(matrix: Array, rates_rad_s: Array) -> Array:
 
 
 def bending(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
-    """Return the effects (6, N, 3) of cubes along x, y, z, then squares, that equal full scale at full scale.
+    """Return the effects (6, N, 3) of cubes along x, y, z, then squares, of unit size at full scale.
 
     Arguments as in `curvature`; F is exact at the speed `true_at_rad_s`.
     """

@@ -102,13 +102,13 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
 
 
 def _warmer_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
-    """Return the temperature (2, N) in K above its weighted mean: as recorded, and the change hidden by its steps."""
+    """Return the temperature (2, N), K, above its weighted mean: as recorded, and the change within recorded steps."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])
 
 
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
-    """Return the change (N,) in K by which temperature may have drifted linearly within one recorded step.
+    """Return the possible change (N,) of temperature, K, by a linear drift within one recorded step.
 
     It is ± half a step, about the mean over the windows (N, 2) by their weights (N,).
     """
@@ -117,6 +117,6 @@ def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
 
 
 def subtract_mean(values: Array, weights: Array) -> Array:
-    """Return values (N,) less their weighted mean; zero if they are unknown, which is NaN."""
+    """Return values (N,) less their weighted mean; zero if they are NaN."""
     deviation: Array = np.nan_to_num(values - np.average(values, weights=weights))
     return deviation

@@ -181,7 +181,7 @@ def solve_turned(
 def _equate(
     gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], state: _TurnsEstimate
 ) -> list[_NormalEquations]:
-    """Return the equations of the means, then of the rotations, these as mean rates."""
+    """Return the equations of the means, then those of the rotations as mean rates."""
     windows_s = np.array([(turn.start_s, turn.end_s) for turn in turns])
     turned = increments(gyroscope.time_s, gyroscope.readings, state.matrix, state.offset, windows_s)
     return [
@@ -203,7 +203,7 @@ def _equate_mean(mean: RateMean, gyroscope: Gyroscope, state: _TurnsEstimate) ->
 def _equate_rotation(
     turn: Turn, rotation: Array, jacobian: Array, gyroscope: Gyroscope, state: _TurnsEstimate
 ) -> _NormalEquations:
-    """Return three equations of the end attitude and two of the mean reading across the axis."""
+    """Return three equations of the end attitude, and two of the mean reading at right angles to the axis."""
     from scipy.spatial.transform import Rotation
 
     time_s = gyroscope.time_s

@@ -50,7 +50,7 @@ def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown
 
 
 def response_of(solution: Solution, inputs: VectorInputs) -> Array:
-    """Return the derivative (6, N, 3) of scale and bias by the mean readings; zero for rests, which are not used.
+    """Return the derivative (6, N, 3) of scale and bias by the mean readings; zero for rests, which are unused.
 
     To first order, as in `Accumulator.solve`: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e with e = −2 Σ_j k_j² (m_j + b_j) δm_j.
     """

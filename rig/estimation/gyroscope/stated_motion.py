@@ -42,7 +42,7 @@ class StatedMotion:
     def from_residuals(
         residuals_rad_s: Array, rates_rad_s: Array, variances_rad2_s2: Array, matrix: Array
     ) -> "StatedMotion":
-        """Return the motion with the patterns of its errors in a gyroscope of that `matrix` F (3, 3)."""
+        """Return the motion with the patterns of its errors in the readings of a gyroscope with `matrix` F (3, 3)."""
         speeds = np.linalg.norm(rates_rad_s, axis=1)
         tilts = np.zeros((2, *rates_rad_s.shape))
         for row in np.flatnonzero(speeds):
@@ -75,7 +75,7 @@ class MotionErrors:
         return _median(self.rate**2, self.weights), _median(self.axis_rad**2, self.weights)
 
     def expanded(self, fixed: Array, of_rate: Array, of_axis: Array) -> Array:
-        """Return the U (q,) of values whose errors are normal for each pair of sizes, at 95.45 %.
+        """Return the U (q,) of values whose errors are normal for given sizes of the motion errors, at 95.45 %.
 
         `fixed` (q,) are the variances that do not depend on the sizes, `of_rate` and `of_axis` (q,) those per squared
         size.

@@ -115,7 +115,7 @@ class VectorInputs:
         return np.concatenate([none, *(kind for kind in kinds if kind is not None)])
 
     def own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
-        """Return the errors outside the model of a sensor with that F (3, 3)."""
+        """Return the sensor's errors outside the model, for that F (3, 3)."""
         if self.sensor is None:
             return ()
         rounded = rounding_errors(self.means_rad_s, self.roundings_rad_s, self.variances_rad2_s2)
@@ -150,7 +150,7 @@ class Explained:
 
     @property
     def loads_rad_s(self) -> Array:
-        """The least and largest rate (3, 2) along x, y, z, in either direction, of sweeps that determine its scale."""
+        """The extreme rates (3, 2) along x, y, z, in either direction, of the sweeps that determine the scale."""
         sensed = np.abs(self.inputs.turns_rad_s @ (self.solution.matrix * self.solution.scale[:, None]).T)
         largest = sensed.max(axis=0)
         smallest = np.where(sensed >= LEAST_LOAD * largest, sensed, np.inf).min(axis=0)
@@ -187,7 +187,7 @@ def solver(
     speed_std_rad_s: Array,
     effects: Callable[[Array], Array],
 ) -> Callable[[Array | None], tuple[VectorSolution, CommonErrors]]:
-    """Return the vector model of the inputs as a function of the covariance (N, N) that the means share, if any.
+    """Return the vector model as a function of the covariance (N, N) shared by the means, if any.
 
     `effects` are those of `solve_with_common_errors`, `gravity_m_s2` is the apparent gravity, None without
     g-sensitivity.

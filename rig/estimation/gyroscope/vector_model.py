@@ -212,7 +212,7 @@ def design_matrix(rates: Array, gravity: Array | None) -> Array:
 
 
 def _unit(design: Array) -> Array:
-    """Return the size (p,) of each block of columns, so that blocks are comparable and a missing axis shows."""
+    """Return the size (p,) of each block of columns, which makes blocks comparable and shows a missing axis."""
     unit = np.ones(design.shape[1])
     squares = np.einsum("np,np->p", design, design)
     for block in (slice(0, 3), slice(4, None)):
@@ -243,7 +243,7 @@ def propagate_speed_std(rates: Array, speed_std: Array, matrix: Array) -> Array:
 
 
 def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None, shared: Array | None) -> Array:
-    """Return the covariance (3 p, 3 p) of the coefficients, axis by axis; a wrong speed changes all three axes."""
+    """Return the covariance (3 p, 3 p) of the coefficients, axis by axis; a speed's error is common to all axes."""
     columns, count = inverse.shape[1:]
     covariance = np.zeros((3, columns, 3, columns))
     if speed_noise is not None:
@@ -260,7 +260,7 @@ def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None,
 
 @cache
 def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the indices (12,) of F, row by row, and c among the coefficients axis by axis, and those of G."""
+    """Return the indices (12,) of F, row by row, and c among the coefficients, then those of G."""
     index = np.arange(3 * columns, dtype=np.intp).reshape(3, columns)
     return np.concatenate([index[:, :3].ravel(), index[:, 3]]), index[:, 4:].ravel()
 
@@ -273,7 +273,10 @@ def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -
 
 
 def _response(to_parameters: Array, inverse: Array) -> Array:
-    """Return the derivative (6, N, 3) of k and b by the mean readings, from (6, 12) and the linear map (3, p, N)."""
+    """Return the derivative (6, N, 3) of k and b by the mean readings, by the chain rule.
+
+    The factors are the derivative (6, 12) by the coefficients, and these coefficients' linear map (3, p, N).
+    """
     by_axis = np.concatenate([to_parameters[:, :9].reshape(6, 3, 3), to_parameters[:, 9:, None]], axis=2)
     response: Array = np.matmul(np.swapaxes(by_axis, 0, 1), inverse[:, :4]).transpose(1, 2, 0)
     return response

@@ -179,7 +179,7 @@ def project_reference(delay_s: float, movement: Movement) -> Array:
 
 
 def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
-    """Return the change (M, 3, …) of waves (M, 3, …) of the angle per second of lag, without the mean rate's."""
+    """Return the derivative (M, 3, …) of waves (M, 3, …) of the angle by the lag, without that of the mean rate."""
     by_wave = (len(waves), 3, *(1,) * (waves.ndim - 2))
     cosine, sine = (sweeps.turning_rad2_s2[:, row] / sweeps.speeds_rad_s[:, None] for row in (4, 5))
     changed: Array = sine.reshape(by_wave) * waves[:, 1:2] - cosine.reshape(by_wave) * waves[:, 2:]
@@ -187,7 +187,7 @@ def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
 
 
 def project_lever_arm(delay_s: float, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) that map the lever arm to its acceleration: at constant speed, in means alone."""
+    """Return the matrices (K, 3, 3) from the lever arm to its acceleration; constant speed gives means alone."""
     sweeps, now, change = movement.sweeps, slice(0, 2), slice(2, 4)
     turning = sweeps.turning_rad2_s2
     phase = (delay_s * sweeps.speeds_rad_s)[:, None, None]
@@ -247,15 +247,15 @@ def jacobian(theta: Array, movement: Movement) -> Array:
 def effects(theta: Array, movement: Movement) -> Array:
     """Return the effect (3 K, P) of each of the arm's errors on the readings, per radian; P = 3 N + 10 per station.
 
-    A dwell has three of its own. All points of a station's sweeps share ten: small rotations of the flange and of the
-    base, and waves of the joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic remains.
-    If the wrists' errors are known by kind, they follow, shared by all.
+    Each dwell has three errors. The sweeps of a station share ten: small rotations of flange and base, and waves of the
+    joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic remains. If the wrists' errors
+    are known by kind, they follow, shared by all.
     """
     return combine_effects(*split_effects(theta, movement), movement.own_share)
 
 
 def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None]:
-    """Return the columns of `effects` by independent errors, and by constant errors of the wrists, if known."""
+    """Return the columns of `effects` in two parts: independent errors, and constant errors of the wrists, if known."""
     independent = turned(theta, movement)
     if movement.arm_turns is None:
         return independent, None
@@ -306,7 +306,7 @@ def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array
 
 
 def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
-    """Return the change (K, 3, P) of the readings by changes (K, 3, P) of s (K, 3)."""
+    """Return the change (K, 3, P) of the readings by a change (K, 3, P) of s (K, 3)."""
     if not theta[SECOND].any():
         return np.asarray(matrix(theta) @ changes, dtype=np.float64)
     nonlinear: Array = changes + 2 * theta[SECOND][:, None] * _product(s[..., None], changes, movement)
@@ -314,7 +314,7 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """Return the product (K, 3, …) by element; in a sweep that of two waves, truncated to the first harmonic."""
+    """Return the product (K, 3, …) by element; for sweeps that of two waves, up to the first harmonic."""
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_waves(one, movement), 1, 0)
     others = np.moveaxis(_waves(other, movement), 1, 0)

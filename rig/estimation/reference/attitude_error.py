@@ -107,7 +107,7 @@ def solve_attitude_weighted(start: Array, placed: Placed) -> AttitudeWeighted:
 def find_worst_attitude(start: Array, placed: Placed, fit: AttitudeWeighted) -> tuple[int, float, float]:
     """Return the attitude that fits worst, its error in rad by the others, and the expected error.
 
-    A wrong attitude raises the estimated error of all and so looks better itself.
+    The others alone are used, because a wrong attitude raises the estimated error of all.
     """
     residuals = placed.readings - predicted(fit.theta, placed.attitudes, placed.v_bar)
     worst = int(np.argmax(np.sum(whitened(fit.whiteners, residuals) ** 2, axis=1)))

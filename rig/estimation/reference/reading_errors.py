@@ -68,7 +68,7 @@ def scale_warming(theta: Array, movement: Movement) -> Array:
 
 
 def _warmer_k(sensor: AccelerometerErrors, movement: Movement) -> tuple[Array, Array]:
-    """Return the temperature of each segment above the mean as recorded, and as hidden by the steps, (K,) each."""
+    """Return each segment's temperature above the mean: as recorded, and as hidden by the steps, (K,) each."""
     return repeat_by_segment(sensor.warmer_k, movement), repeat_by_segment(sensor.unseen_k, movement)
 
 
@@ -81,7 +81,7 @@ def flickering(movement: Movement) -> Array:
 
 
 def wandering(movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of the bias by the readings: its random walk, and disturbances."""
+    """Return the covariance (3 K, 3 K) of the bias estimated from the readings: random walk, and disturbances."""
     sensor, covariance = movement.sensor_errors, np.zeros((movement.readings().size,) * 2)
     if sensor is not None and sensor.walk_m_s2_sqrt_s:
         covariance += sensor.walk_m_s2_sqrt_s**2 * walking(sensor, movement)
@@ -93,12 +93,12 @@ def wandering(movement: Movement) -> Array:
 
 
 def walking(sensor: AccelerometerErrors, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of independent random walks of 1 m/s² in a second of each axis."""
+    """Return the covariance (3 K, 3 K) of a random walk of each axis, 1 m/s² in a second."""
     return _expand_bias(walk_covariance(sensor.windows_s), movement)
 
 
 def _expand_bias(covariance: Array, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of biases by that (N + M, N + M) of their means, independent by axis."""
+    """Return the covariance (3 K, 3 K) of biases from that (N + M, N + M) of their means, independent by axis."""
     steady = movement.constant() > 0
     expanded = np.zeros((len(steady),) * 2)
     expanded[np.ix_(steady, steady)] = covariance
@@ -113,7 +113,7 @@ def select_sweeps(movement: Movement) -> Array:
 
 
 def repeat_by_segment(values: Array, movement: Movement) -> Array:
-    """Return values (K,) of dwells and sweeps (N + M,): mean, cosine and sine of a sweep the same."""
+    """Return values (K,) from those (N + M,) of dwells and sweeps, three times the same for a sweep's mean and wave."""
     dwells = len(movement.dwells.readings_m_s2)
     return np.concatenate([values[:dwells], np.repeat(values[dwells:], 3)])
 
@@ -124,7 +124,7 @@ def per_axis(columns: Array) -> Array:
 
 
 def project_errors(theta: Array, movement: Movement, change: Callable[[Array], Array]) -> Array:
-    """Return the patterns (3 K, 3) of axes that read `change` of the force along them: in sweeps, the harmonic."""
+    """Return the patterns (3 K, 3) of a `change` of the force along each axis; for sweeps its harmonic."""
     dwells, axes = len(movement.dwells.readings_m_s2), matrix(theta)
     felt_along = find_force(theta, movement) @ (axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
     mean, cos, sin = np.moveaxis(felt_along[dwells:].reshape(-1, 3, 3), 1, 0)
@@ -135,7 +135,7 @@ def project_errors(theta: Array, movement: Movement, change: Callable[[Array], A
 
 
 def _not_repeated(theta: Array, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of the independent small rotations of each sweep."""
+    """Return the covariance (3 K, 3 K) of small rotations of each sweep that do not repeat."""
     sweeps = movement.sweeps
     if movement.repeatability_rad == 0.0:
         return np.zeros((movement.readings().size,) * 2)

@@ -27,7 +27,10 @@ class Decorrelation:
 
 
 def decorrelate(noise: Array, effects: Array) -> Decorrelation:
-    """Return readings of noise V (n, n) and errors E (n, P) decorrelated. Raise LinAlgError if V is not positive."""
+    """Return readings with noise V (n, n) and errors E (n, P), decorrelated.
+
+    Raise LinAlgError if V is not positive definite.
+    """
     whitener = np.linalg.inv(np.linalg.cholesky(noise))
     scaled = whitener @ effects
     growth, directions = np.linalg.eigh(scaled @ scaled.T)

@@ -60,9 +60,11 @@ def first_harmonic(
 ) -> FirstHarmonic:
     """Return the first harmonic of one whole revolution of n samples.
 
-    `time_s` (n,) on the arm's clock, `readings_m_s2` (n, 3); `angle_rad`, `speed_rad_s` (n,): of the joint at these
-    times, by the arm's states, the angle from the known attitude. `coloured` returns the ratio of the variance of a
-    mean of residuals (n,) to that of white noise, `swings` the columns (n, k) of spectral lines in residuals (n, 3).
+    - time_s (n,): on the arm's clock.
+    - readings_m_s2 (n, 3): the specific force.
+    - angle_rad, speed_rad_s (n,): of the joint at these times by the arm's states, from the known attitude on.
+    - coloured: returns the ratio of the variance of a mean of residuals (n,) to that of white noise.
+    - swings: returns the columns (n, k) of spectral lines in residuals (n, 3).
 
     Raise Fault `not_finite`, `incomplete_revolution`; ValueError for a wrong shape.
     """
@@ -124,7 +126,10 @@ def _find_long_run_covariance(residuals: Array, scatter: Array, coloured: Callab
 
 
 def _mean_speed(time_s: Array, angle_rad: Array) -> float:
-    """Return 2π/T, the mean by time, which no vibration changes in a revolution. Raise `incomplete_revolution`."""
+    """Return 2π/T, the mean speed over time, which vibration leaves unchanged in a revolution.
+
+    Raise `incomplete_revolution`.
+    """
     travel = angle_rad[-1] - angle_rad[0] if len(angle_rad) else 0.0
     covered_rad = abs(travel) * len(angle_rad) / max(len(angle_rad) - 1, 1)  # with the last sample's interval
     if len(angle_rad) < MIN_SAMPLES or abs(covered_rad / (2 * np.pi) - 1) > WHOLE_TURN:
@@ -159,8 +164,8 @@ class _Uneven:
 def _smooth(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Uneven:
     """Return the deviations of the joint from constant speed.
 
-    Differences of encoder steps are noise, so the speed is first smoothed by harmonics of the revolution, which are
-    then differentiated.
+    Differences of encoder steps are noise, so the speed is smoothed by harmonics of the revolution and then
+    differentiated.
     """
     waves = _waves(mean_speed_rad_s * (time_s - time_s[0]), min(VIBRATION_WAVES, len(time_s) // 4))
     normal = waves.T @ waves  # nearly diagonal: over a turn the waves are orthogonal
@@ -191,7 +196,7 @@ def _turning(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Arra
 
 
 def _list_vibration(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:
-    """Return the specific force (n, 6) of the joint's vibration; the filter's lag adds derivatives of α."""
+    """Return the specific force (n, 6) of the joint's vibration, with derivatives of α for the filter's lag."""
     rate, *derivatives = uneven.fast
     squared = (2 * mean_speed_rad_s + rate) * rate
     return np.column_stack([squared, *derivatives, rate * np.cos(angle_rad), rate * np.sin(angle_rad)])

@@ -211,19 +211,19 @@ def _check(m: Array, r: Array, v: Array, prior: ReferencePrior, parameters: int)
 
 
 def _check_size(m: Array, norm: float) -> None:
-    """Raise Fault `wrong_unit` for readings smaller than the reference, or that differ by more, in any attitudes."""
+    """Raise Fault `wrong_unit` for readings below the reference, or that differ by more than attitudes cause."""
     size, spread = (float(np.sqrt(np.mean(np.sum(vectors**2, axis=1)))) for vectors in (m, m - m.mean(axis=0)))
     refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)))
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
-    """Return the conditioning of the scaled X, without directions in which its readings' noise dominates."""
+    """Return the conditioning of the scaled X, apart from directions dominated by noise."""
     noise = np.sqrt(v.max() / np.mean(m**2)) * (np.sqrt(len(m)) + np.sqrt(3))
     return refusals.condition_of(scaled, needed, float(noise))
 
 
 def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
-    """Return a warning if noise in X biases the published estimate beyond its standard deviation."""
+    """Return a warning if the bias by noise in X exceeds the published estimate's standard deviation."""
     if method != "as_published" or len(m) * v.mean() < NOTICEABLE**2 * np.mean(m**2):
         return ()
     return ("noise in the readings biases the published estimate; maximum_likelihood does not suffer from it",)

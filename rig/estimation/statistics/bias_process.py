@@ -114,8 +114,8 @@ def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
 def average_posterior(sizes: Array, likelihood: Array) -> Array:
     """Return the posterior mean (2,) of sizes (K, 2), with a spike-and-slab prior, log-uniform in the slab.
 
-    The maximum of the likelihood would by chance be far too small in one run and too large in the next, and so would
-    every uncertainty (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
+    The maximum of the likelihood, and with it every uncertainty, is by chance far too small in one run and too large in
+    another (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
     """
     log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
     weights = np.exp(log_posterior - log_posterior.max())
@@ -123,12 +123,12 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
 
 
 def average_walks(sizes: Array, likelihood: Array) -> Array:
-    """Return the root of the posterior mean square (2,) of sizes (K, 2) with a uniform prior of the walk.
+    """Return the root-mean-square posterior sizes (2,) of (K, 2), with a uniform prior of the walk.
 
-    The scatter has the prior of `average_posterior`. It is for parameters over a long time, as slopes over temperature:
-    most of their uncertainty may be by a walk that the averages hardly show. So a walk is certain, with a uniform prior
-    (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean. Sizes are on a geometric grid,
-    so the prior of one is proportional to the step to the next.
+    The scatter has the prior of `average_posterior`. It is for parameters over a long time, as slopes over temperature,
+    whose uncertainty may come mostly from a walk that the averages hardly show. So a walk is certain, with a uniform
+    prior (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean. Sizes are on a geometric
+    grid, so the prior of one is proportional to the step to the next.
     """
     log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
     weights = sizes[:, 0] * np.exp(log_posterior - log_posterior.max())
@@ -183,7 +183,7 @@ def bias_process(
 def _likelihood(contrasts: Array, noise: Array, scatters: Array) -> Array:
     """Return log-likelihoods (K, L), up to a constant, of noise covariances (K, n, n) with L squared scatters each.
 
-    A scatter is added to every eigenvalue, so each covariance is decomposed only once.
+    A scatter adds to every eigenvalue, so each covariance is decomposed only once.
     """
     values, vectors = np.linalg.eigh(noise)
     squares = np.square(contrasts @ vectors)[:, None]

@@ -35,7 +35,7 @@ def covered(factors: ArrayLike, dof: ArrayLike) -> Array:
 
 
 def beyond(distances: ArrayLike, dof: ArrayLike) -> Array:
-    """Return the probability that the true value is farther than this on one side, in standard uncertainties."""
+    """Return the probability that the true value is beyond this distance, in standard uncertainties, on one side."""
     distance, whole_dof = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _round_down(dof))
     tails = np.array([math.erfc(value / math.sqrt(2)) / 2 for value in distance.ravel()]).reshape(distance.shape)
     if np.isfinite(whole_dof).any():
@@ -47,7 +47,7 @@ def beyond(distances: ArrayLike, dof: ArrayLike) -> Array:
 
 
 def false_alarm_of_each(of_all: float, tests: int) -> float:
-    """Return the false-alarm probability of each of `tests` tests, so that that of any of them is at most `of_all`.
+    """Return the false-alarm probability of each of `tests` tests for a probability `of_all` that any fails.
 
     Bonferroni's inequality: it holds for dependent tests, too.
     """

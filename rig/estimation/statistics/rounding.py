@@ -50,7 +50,7 @@ class Steps:
         return result
 
     def widths(self, readings: Array) -> Array:
-        """Return the widest interval (3,) that a number of readings (n, 3) stands for."""
+        """Return the widest interval (3,) of values that one recorded reading (n, 3) may represent."""
         if not self.cut:
             return self.units
         wide = [bool(self.reads_zero(axis, readings[:, axis]).any()) for axis in range(3)]
@@ -67,7 +67,7 @@ class Steps:
 
 
 def cut_steps(readings: Array, unit: float) -> Steps:
-    """Return the steps of all readings (n, 3) of a source that cuts numbers toward zero, with that unit.
+    """Return the steps of all readings (n, 3) of a source that truncates toward zero, with that unit.
 
     An offset, and a scale factor near one, may have been applied since. All numbers but zero are half-integers, which
     shows the position of zero.
@@ -98,9 +98,9 @@ def find_steps(readings: Array) -> Array:
 def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatter: Array) -> Array:
     """Return an upper bound of the variance (3,) by rounding of a mean of readings (n, 3).
 
-    `smooth` (n, 3) is their known variation, such as the ripple of the arm, which carries them across steps; `scatter`
-    (3,) is the variance of the rest, noise and rounding together (Sheppard). Readings on fewer than three numbers do
-    not determine their noise, which may be zero.
+    `smooth` (n, 3) is their known variation, such as the ripple of the arm, which makes readings cross steps; `scatter`
+    (3,) is the variance of the rest, noise and rounding together (Sheppard). Readings with fewer than three different
+    values do not determine their noise, which may be zero.
     """
     units = steps.units
     coarse, bounds = np.flatnonzero((units > 0) & (scatter <= (LARGE_NOISE * units) ** 2)), np.zeros(3)
@@ -143,10 +143,11 @@ def _count_fractions(axis: Array, unit: float) -> Array:
 
 
 def _bound_zero_error(steps: Steps, axis: int, readings: Array) -> float:
-    """Return the standard uncertainty in units of a mean of cut readings (n,) by those that read zero.
+    """Return the standard uncertainty, in units, of a mean of truncated readings (n,) by those that read zero.
 
-    Within a unit either way of zero the density of readings falls as between zero's neighbours, three units apart: with
-    the slope s of its logarithm their mean is s · 2²/12 off zero. If no neighbour shows s it is anywhere in between.
+    Within a unit of zero the density of readings decreases as between zero's neighbours, three units apart: if s is the
+    slope of its logarithm, their mean is s · 2²/12 from zero. If no neighbour shows s, the mean may be anywhere in
+    between.
     """
     zeros = steps.reads_zero(axis, readings)
     if zeros.all():

@@ -81,7 +81,7 @@ class MixedModel:
         return MixedFit(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
 
     def causes(self, sizes: VarianceComponents, covariance: Array) -> tuple[Array, Array]:
-        """Return the parts of θ's `covariance` (p, p) by δ and by σ; the rest is by the prior of θ."""
+        """Return the parts of θ's `covariance` (p, p) by δ and by σ; the remainder is due to the prior of θ."""
         variances = sizes.scattered**2 * self._spread + sizes.walked**2
         columns = self._design.shape[2]
 
@@ -181,7 +181,7 @@ class MixedModel:
 
 
 def inflate_to_student(covariance: Array, dof: Array) -> Array:
-    """Return a covariance (q, q) inflated to that of Student's t of `dof` (q,): twice its root is then t's 95 %.
+    """Return a covariance (q, q) inflated to that of Student's t of `dof` (q,), so that two stds contain 95 %.
 
     The variance of t is ν/(ν − 2), and infinite below ν = 2: there t's coverage factor is used (JCGM 100, G.3).
     """

@@ -63,7 +63,7 @@ class BiasByRepeat:
 
 
 def largest_change_std(bias: Array, std: Array) -> Array:
-    """Return the standard deviation (3,) of the largest change of biases (R, 3), by those of the two repeats."""
+    """Return the standard deviation (3,) of the largest change of biases (R, 3), from those of its two repeats."""
     ends = np.stack([bias.argmin(axis=0), bias.argmax(axis=0)])
     change_std: Array = np.hypot(*np.take_along_axis(std, ends, axis=0))
     return change_std

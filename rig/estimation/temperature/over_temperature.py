@@ -282,7 +282,7 @@ class _ParameterFits:
         self.count = 3 * (len(readings.means) - poses.shape[1])
 
     def refer(self, readings: RepeatedMeans, fit: "_TemperatureFit") -> None:
-        """Set the inputs to the readings at the reference, not to those in the mean of all temperatures."""
+        """Refer the inputs to the readings at the reference temperature instead of the mean one."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
         self._take(readings, readings.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.inputs)
 
@@ -392,7 +392,7 @@ class _ParameterFits:
         return _TemperatureFit(relative, bias, covariance, without_lag, aicc, float(values[-1]), lag_std_s, loop)
 
     def centre(self, fit: _TemperatureFit) -> Array:
-        """Return mean powers (2, 3, 3) of T − reference, weighted as they determine k and c."""
+        """Return the weighted mean powers (2, 3, 3) of T − reference, with the weights of k and of c."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
         centre: Array = np.einsum("qan,np->qpa", self.weights, powers) / self.weights.sum(axis=2)[:, None, :]
         return centre
@@ -403,7 +403,7 @@ class _ParameterFits:
         return self.rescale(take @ covariance @ take.T)
 
     def rescale(self, covariance: Array) -> Array:
-        """Return the covariance (24, 24) with k in its own size instead of relative."""
+        """Return the covariance (24, 24) for absolute instead of relative k."""
         size = np.concatenate([np.tile(self.scale, HIGHEST + 1), np.ones(COEFFICIENTS // 2)])
         scaled: Array = np.outer(size, size) * covariance
         return scaled
@@ -412,7 +412,7 @@ class _ParameterFits:
 def _coefficients_from_changes(centre: Array, which: int) -> Array:
     """Return the matrix (12, 18) from changes of k (0) or c (1) to its coefficients at a fixed mean of the readings.
 
-    A change that is too large makes the value at the reference too small: hence the negative mean power there.
+    A change that is too large makes the value at the reference too small, hence the negative mean power.
     """
     matrix = np.zeros((3 * (HIGHEST + 1), 6 * HIGHEST))
     first = 3 * HIGHEST * which
@@ -434,7 +434,7 @@ def _centred_coefficients(fit: _TemperatureFit, centre: Array) -> Array:
 
 
 def _loop_covariance(size: Array, std: Array) -> Array:
-    """Return the covariance (24, 24) of values anywhere in the loop, as far as this exceeds its noise."""
+    """Return the covariance (24, 24) of values within the hysteresis loop, beyond that by noise."""
     variances = np.zeros(COEFFICIENTS)
     half = np.maximum(size**2 - std**2, 0.0) / 3
     variances[:3], variances[COEFFICIENTS // 2 : COEFFICIENTS // 2 + 3] = half[:3], half[3:]
@@ -444,8 +444,8 @@ def _loop_covariance(size: Array, std: Array) -> Array:
 def _gradient(polynomials: OverTemperature, half_width_k: float) -> TemperatureLine:
     """Return the contributor of a temperature difference between sensor and thermometer.
 
-    It shifts all values along the polynomials: once equally everywhere and, independently, with opposite signs at both
-    ends of the range, as a heater's power and the loss to the air grow with temperature.
+    It shifts all values along the polynomials, in two independent ways: equally everywhere, and with opposite signs at
+    both ends of the range, because a heater's power and the loss to the air grow with temperature.
     """
     both = np.array([polynomials.scale, polynomials.bias])
     steep = np.arange(1, HIGHEST + 1)[:, None] * both[:, 1:]
@@ -481,7 +481,7 @@ def _drop_rare_poses(readings: RepeatedMeans) -> RepeatedMeans:
 
 
 def group_by_input(inputs: Array, conditions: Array) -> NDArray[np.intp]:
-    """Return the number (N,) of each pose: inputs (N, 3) and other conditions (N, q) are nearly equal in a pose."""
+    """Return the number (N,) of each reading's pose: nearly equal inputs (N, 3) and conditions (N, q)."""
 
     def scale_columns(columns: Array) -> Iterator[Array]:
         size = float(np.abs(columns).max(initial=0.0))

@@ -170,7 +170,7 @@ def read_configuration(folder: Path) -> "Loaded | None":
 
 
 def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts") -> Issued | None:
-    """Return the certificate in the folder if it is exactly that of this result: its number alone proves nothing.
+    """Return the certificate in the folder if its content is that of this result; its number alone proves nothing.
 
     An amended one is entered when it is made.
     """

@@ -60,7 +60,7 @@ STATE_WORDS = {
 
 
 def again_csv(outcome: RecomputeOutcome) -> str:
-    """Return a line for each calibration, with its parameter that moved most; a run without any has one line."""
+    """Return a line for each calibration, with its most changed parameter; a run without calibrations has one."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()

@@ -80,7 +80,7 @@ class ParameterMove:
 
     @property
     def growth(self) -> float:
-        """The growth of U in multiples of the stated one, which then was too small; negative if U became smaller."""
+        """The growth of U in multiples of the stated one, which was too small then; negative if U became smaller."""
         return (
             math.inf if self.now is None else _in_units(self.now.expanded - self.before.expanded, self.before.expanded)
         )
@@ -101,7 +101,7 @@ class Compared:
 
     @cached_property
     def moves(self) -> Mapping[int, tuple[ParameterMove, ...]]:
-        """Every parameter of each calibration, by its number, the largest move first; empty if unsolved."""
+        """Every parameter of each calibration by number, the largest change first; empty if unsolved."""
         if not isinstance(self.answer, RecomputedResult):
             return {}
         now = {(record.sensor, record.quantity): record.parameters for record in self.answer.calibrations}
@@ -124,7 +124,7 @@ class Compared:
 
     @property
     def withdrawn(self) -> tuple[Issued, ...]:
-        """The certificates that the recordings do not confirm (ISO/IEC 17025, 7.10.1, 7.8.8 and 8.7)."""
+        """The certificates that the recordings contradict (ISO/IEC 17025, 7.10.1, 7.8.8 and 8.7)."""
         refused = isinstance(self.answer, Unsolved) and self.answer.state == "refused"
         return self.stated.certificates if refused or self.verdict_changed or self.moved else ()
 

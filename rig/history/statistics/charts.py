@@ -68,7 +68,7 @@ def merge_charts(deviations: Array) -> Chart:
 
 
 def step(average: Array, deviation: Array, before: int) -> tuple[Array, float]:
-    """Return the EWMA with one more deviation, after `before` earlier ones, and its limit then.
+    """Return the EWMA with one more deviation, after `before` earlier ones, and its limit at that point.
 
     A single outlier is left to Shewhart's chart: it enters the average clipped to that chart's limit.
     """

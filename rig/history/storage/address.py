@@ -31,9 +31,9 @@ class HistoryAddress:
 def choose_history_address(
     section: "HistorySection", environment: Mapping[str, str] = os.environ
 ) -> HistoryAddress | None:
-    """Return the history of a run: by the environment's `RIG_HISTORY`, else by its configuration; None for none.
+    """Return the history of a run: the environment's `RIG_HISTORY`, else the configuration's; None without one.
 
-    `section` must be of a configuration that the user has named or knows, never of a foreign folder. Raise Refused
+    `section` must be of a configuration that the user has named or run before, never of a foreign folder. Raise Refused
     `history_address`.
     """
     variable = environment.get(ENVIRONMENT)

@@ -59,7 +59,7 @@ def refuse_unlike(before: FileIdentity | None, file: Path, label: str) -> None:
 
 
 def refuse_anew(address: HistoryAddress) -> None:
-    """Refuse to make the tables of a history that had them before. Raise Refused `history_gone`."""
+    """Refuse to make new tables in a history that had tables before. Raise Refused `history_gone`."""
     if address.where in _identities:
         raise _gone(address.label)
 

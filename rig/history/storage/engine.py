@@ -69,7 +69,7 @@ def _make(file: Path, label: str) -> None:
 
 @contextmanager
 def _server_engine(server: URL) -> Iterator[Engine]:
-    """Yield an engine for this block alone: one that waits for a frozen server delays no other."""
+    """Yield an engine for this block alone, so that a frozen server delays no other block."""
     engine = _postgresql(server)
     try:
         yield engine

@@ -41,7 +41,7 @@ class Head:
 
 
 def alone(connection: Connection) -> None:
-    """Lock out other writers until the end of the transaction; a writing SQLite transaction is alone anyway."""
+    """Lock out other writers until the end of the transaction; a writing SQLite transaction is exclusive anyway."""
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
 
@@ -77,7 +77,7 @@ def has(connection: Connection, earlier: Head) -> bool:
 
 
 def holds(connection: Connection, earlier: Head) -> bool:
-    """Return whether the lines up to an `earlier` end are unchanged; it may be years old."""
+    """Return whether the lines up to an `earlier` end, which may be years old, are unchanged."""
     lines = select(schema.journal).where(schema.journal.c.number <= earlier.number).order_by(schema.journal.c.number)
     chain = ""
     for line in connection.execute(lines):
@@ -135,7 +135,7 @@ def _sha256(connection: Connection, table: Table, key: tuple[int | str, ...]) ->
 
 
 def _rows(connection: Connection, table: Table, key: tuple[int | str, ...]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the row, and for a run its parts, without nulls: a later column changes no hash."""
+    """Yield the row, and for a run its parts, without nulls, so that a column added later changes no hash."""
     condition = [column == value for column, value in zip(table.primary_key, key, strict=True)]
     questions = [(table.name, select(table).where(*condition))]
     if table is schema.run:

@@ -81,7 +81,7 @@ def _make(connection: Connection) -> None:
 
 
 def _meta(connection: Connection) -> dict[str, str | None]:
-    """Return the content of `meta`, or nothing if a table of that name has other columns."""
+    """Return the content of `meta`; empty if a table of that name has other columns."""
     if {column["name"] for column in inspect(connection).get_columns(schema.meta.name)} != {"key", "value"}:
         return {}
     return {row.key: row.value for row in connection.execute(select(schema.meta))}

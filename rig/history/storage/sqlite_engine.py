@@ -55,7 +55,7 @@ def shared_engine(file: Path, label: str) -> Iterator[Engine]:
 
 
 def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
-    """Return an engine of a file that is a history, or will be a `new` one.
+    """Return an engine of a history's file, or of a `new` one.
 
     Each use of a connection raises Refused `history_gone` or `history_exchanged` if the file is gone or another one.
     """

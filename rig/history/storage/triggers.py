@@ -116,7 +116,7 @@ def _file_triggers() -> Mapping[str, str]:
 
 
 def _same_row(table: Table) -> str:
-    """Return the condition that a row of `table` has a key of the new one."""
+    """Return the condition that a row of `table` has the primary key of the new row."""
     keys = [list(table.primary_key.columns)]
     keys += [list(unique.columns) for unique in table.constraints if isinstance(unique, UniqueConstraint)]
     keys += [list(index.columns) for index in table.indexes if index.unique]

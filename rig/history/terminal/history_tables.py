@@ -74,7 +74,7 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
 def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
     """Return a table of changes: each parameter before and now, the difference, and E_n.
 
-    In a narrow terminal the values have no U, which E_n includes; in the narrowest the values before are omitted.
+    A narrow terminal shows values without U, which E_n includes; the narrowest also omits the values before.
     """
 
     def values(heading: str, parameters: Sequence[Parameter], rank: int, shorter_rank: int) -> TableColumn:

@@ -10,9 +10,9 @@ MOST = 16  # of the newest results
 
 
 def picture(trend: Trend) -> str:
-    """Return a block for each of the newest results, by its place between the lowest value − U and the highest + U.
+    """Return a block for each of the newest results, at its height between the lowest value − U and the highest + U.
 
-    So a row of equal blocks has changed by less than its U, and a climbing one by more. Empty for a single result.
+    Equal blocks thus differ by less than U. Empty for a single result.
     """
     newest = trend.parameters[-MOST:]
     if len(newest) < 2:

@@ -46,7 +46,7 @@ def segment_session(
 
 
 def _began_still(time_s: Array, rates: Array) -> bool:
-    """Return whether the body hardly moved in the first second: if a hand held it then, one may hold it later."""
+    """Return whether the body hardly moved in the first second; if a hand held it then, it may hold it later."""
     first = rates[time_s < time_s[0] + FIRST_S]
     return bool(len(first) > 1 and first.std(axis=0).max() < STILL_RAD_S)
 
@@ -71,7 +71,7 @@ def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Windo
 
 
 def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
-    """Return the readings (n,) at the end of the range; of an unknown one, too many equal ones in a row."""
+    """Return the readings (n,) at the limit of the range; for an unknown range, those of a long run of equal ones."""
     if range_rad_s is not None:
         return np.asarray((np.abs(rates) >= NEAR_RANGE * range_rad_s).any(axis=1))
     size = np.abs(rates)
@@ -84,7 +84,7 @@ def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
 
 
 def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...]) -> tuple[tuple[float, float], ...]:
-    """Return the intervals in which a hand held the body: it turned too little for a move, and too much for a rest."""
+    """Return the intervals in which a hand held the body: with less rotation than a move, and more than a rest."""
     if not rests:
         return ()
     width = max(2, int(np.ceil(PAUSE_S / find_sampling(time_s).interval_s - ROUNDING)))
@@ -129,7 +129,7 @@ class Segmenter:
         self._session = HandRecording(np.empty(0), np.empty((0, 3)), None, (), ())
 
     def feed(self, time_s: Array, rates: Array, acceleration: Array | None = None) -> tuple[HandRest | Move, ...]:
-        """Add readings (k, 3) at times (k,) that follow; return the moves and rests that have settled since."""
+        """Add the next readings (k, 3) at times (k,); return the moves and rests settled since the last call."""
         if not len(time_s):
             return ()
         self._blocks.append((time_s, rates, acceleration))

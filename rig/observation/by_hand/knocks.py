@@ -15,7 +15,7 @@ FEWEST = 5  # readings, most of which are undisturbed
 
 
 def mask_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the readings (n, 3) at rest that are not due to a knock."""
+    """Return a mask (n,) of the readings (n, 3) at rest without those during knocks."""
     kept: NDArray[np.bool_] = np.ones(len(readings), dtype=np.bool_)
     if len(readings) < FEWEST:
         return kept

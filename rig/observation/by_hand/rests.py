@@ -43,8 +43,8 @@ def find_rests(
 ) -> tuple[Window, ...]:
     """Return the rests of two blocks and longer, by readings (n, 3) of one or several quantities at rising times (n,).
 
-    `still_at_first`: the body was as still in the first second as it is ever meant to be. `lying`: windows in which it
-    is declared to lie still at least part of the time, if anything is declared.
+    `still_at_first`: the first second shows the body as still as it ever is. `lying`: windows of declared rests, in
+    which it lies still at least part of the time, if anything is declared.
     """
     quantity = next(quantity for quantity in quantities().values() if quantity in readings)
     if len(time_s) < 2 * FEWEST:
@@ -90,7 +90,7 @@ def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
 
 
 def _steady(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the blocks (count,) that agree with a neighbour, if any does: one that turns ever faster does not."""
+    """Return the blocks (count,) that agree with a neighbour, if any do; blocks of an accelerating body do not."""
     steady = np.append(pairs, False) | np.append(False, pairs)
     return steady if steady.any() else still
 
@@ -107,7 +107,7 @@ def _within(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
 def _find_unturned(
     means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return the blocks (count,) at a gyroscope's rest reading: the most frequent one, of those declared at rest."""
+    """Return the blocks (count,) at a gyroscope's rest reading, the most frequent one in declared rests."""
     declared = steady & lying
     pool = means[declared if declared.any() else steady]
     candidates = pool[:: -(-len(pool) // CANDIDATES)]

@@ -37,12 +37,12 @@ Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accele
 
 
 def microsecond_of(sensor: RecordedSensor) -> float:
-    """Return the duration, s, of a microsecond of a sensor's time stamps: the board's counter runs at its own rate."""
+    """Return the duration, s, of a microsecond of a sensor's stamps, whose board's counter runs at its own rate."""
     return MICROSECOND_S if sensor.on_board else 1e-6
 
 
 def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float = 0.0) -> Readings:
-    """Return samples (n,) in SI units, on the crystal that stamps them, shifted by `from_s`."""
+    """Return samples (n,) in SI units, at times of the crystal that stamps them, shifted by `from_s`."""
     time_s = from_s + microsecond_of(sensor) * samples["board_time_us"].astype(np.float64)
     force = sensor.channel(ACCELERATION).values(samples) if sensor.measures(ACCELERATION) else None
     return time_s, sensor.channel(RATE).values(samples), force
@@ -84,7 +84,7 @@ class NotCounted:
         return shift_s + self.microsecond_s * begin_us, shift_s + self.microsecond_s * end_us
 
     def filter_session(self, session: HandRecording) -> HandRecording:
-        """Return the session without them: a rest that does not count is a pause of the move through it."""
+        """Return the session without these rests: each becomes a pause of the move through it."""
         rests, moves, through = list[HandRest](), list[Move](), list[Move]()
         for index, rest in enumerate(session.rests):
             if _middle(rest) < self.from_s:
@@ -113,7 +113,7 @@ def _within(part: HandRest | Move, spans: Sequence[tuple[float, float]]) -> bool
 
 
 def replay_runs(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted, float]:
-    """Return the session's rests and moves so far by one sensor, its parts that do not count, and when it may go on.
+    """Return one sensor's rests and moves so far, the parts that do not count, and the time to continue.
 
     The item may have been moved in any way between two recordings, so no move connects the last rest of one with the
     first of the next. Raise Fault as `check_readings` does.
@@ -145,10 +145,10 @@ def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
 
 
 def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> SessionConditions:
-    """Return what the solution of a session needs besides a sensor's readings. Raise Refused `clock_unknown`.
+    """Return the inputs of a session's solution besides a sensor's readings. Raise Refused `clock_unknown`.
 
     The clock that stamps the readings is the only measure of time, and no reading shows an error of it. Without an
-    accelerometer to show which side is up, the first face is the one that is asked for first.
+    accelerometer to determine the side that is up, the first face is the one requested first.
     """
     by_hand, uncertainty = settings.by_hand, settings.uncertainty
     if by_hand is None or uncertainty is None or (sensor.on_board and not provenance.board_follows_crystal):

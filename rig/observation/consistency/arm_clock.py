@@ -35,7 +35,7 @@ class ClockRate:
 def compare_with_computer(motion: ArmMotion) -> ClockRate:
     """Return the rate of the controller's clock against the computer's: a line through the arrival times of states.
 
-    States arrive late in bursts, so fewer than all of them count as independent.
+    States arrive in bursts after delays, so only some of them count as independent.
     """
     host_s, arm_s = motion.host_time_s - motion.host_time_s[0], motion.time_s - motion.time_s[0]
     design = np.column_stack([np.ones_like(host_s), host_s])

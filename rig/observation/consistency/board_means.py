@@ -23,8 +23,8 @@ NEXT_S = 1e-7  # rounding of a sample's time
 def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[int, float]:
     """Return the deviation of the board's average of each sweep from the computer's mean, by the sweep's index.
 
-    In standard deviations of the computer's mean, on the axis where it is largest; only of sweeps that the board
-    averaged.
+    It is in standard deviations of the computer's mean, on the axis with the largest; only for sweeps averaged on the
+    board.
     """
     deviations = dict[int, float]()
     for recording in recordings:
@@ -41,7 +41,7 @@ def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[
 
 
 def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observed: BoardObserved) -> float:
-    """Return how many standard deviations the board's average is from the computer's for the board's window."""
+    """Return the deviation, in standard deviations, of the board's average from the computer's in the same window."""
     zero, average, board = stream.clock.zero_rate_rad_s, turn.average, observed.observation
     axis = turn.axis_flange
     across = np.array(stream.sensor.mounting) @ (np.eye(3) - np.outer(axis, axis))  # motion across the axis is small
@@ -61,9 +61,10 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
 
 
 def _passing(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
-    """Return columns (n, k) that the computer's mean is free of, at times (n,) with rates (n,) about the axis.
+    """Return columns (n, k) that the computer's mean excludes, at times (n,) with rates (n,) about the axis.
 
-    They are what comes once and twice in a turn, its lines, and what a sensor that lags reads of a slow ripple.
+    They are the first two harmonics of the turn, spectral lines, and the effect of a slow ripple on a sensor with a
+    lag.
     """
     average = turn.average
     fraction = (time_s - average.start_s) / average.duration_s

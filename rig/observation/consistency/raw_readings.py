@@ -40,9 +40,9 @@ def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.i
 
 
 def innovation_std(counts: NDArray[np.int64]) -> Array:
-    """Return the standard deviation (3,), in counts, of a reading's error of prediction from the readings before it.
+    """Return the standard deviation (3,), in counts, of a reading's error of prediction from the previous readings.
 
-    Drift and vibration do not count: they carry a reading across counts together with its neighbours.
+    Drift and vibration are excluded: they shift neighbouring readings together.
     """
     return np.array([_innovation_std(axis - axis.mean()) for axis in counts.T])
 

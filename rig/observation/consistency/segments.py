@@ -133,7 +133,7 @@ class _Division:
 
 
 def _divide(stream: Stream, average: Average, usable: NDArray[np.bool_], count: int) -> _Division:
-    """Divide the samples of an average that are `usable` (n,) into `count` segments, or into fewer of few samples."""
+    """Divide the `usable` samples (n,) of an average into `count` segments, or fewer for few samples."""
     inside = between(stream, average.start_s, average.end_s)
     time_s = stream.time_s[inside]
     count = max(1, min(count, int(usable.sum()) // FEWEST_SAMPLES))
@@ -149,9 +149,9 @@ def _divide(stream: Stream, average: Average, usable: NDArray[np.bool_], count: 
 def _segment_revolution(
     stream: Stream, motion: ArmMotion, turn: Observation, count: int, sweep: int
 ) -> SegmentedAverage:
-    """Average a revolution or an arc in segments, without the spectral lines of its average as a whole.
+    """Average a revolution or an arc in segments, without the spectral lines of the whole average.
 
-    The encoders do not measure all of a vibration; what they miss of a ripple is no noise of a segment's.
+    A vibration that the encoders miss in part is no noise of a segment.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[between(stream, average.start_s, average.end_s)]
@@ -217,7 +217,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
 
 
 def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> MeanNoise:
-    """Return the noise of readings with residuals (n, 3) after a fit of the segments' means and columns of lines."""
+    """Return the noise of readings from residuals (n, 3) of a fit of the segments' means and spectral lines."""
     dof = max(len(residuals) - segments - columns, 1)
     scatter = np.maximum(np.sum(residuals**2, axis=0) / dof, steps.variance)
     in_a_mean = scatter * np.array([correlation_inflation(axis) for axis in residuals.T])

@@ -96,7 +96,7 @@ def average_transfers(
 
 
 def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInterval | None:
-    """Return the interval from before the arm moves until it stands; None if it does not move in this time."""
+    """Return the interval from before the arm moves until it stands; None if it does not move within the window."""
     inside = (motion.time_s >= start_s) & (motion.time_s <= end_s)
     moving = motion.time_s[inside][np.linalg.norm(motion.rate(motion.time_s[inside]), axis=1) > MIN_RATE_RAD_S]
     if not len(moving):
@@ -105,7 +105,7 @@ def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInte
 
 
 def is_by_wrists(interval: MotionInterval) -> bool:
-    """Return whether a transfer counts: it is neither too short nor too long, and only wrists turn."""
+    """Return whether a transfer is used: of suitable duration, and by wrists only."""
     before = max(interval.motion.kinematics.joints - WRISTS, 0)  # of any chain the last three joints are its wrists
     others = interval.motion.angles(np.linspace(interval.start_s, interval.end_s, STEPS))[:, :before]
     rotated_rad = np.ptp(others, axis=0).max(initial=0.0)
@@ -123,10 +123,10 @@ def mean_specific_force_m_s2(interval: MotionInterval, down_m_s2: Array, extensi
 
 
 def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
-    """Return the variance (3,) of the mean of readings (n, 3) that neither the arm's rate nor gravity explains.
+    """Return the variance (3,) of the mean of readings (n, 3) beyond the effects of the arm's rate and gravity.
 
-    A sensor's filter combines the arm's rates of the samples around. A ripple above half the data rate looks like
-    noise, at low frequencies too.
+    A sensor's filter combines the arm's rates of adjacent samples. A ripple above half the data rate looks like noise,
+    at low frequencies too.
     """
     step_s = float(np.median(np.diff(time_s)))
     rates = [motion.rates_at_samples(time_s + shift * step_s) for shift in FILTERED]
@@ -140,7 +140,7 @@ def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array
 def _find_transfers(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[MotionInterval]:
     """Yield the intervals from before the arm moves until it stands, with all samples present.
 
-    None for a shaft whose encoder is right over whole turns alone: a transfer is a part of one.
+    None for a shaft whose encoder is right over whole turns only, because a transfer is a part of a turn.
     """
     if not motion.tells_parts_of_turns:
         return

@@ -111,18 +111,18 @@ class ArmMotion:
         return errors
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return which of these times (n,) lie between states that are close enough together for `rate` to hold."""
+        """Return the times (n,) between states close enough together for `rate` to be valid."""
         return closely_followed(self.time_s, self._covered, time_s)
 
     @property
     def tells_parts_of_turns(self) -> bool:
-        """Whether a single reading of an angle is right, and not only the angle between equal readings a turn apart."""
+        """Whether single angles are right, and not only the difference between equal readings a turn apart."""
         return not self._scatters
 
     def travel_rad(self, window: Window) -> float | None:
-        """Return the travel of the joint that moved most in a window; None if it holds fewer than two states.
+        """Return the travel of the joint that moved most in a window; None if it contains fewer than two states.
 
-        The oscillation of a standing arm about its position is not counted: its angles show it, and so do means.
+        The oscillation of a standing arm about its position is excluded, because angles and means are corrected for it.
         """
         q_rad = self._q_rad(window)
         if self._scatters and len(q_rad) >= PARTS:
@@ -135,9 +135,9 @@ class ArmMotion:
         return travel_rad
 
     def swing_rates(self, time_s: Array) -> Array:
-        """Return rates (n, 3) as `sampled_rates`, at rising times (n,), of a standing arm that oscillates; else zero.
+        """Return rates (n, 3) as `sampled_rates`, at rising times (n,), for a standing arm that oscillates; else zero.
 
-        An arm whose encoders show only noise has no rate, and the noise adds none.
+        Without an oscillation the encoders show only noise, which is not added as a rate.
         """
         still = np.zeros((len(time_s), 3))
         q_rad = self._q_rad(Window(float(time_s[0]), float(time_s[-1])))
@@ -159,17 +159,18 @@ class ArmMotion:
     def mean_rates(self, time_s: Array, lasting_s: float) -> Array:
         """Return the flange's mean rate (n, 3), rad/s, over `lasting_s` around each of the times (n,).
 
-        By differences of the joints' angles: the error of one angle cancels between neighbouring rates, and the mean
-        over samples that follow each other is that between their ends.
+        It is the difference of the joints' angles, so the error of one angle cancels between neighbouring rates, and
+        the mean over consecutive samples depends on their ends only.
         """
         travel_rad = self.angles(time_s + lasting_s / 2) - self.angles(time_s - lasting_s / 2)
         rates: Array = flange_rate(self.angles(time_s), travel_rad / lasting_s, self.kinematics) @ self.mount.T
         return rates
 
     def rates_at_samples(self, time_s: Array) -> Array:
-        """Return the flange's rate (n, 3), rad/s, around samples at times (n,) that follow each other evenly.
+        """Return the flange's rate (n, 3), rad/s, around consecutive evenly spaced samples at times (n,).
 
-        The mean from half-way to the sample before to half-way to the next; of samples far apart the momentary rate.
+        It is the mean from half-way to the previous sample to half-way to the next; for samples far apart the momentary
+        rate.
         """
         return self.rate(time_s) if is_sparse(time_s) else self.mean_rates(time_s, float(np.median(np.diff(time_s))))
 
@@ -217,7 +218,7 @@ class ArmMotion:
 
 
 def is_sparse(time_s: Array) -> bool:
-    """Return whether samples at times (n,) are so far apart that the arm's mean rates between them are not theirs."""
+    """Return whether samples at times (n,) are too sparse for the arm's mean rates between them."""
     return float(np.median(np.diff(time_s))) > SPARSE_S
 
 

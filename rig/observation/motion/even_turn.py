@@ -26,7 +26,7 @@ GUARD_RAD = float(np.radians(1.5))  # distance from the ramps: the shaft's lag, 
 
 
 def well_timed(states: NDArray[Any]) -> NDArray[Any]:
-    """Return the states without those whose request was delayed, if the duration of requests was recorded.
+    """Return the states without delayed requests, if the duration of requests was recorded.
 
     The moment of the measurement lies somewhere within the request.
     """
@@ -51,7 +51,7 @@ def fit_lines(time_s: Array, q_rad: Array) -> tuple[Array, Array, Array]:
 
 
 def find_even_turn(states: NDArray[Any], sweep: Sweep, settings: ObservationThresholds) -> Ends:
-    """Return the turn of one sweep from the turner's `states` (n,), in the middle of the even part of its motion.
+    """Return the turn of one sweep from the turner's `states` (n,), in the middle of the part at even speed.
 
     Raise Fault `incomplete_revolution`, `arm_states_lost`, `speed_not_constant`, `turn_too_short`.
     """

@@ -28,12 +28,12 @@ class KnownMotion(Protocol):
         ...
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return which times (n,) lie between states that are close enough together for `rate` to hold."""
+        """Return the times (n,) between states close enough together for `rate` to be valid."""
         ...
 
 
 def closely_followed(states_s: Array, close: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
-    """Return which of the times (n,) lie between two of the states (m,) that are `close` (m − 1,)."""
+    """Return the times (n,) between two of the states (m,) that are `close` (m − 1,) together."""
     interval = np.searchsorted(states_s, time_s, side="right") - 1
     inside = (interval >= 0) & (interval < len(close))
     covered: NDArray[np.bool_] = inside & close[np.clip(interval, 0, len(close) - 1)]

@@ -45,7 +45,7 @@ class Revolution:
 
     @property
     def beats(self) -> int:
-        """Number of sidebands of each spectral line: cycles per turn at which the shaft runs ahead and behind.
+        """The number of sidebands of each spectral line: cycles per turn at which the shaft runs ahead and behind.
 
         An encoder with a large error errs once and twice a turn; products of these come up to four times.
         """
@@ -138,8 +138,8 @@ def _extent(sweep: Sweep) -> str:
 def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
     """Return the start and end of the revolution, and the standard deviation of the time between, s.
 
-    Between two neighbouring states the angle is interpolated. If states are missing, the joint might already be in a
-    ramp: there the straight line through the whole revolution gives the time, to within the ripple about it.
+    The angle is interpolated between two neighbouring states. If states are missing, the joint might already be in a
+    ramp: there the straight line through the whole revolution gives the time, within its ripple.
     """
     t, angle = time_s[first : last + 1], travelled[first : last + 1]
     speed, offset = np.polyfit(t - t[0], angle, 1)

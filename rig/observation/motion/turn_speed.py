@@ -33,15 +33,13 @@ class TurnSpeed:
 def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnSpeed:
     """Return the speed 2π/T of a shaft that turns evenly through more than a whole turn.
 
-    `time_s` (n,) rising, `q_rad` (n,) the encoder's readings, turns counted; all of them between the ramps. T is the
-    time after which the readings are a turn farther, in the mean over every reading that has one a turn later: how far
-    the recording goes beyond the turn decides how well T is known. A quarter of a turn more, read at 100 Hz at 60°/s by
-    a 12-bit encoder with a noise of 0.06°, gives 2e-5 (one standard deviation).
-
-    The standard deviation comes from the scatter of these differences, with white noise of the single readings. Each
-    reading of the second turn enters two differences, which correlates neighbours; that is allowed for.
-
-    Raise Fault `turn_too_short` for less than a turn and `FEWEST_PAIRS` readings more, or a shaft that stands.
+    `time_s` (n,) rising, `q_rad` (n,) the encoder's readings, turns counted; all between the ramps. T is the time
+    between readings one turn apart, in the mean over all such pairs: the more readings beyond the turn, the better T is
+    determined. A quarter of a turn more, read at 100 Hz at 60°/s by a 12-bit encoder with a noise of 0.06°, gives 2e-5
+    (one standard deviation). The standard deviation follows from the scatter of these differences, with white noise of
+    the single readings. Each reading of the second turn enters two differences, which correlates neighbours; that is
+    included. Raise Fault `turn_too_short` for less than a turn and `FEWEST_PAIRS` readings more, or a shaft that
+    stands.
     """
     far_rad = abs(float(q_rad[-1] - q_rad[0])) if len(q_rad) > FEWEST_PAIRS else 0.0
     if far_rad <= TURN_RAD:
@@ -56,7 +54,7 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
     first_s, first_rad = time_s[:pairs], angle_rad[:pairs]
 
     def excess_rad(period_s: float) -> NDArray[np.float64]:
-        """Return the angles (pairs,), rad, by which the shaft has turned more than one turn after that time."""
+        """Return the angles (pairs,), rad, beyond one turn after a trial value of the period."""
         ahead: NDArray[np.float64] = np.interp(first_s + period_s, time_s, angle_rad) - first_rad - TURN_RAD
         return ahead
 

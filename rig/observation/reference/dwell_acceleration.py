@@ -78,7 +78,7 @@ def accelerations(stream: Stream, inside: slice) -> Array:
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
     """Raise Fault `saturation` or `stuck_sensor` for the accelerometer's samples `inside`.
 
-    While the sensor is `turning` a single axis that repeats one reading is stuck too.
+    While the sensor is `turning`, one axis with equal readings is stuck too.
     """
     channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
     counts, saturated = channel.counts(samples), channel.is_saturated(samples)
@@ -98,7 +98,7 @@ def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bo
 
 
 def _is_noisy(stream: Stream) -> bool:
-    """Return whether neighbouring samples mostly differ: without noise they may well be equal."""
+    """Return whether neighbouring samples mostly differ, which they need not without noise."""
     steps = np.abs(np.diff(stream.sensor.channel(ACCELERATION).counts(stream.raw), axis=0))
     return bool(len(steps)) and np.median(steps, axis=0).min() >= 1
 
@@ -130,7 +130,7 @@ def _dwell_reading(
 def gravity_difference(attitudes: Array, expected: Array, sensor: RecordedSensor, site: Site) -> Array:
     """Return the difference (n, 3), m/s², of gravity at attitudes and at expected ones, in the sensor's nominal axes.
 
-    attitudes (n, 3, 3) are those of the arm's encoders, expected the ones to which the readings are compared.
+    attitudes (n, 3, 3) are those of the arm's encoders, expected those of the readings' model.
     """
     difference: Array = (attitudes - expected) @ -site.down_m_s2 @ np.array(sensor.mounting).T
     return difference

@@ -39,8 +39,8 @@ def swept_acceleration(
 ) -> SweptAcceleration:
     """Fit the first harmonic of one sweep's revolution, together with its vibrations.
 
-    The joints at rest may oscillate, as the encoders measure: readings are compared with one attitude that the joint
-    alone turns, and gravity's difference between that and the arm's attitude is subtracted. Raise Fault `saturation`,
+    Joints at rest may oscillate, as the encoders measure. The model has one attitude that the sweep's joint alone
+    rotates, so gravity's difference between that and the arm's attitude is subtracted. Raise Fault `saturation`,
     `stuck_sensor`, `incomplete_revolution` or `not_finite`.
     """
     inside = between(stream, turn.start_s, turn.end_s)

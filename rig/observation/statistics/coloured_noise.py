@@ -69,7 +69,7 @@ def _spectrum_dof(centred: Array, memory: int) -> float:
 def _autoregression(products: Array, count: int, memory: int) -> tuple[float, float, int]:
     """Return Akaike's criterion and the spectrum at zero, by the `_products` of `count` residuals; and `memory`.
 
-    Residuals that only repeat the one before, such as coarse readings of which few differ, show no spectrum: 0 / 0.
+    The spectrum is 0 / 0 for residuals that only repeat, such as coarse readings of which few differ.
     """
     coefficients, power = _predict(products[-memory - 1 :, -memory - 1 :])
     likelihood = count * float(np.log(power / count)) if power else -np.inf
@@ -90,7 +90,7 @@ def _products(residuals: Array, memory: int) -> Array:
 def _predict(products: Array) -> tuple[Array, float]:
     """Return the best linear prediction of residuals from the k before each, by their `_products`.
 
-    Its coefficients (k,), and the sum of squares of its errors, which are called innovations.
+    Return its coefficients (k,), and the sum of squares of its errors, the innovations.
     """
     before, now = products[:-1, :-1], products[:-1, -1]
     coefficients = np.asarray(np.linalg.lstsq(before, now, rcond=None)[0], dtype=np.float64)

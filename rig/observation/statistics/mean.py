@@ -87,19 +87,22 @@ class ReadAtRest:
 
 
 def by_axis(dofs: Iterable[Array | float]) -> Array:
-    """Return degrees of freedom (N, 3) of N means' variances, some of which are given for all axes alike."""
+    """Return degrees of freedom (N, 3) of N means' variances; some inputs have one number for all axes."""
     return np.array([np.broadcast_to(dof, 3) for dof in dofs])
 
 
 def weighted_means(
     readings: Array, groups: Array, weights: Array, *, smooth: Array, noise: MeanNoise, steps: Steps
 ) -> tuple[Mean, ...]:
-    """Return the means of p groups of readings by their weights: one group is a whole window, several are its segments.
+    """Return the means of p groups of readings by their weights: one group is a whole window, several its segments.
 
-    readings (n, 3): in any unit, recorded in `steps`. groups (n, p): above zero if a reading belongs to a group.
-    weights (p, n): those of each group add up to one over its readings and cancel nuisance columns
-    (`rig.estimation.statistics.mean_weights`). smooth (n, 3): the readings without noise. The variance includes what
-    rounding leaves in a mean of any number of readings.
+    - readings (n, 3): in any unit, recorded in `steps`.
+    - groups (n, p): above zero if a reading belongs to a group.
+    - weights (p, n): those of each group add up to one over its readings and cancel nuisance columns
+      (`rig.estimation.statistics.mean_weights`).
+    - smooth (n, 3): the readings without noise.
+
+    The variance includes the part of the rounding that remains in a mean of any length.
     """
     return tuple(
         _average_group(readings, group > 0, row, smooth=smooth, noise=noise, steps=steps)
@@ -128,10 +131,10 @@ def whole(readings: Array) -> Array:
 
 
 def even_mean(readings: Array, steps: Steps) -> Mean:
-    """Return the even mean of readings (n, 3) in these steps, without vibration.
+    """Return the unweighted mean of readings (n, 3) in these steps, without vibration.
 
-    The noise is their scatter, and at least the rounding to steps. The variance of the mean allows for readings that
-    are not white, by `fit_autoregression` of each axis, and includes what rounding leaves in a mean of any length.
+    The noise is their scatter, and at least the rounding to steps. The variance of the mean includes correlation, by
+    `fit_autoregression` of each axis, and the part of the rounding that remains in a mean of any length.
     """
     variance = np.maximum(readings.var(axis=0, ddof=1), steps.variance)
     coloured = [fit_autoregression(axis) for axis in (readings - readings.mean(axis=0)).T]
@@ -149,9 +152,10 @@ def even_mean(readings: Array, steps: Steps) -> Mean:
 def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
     """Return the mean of readings (n, 3) in these steps, at times (n,), and the window that it represents.
 
-    If the arm vibrates the weights are tapered, see `average_tapered`: 2 mg at 14 Hz leave 10 µg in an even mean of
-    three seconds. Its window reaches from half-way up the first flank to half-way down the last: for a bias that walks,
-    an even mean of that window differs as much from another, to a thousandth.
+    If the arm vibrates the weights are tapered, see `average_tapered`: 2 mg at 14 Hz leave 10 µg in an unweighted mean
+    of three seconds. The window reaches from half-way up the first flank to half-way down the last: with a random walk
+    of the bias, the difference between two tapered means equals that between unweighted means of these windows, within
+    a thousandth.
     """
     if vibrates(readings):
         half_s = flank_s(window.end_s - window.start_s) / 2

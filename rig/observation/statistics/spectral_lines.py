@@ -46,11 +46,10 @@ class LineSearch:
 
 
 def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fraction: Array | None = None) -> Array:
-    """Return the number of cycles (k,) that each spectral line makes in all of the residuals (n, axes); k may be zero.
+    """Return the number of cycles (k,) of each spectral line in the residuals (n, axes); k may be zero.
 
-    `fraction` (n,): elapsed fraction of the time at each reading, nearly even but for gaps; even by default. No line is
-    sought nearer to another than `APART`; one that merges with another is dropped. `previous` lines are returned
-    unchanged.
+    `fraction` (n,): elapsed fraction of the time at each reading, nearly even but for gaps; even by default. Lines are
+    at least `APART` from each other; one that merges with another is dropped. `previous` lines are returned unchanged.
     """
     count, merged, fixed = len(residuals), NONE, len(previous)
     cycles = previous
@@ -73,8 +72,8 @@ def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fra
 def _are_too_near(cycles: Array, search: LineSearch) -> bool:
     """Return whether lines merge, or the slowest merges with the turn's own waves.
 
-    Refined to less than what is sought, it may stand only where its sidebands meet no other line's: two such lines,
-    about a vibration and a ripple less than a cycle apart, explain a part of the mean.
+    Below the search's lowest frequency a refined line is valid only if its sidebands are apart from any other line's:
+    two such lines, about a vibration and a ripple less than a cycle apart, explain a part of the mean.
     """
     ordered = np.sort(cycles)
     gaps = np.diff(ordered)
@@ -96,8 +95,8 @@ def column_count(beats: int) -> int:
 def waves(cycles: Array, fraction: Array, beats: int = BEATS) -> Array:
     """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
-    Each line has two more columns that grow steadily, for one that comes or goes, and sidebands at one cycle more and
-    one less: so a sensor that makes a turn reads a vibration in the room. With `beats` b they reach up to b cycles: see
+    Each line also has two steadily growing columns, for one that begins or ends, and sidebands at one cycle more and
+    one less, by which a rotating sensor senses a vibration in the room. With `beats` b they reach up to b cycles: see
     `rig.observation.motion.revolution.Revolution`.
     """
     line, turn = (np.exp(2j * np.pi * np.outer(cycles_each, fraction)) for cycles_each in (cycles, range(1, beats + 1)))
@@ -107,13 +106,13 @@ def waves(cycles: Array, fraction: Array, beats: int = BEATS) -> Array:
 
 
 def harmonics(angle_rad: Array, most: int) -> Array:
-    """Return columns (n, 2 most) of cosine and sine of what comes once, twice, up to `most` times in a turn."""
+    """Return columns (n, 2 most) of cosine and sine of the first `most` harmonics of a turn."""
     columns = [wave(times * angle_rad) for times in range(1, most + 1) for wave in (np.cos, np.sin)]
     return np.reshape(columns, (2 * most, len(angle_rad))).T
 
 
 def unit_columns(columns: Array) -> Array:
-    """Return columns (n, k), of any units, scaled to unit length; those that are rounding alone become zero.
+    """Return columns (n, k), of any units, scaled to unit length; columns of rounding alone become zero.
 
     Scaled up, rounding would make columns of noise that differ from one processor to another.
     """
@@ -124,16 +123,16 @@ def unit_columns(columns: Array) -> Array:
 def fit_columns(columns: Array, values: Array) -> Array:
     """Return the least-squares coefficients (k, m) of values (n, m) by columns (n, k), some of them nearly alike.
 
-    By the normal equations, in a third of the time: what `ALIKE` keeps apart is well enough separated.
+    The normal equations take a third of the time; their precision suffices for columns that `ALIKE` separates.
     """
     return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=ALIKE**2)[0], dtype=np.float64)
 
 
 def line_swing(residuals: Array, columns: Array, lines_hz: Array) -> Array:
-    """Return the mean square (3,), (rad/s)² s², by which the angle of all lines differs between two moments.
+    """Return the mean square (3,), (rad/s)² s², of the change of the lines' angle between two moments.
 
-    The lines are those of columns (n, w k) in residuals (n, 3): one of the mean square P and the frequency f swings by
-    √(2 P) / (2π f) either way, and so its angle differs between two moments by P / (2 π² f²) in the mean square.
+    The lines are those of columns (n, w k) in residuals (n, 3). One of mean square P and frequency f has the angle
+    amplitude √(2 P) / (2π f), so its mean square change is P / (2 π² f²).
     """
     width = columns.shape[1] // max(len(lines_hz), 1)
     sizes = fit_columns(columns, residuals).reshape(len(lines_hz), width, residuals.shape[1])
@@ -171,9 +170,9 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
 
 
 def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float:
-    """Return the line of which a peak is the middle or a sideband: the one that explains most of the residuals.
+    """Return the line whose centre or sideband a peak is: the one that explains most of the residuals.
 
-    A sensor may read a vibration in the room across its axis alone, in the sidebands and not in the line itself.
+    A sensor may sense a vibration in the room only across its axis, in the sidebands and not in the line itself.
     """
     whitened = residuals / (residuals.std(axis=0) + np.finfo(np.float64).tiny)
     sidebands = [peak + shift for shift in (-1.0, 1.0) if search.slowest <= peak + shift]
@@ -189,8 +188,8 @@ def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Arr
 def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, beats: int) -> Array:
     """Return the frequencies of spectral lines, in cycles, refined from their phase drift.
 
-    The drift is the part of the amplitude that grows in quadrature. The first `fixed` lines are kept. A line that shows
-    only in its sidebands has no phase and is kept, too.
+    The drift is the part of the amplitude that grows in quadrature. The first `fixed` lines are unchanged, as are lines
+    with sidebands only, which have no phase.
     """
     for _ in range(PASSES):
         sizes = fit_columns(waves(cycles, fraction, beats), residuals).reshape(len(cycles), column_count(beats), -1)

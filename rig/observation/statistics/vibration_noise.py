@@ -41,12 +41,12 @@ def average_standstill(readings: Array, time_s: Array, window: Window, steps: St
 
 
 def line_columns(residuals: Array) -> Array:
-    """Return columns (n, 8 k) of the k spectral lines in residuals (n, 3) of a sensor that makes a turn."""
+    """Return columns (n, 8 k) of the k spectral lines in residuals (n, 3) of a rotating sensor."""
     return _columns(residuals, LineSearch())
 
 
 def fit_inflation(residuals: Array) -> float:
-    """Return the factor of `fit_noise_factor`, of residuals (n,) that may hold the remainder of a line."""
+    """Return the factor of `fit_noise_factor` for residuals (n,) with a possible remainder of a line."""
     return fit_autoregression(residuals, BRIEF).factor
 
 

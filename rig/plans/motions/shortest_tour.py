@@ -10,8 +10,8 @@ WORTH_S = 1e-9  # a change that gains less is rounding, and might repeat for eve
 def shortest_way(between_s: Array) -> tuple[int, ...]:
     """Return the points 1 to n − 1 in the order of the shortest round trip from point 0.
 
-    `between_s` (n, n), symmetric. Each nearest-neighbour round is improved by reversing parts until that gains nothing
-    more (2-opt: Croes, Operations Research 6 (1958) 791), and the best is taken: not always the very shortest round.
+    `between_s` (n, n), symmetric. Each nearest-neighbour tour is improved by reversing parts as long as that helps
+    (2-opt: Croes, Operations Research 6 (1958) 791), and the best is taken, which is not always the optimum.
     """
     rounds = [_improve(_nearest_neighbours(between_s, first), between_s) for first in range(1, len(between_s))]
     best = min(rounds, key=lambda order: round(_length(order, between_s), 9))
@@ -32,7 +32,7 @@ def _nearest_neighbours(between_s: Array, first: int) -> list[int]:
 
 
 def _improve(order: list[int], between_s: Array) -> list[int]:
-    """Return the order after reversing the part between two edges, repeatedly, wherever that gains most."""
+    """Return the order after reversing the part between two edges repeatedly, each time the best part."""
     while True:
         starts, ends = np.array(order), np.roll(order, -1)
         durations_s = between_s[starts, ends]

@@ -128,9 +128,9 @@ def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, 
 
 
 def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -> tuple[SweepPose, ...]:
-    """Return the stations in the order of the wrists; those of wrist 1 with the others turned follow its own sweep.
+    """Return the sweep poses in the order of the wrists; wrist 1's poses with other wrists turned follow its own.
 
-    Wrist 2 is turned by 45° so that the flange comes away from the forearm, never towards it.
+    Wrist 2 is turned by 45° so that the flange moves away from the forearm.
     """
     tilt_rad = math.radians(-45 if math.sin(home[WRIST_2]) > 0 else 45)
     offsets = ((tilt_rad, 0.0), (tilt_rad, math.pi / 2), (0.0, math.pi / 4)) if procedure.axes == 6 else ()
@@ -158,7 +158,7 @@ def _list_orders(stations: tuple[SweepPose, ...], procedure: SixSweepsSection) -
 
 
 def _sweeps(order: Order, procedure: SixSweepsSection, repeats: int) -> list[Sweep]:
-    """Return the sweeps one after the other: repeat by repeat, speed by speed, station by station."""
+    """Return all sweeps: repeat by repeat, speed by speed, pose by pose."""
     sweeps: list[Sweep] = []
     averaged_rad = math.radians(procedure.arc_deg)
     even_rad = averaged_rad + 2 * math.radians(procedure.margin_deg)

@@ -33,9 +33,9 @@ def plan_static_attitudes(
 def dwells(
     arm: ArmSection, procedure: AttitudesSection, repeats: int, done: Collection[int] = (), first: int = 0
 ) -> Iterator[Step]:
-    """Yield the dwells, counted from `first`, with the transfers to them, from home and back; none if all are `done`.
+    """Yield the dwells, counted from `first`, with the transfers, from home and back; none if all are `done`.
 
-    With field tests at home before them and after.
+    There are field tests at home before and after them.
     """
     home = find_home(arm)
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)

@@ -88,9 +88,10 @@ def build_stages(
     steps_of: Callable[[Sequence[Sweep]], Iterable[Step]],
     done: Collection[int],
 ) -> Plan:
-    """Return the approach, then every stage: the steps of those of its sweeps that are not `done`, from home and back.
+    """Return the approach, then every stage: its remaining sweeps, from home and back.
 
-    The sweeps are counted through all stages. A stage without remaining sweeps has no steps.
+    Sweeps in `done` are left out. The sweeps are counted through all stages. A stage without remaining sweeps has no
+    steps.
     """
     steps, stages, numbers = list(approach.steps), list[Stage](), count()
     for section, sweeps in mounted:

@@ -32,7 +32,7 @@ class TemperatureCourse:
     warming: bool | None = None
 
     def begin(self, temperature_c: float) -> None:
-        """Choose the direction: away from the nearer end, or the one before a run was interrupted."""
+        """Choose the direction: away from the nearer end, or that of an interrupted run."""
         self.warming = temperature_c <= (self.from_c + self.to_c) / 2
         if self.sets:
             self.warming = self.sets[-1].warming
@@ -68,7 +68,7 @@ class TemperatureCourse:
         return min(max(last) + step_k, self.to_c) if self.warming else max(min(last) - step_k, self.from_c)
 
     def missing(self) -> str | None:
-        """Return the part of the range that no set covers, in words; None if all of it is covered."""
+        """Return the part of the range without a set, in words; None if all of it is covered."""
         directions = ((True, "while warming"), (False, "while cooling")) if self.both_directions else ((None, ""),)
         return next(self._missing(directions), None)
 
@@ -83,7 +83,7 @@ class TemperatureCourse:
                     yield f"{name} was never between {gap[0]:.1f} and {gap[1]:.1f} °C {words}".strip()
 
     def _sets_in(self, direction: bool | None) -> list[SetMeasured]:
-        """Return the sets in a direction, or all; one at which it reversed belongs to both directions."""
+        """Return the sets in a direction, or all; a set at a reversal belongs to both directions."""
         pairs = zip_longest(self.sets, self.sets[1:])
         return [
             step
@@ -92,7 +92,7 @@ class TemperatureCourse:
         ]
 
     def _gap(self, temperatures_c: Sequence[float]) -> tuple[float, float] | None:
-        """Return the first part of the range that has no set, from the cold end on."""
+        """Return the first gap between sets, from the cold end on."""
         end_k = AT_THE_END * self.max_step_k
         if temperatures_c[0] > self.from_c + end_k:
             return self.from_c, temperatures_c[0]

@@ -50,6 +50,6 @@ def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
 
 
 def _wait_s(procedure: ThermalSection, steps: list[Step]) -> float:
-    """Return the fastest change of temperature to the next set, without the set itself: an estimate, for the plan."""
+    """Return the shortest time of heating to the next set, without the set itself: an estimate for the plan."""
     gap_s = 60 * procedure.max_step_k / (procedure.max_rate_k_per_min * 2)
     return max(LEAST_WAIT_S, gap_s - sum(step.duration_s for step in steps))

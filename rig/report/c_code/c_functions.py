@@ -129,5 +129,5 @@ def _array(values: Iterable[float]) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return text that cannot end the comment around it, as a serial number could."""
+    """Return text without the end mark of the comment around it, which a serial number could contain."""
     return printable(" ".join(text.split())).replace("*/", "* /").replace("/*", "/ *")

@@ -154,7 +154,7 @@ class Certificate:
 
     @property
     def words(self) -> Wording:
-        """The words for the turner; those of no arm for external readings."""
+        """The wording for the turner; neutral for external readings."""
         return words_of(self.provenance.turner_kind or NO_ARM)
 
     @property
@@ -216,7 +216,7 @@ class Certificate:
 
     @property
     def without_uncertainty(self) -> tuple[str, ...]:
-        """The calibrated sensors of which only the noise part of the uncertainty is known."""
+        """The calibrated sensors with only the noise part of the uncertainty."""
         return tuple(_find_incomplete(self.result))
 
     @property
@@ -228,7 +228,7 @@ class Certificate:
 def certificate_of(
     result: ResultDocument, stated: StatedFacts, reversals: Mapping[str, ReversalEntry] = MappingProxyType({})
 ) -> Certificate:
-    """Return the certificate of a result; it depends on its arguments alone, its number too.
+    """Return the certificate of a result, whose number too depends on the arguments alone.
 
     Raise Refused `another_sensor` for reversals of magnetometers, or from runs, other than the result's.
     """
@@ -271,7 +271,7 @@ def is_simulated(result: ResultDocument, stated: StatedFacts) -> bool:
 
 
 def _number(result: ResultDocument, stated: StatedFacts, reversals: Mapping[str, ReversalEntry]) -> str:
-    """Return the day and a part of the SHA-256 of the content: another content, another number."""
+    """Return the day and a part of the SHA-256 of the content, so that the number changes with the content."""
     content = f"{result.text()}\n{stated.site!r}\n{stated.certificate!r}\n{stated.simulated}"
     content += "".join(f"\n{name}: {reversal.model_dump_json()}" for name, reversal in reversals.items())
     day = datetime.fromisoformat(result.provenance.started_utc)
@@ -290,7 +290,7 @@ def _title(result: ResultDocument) -> str:
 
 
 def _find_incomplete(result: ResultDocument) -> Iterator[str]:
-    """Yield sensors of which only the noise is known, by estimators without a budget."""
+    """Yield sensors with only the noise part of the uncertainty, by estimators without a budget."""
     for _, show, finding in outlets(result, lambda kind: kind.shown):
         if not finding.is_reference and (row := show(finding)).scale is not None and not row.combined:
             yield finding.sensor
@@ -329,7 +329,7 @@ def _angles_rad(result: ResultDocument) -> Iterator[float]:
 def _traceable(result: ResultDocument, stated: StatedFacts) -> bool:
     """Return whether time, the only standard of a gyroscope's scale, is traceable to a named reference.
 
-    Arcs are not traceable: their angles are those of the encoders.
+    Arcs are not traceable, because encoders measure their angles.
     """
     compared = result.clock is not None and any(
         comparison.clock == BY_COMPUTER for comparison in result.clock.comparisons

@@ -11,7 +11,7 @@ REPEATED = (
 
 
 def method_in_words(certificate: Certificate) -> str:
-    """Return how the items were moved and with what their readings were compared, then the procedure."""
+    """Return sentences on the motion of the items and the reference of their readings, then on the procedure."""
     if certificate.by_hand:
         sentences = [_describe_hand(certificate)]
     elif certificate.external:

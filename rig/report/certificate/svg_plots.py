@@ -115,7 +115,7 @@ def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, Displ
 
 
 def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
-    """Return standard uncertainties over the combined one, for the printed budget; at least 1e-4 is drawn."""
+    """Return standard uncertainties over the combined one, for the printed budget, raised to 1e-4 at least."""
     k, b = printed_indices(budget, scale)
     across = (WIDTH - NAMES - RIGHT_MARGIN) / DECADES
 

@@ -23,7 +23,7 @@ def in_budget(budget: BudgetEntry | None, name: str) -> bool:
 
 
 def list_omitted_rates(sensor: GyroscopeEntry, *, external: bool = False) -> str:
-    """Return what a gyroscope's U does not include; for external motion also errors that the readings do not show."""
+    """Return the errors that a gyroscope's U omits; for external motion also errors that no reading shows."""
     bent = ALWAYS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *ALWAYS)
     return ", ".join(("the effect of gravity", *OF_THE_FILE, *bent) if external else bent)
 
@@ -36,5 +36,5 @@ def list_omitted_accelerations(entry: AccelerometerEntry) -> str:
 
 
 def list_omitted_fields() -> str:
-    """Return what a magnetometer's U does not include; the arm's field is stated with its bias."""
+    """Return the errors that a magnetometer's U omits; the arm's field is stated with its bias."""
     return ", ".join(("nonlinearity", "iron magnetised since", *ALWAYS))

@@ -82,7 +82,7 @@ def unsolved_entries(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
 
 
 def rates_in_attitudes(sensor: OfSensor) -> AttitudesEntry | None:
-    """Return what known attitudes give of a gyroscope in addition to scale and bias; None if it was swept."""
+    """Return a gyroscope's results by attitudes in addition to scale and bias; None if it was swept."""
     if sensor.rates is None:
         return None
     earth = _earth_rate(sensor.rates)

@@ -96,7 +96,7 @@ def estimate_entry(solution: Estimate) -> EstimateEntry:
 
 
 def _estimate_or_error(solution: Estimate | None, fault: Fault | None) -> EstimateEntry | ErrorEntry:
-    """Return the entry of a solution, or of the error that took its place."""
+    """Return the entry of a solution, or of the error instead of one."""
     return ErrorEntry(error=str(fault)) if solution is None else estimate_entry(solution)
 
 

@@ -157,7 +157,7 @@ def _ardupilot_magnetometer(number: int, magnetometer: Corrected) -> Parameters:
 
 
 def _nth(number: int) -> str:
-    """Return the number in a parameter's name; the first sensor has none."""
+    """Return the number in a parameter's name; empty for the first sensor."""
     return str(number + 1) if number else ""
 
 

@@ -65,7 +65,7 @@ def ardupilot_parameters(polynomials: Polynomials, numbers: Mapping[str, int]) -
 
 
 def _about_35(quantity: str, entry: OverTemperatureEntry) -> tuple[tuple[float, ...], ...]:
-    """Return the coefficients of orders 1 to 3 about ArduPilot's own reference, in its unit."""
+    """Return the coefficients of orders 1 to 3 about ArduPilot's reference of 35 °C, in its unit."""
     shift_k = ARDUPILOT_REFERENCE_C - entry.reference_c
     orders = [offset_of(quantity, entry, order) for order in range(4)]
     return tuple(

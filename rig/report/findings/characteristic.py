@@ -123,7 +123,7 @@ class Term:
 def terms(
     characteristics: Iterable[Characteristic], finding: Finding[Any], outlet: Outlet | None = None
 ) -> Iterator[Term]:
-    """Yield the characteristics that an entry states, or those of them that `outlet` takes."""
+    """Yield the characteristics that an entry states, optionally only those for `outlet`."""
     for characteristic in characteristics:
         if outlet not in characteristic.exempt and characteristic.read(finding.entry) is not None:
             yield characteristic.term_of(finding)
@@ -149,11 +149,11 @@ def read_fields(what: str, suffix: str, sign: int = 1) -> Callable[[Any], Uncert
 
 
 def _flat(numbers: Any) -> list[Any]:
-    """Return one number, those of a vector, or those of a matrix row by row."""
+    """Return the numbers of a scalar, a vector, or a matrix row by row."""
     return list(np.ravel(numbers).tolist())
 
 
 def always(si: str, d_si: str, shown: DisplayUnit | None = None) -> Callable[[Quantity], Units]:
-    """Return a unit that does not depend on the sensor's quantity; it is `shown` as it is unless another is given."""
+    """Return a unit for any quantity of the sensor, `shown` unchanged unless another unit is given."""
     units = Units(si, d_si, shown or DisplayUnit(si, 1.0))
     return lambda _: units

@@ -40,7 +40,7 @@ class Parameter:
 
     @property
     def std(self) -> float:
-        """The standard uncertainty: the combined one if it is known, else that of the noise."""
+        """The standard uncertainty: the combined one if available, else that of the noise."""
         return self.std_statistical if self.std_combined is None else self.std_combined
 
     @property
@@ -103,7 +103,7 @@ def is_scale(name: str) -> bool:
 def scale_and_bias(
     sensor: str, quantity: "Quantity", entry: Calibrated, bias: Sequence[float], document: "ResultDocument"
 ) -> Iterator[Parameter]:
-    """Yield scale factor and bias of each axis, and the mean scale factor by their covariance and largest k."""
+    """Yield scale factor and bias of each axis, then the mean scale factor by their covariance and largest k."""
     from rig.data.meaning import JUDGED_PARAMETERS, limit_held
 
     axes, unit_rows = len(entry.scale), np.eye(2 * len(entry.scale))

@@ -79,7 +79,7 @@ class Corrected:
 def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float], int]]) -> ReadingNoise:
     """Return the noise by averages, and by σ of one sample and the number of samples of each rest.
 
-    The density is that of the noisiest axis, σ over √rate, as if it were white up to half the rate. It is None for
+    The density is that of the noisiest axis, σ over √rate, for noise that is white up to half the rate. It is None for
     readings in attitudes of a file.
     """
     duration_s = sum(mean.duration_s for mean in means)

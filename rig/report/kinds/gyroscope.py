@@ -113,7 +113,7 @@ def _build_correction(finding: Finding[GyroscopeEntry]) -> Corrected | None:
 
 
 def temperatures_c(sensor: GyroscopeEntry) -> dict[str, float | None]:
-    """Return the temperatures of a gyroscope; scale factors are from the sweeps alone, so they may have their own."""
+    """Return the temperatures of a gyroscope's values; scale factors from sweeps alone have one of their own."""
     if sensor.scale_conditions is None or sensor.bias_conditions is None:
         return {"": sensor.temperature_c}
     return warmth(sensor.scale_conditions, " at the scale factors") | warmth(sensor.bias_conditions, " at the biases")
@@ -154,7 +154,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
 
 
 def _differs(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
-    """Yield which of two estimators to use, if they differ by more than U."""
+    """Yield a sentence on which of two estimators to use, if they differ by more than U."""
     expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*solution.scale, *solution.bias_rad_s) for solution in (sensor, other))
     differences = divide_or_infinity(np.abs(np.subtract(others, values)), expanded)

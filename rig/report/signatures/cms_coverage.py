@@ -92,7 +92,7 @@ def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
 
 
 def _plain(algorithm: Any) -> Any:
-    """Return the algorithm as it is, without parameters or with NULL; other parameters are removed."""
+    """Return the algorithm without parameters other than NULL."""
     name = algorithm["algorithm"].native
     if name == WITH_PARAMETERS:
         return algorithm

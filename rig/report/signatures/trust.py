@@ -110,7 +110,7 @@ def _other_name(certificate: "Certificate", expected: str | None) -> str:
 
 
 def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
-    """Return certificates of a signer's `chain`, except the first, whose content may have been altered.
+    """Return the certificates of a signer's `chain`, except the first, whose content is not verified.
 
     The signature itself identifies the first. The others must be trusted, or issued by one of the chain or a trusted
     one.

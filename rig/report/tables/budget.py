@@ -13,12 +13,12 @@ from rig.station.plain_text import plain
 
 
 def heading_for(budget: BudgetEntry | None) -> str:
-    """Return the heading of a column of U by a budget; without one U is two standard deviations."""
+    """Return the heading of a column of U by a budget, or of two standard deviations without one."""
     return heading_of((COVERAGE_FACTOR,) if budget is None else budget.coverage_factors)
 
 
 def heading_of(factors: Sequence[float]) -> str:
-    """Return the heading of a column of U: with its coverage factor, or the largest if they differ in print."""
+    """Return the heading of a column of U with its coverage factor, or the largest of different ones."""
     printed = sorted({round(factor, 2) for factor in factors})
     return f"± U (k {'=' if len(printed) == 1 else '≤'} {printed[-1]:g})"
 

@@ -64,7 +64,7 @@ def pair(value: float, uncertainty: float) -> Pair:
 
 
 def axis_rows(sensor: GyroscopeEntry) -> list[AxisRow]:
-    """Return a gyroscope's axes with U of the budget; without one, with the standard deviation of the noise."""
+    """Return a gyroscope's axes with U of the budget; without a budget, with the standard deviation of the noise."""
     return rows_of(sensor.scale, sensor.bias_rad_s, _widths(sensor), too=degrees_of(sensor)[1])
 
 
@@ -76,7 +76,7 @@ def rows_of(
     size: float = 1.0,
     too: float | None = None,
 ) -> list[AxisRow]:
-    """Return each axis with U from `widths` of scale factors and biases; the bias times `size`, and times `too`."""
+    """Return each axis with U from `widths` of scale factors and biases; biases in units of `size`, and of `too`."""
 
     def bias_in(unit: float, i: int) -> Pair:
         return pair(unit * bias[i], unit * widths[3 + i])
@@ -110,7 +110,7 @@ def check_row(check: CheckEntry) -> CheckRow:
 
 
 def verification_rows(entry: VerificationEntry) -> Iterator[tuple[str, ...]]:
-    """Yield a verification's axes: RMS as found and left; largest mean over a revolution as found and left; rad/s."""
+    """Yield a verification's axes: RMS before and after, largest mean over a revolution before and after, rad/s."""
     for i, axis in enumerate(AXES):
         yield (
             axis,

@@ -54,7 +54,7 @@ def _group(budget: BudgetEntry, factors: Sequence[str], first: int, name: str) -
 
 
 def _percent(probability: float) -> str:
-    """Return whole percent; in full for the probability that defines the coverage factor."""
+    """Return whole percent, or all digits of the probability that defines the coverage factor."""
     full = f" ({100 * PROBABILITY:.2f} %)" if math.isclose(probability, PROBABILITY, abs_tol=5e-5) else ""
     return f"{100 * probability:.0f} %{full}"
 

@@ -19,7 +19,7 @@ Part = Element | None
 
 
 def dcc(name: str, *parts: Part, **attributes: str) -> Element:
-    """Return an element of the certificate with those of its parts that are not None."""
+    """Return an element of the certificate with its parts, without those that are None."""
     return _extend(Element(f"{{{DCC}}}{name}", attributes), parts)
 
 

@@ -128,5 +128,5 @@ def _checks(sensor: str | None, checks: Sequence[CheckEntry]) -> Table:
 
 
 def _number(value: float, limit: float | None) -> str:
-    """Return the value in print; values below the digits of the limit are rounding errors and read 0."""
+    """Return the printed value; values below the digits of the limit are rounding errors and read 0."""
     return "0" if limit is not None and abs(value) < ROUNDING * limit else f"{value:.4g}"

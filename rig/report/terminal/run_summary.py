@@ -139,7 +139,7 @@ def _several(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
 
 
 def _heading(item: _SensorValues) -> str:
-    """Return what the numbers other than scale factors are, with their unit."""
+    """Return the heading of the numbers other than scale factors, with their unit."""
     return f"{item.shown.noun}, {item.shown.unit.name}"
 
 

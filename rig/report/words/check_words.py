@@ -55,7 +55,7 @@ def words_of_name(name: str) -> CheckWords | None:
 
 
 def what_failed(check: CheckEntry, folder: Path | None) -> str | None:
-    """Return the meaning of a failed check and what to do, with run folder and limit key in the commands.
+    """Return the meaning of a failed check and its remedy, with run folder and limit key in the commands.
 
     The advice to raise a limit is left out if no configuration has that limit.
     """

@@ -23,7 +23,7 @@ class Word:
 
     @property
     def synonyms(self) -> tuple[str, ...]:
-        """Every name alone: of `coverage factor, k = 2` also the letter."""
+        """The separate names: for `coverage factor, k = 2` also the letter."""
         return tuple(name.partition(" = ")[0] for name in self.names.split(", "))
 
     @property

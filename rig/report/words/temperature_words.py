@@ -11,7 +11,7 @@ STEP = 4  # every fourth row of the table is shown
 
 
 def shown_rows(entry: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
-    """Return the rows of both ends of the range, of its middle, and half-way between."""
+    """Return the rows for the ends and the middle of the range, and half-way between."""
     return entry.table[::STEP]
 
 

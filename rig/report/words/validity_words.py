@@ -38,12 +38,12 @@ def warmth_words(when: ConditionsEntry | None) -> str:
 
 
 def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
-    """Return a temperature by the use of the readings (`use`), " at the biases" for example."""
+    """Return a temperature with the `use` of its readings, for example " at the biases"."""
     return {f"{use}{AS_STATED}" if when.temperature_stated else use: when.temperature_c}
 
 
 def label_source(use: str) -> str:
-    """Return the label of a temperature of `warmth` with its source."""
+    """Return the source of a temperature as the label for its `warmth`."""
     return use if use.endswith(AS_STATED) else f"{use}, by its own thermometer"
 
 

@@ -57,7 +57,7 @@ class BoardCalibration:
                 self.note(BoardRecalled(name, sweep))
 
     def begin(self) -> None:
-        """Make the host keep data from before the first sample on, for the time base of the first sweep."""
+        """Make the host keep data from before the first sample, for the time base of the first sweep."""
         self.acquisition.keep()
 
     def keep(self, sweep: Sweep) -> None:

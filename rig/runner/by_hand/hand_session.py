@@ -162,7 +162,7 @@ class HandSession:
         self._ask(self._next(now, face), wrong)
 
     def _pauses_before(self, rest: HandRest) -> None:
-        """Refuse rests too short to be judged: they are pauses in the hand."""
+        """Refuse rests too short to be judged, which are pauses in the hand."""
         for pause in self._segmenter.handled.rests:
             if self._judged_s < pause.start_s and pause.end_s < rest.start_s:
                 event = HandRestRefused(*self._board_us(pause), "held_not_laid_down")
@@ -200,10 +200,10 @@ class HandSession:
         self.note(HandMoveTaken(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
     def _wrong(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
-        """Leave out a faulty move, a rest, or all before; return whether the rest counts.
+        """Omit a faulty move, a rest, or all before; return whether the rest counts.
 
-        A changed bias at one rest may be a creep and costs this rest; at the next rest too it is a new bias. Raise the
-        Fault that no move can correct.
+        A changed bias at one rest may be a creep, so that rest is omitted; at the next rest too it is a new bias. Raise
+        the Fault that no move can correct.
         """
         self._refused += 1
         if wrong.name not in MENDED_BY_HAND:

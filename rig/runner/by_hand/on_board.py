@@ -64,7 +64,10 @@ class FollowedSession:
     _has_asked: bool = False
 
     def take(self, report: HandReport) -> None:
-        """Take the board's report and report its news. If its button has begun a new session, this begins one too."""
+        """Process the board's report and announce its changes.
+
+        If its button has begun a new session, this begins one too.
+        """
         wrong = None
         if self.reports and report.judged < self.reports[-1].judged:
             self.reports, self._accepted, self._lay, self._has_asked = [], [], [], False
@@ -98,7 +101,7 @@ class FollowedSession:
         self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
 
     def _ask(self, wrong: Fault | None) -> None:
-        """Ask for the next move of the list, which goes on until the board has enough."""
+        """Ask for the next move of the list, which restarts until the board has enough."""
         flips = self.moves
         while (remaining := still_open(WantedMoves(flips, 0), self._accepted, self._lay)).done:
             flips += len(ROUND)

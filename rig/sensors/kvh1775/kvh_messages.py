@@ -174,7 +174,7 @@ def encode(
 
 
 def encode_one(name: Format, rotation: Sequence[float], acceleration_g: Sequence[float], **tail: float) -> bytes:
-    """Return the bytes of one message, without arrays; `tail` has all other fields of the format, and may have more."""
+    """Return the bytes of one message, without arrays; `tail` has at least the other fields of the format."""
     packer, fields = _PACKERS[name]
     data = packer.pack(_HEADERS[name], *rotation, *acceleration_g, *[tail[field] for field in fields])
     return data + _crc(data.translate(_BITS_REVERSED))

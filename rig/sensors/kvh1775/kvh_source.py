@@ -78,7 +78,7 @@ class Kvh1775Source:
         self._driver.start(self._required)
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors of the meantime: SensorError as `OwnPort.check`, and `kvh_axis_invalid`."""
+        """Raise errors since the last call: SensorError as `OwnPort.check`, and `kvh_axis_invalid`."""
         self._driver.own_port.check(clock_s)
 
     def close(self) -> None:

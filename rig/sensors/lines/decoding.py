@@ -136,7 +136,7 @@ class LineReader:
 
     @staticmethod
     def _match(raw: NDArray[np.uint8], starts: NDArray[np.intp], text: bytes) -> NDArray[np.bool_]:
-        """Return which lines begin with `text`; it has no line end, so a shorter line never matches."""
+        """Return the lines that begin with `text`; without a line end in it, no shorter line matches."""
         expected = np.frombuffer(text, np.uint8)
         positions = np.minimum(starts[:, None] + np.arange(len(expected)), len(raw) - 1)
         matches: NDArray[np.bool_] = (raw[positions] == expected).all(axis=1)
@@ -146,7 +146,7 @@ class LineReader:
     def _match_checksums(
         raw: NDArray[np.uint8], text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """Return which lines end with `*hh`, the XOR of the bytes before; blank that end in `text`."""
+        """Return the lines that end with `*hh`, the XOR of the bytes before; blank that end in `text`."""
         star = np.maximum(ends - 3, 0)
         high, low = _HEX[raw[ends - 2]], _HEX[raw[ends - 1]]
         body_starts = starts + np.isin(raw[starts], np.frombuffer(b"$!", np.uint8))
@@ -207,7 +207,7 @@ class LineReader:
 def _have_valid_bytes(
     classes: NDArray[np.uint8], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Return which lines hold only bytes that a sample may hold. Bytes between lines belong to none."""
+    """Return the lines with only bytes that a sample may contain. Bytes between lines belong to none."""
     good = np.ones(len(line_starts), np.bool_)
     others = np.flatnonzero(classes == _OTHER)
     if len(others):

@@ -24,7 +24,7 @@ class StatedProperties:
 def section(
     shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, user: StatedProperties | None = None
 ) -> str:
-    """Return the YAML of `sensors`; `?` stands for what is to be looked up, and `rig check` refuses it by the key."""
+    """Return the YAML of `sensors`; `?` marks values to look up, which `rig check` refuses by key."""
     user = user or StatedProperties()
     lines: dict[str, object] = {"columns": _format_list(guess.columns)}
     if shape.keys:

@@ -140,7 +140,7 @@ class LinesDevice:
         return rate_hz
 
     def _has_enough(self) -> bool:
-        """Return whether the rate can be judged: few samples suffice for a slow device, coarse times need more."""
+        """Return whether the rate can be judged: a slow device needs few samples, coarse times need more."""
         if self._section.time is None:
             return self.counts.samples >= 3
         is_long_enough = self.counts.samples >= 5 and self._span_s() >= LOOK_S

@@ -128,7 +128,7 @@ class Stamper:
         self._last_sequence = float(row[columns.index("sequence")]) if "sequence" in columns else None
 
     def _select_possible(self, values: Array) -> NDArray[np.bool_]:
-        """Return which rows of (n, columns) can follow those before. Raise SensorError `lines_time_jumped`."""
+        """Return the rows of (n, columns) that can follow those before. Raise SensorError `lines_time_jumped`."""
         is_sample = np.zeros(len(values), np.bool_)
         last = (self._last_time, self._last_sequence)
         try:
@@ -147,7 +147,7 @@ class Stamper:
         return is_sample
 
     def _is_possible(self, passed_s: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which samples can follow the one before: later, or equal if times are coarse, and not too late."""
+        """Return the samples that can follow the one before: later, or equal if times are coarse, and not too late."""
         later = passed_s > 0 if self.section.time is not None and not self._is_coarse else passed_s >= 0
         in_time = (passed_s <= LONGEST_GAP_S) & (steps >= 1) & (steps <= LONGEST_GAP_S * self.rate_hz + 1)
         possible: NDArray[np.bool_] = later & in_time
@@ -159,7 +159,7 @@ class Stamper:
         return self.section.time is not None and is_coarse(self.step_s, self.rate_hz)
 
     def _count_coarse_steps(self, device_s: Array) -> NDArray[np.int64]:
-        """Return the samples (n,) that passed before each, by coarse times (n,): one, or more if a time is far ahead.
+        """Return the number of samples (n,) since the previous one, by coarse times (n,): more than one after a jump.
 
         A loss within a step of the time is invisible.
         """
@@ -184,7 +184,7 @@ class Stamper:
 
     # -- times ---------------------------------------------------------------------------------------------------
     def _add_late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
-        """Return the steps, plus the loss that only the delay of the lines shows."""
+        """Return the steps, plus a loss that shows only as a delay of the lines."""
         if "sequence" in self.section.columns or self._smoothed is None:
             return steps
         late_s = host_time_s - (self._host_began_s or 0.0) - self._smoothed.predict_s(int(steps.sum()))

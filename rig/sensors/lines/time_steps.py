@@ -9,7 +9,7 @@ GROWS = 2.0  # growth of the step of a single-precision number that doubles
 
 
 def find_time_step_s(printed: Array, decimals: int, unit: str) -> float:
-    """Return the step, s, of printed times (n,) with `decimals` digits, for a device that runs on for as long again.
+    """Return the step, s, of printed times (n,) with `decimals` digits, also for later times of the same device.
 
     A time in single precision, with 24 bits, has the step of its last bit, however many digits are printed: every
     printed time lies on that grid.

@@ -73,7 +73,10 @@ class _ImuStream:
         self.description = describe(self.name, self.section, provides_temperature=self.thermometer.provides)
 
     def take(self, message: Any, *, is_consecutive: bool) -> tuple[int, int, ImuReading] | None:
-        """Return number, time and reading of a message; None for a copy. `is_consecutive`: none was lost before it."""
+        """Return number, time and reading of a message; None for a copy.
+
+        `is_consecutive`: no message was lost before it.
+        """
         reading = decode_reading(message)
         if not self.thermometer.provides:
             self.thermometer.last_c = reading.temperature_c
@@ -132,7 +135,7 @@ class MavlinkSource:
 
     @property
     def corrected(self) -> Mapping[str, str]:
-        """The settings that were changed: none, to read an autopilot."""
+        """The changed settings, which are none: an autopilot is only read."""
         return {}
 
     @property
@@ -145,7 +148,7 @@ class MavlinkSource:
         self.link.own_port.stream()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors of the meantime: SensorError as `OwnPort.check`, and `autopilot_armed`."""
+        """Raise errors since the last call: SensorError as `OwnPort.check`, and `autopilot_armed`."""
         self.link.own_port.check(clock_s)
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ class Clock(Protocol):
         """Wait for an event; return whether it came in time."""
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done`, evaluated whenever `changed` (which is locked) is notified; return its last value."""
+        """Wait until `done`, evaluated at each notification of `changed` (which is locked); return its value."""
 
 
 class HostClock:

@@ -46,7 +46,7 @@ def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
 
 
 def _ping(bus: Bus, port: str, servo_id: int) -> None:
-    """Confirm that a ping brings exactly one answer; one odd answer in four may be a late one."""
+    """Confirm that a ping has exactly one answer; one wrong answer in four may be a late one."""
     answers = odd = 0
     for _ in range(PINGS):
         try:
@@ -71,7 +71,7 @@ def _ping(bus: Bus, port: str, servo_id: int) -> None:
 
 
 def _request_acknowledgements(bus: Bus) -> None:
-    """Have writes acknowledged (a setting in RAM): without it the arrival of a goal is unconfirmed."""
+    """Make the servo acknowledge writes (a setting in RAM); otherwise the arrival of a goal is unconfirmed."""
     try:
         (level,) = bus.read(RETURN_LEVEL)
     except ReplyLost:

@@ -20,7 +20,7 @@ BRAKE_MS, BRAKE_RAMP_MS = 200, 100  # the profile of a stop
 
 
 def make_ready(bus: Bus, watchdog: int) -> None:
-    """Have the servo hold its shaft at its position, with its watchdog armed. Raise Refused by name, BusError.
+    """Make the servo hold its shaft at its position, with its watchdog armed. Raise Refused by name, BusError.
 
     `watchdog` is in the register's units. Operating mode and drive mode lie in the EEPROM and are written only if they
     differ. Writing the mode sets the profile to zero, the fastest motion; so the profile comes after it and the goal

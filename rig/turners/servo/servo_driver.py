@@ -118,7 +118,7 @@ class Servo:
         ]
 
     def check(self) -> None:
-        """Raise a supervising thread's problem. The shaft is stopped by then if this driver controls it."""
+        """Raise the problem that a supervising thread found. The shaft is stopped by then if under control."""
         if self._link is not None and (problem := self._thread_problem(self._link)) is not None:
             self._fail(problem)
         if self._problem is None and not (self._link is not None and self._stopper.begun):
@@ -135,7 +135,7 @@ class Servo:
     # Moving -----------------------------------------------------------------------------------------------------
 
     def take_control(self, carried: FlangeLoad) -> None:
-        """Have the shaft held at its position, with the watchdog armed. Raise `Refused` by name."""
+        """Make the servo hold its shaft at its position, with the watchdog armed. Raise `Refused` by name."""
         self.check()
         refuse(self.problems(carried))
         ends_s = self._clock.now_s() + STANDING_S

@@ -126,7 +126,7 @@ class Arm:
         return read_report(self._host, self._controller, self.latest, self._robot_api_port)
 
     def check(self) -> None:
-        """Raise a supervising thread's problem. The arm is stopped by then if this driver controls it."""
+        """Raise the problem that a supervising thread found. The arm is stopped by then if under control."""
         if self._problem is None and not self._stopper.begun:
             return
         problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "Start again when ready")
@@ -187,7 +187,7 @@ class Arm:
             deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
 
             def is_late() -> bool:
-                """Return whether it is late by the controller's clock; its arrival may be reported a little later."""
+                """Return whether the move is late by the controller's clock; the report of its arrival takes time."""
                 has_arrived = self._stands_at(motion) and time.monotonic() < reported_s
                 return self.latest.time_s > deadline_s and not has_arrived
 
@@ -288,7 +288,7 @@ class Arm:
             raise Refused.of(readiness(self.latest) or problem)
 
     def _shows(self, runtime_state: RuntimeState, timeout_s: float) -> bool:
-        """Return whether the arm's states show this state of its program within `timeout_s`."""
+        """Return whether the arm's states report this state of its program within `timeout_s`."""
         with self._changed:
             return self._changed.wait_for(lambda: self.latest.runtime_state == runtime_state, timeout_s)
 
@@ -339,7 +339,7 @@ class Arm:
             self._changed.wait_for(lambda: self._problem is not None, REASON_S)
 
     def _unbegun(self, problem: Problem) -> Problem:
-        """Return why a move was not begun: the controller refused it, or had lost the client in a silence."""
+        """Return why a move did not begin: the controller refused it, or had lost the client during a silence."""
         if self._silent_s <= SILENCE_S:
             return problem
         what = f"the arm at {self._host} was silent for {self._silent_s:.1f} s, and {problem.what}"

@@ -102,10 +102,10 @@ def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 
 
 def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
-    """Return the problems of the controller's account of its arm, if the configuration uses it.
+    """Return the problems of the controller's description of its arm, if the configuration uses it.
 
-    A problem for each wrist whose axis differs from the drawing's, in the flange's frame at home, or if no account is
-    there.
+    These are a missing description, and each wrist whose axis differs from the drawing's, in the flange's frame at
+    home.
     """
     if arm.kinematics == "nominal":
         return []

@@ -79,7 +79,7 @@ def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
 
 
 def identity_problems(arm: "ArmSection", report: ArmReport) -> list[Problem]:
-    """Compare the arm that answers with the configured one by series, type and lengths; return one problem, or none."""
+    """Compare the arm that answers with the configured one by series, type and lengths; return at most one problem."""
     model, robot_type = model_of(arm), _robot_type(report)
     if series := series_problem(report.host, report.version):
         if not (model.series == "CB3" and series.name == "cb3_not_supported"):

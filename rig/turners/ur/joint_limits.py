@@ -97,7 +97,7 @@ def _find_excess(values: Array, ours: Joints, theirs: Joints | None) -> Iterator
 
 
 def _fractions(motion: Motion) -> Array:
-    """Return (6,) the travel of each joint relative to the longest: its speed scales with it."""
+    """Return the travel (6,) of each joint relative to the longest, in proportion to which its speed is."""
     travel_rad = np.abs(travel(motion.start_q_rad, motion.target_q_rad))
     fractions: Array = travel_rad / travel_rad.max()
     return fractions

@@ -39,7 +39,7 @@ class Supervision:
         self._limited_since_s: float | None = None
 
     def judge(self, state: ArmState) -> Problem | None:
-        """Return why the arm cannot go on. The safety bits that explain a stopped program may come a packet later.
+        """Return why the arm cannot continue; the safety bits that explain a stopped program may follow a packet later.
 
         An interruption ends our program: one that runs again a moment later belongs to another client.
         """

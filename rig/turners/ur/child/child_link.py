@@ -91,7 +91,7 @@ class ChildLink:
 
     @contextmanager
     def patience(self) -> Iterator[None]:
-        """Tolerate a long silence inside the block: a constructor of the client holds the child's interpreter."""
+        """Tolerate a long silence inside the block, in which a constructor of the client blocks the child."""
         self._patient = True
         try:
             yield
@@ -159,7 +159,7 @@ class ChildLink:
         return None
 
     def _say_alive(self) -> None:
-        """Tell the child that its parent lives; never wait: a child that does not read must be detected."""
+        """Send the child a sign of life without waiting, so that a child that does not read is detected."""
         if not self._sending.acquire(blocking=False):
             return
         try:
@@ -194,7 +194,7 @@ def _writable(pipe: "Connection[Request, Message]") -> bool:
 
 @contextmanager
 def _block_interrupts() -> Iterator[None]:
-    """Block Ctrl-C, so that a child started inside never gets it; the parent gets it afterwards."""
+    """Block Ctrl-C, so that a child started inside never receives it; the parent receives it afterwards."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows: the child ignores Ctrl-C once it runs
         yield
         return

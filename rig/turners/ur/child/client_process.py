@@ -241,7 +241,7 @@ class _Child:
         return ControlTaken()
 
     def _link_problem(self, *, silent: bool = False) -> Problem | None:
-        """Return the problem of a lost link, if any: its consequences are not the arm's faults."""
+        """Return the problem of a lost link, if any, so that its consequences are not reported as the arm's faults."""
         if self._states.problem is not None or not (self._states.closed or silent):
             return self._states.problem
         return link_lost(f"no new state comes from the arm at {self._host}")
@@ -267,7 +267,7 @@ class _Child:
             self.send(RequestFailed(move_failure("the controller did not start the move")))
 
     def _await_state(self) -> None:
-        """Wait for another state: a lost link, not the controller, may have kept the move from beginning.
+        """Wait for another state, because a lost link may be the reason why the move did not begin.
 
         Without a state the parent reports the link before this ends.
         """

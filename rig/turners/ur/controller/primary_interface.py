@@ -48,7 +48,7 @@ class ArmDescription:
 
     @property
     def complete(self) -> bool:
-        """Whether all items to wait for are there; the software comes before them, or never."""
+        """Whether all expected items are there; the software comes before them, or never."""
         return None not in (self.kinematics, self.tcp_offset, self.setup)
 
 

@@ -36,7 +36,7 @@ class StopOrder:
             threading.Thread(target=self._give, args=(path,), name=f"arm stop by {path.name}", daemon=True).start()
 
     def await_delivery(self) -> bool:
-        """Wait until the order is delivered or has failed on every path, within its time; return whether that is so.
+        """Wait, at most the order's time, until it is delivered or has failed on every path; return whether that is so.
 
         A later delivery would end a program that is started meanwhile.
         """
@@ -105,7 +105,7 @@ class StopOrder:
             self._changed.notify_all()
 
     def _ask(self, path: StopPath, connection: StopConnection) -> None:
-        """Ask whether the program has ended, until it has, and at least until the path has answered the order."""
+        """Poll until the program has ended, and at least until the path has answered the order."""
         looks = 0
         while connection.tells_of_programs and self._remaining_s > 0.0:
             running = connection.program_running()

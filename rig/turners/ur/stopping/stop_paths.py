@@ -40,7 +40,7 @@ class StopPath:
 
 
 def stop_paths(host: str, version: tuple[int, ...], robot_api_port: int) -> tuple[StopPath, ...]:
-    """Return the paths at the controller `host` with software `version`; without the first no arm is moved."""
+    """Return the stop paths of the controller `host` with software `version`; the first one is indispensable."""
     primary = StopPath(PrimaryStop.name, partial(PrimaryStop, host))
     if not is_polyscope_x(version):
         return StopPath(Dashboard.name, partial(Dashboard, host)), primary
