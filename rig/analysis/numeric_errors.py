@@ -25,7 +25,7 @@ def solvable() -> Iterator[None]:
 
 
 def _is_of_library(error: ValueError) -> bool:
-    """Return whether one of the libraries raised it."""
+    """Return whether the error comes from one of the libraries."""
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

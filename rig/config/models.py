@@ -128,7 +128,7 @@ class ArmSection(TurnerSection):
 
     @property
     def address_key(self) -> str:
-        """The key of that."""
+        """The key of this section with the address."""
         return "host"
 
     @property

@@ -42,7 +42,7 @@ class Workers(Protocol):
         ...
 
     def give(self, solve: Solve, task: Task) -> None:
-        """Give them one more recording."""
+        """Pass one more recording to the workers."""
         ...
 
     def answers(self) -> Iterator[SolvedTask]:

@@ -46,7 +46,7 @@ def read_layers(path: Path, overrides: Sequence[str] = ()) -> Layered:
 
 
 def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) -> Layered:
-    """Merge a file's text with its base files; a text without a `path` has none. Raise `Unreadable`."""
+    """Merge a file's text with its base files; without a `path` there are none. Raise `Unreadable`."""
     layers = list(_layers(text, path))
     document: dict[str, Any] = {}
     places: dict[Location, str] = {}

@@ -64,7 +64,7 @@ class ServoSection(TurnerSection):
 
     @property
     def address_key(self) -> str:
-        """The key of that."""
+        """The key of this section with the address."""
         return "port"
 
     @property

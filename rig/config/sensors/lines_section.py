@@ -111,7 +111,7 @@ class LineTemperatureSection(Section):
 
     @property
     def stated(self) -> StatedTemperatureSection | None:
-        """What is stated, if anything is."""
+        """The stated value, if any."""
         if self.stated_c is None:
             return None
         return StatedTemperatureSection(stated_c=self.stated_c, stated_within_k=self.stated_within_k)

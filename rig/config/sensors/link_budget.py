@@ -39,7 +39,7 @@ class LinkLoad:
 
     @property
     def bytes_per_s(self) -> float:
-        """What the stream takes of the link."""
+        """The load of the stream on the link, bytes/s."""
         return self.rate_hz * self.bytes_per_sample
 
 

@@ -186,7 +186,7 @@ class RecomputeOutcome:
 
     @property
     def same(self) -> bool:
-        """Whether all were solved with the stated results."""
+        """Whether all recordings were solved, each with the stated result."""
         return all(comparison.same for comparison in self.compared)
 
     @property

@@ -148,7 +148,7 @@ def _sampling_step(fraction: Array) -> float:
 
 
 def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float | None:
-    """Return the cycles of the strongest line in residuals (n, axes) besides the `previous`, or None without one."""
+    """Return the cycles of the strongest line in residuals (n, axes), apart from `previous` ones; None without one."""
     from scipy.ndimage import median_filter
 
     powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2

@@ -99,7 +99,7 @@ class Term:
 
     @property
     def whose(self) -> str:
-        """The sensor's name among others of the same name."""
+        """The label of the sensor's readings, distinct from its other quantities."""
         return self.finding.quantity.label(self.finding.sensor)
 
     @property

@@ -241,7 +241,7 @@ def _are_in_lines(
 
 
 def _markers(keys: tuple[str, ...]) -> Mapping[bytes, bytes]:
-    """Return the marker of each key, of the same length; long keys first, which may contain others."""
+    """Return a marker for each key, of the key's length; longer keys first, because they may contain others."""
     by_length = sorted(enumerate(keys), key=lambda indexed_key: -len(indexed_key[1]))
     return MappingProxyType({key.encode(): bytes([_KEYS + index]) + b" " * (len(key) - 1) for index, key in by_length})
 
