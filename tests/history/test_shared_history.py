@@ -15,7 +15,7 @@ from support.history.past_runs import enter_many, finished
 from support.history.postgres import postgresql
 from support.processes.forked import forked
 
-PROCESSES, ENTRIES, FEW = 8, 250, 20
+PROCESSES, ENTRIES, FEW = 8, 250, 5
 pytestmark = pytest.mark.slow
 
 
@@ -35,7 +35,7 @@ def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(
     with forked().Pool(PROCESSES) as pool:
         new = pool.starmap(enter_many, [(url, worker, entries) for worker in range(PROCESSES)])
         assert new == [entries] * PROCESSES
-        again = pool.starmap(enter_many, [(url, worker % 2, 20) for worker in range(PROCESSES)])
+        again = pool.starmap(enter_many, [(url, worker % 2, FEW) for worker in range(PROCESSES)])
         assert again == [0] * PROCESSES
     with open_history(url) as history:
         with history.engine.connect() as connection:
