@@ -37,10 +37,11 @@ def counted(dof: Array | None) -> list[Any] | None:
 
 def _attributes(kind: type[BaseModel], source: object) -> Mapping[str, str]:
     """Return by field the attribute of a source that fills an entry of `kind`."""
-    from rig.report.entry_sources import SOURCES  # which imports all of analysis: only writing entries needs it
+    from rig.report.entry_sources import SOURCES  # which imports all entries: only writing one needs it
 
+    names = {cls.__name__ for cls in type(source).__mro__}
     for row in SOURCES.get(kind, ()):
-        if isinstance(source, row.classes):
+        if not names.isdisjoint(row.classes):
             return row.attributes
     raise TypeError(f"no row of entry_sources.py says what {kind.__name__} takes from {type(source).__name__}")
 
