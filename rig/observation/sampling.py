@@ -31,14 +31,18 @@ NEAR, MOSTLY = 0.25, 0.8  # of an interval: tolerance of a whole multiple; fract
 LOST = 0.6  # of an interval: a larger difference is a lost reading
 COARSE = 1 / 3  # of the interval: with a coarser resolution the stamps are worse than `NEAR`
 SHORT, SOME_SHORT = 0.6, 0.05  # of the interval; if this fraction of steps is shorter, readings are stamped on arrival
+LATE = 0.1  # of the long steps: if as many are short, readings were late and not lost
 MORE = 1.5  # times the resolution: stamps that are later than this are not only rounded
 SMALLER, OF_NORMAL = 0.85, 0.5204  # quantile of squared normal deviates; mean of those below it over the mean of all
+AVERAGED = 32  # readings whose stamps err either way
 PASSES, SETTLED = 6, 1e-9
 DECIMALS = 7  # of a second, to which stamps may be rounded
 COUNTED = 50  # missing readings: the number in a longer gap is too inexact to refine the interval
 SEGMENTS, FARTHEST = 24, 1024  # the fewest segments of a log that show a random walk; readings of one at most
 GROWN = (2.5, 12.0)  # range of the factor by which a random walk's variance grows over four segments
 WIDEST_BURST = 16  # readings: at least one of them in a row must be on time
+WHOLE = 0.01  # of a coarse resolution: tolerance of an interval that is a whole multiple of it
+BEAT, IN_BLOCK, BLOCKS = 0.35, 8, 20  # variance over mean of missing readings; expected ones in a block; fewest blocks
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +75,11 @@ class Sampling:
         long = np.diff(time_s) > max(fewest + 1, LONG_STEP) * self.interval_s
         return np.asarray(long | self.late[1:] | self.late[:-1])
 
+    @classmethod
+    def even(cls, count: int) -> "Sampling":
+        """Return the sampling of a `count` of readings, too few to show any."""
+        return cls(0.0, np.zeros(max(count - 1, 0), dtype=np.intp), 0.0, 1, on_arrival=False)
+
     @property
     def numbers(self) -> NDArray[np.intp]:
         """(n,) the readings' numbers, from 0, missing ones counted."""
@@ -86,16 +95,25 @@ class Sampling:
 def find_sampling(time_s: Array) -> Sampling:
     """Return the sampling of readings at rising times (n ≥ 2,)."""
     steps_s = np.diff(time_s)
-    mean_s = min(_slope(time_s, apart) for apart in LONG)
+    mean_s = typical_interval_s(time_s)
     # Equal steps are as coarse as their resolution, and good.
-    coarse = _resolution_s(time_s) > COARSE * mean_s and float(np.ptp(steps_s)) > SETTLED * mean_s
+    rounded_s = resolution_s(time_s)
+    coarse = rounded_s > COARSE * mean_s and float(np.ptp(steps_s)) > SETTLED * mean_s
     uneven = float(np.quantile(steps_s, SOME_SHORT)) < SHORT * mean_s
     single = _count_missing(time_s, 1, MEDIAN)
-    if single.fit >= MOSTLY and not coarse and (not uneven or single.median_run_s(time_s) > PACKET_S):
+    beats = _is_beat(single.missing)
+    # After a late reading the next step is short; after a lost one it is not.
+    late = np.count_nonzero(steps_s < SHORT * single.interval_s) > LATE * single.gap_count
+    good = single.fit >= MOSTLY and not coarse and not beats and not late
+    if good and (not uneven or single.median_run_s(time_s) > PACKET_S):
         return Sampling(single.interval_s, single.missing, 0.0, 1, on_arrival=False)
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
-    candidates = (_count_missing(time_s, width, begun) for width in widths for begun in (MEDIAN, UNDISTURBED))
-    fitting = [candidate for candidate in (single, *candidates) if candidate.fit >= MOSTLY]
+    wider = (_count_missing(time_s, width, begun) for width in widths for begun in (MEDIAN, UNDISTURBED))
+    candidates = [candidate for candidate in wider if not _is_beat(candidate.missing)]
+    # Every step is a whole multiple of the resolution, so of another interval than the true one too.
+    misleading = coarse and abs(mean_s / rounded_s - round(mean_s / rounded_s)) > WHOLE
+    candidates = candidates if misleading or beats else [single, *candidates]
+    fitting = [candidate for candidate in candidates if candidate.fit >= MOSTLY]
     # The steps inside a burst would make the time between bursts look like a gap.
     fitting = [candidate for candidate in fitting if candidate.interval_s > mean_s / 2]
     if not fitting:
@@ -105,26 +123,63 @@ def find_sampling(time_s: Array) -> Sampling:
     best = next(candidate for candidate in fitting if candidate.gap_count <= 2 * fewest + 1)
     sampling = Sampling(best.interval_s, best.missing, 0.0, best.width, on_arrival=False)
     late_s = time_s - best.interval_s * sampling.numbers
-    rounded_s = max(_resolution_s(time_s), NEAR * best.interval_s)
-    too_late = float(np.max(late_s - _least(late_s, best.width))) > MORE * rounded_s
+    allowed_s = max(rounded_s, NEAR * best.interval_s)
+    too_late = float(np.max(late_s - _least(late_s, best.width))) > MORE * allowed_s
     return replace(sampling, on_arrival=uneven and too_late)
 
 
-def even_times(time_s: Array, sampling: Sampling) -> Array:
-    """Return the sampling times (n,) of readings that were stamped on arrival; others unchanged.
+def typical_interval_s(time_s: Array) -> float:
+    """Return the interval over many readings at rising times (n ≥ 2,), of which some may be missing or late."""
+    return min(_slope(time_s, apart) for apart in LONG)
 
-    The latency common to all readings remains, because no stamp shows it.
+
+def even_times(time_s: Array, sampling: Sampling) -> Array:
+    """Return the strictly rising times (n,) at which readings were taken; good and different stamps unchanged.
+
+    Stamps of arrival are never early, so the least lateness counts; coarse ones err either way, so the mean does. The
+    latency that all readings have in common stays in: no stamp shows it.
     """
-    if not sampling.on_arrival:
+    if sampling.late is not None:
+        return _separate(time_s)
+    if not sampling.on_arrival and sampling.width == 1 and (np.diff(time_s) > 0).all():
         return time_s
     numbers = sampling.interval_s * sampling.numbers
     late_s = time_s - numbers
     width = 2 * sampling.width
-    least_s = _least(late_s, width)
-    # Moving averages of a moving maximum: the least lateness, without steps.
-    padded = np.pad(least_s, (width // 2, width - width // 2 - 1), mode="edge")
-    smooth_s = np.convolve(padded, np.full(width, 1 / width), mode="valid")
-    return np.asarray(numbers + smooth_s, dtype=np.float64)
+    if sampling.on_arrival:
+        # Moving averages of a moving maximum: the least lateness, without steps.
+        smooth_s = _moving_mean(_least(late_s, width), width)
+    else:
+        smooth_s = _moving_mean(late_s, max(width, AVERAGED))
+    return _separate(np.asarray(numbers + smooth_s, dtype=np.float64))
+
+
+def _moving_mean(values: Array, width: int) -> Array:
+    """Return the mean (n,) of the values around each, of fewer at either end."""
+    total = np.concatenate([[0.0], np.cumsum(values - values[0])])
+    index = np.arange(len(values))
+    first, last = np.maximum(index - width // 2, 0), np.minimum(index + width - width // 2, len(values))
+    return np.asarray(values[0] + (total[last] - total[first]) / (last - first), dtype=np.float64)
+
+
+def _separate(time_s: Array) -> Array:
+    """Return times (n,) that rise strictly: equal ones, and any after a later one, are spread until the next later."""
+    latest_s = np.maximum.accumulate(time_s)
+    new = np.concatenate([[True], np.diff(latest_s) > 0])
+    if new.all():
+        return time_s
+    starts = np.flatnonzero(new)
+    index = np.arange(len(time_s))
+    end_s = (
+        latest_s[-1] + max(float(np.median(np.diff(latest_s[starts]))), np.finfo(np.float64).tiny)
+        if len(starts) > 1
+        else latest_s[-1] + 1.0
+    )
+    apart = np.diff(np.append(starts, len(time_s)))
+    typical_s = (end_s - latest_s[0]) / len(time_s)
+    span_s = np.minimum(np.diff(np.append(latest_s[starts], end_s)), typical_s * apart)
+    group = np.cumsum(new) - 1
+    return np.asarray(latest_s + (index - starts[group]) * (span_s / apart)[group], dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,14 +209,35 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
     missing, fit = np.zeros(len(steps_s), dtype=np.intp), 0.0
     for _ in range(PASSES):
         late_s = time_s - interval_s * numbers
+        if interval_s <= 0:  # most stamps are equal
+            break
         later_s = _least_ahead(late_s, width)[1:] - _least_behind(late_s, width)[:-1]
         whole = np.rint(later_s / interval_s) * (later_s > LOST * interval_s)
         fit = float(np.mean(np.abs(later_s - interval_s * whole) < NEAR * interval_s))
-        missing = _merge_at_longest(whole.astype(np.intp), steps_s) if width > 1 else whole.astype(np.intp)
+        missing = whole.astype(np.intp)
+        if width > 1:
+            ending = missing[-width:]
+            ending[ending <= width] = 0  # the last packet may be a part of one
+            missing = _merge_at_longest(missing, steps_s)
         if abs(interval_s - last_s) <= SETTLED * interval_s:
             break
         last_s, interval_s = interval_s, _interval_s(time_s, missing, width)
     return _PeriodCandidate(width, interval_s, missing, fit)
+
+
+def _is_beat(missing: NDArray[np.intp]) -> bool:
+    """Return whether readings seem to be missing (n − 1,) more regularly than by chance.
+
+    Stamps that are whole multiples of a time shorter than the interval, as those of a polled port, show that.
+    """
+    missing = np.minimum(missing, 1)  # a gap is one
+    lost = int(missing.sum())
+    size = max(len(missing) * IN_BLOCK // lost, 1) if lost else len(missing) + 1
+    blocks = len(missing) // size
+    if blocks < BLOCKS:
+        return False
+    counts = missing[: blocks * size].reshape(blocks, size).sum(axis=1)
+    return bool(counts.var() < BEAT * counts.mean())
 
 
 def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
@@ -190,7 +266,7 @@ def _estimate_unlocated_losses(time_s: Array) -> Sampling:
     lost = width >= WIDEST_BURST and GROWN[0] * near < far < GROWN[1] * near
     nowhere = np.zeros(len(time_s) - 1, dtype=np.intp)
     scattered = far / (apart * mean_s**2) if lost else 0.0
-    usual_s = min(_slope(time_s, steps) for steps in LONG)
+    usual_s = typical_interval_s(time_s)
     late_s = time_s - usual_s * np.arange(len(time_s))
     late = late_s - _least_ahead(late_s, LONG[0]) > LONG_STEP * usual_s
     return Sampling(_interval_s(time_s, nowhere, width), nowhere, scattered, width, on_arrival=False, late=late)
@@ -226,8 +302,8 @@ def _slope(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
     return float(np.quantile(time_s[apart:] - time_s[:-apart], quantile) / apart)
 
 
-def _resolution_s(time_s: Array) -> float:
-    """Return the largest power of ten, s, that divides all stamps; 0 without one."""
+def resolution_s(time_s: Array) -> float:
+    """Return the power of ten of a second that all stamps are multiples of; 0 without one."""
     for decimals in range(DECIMALS):
         scaled = (time_s - time_s[0]) * 10**decimals
         if np.abs(scaled - np.rint(scaled)).max() < 1e-3:

@@ -91,20 +91,25 @@ def solve_external(read: ReadElsewhere, settings: RunSettings, estimator: str | 
     Raise Refused `unknown_estimator`; Fault as the observers do, and if no quantity has a solution, as the estimator
     does, or for several `nothing_solved` with every reason.
     """
+    samples = samples_in(read.readings, "the recording")
     if read.tells == "turns":
-        return _add_notes(_solve_turns(read, estimator), read)
+        return _add_notes(_solve_turns(read, samples, estimator), read, samples)
     solved = (
-        _solve_sweeps(read, estimator, settings.reference_c)
+        _solve_sweeps(read, samples, estimator, settings.reference_c)
         if read.tells == "sweeps"
-        else _solve_attitudes(read, settings, estimator)
+        else _solve_attitudes(read, samples, settings, estimator)
     )
     if solved.gyroscope is None and not solved.at_rest and not solved.installed_kinds:
         raise _nothing_solved(solved.unsolved)
-    return _add_notes(solved, read)
+    return _add_notes(solved, read, samples)
 
 
-def _add_notes(sensor: OfSensor, read: ReadElsewhere) -> OfSensor:
-    return replace(sensor, notes=(*notes_on_reading(read, _samples(read).sampling), *sensor.notes))
+def _add_notes(sensor: OfSensor, read: ReadElsewhere, samples: Samples) -> OfSensor:
+    return replace(
+        sensor,
+        omitted=(*((None, part) for part in samples.omitted), *sensor.omitted),
+        notes=(*notes_on_reading(read, samples), *sensor.notes),
+    )
 
 
 def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
@@ -123,15 +128,15 @@ def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
             yield fitness(name, quantity.name, "attitude_error", at_least, UNTRUSTWORTHY_RAD, unit="rad")
 
 
-def _solve_turns(read: ReadElsewhere, name: str | None) -> OfSensor:
+def _solve_turns(read: ReadElsewhere, samples: Samples, name: str | None) -> OfSensor:
     if name not in (None, "by_hand"):
         choose_estimator(("by_hand",), str(name))
-    return OfSensor(read.item, solve_hand_samples(read.item, _samples(read), read.motion), None, {}, {})
+    return OfSensor(read.item, solve_hand_samples(read.item, samples, read.motion), None, {}, {})
 
 
-def _solve_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:
+def _solve_sweeps(read: ReadElsewhere, samples: Samples, name: str | None, reference_c: float | None) -> OfSensor:
     chosen = None if name is None else choose_estimator(BY_SWEEPS, name)
-    data, polynomials = average_sweeps(_samples(read), read.motion), None
+    data, polynomials = average_sweeps(samples, read.motion), None
     if reference_c is not None and data.turned is not None:
         raise Refused(
             "bad_option",
@@ -223,10 +228,10 @@ def _vector(data: ExternalData) -> VectorSolution:
     return solve_vector(data.sweeps, data.rests)
 
 
-def _solve_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) -> OfSensor:
+def _solve_attitudes(read: ReadElsewhere, samples: Samples, settings: RunSettings, name: str | None) -> OfSensor:
     method, site, options = find_method(name), settings.site, settings.elsewhere
     assert options is not None, "of readings of others"
-    placed = placed_by(_samples(read), read.motion, find_clock=options.find_clock)
+    placed = placed_by(samples, read.motion, find_clock=options.find_clock)
     attempts = solve_placed(read.item.name, placed, site, options, method, second_order=settings.second_order)
     rates = attempts.results.get(RATE)
     gyroscope = rates if isinstance(rates, InAttitudes | InIncrements) else None
@@ -247,10 +252,6 @@ def _solve_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | Non
             if isinstance(result, OfKind)
         ),
     )
-
-
-def _samples(read: ReadElsewhere) -> Samples:
-    return samples_in(read.readings, "the recording")
 
 
 def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:

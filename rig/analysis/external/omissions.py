@@ -11,9 +11,9 @@ from rig.estimation.gyroscope.estimate import Estimate
 from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.observation.external.attitude_import import PlacedReadings
 from rig.observation.external.csv_import import ExternalData
+from rig.observation.external.csv_samples import Samples
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placements import Placements
-from rig.observation.sampling import Sampling
 
 
 def list_omitted(
@@ -29,13 +29,9 @@ def list_omitted(
         yield from ((solved[0], omitted) for omitted in (*placed.unsampled, *placed.placements.omitted))
 
 
-def notes_on_reading(read: ReadElsewhere, sampling: Sampling | None) -> Iterator[str]:
+def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
     """Yield what was done to the files' times and rows."""
-    if sampling is not None and sampling.on_arrival:
-        yield (
-            f"the readings are stamped on arrival, several at once: they count as taken every "
-            f"{1e3 * sampling.interval_s:.4g} ms"
-        )
+    yield from samples.notes
     if read.origin_s:
         yield f"times count from {read.origin_s} s of the files' clock"
     if read.other_rows:

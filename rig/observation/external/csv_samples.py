@@ -8,7 +8,7 @@ recording serves every command: each uses the quantities that it needs.
 Loggers of several sensors leave cells blank if a row belongs to another one. Such rows are left out, and counted.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,9 +21,11 @@ from rig.data.recording.motion_file import TIME, Columns, samples_header
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.external.csv_windows import check_times
+from rig.observation.external.omission import Omitted
 from rig.observation.formats.csv_table import CsvTable, Mapped, blank_cell, read_table
 from rig.observation.formats.sample_files import readings_in
-from rig.observation.sampling import Sampling, even_times, find_sampling
+from rig.observation.sampling import Sampling
+from rig.observation.stamps import OrderedStamps, order_stamps
 
 SAMPLES_MB = 256  # an hour at 1 kHz
 
@@ -42,16 +44,19 @@ class SampleTable:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """A file's readings: `time_s` (n,), increasing, and (n, 3) of every quantity it holds, in SI units.
+    """A file's readings in the order of time, in SI units.
 
-    `temperature_c` (n,) is None without such a column. Times are evened if readings were stamped on arrival; `sampling`
-    is that of the stamps.
+    - `time_s` (n,): evened if stamps are too bad to be the times of the readings; `sampling` is that of the stamps.
+    - `readings` (n, 3) by quantity; `temperature_c` (n,), None without such a column.
+    - `omitted`: rows of the file that are no readings of their own; `notes`: how stamps were read, in words.
     """
 
     time_s: Array
     readings: Mapping[Quantity, Array]
     temperature_c: Array | None = None
     sampling: Sampling | None = None
+    omitted: tuple[Omitted, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None) -> Samples:
@@ -138,7 +143,7 @@ def _apart(
 
 
 def samples_in(table: Columns, where: str) -> Samples:
-    """Return the readings in columns (n,), called `where` in messages; if stamped on arrival, at even times.
+    """Return the readings in columns (n,), called `where` in messages, as `order_stamps` puts them in order.
 
     Raise Refused `wrong_columns`, `not_a_number`, `time_not_increasing`.
     """
@@ -146,15 +151,44 @@ def samples_in(table: Columns, where: str) -> Samples:
     if not present:
         names = ", or ".join(" ".join(quantity.columns) for quantity in quantities().values())
         raise Refused("wrong_columns", f"{where} holds no readings", f"Its first row must name time_s and {names}")
+    columns = np.column_stack([table[name] for quantity in present for name in quantity.columns])
+    ordered = order_stamps(table[TIME], columns, where)
+    rows = ordered.rows
     for name, column in table.items():
-        if len(wrong := np.flatnonzero(~np.isfinite(column))):
+        if len(wrong := np.flatnonzero(~np.isfinite(column[rows]))):
             raise Refused(
                 "not_a_number",
-                f"{where} has {len(wrong)} samples whose {name} is not a number, the first is sample {wrong[0] + 1}",
+                f"{where} has {len(wrong)} samples whose {name} is not a number, the first is sample "
+                f"{rows[wrong[0]] + 1}",
                 "Leave out what was not measured, or record again",
             )
-    check_times(table[TIME], where)
-    readings = {quantity: np.column_stack([table[name] for name in quantity.columns]) for quantity in present}
-    sampling = find_sampling(table[TIME])
-    time_s = even_times(table[TIME], sampling)
-    return Samples(time_s, readings, table.get(TEMPERATURE.columns[0]), sampling)
+    check_times(ordered.time_s, where)
+    temperature_c = table.get(TEMPERATURE.columns[0])
+    total = len(table[TIME])
+    return Samples(
+        ordered.time_s,
+        {quantity: np.column_stack([table[name][rows] for name in quantity.columns]) for quantity in present},
+        None if temperature_c is None else temperature_c[rows],
+        ordered.sampling,
+        tuple(
+            Omitted("samples", finding.count, total, finding.reason, str(finding))
+            for finding in ordered.findings
+            if finding.left_out
+        ),
+        tuple(_describe_stamps(ordered, total)),
+    )
+
+
+def _describe_stamps(ordered: OrderedStamps, total: int) -> Iterator[str]:
+    """Yield how the stamps of a `total` of samples were read; nothing of good ones."""
+    for finding in ordered.findings:
+        if not finding.left_out:
+            yield f"{finding.count} of {total} samples, the first {finding}: {finding.reason}"
+    sampling = ordered.sampling
+    taken = f"they count as taken every {1e3 * sampling.interval_s:.4g} ms"
+    if sampling.late is not None:
+        return
+    if sampling.on_arrival:
+        yield f"the readings are stamped on arrival, several at once: {taken}"
+    elif sampling.width > 1:
+        yield f"the stamps are coarse: {taken}"

@@ -99,7 +99,7 @@ def test_speeds_may_stand_in_place_of_angles(tmp_path: Path) -> None:
         ("wrong_columns", list, lambda lines: [line.rsplit(",", 1)[0] for line in lines]),
         ("not_a_number", lambda lines: [*lines[:100], "1.98,nan,0,0", *lines[101:]], list),
         ("not_a_number", lambda lines: [*lines[:100], "1.98,0,0", *lines[101:]], list),
-        ("time_not_increasing", lambda lines: [*lines[:100], lines[50], *lines[100:]], list),
+        ("time_not_increasing", lambda lines: [*lines[:100], *(f"{line}1" for line in lines[50:])], list),
         ("bad_sweep", list, lambda lines: [lines[0], "7,1,0,0,-1,6.28", *lines[2:]]),
         ("bad_sweep", list, lambda lines: [lines[0], "1,7,0,0,-2,6.28", *lines[2:]]),
         ("overlapping_sweeps", list, lambda lines: [*lines, lines[1]]),

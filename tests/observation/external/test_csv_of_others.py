@@ -67,7 +67,10 @@ def test_headings_of_a_german_logger_are_found_in_any_encoding(tmp_path: Path, e
         (gzip.compress(PLAIN.encode(), mtime=0)[:60], "no_file: .*ended before the end"),
         (gzip.compress(PLAIN.encode(), mtime=0)[:30] + b"\xff" * 60, "no_file: .*log.csv cannot be read"),
         ("\n".join(PLAIN.splitlines()[:9]).encode(), "time_not_increasing: .*log.csv has 8 samples, 20 are the least"),
-        (PLAIN.replace("\n1.0,", "\n0.9,").encode(), "time_s 0.9 after 0.9, in sample 11, and 1 such steps"),
+        (
+            PLAIN.replace("\n1.0,", "\n-1.0,").encode(),
+            "time_s -1 after 0.9, in sample 11: the clock was set back by 1.9 s",
+        ),
     ],
 )
 def test_what_cannot_be_read_says_what_is_the_matter(tmp_path: Path, content: bytes, says: str) -> None:

@@ -1,0 +1,285 @@
+"""The time stamps of a log put in order: what belongs to the recording, and when each reading was taken.
+
+Other people's loggers write rows that are no readings (NaN, zeros before the first conversion), the same row twice,
+rows in another order, counters that wrap, and readings that had waited in a buffer: at the start of a recording stale
+ones, which come faster than they were taken, and after a stall of the link those that were taken meanwhile. A stall is
+no gap: after it all readings are there. So a long step between two stamps is held against the number of readings that
+follow until a reading is on time again.
+
+Each of these is counted, with the first of them by number and time. What remains has the times of
+`rig.observation.sampling`. All functions are pure.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import Refused
+from rig.estimation.arrays import Array
+from rig.observation.sampling import (
+    COARSE,
+    LONG,
+    LONG_STEP,
+    Sampling,
+    even_times,
+    find_sampling,
+    resolution_s,
+    typical_interval_s,
+)
+
+# Seconds after which counters begin anew: 16, 24 and 32 bits of ms and µs; midnight and the GPS week.
+WRAPS_S = (*(2.0**bits * unit_s for unit_s in (1e-3, 1e-6) for bits in (16, 24, 32)), 86_400.0, 604_800.0)
+LONGEST_STEP = 0.25  # of a counter's period: a longer step over its end is none
+FIRST_ROWS = 5  # at most: rows of zeros before the first reading
+REPEATS = 0.01  # of neighbouring readings that are equal: a sensor with as few does not repeat itself by chance
+DENSER = 1.5  # readings per interval where two parts of a log overlap, instead of rows in another order
+FARTHEST_S = 1.0  # that a row in another order is off; beyond, a clock was set back
+STALE_S, FASTER = 0.1, 0.8  # least delay of a stale reading; largest step of stale readings, in intervals
+ON_TIME = 1.0  # intervals: a reading that is later than another one soon after it is late
+USUAL = 3.0  # medians of the delay
+WAITING = 0.5  # fraction of the readings of a long step that come after it, if they waited and were not lost
+REACH = 6  # steps' lengths, in readings, within which a link has caught up after it stalled
+
+
+@dataclass(frozen=True, slots=True)
+class StampFinding:
+    """A kind of rows that are `left_out`, or whose times are `replaced`: their `count`, and the first of them.
+
+    `sample` is its number in the log, from 1; `time_s` its stamp.
+    """
+
+    reason: str
+    count: int
+    sample: int
+    time_s: float
+    left_out: bool = True
+
+    def __str__(self) -> str:
+        return f"sample {self.sample}, at {self.time_s:.10g} s"
+
+
+@dataclass(frozen=True, slots=True)
+class OrderedStamps:
+    """The readings of a log in order: their `rows` (m,) in the log, the `time_s` (m,) of each, strictly increasing.
+
+    `sampling` is that of the stamps; `findings` what was left out or stamped anew.
+    """
+
+    rows: NDArray[np.intp]
+    time_s: Array
+    sampling: Sampling
+    findings: tuple[StampFinding, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Log:
+    """The rows (m,) that remain of a log, with `stamps_s` (m,) and `readings` (m, c)."""
+
+    rows: NDArray[np.intp]
+    stamps_s: Array
+    readings: Array
+    findings: tuple[StampFinding, ...] = ()
+
+    def select(self, kept: NDArray[np.bool_], reason: str) -> "_Log":
+        """Return the log without some rows, for a reason in words; the log itself if all are kept."""
+        if kept.all():
+            return self
+        finding = self._describe(~kept, reason, left_out=True)
+        return _Log(self.rows[kept], self.stamps_s[kept], self.readings[kept], (*self.findings, finding))
+
+    def restamp(self, stamps_s: Array, changed: NDArray[np.bool_], reason: str) -> "_Log":
+        """Return the log with other stamps of some rows."""
+        finding = self._describe(changed, reason, left_out=False)
+        return replace(self, stamps_s=stamps_s, findings=(*self.findings, finding))
+
+    def _describe(self, mask: NDArray[np.bool_], reason: str, *, left_out: bool) -> StampFinding:
+        first = int(np.flatnonzero(mask)[0])
+        count = int(np.count_nonzero(mask))
+        return StampFinding(reason, count, int(self.rows[first]) + 1, float(self.stamps_s[first]), left_out)
+
+
+def order_stamps(stamps_s: Array, readings: Array, where: str = "the samples") -> OrderedStamps:
+    """Return a log with `stamps_s` (n,) and `readings` (n, c) in order.
+
+    Raise Refused `time_not_increasing`, which names `where`, if a clock was set back.
+    """
+    log = _Log(np.arange(len(stamps_s)), stamps_s, readings)
+    for step in (_drop_empty, _drop_zeros, _unwrap, _drop_repeated, _sort):
+        log = step(log)
+    _check_rising(log, where)
+    if len(log.rows) > 2:
+        for step in (_drop_stale, _spread_stalled, _separate_equal):
+            log = step(log)
+    if len(log.rows) < 2:
+        return OrderedStamps(log.rows, log.stamps_s, Sampling.even(len(log.rows)), log.findings)
+    sampling = find_sampling(log.stamps_s)
+    return OrderedStamps(log.rows, even_times(log.stamps_s, sampling), sampling, log.findings)
+
+
+def _drop_empty(log: _Log) -> _Log:
+    return log.select(~np.isnan(log.readings).all(axis=1), "they hold no reading")
+
+
+def _drop_zeros(log: _Log) -> _Log:
+    """Return the log without rows of zeros at its start: a register before the first conversion."""
+    zero = (log.readings == 0).all(axis=1)
+    first = int(np.argmin(zero)) if not zero.all() else 0
+    kept = np.ones(len(zero), dtype=np.bool_)
+    if first <= FIRST_ROWS and not zero[first:].any():
+        kept[:first] = False
+    return log.select(kept, "they are zeros before the first reading")
+
+
+def _unwrap(log: _Log) -> _Log:
+    """Return the log with a counter that began anew continued."""
+    steps_s = np.diff(log.stamps_s)
+    back = np.flatnonzero(steps_s < 0)
+    if not len(back):
+        return log
+    for period_s in WRAPS_S:
+        over_s = steps_s[back] + period_s
+        if ((over_s >= 0) & (over_s <= LONGEST_STEP * period_s)).all() and np.ptp(log.stamps_s) <= period_s:
+            turns = np.concatenate([[0], np.cumsum(steps_s < 0)])
+            return log.restamp(
+                log.stamps_s + period_s * turns,
+                turns > 0,
+                f"their counter begins anew after {period_s:.10g} s, which are added",
+            )
+    return log
+
+
+def _drop_repeated(log: _Log) -> _Log:
+    """Return the log without rows that repeat stamp and readings of another one.
+
+    Of a sensor whose readings often repeat, neighbours with equal stamps may be two readings.
+    """
+    order = np.lexsort((log.rows, log.stamps_s))
+    same_stamp = np.diff(log.stamps_s[order]) == 0
+    if not same_stamp.any():
+        return log
+    same_reading = (np.diff(log.readings[order], axis=0) == 0).all(axis=1)
+    of_others = same_reading[~same_stamp]
+    if len(of_others) and of_others.mean() > REPEATS and not same_reading[same_stamp].all():
+        return log
+    kept = np.ones(len(order), dtype=np.bool_)
+    kept[order[1:][same_stamp & same_reading]] = False
+    return log.select(kept, "they repeat another one, stamp and readings")
+
+
+def _sort(log: _Log) -> _Log:
+    """Return the log in the order of time if rows were written in another; one whose clock was set back as it is."""
+    latest_s = np.maximum.accumulate(log.stamps_s)
+    early = log.stamps_s < latest_s
+    if not early.any():
+        return log
+    order = np.argsort(log.stamps_s, kind="stable")
+    stamps_s = log.stamps_s[order]
+    interval_s = typical_interval_s(stamps_s)
+    for row in np.flatnonzero(np.diff(log.stamps_s) < 0):
+        first, last = np.searchsorted(stamps_s, (log.stamps_s[row + 1], log.stamps_s[row]))
+        overlap_s = log.stamps_s[row] - log.stamps_s[row + 1]
+        if overlap_s > FARTHEST_S or last - first > DENSER * overlap_s / interval_s + 2:
+            return log
+    ordered = _Log(log.rows[order], stamps_s, log.readings[order], log.findings)
+    return ordered.restamp(stamps_s, early[order], "they stand after later ones, and are put in order")
+
+
+def _check_rising(log: _Log, where: str) -> None:
+    back = np.flatnonzero(np.diff(log.stamps_s) < 0)
+    if not len(back):
+        return
+    first = int(back[0])
+    before_s, after_s = log.stamps_s[first : first + 2]
+    more = "" if len(back) == 1 else f", the first of {len(back)} such steps"
+    raise Refused(
+        "time_not_increasing",
+        f"{where} has time_s {after_s:.9g} after {before_s:.9g}, in sample {log.rows[first + 1] + 1}{more}: the clock "
+        f"was set back by {before_s - after_s:.6g} s, and nothing shows which of the two is right",
+        "Give the part before it or the part after it, with a motion on the same clock",
+    )
+
+
+def _drop_stale(log: _Log) -> _Log:
+    """Return the log without the readings at its start that had waited: they come faster than they were taken."""
+    interval_s = typical_interval_s(log.stamps_s)
+    late_s = log.stamps_s - interval_s * np.arange(len(log.stamps_s))
+    usual_s = _usual_delay_s(late_s, interval_s)
+    on_time = late_s <= _least_soon(late_s) + usual_s
+    first = int(np.argmax(on_time))
+    delay_s = float(late_s[0] - late_s[first])
+    kept = np.ones(len(late_s), dtype=np.bool_)
+    if delay_s > max(STALE_S, LONG_STEP * interval_s, 2 * usual_s):
+        step_s = float(log.stamps_s[first] - log.stamps_s[0]) / first
+        kept[:first] = step_s >= FASTER * interval_s
+        return log.select(kept, f"they had waited in a buffer: they come every {1e3 * step_s:.3g} ms")
+    return log
+
+
+def _spread_stalled(log: _Log) -> _Log:
+    """Return the log with readings that waited while a link stalled at the times at which they were taken.
+
+    If some were lost meanwhile, nothing shows which: then all that waited are left out.
+    """
+    stamps_s, interval_s = log.stamps_s.copy(), typical_interval_s(log.stamps_s)
+    steps_s = np.diff(stamps_s)
+    usual_s = _usual_delay_s(stamps_s - interval_s * np.arange(len(stamps_s)), interval_s)
+    waited, lost = np.zeros(len(stamps_s), dtype=np.bool_), np.zeros(len(stamps_s), dtype=np.bool_)
+    for last in np.flatnonzero(steps_s > LONG_STEP * interval_s + usual_s).tolist():
+        reach = int(REACH * steps_s[last] / interval_s)
+        ahead_s = log.stamps_s[last + 1 : last + 1 + reach] - log.stamps_s[last]
+        late_s = ahead_s - interval_s * np.arange(1, len(ahead_s) + 1)
+        caught_up = int(np.argmax(late_s <= late_s.min() + ON_TIME * interval_s))
+        missing = max(round(float(late_s[caught_up]) / interval_s), 0)
+        if not caught_up or missing > (1 - WAITING) * steps_s[last] / interval_s or waited[last]:
+            continue
+        late = slice(last + 1, last + 1 + caught_up)
+        if missing * interval_s > usual_s + ON_TIME * interval_s:
+            lost[late] = True
+            continue
+        waited[late] = True
+        span_s = log.stamps_s[last + 1 + caught_up] - log.stamps_s[last]
+        stamps_s[late] = log.stamps_s[last] + span_s * np.arange(1, caught_up + 1) / (caught_up + 1)
+    if waited.any():
+        what = "they waited while the link stalled and came at once: they count as taken one after the other"
+        log = log.restamp(stamps_s, waited, what)
+    return log.select(~lost, "they waited while the link stalled, and others of them are lost")
+
+
+def _separate_equal(log: _Log) -> _Log:
+    """Return the log without second readings of one stamp that have no time of their own.
+
+    Stamps that are coarse or those of arrival are often equal, and an even series has a time for each reading. Of good
+    stamps a reading has one if an interval is missing before or after it.
+    """
+    steps_s = np.diff(log.stamps_s)
+    equal = np.flatnonzero(steps_s == 0)
+    if not len(equal):
+        return log
+    sampling = find_sampling(log.stamps_s)
+    if sampling.width > 1 or sampling.on_arrival or resolution_s(log.stamps_s) > COARSE * sampling.interval_s:
+        return log
+    before = np.append(np.inf, steps_s)[equal] > 1.5 * sampling.interval_s
+    after = np.append(steps_s, np.inf)[equal + 1] > 1.5 * sampling.interval_s
+    stamps_s = log.stamps_s.copy()
+    kept = np.ones(len(stamps_s), dtype=np.bool_)
+    kept[equal[~before & ~after] + 1] = False
+    stamps_s[equal[after] + 1] += sampling.interval_s
+    stamps_s[equal[before & ~after]] -= sampling.interval_s
+    if (moved := stamps_s != log.stamps_s).any():
+        log = log.restamp(stamps_s, moved, "they have the stamp of another one, and the time between is free")
+    return log.select(kept, "they are second readings with one stamp")
+
+
+def _usual_delay_s(late_s: Array, interval_s: float) -> float:
+    """Return a delay, over the least soon after it, that hardly any reading exceeds unless it waited."""
+    return USUAL * float(np.median(late_s - _least_soon(late_s))) + ON_TIME * interval_s
+
+
+def _least_soon(late_s: Array) -> Array:
+    """Return the least (n,) of each lateness and those of the readings soon after it."""
+    least_s, covered = late_s.copy(), 1
+    while covered < min(LONG[-1], len(late_s)):
+        least_s[:-covered] = np.minimum(least_s[:-covered], least_s[covered:])
+        covered *= 2
+    return least_s
