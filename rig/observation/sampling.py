@@ -104,14 +104,14 @@ def find_sampling(time_s: Array) -> Sampling:
     beats = _is_beat(single.missing)
     # After a late reading the next step is short; after a lost one it is not.
     late = np.count_nonzero(steps_s < SHORT * single.interval_s) > LATE * single.gap_count
-    good = single.fit >= MOSTLY and not coarse and not beats and not late
+    # Every step is a whole multiple of the resolution, so of another interval than the true one too.
+    misleading = coarse and abs(mean_s / rounded_s - round(mean_s / rounded_s)) > WHOLE
+    good = single.fit >= MOSTLY and not misleading and not beats and not late
     if good and (not uneven or single.median_run_s(time_s) > PACKET_S):
         return Sampling(single.interval_s, single.missing, 0.0, 1, on_arrival=False)
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
     wider = (_count_missing(time_s, width, begun) for width in widths for begun in (MEDIAN, UNDISTURBED))
     candidates = [candidate for candidate in wider if not _is_beat(candidate.missing)]
-    # Every step is a whole multiple of the resolution, so of another interval than the true one too.
-    misleading = coarse and abs(mean_s / rounded_s - round(mean_s / rounded_s)) > WHOLE
     candidates = candidates if misleading or beats else [single, *candidates]
     fitting = [candidate for candidate in candidates if candidate.fit >= MOSTLY]
     # The steps inside a burst would make the time between bursts look like a gap.

@@ -38,6 +38,7 @@ FARTHEST_S = 1.0  # that a row in another order is off; beyond, a clock was set 
 STALE_S, FASTER = 0.1, 0.8  # least delay of a stale reading; largest step of stale readings, in intervals
 ON_TIME = 1.0  # intervals: a reading that is later than another one soon after it is late
 USUAL = 3.0  # medians of the delay
+EXACT = 1e-6  # tolerance of a whole multiple of a resolution: no rounding makes equal stamps then
 WAITING = 0.5  # fraction of the readings of a long step that come after it, if they waited and were not lost
 REACH = 6  # steps' lengths, in readings, within which a link has caught up after it stalled
 
@@ -118,7 +119,7 @@ def order_stamps(stamps_s: Array, readings: Array, where: str = "the samples") -
 
 
 def _drop_empty(log: _Log) -> _Log:
-    return log.select(~np.isnan(log.readings).all(axis=1), "they hold no reading")
+    return log.select(np.asarray(~np.isnan(log.readings).all(axis=1), dtype=np.bool_), "they hold no reading")
 
 
 def _drop_zeros(log: _Log) -> _Log:
@@ -154,17 +155,25 @@ def _drop_repeated(log: _Log) -> _Log:
 
     Of a sensor whose readings often repeat, neighbours with equal stamps may be two readings.
     """
-    order = np.lexsort((log.rows, log.stamps_s))
-    same_stamp = np.diff(log.stamps_s[order]) == 0
-    if not same_stamp.any():
+    shared = np.flatnonzero(np.isin(log.stamps_s, _repeated_values(log.stamps_s)))
+    if not len(shared):
         return log
-    same_reading = (np.diff(log.readings[order], axis=0) == 0).all(axis=1)
-    of_others = same_reading[~same_stamp]
-    if len(of_others) and of_others.mean() > REPEATS and not same_reading[same_stamp].all():
+    rows = np.column_stack([log.stamps_s, log.readings])[shared]
+    repeated = np.ones(len(shared), dtype=np.bool_)
+    repeated[np.unique(rows, axis=0, return_index=True)[1]] = False
+    later = np.diff(log.stamps_s) > 0
+    equal = (np.diff(log.readings, axis=0) == 0).all(axis=1)[later]
+    others = len(shared) - len(np.unique(rows[:, 0])) - np.count_nonzero(repeated)  # second readings of one stamp
+    if others and len(equal) and equal.mean() > REPEATS:
         return log
-    kept = np.ones(len(order), dtype=np.bool_)
-    kept[order[1:][same_stamp & same_reading]] = False
+    kept = np.ones(len(log.rows), dtype=np.bool_)
+    kept[shared[repeated]] = False
     return log.select(kept, "they repeat another one, stamp and readings")
+
+
+def _repeated_values(values: Array) -> Array:
+    unique, counts = np.unique(values, return_counts=True)
+    return np.asarray(unique[counts > 1], dtype=np.float64)
 
 
 def _sort(log: _Log) -> _Log:
@@ -190,12 +199,13 @@ def _check_rising(log: _Log, where: str) -> None:
     if not len(back):
         return
     first = int(back[0])
-    before_s, after_s = log.stamps_s[first : first + 2]
+    before_s, after_s = log.stamps_s[first : first + 2].tolist()
+    back_s = before_s - after_s + float(np.median(np.diff(log.stamps_s)))
     more = "" if len(back) == 1 else f", the first of {len(back)} such steps"
     raise Refused(
         "time_not_increasing",
         f"{where} has time_s {after_s:.9g} after {before_s:.9g}, in sample {log.rows[first + 1] + 1}{more}: the clock "
-        f"was set back by {before_s - after_s:.6g} s, and nothing shows which of the two is right",
+        f"was set back by about {back_s:.4g} s, and nothing shows which of the two is right",
         "Give the part before it or the part after it, with a motion on the same clock",
     )
 
@@ -257,7 +267,10 @@ def _separate_equal(log: _Log) -> _Log:
     if not len(equal):
         return log
     sampling = find_sampling(log.stamps_s)
-    if sampling.width > 1 or sampling.on_arrival or resolution_s(log.stamps_s) > COARSE * sampling.interval_s:
+    interval_s, rounded_s = typical_interval_s(log.stamps_s), resolution_s(log.stamps_s)
+    uneven_s = abs(interval_s - rounded_s * round(interval_s / rounded_s)) if rounded_s else 0.0
+    slips = rounded_s > COARSE * interval_s and uneven_s > EXACT * rounded_s
+    if sampling.width > 1 or sampling.on_arrival or slips:
         return log
     before = np.append(np.inf, steps_s)[equal] > 1.5 * sampling.interval_s
     after = np.append(steps_s, np.inf)[equal + 1] > 1.5 * sampling.interval_s

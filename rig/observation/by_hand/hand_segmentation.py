@@ -15,6 +15,7 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move
 from rig.observation.by_hand.rests import ROUNDING, find_rests
+from rig.observation.gaps import find_hiding_gaps
 from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window
 
@@ -34,8 +35,7 @@ def segment_session(
     windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
     rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
     top = _find_clipped(rates, range_rad_s)
-    lost = find_sampling(time_s).gaps(time_s, GAP) if len(time_s) > 1 else np.zeros(0, np.bool_)
-    gaps = np.append(lost, False)[: len(time_s)]
+    gaps = _find_gaps(time_s, rates)
     moves = []
     for first, second in pairwise(windows):
         start_s, end_s = first.end_s - _margin(first), second.start_s + _margin(second)
@@ -43,6 +43,15 @@ def segment_session(
         peak = float(np.abs(rates[inside]).max())
         moves.append(Move(start_s, end_s, peak, bool(gaps[inside].any()), bool(top[inside].any())))
     return HandRecording(time_s, rates, acceleration, rests, tuple(moves), _find_held_intervals(time_s, rates, rests))
+
+
+def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
+    """Return the readings (n,) after which others are missing, over which the body may have turned otherwise."""
+    mask = np.zeros(len(time_s), dtype=np.bool_)
+    if len(time_s) > 1:
+        steps = np.flatnonzero(find_sampling(time_s).gaps(time_s, GAP))
+        mask[find_hiding_gaps(time_s, rates, steps)] = True
+    return mask
 
 
 def _began_still(time_s: Array, rates: Array) -> bool:

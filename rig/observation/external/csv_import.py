@@ -28,18 +28,21 @@ from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
 from rig.observation.external.csv_samples import Samples
 from rig.observation.external.csv_windows import (
-    average_of,
+    RowGaps,
+    average_bridged,
     check_complete,
     check_overlap,
     check_scattered,
     check_times,
     find_overlap,
+    find_row_gaps,
+    is_losing,
 )
 from rig.observation.external.omission import Omitted
 from rig.observation.external.turns import DeclaredTurns, TurnedData, find_turns
 from rig.observation.formats.csv_table import Mapped, read_columns
 from rig.observation.observe import Observation, nearest_axis
-from rig.observation.sampling import Sampling, find_sampling
+from rig.observation.sampling import find_sampling
 from rig.observation.stuck_check import check_reads
 from rig.observation.windows import Window, inside
 
@@ -56,7 +59,7 @@ class ExternalData:
 
     `at_reference`: corrected to one temperature by polynomials that include the contradictions of repeats. `by_mean`:
     numbers of the rows with an angle of which only the mean speed counts, for the body did not lie still before or
-    after. `omitted`: readings that are missing in the rows.
+    after. `omitted`: rows that are left out for missing readings, and the readings that are missing in the others.
     """
 
     sweeps: tuple[Observation, ...]
@@ -91,9 +94,19 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
         return data
     declared = DeclaredTurns(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
     by_angle = find_turns(samples.time_s, samples.readings[RATE], declared, data.sweeps, data.rests)
-    solved = () if by_angle is None else by_angle.rows
-    by_mean = tuple(sweep.sweep for sweep in data.sweeps if sweep.sweep not in solved)
-    return replace(data, turned=by_angle, by_mean=by_mean)
+    if by_angle is None:
+        return replace(data, by_mean=tuple(sweep.sweep for sweep in data.sweeps))
+    by_mean = tuple(sweep.sweep for sweep in data.sweeps if sweep.sweep not in (*by_angle.rows, *by_angle.hiding))
+    return replace(data, turned=by_angle, by_mean=by_mean, omitted=(*_hiding(by_angle, data), *data.omitted))
+
+
+def _hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
+    """Yield the turns that are left out for missing readings, if there are any."""
+    if by_angle.hiding:
+        first = next(sweep for sweep in data.sweeps if sweep.sweep in by_angle.hiding)
+        where = f"row {first.sweep}, from {first.average.start_s:.10g} s"
+        reason = "lost_samples: what is missing in them may hide a part of the turn"
+        yield Omitted("rows", len(by_angle.hiding), len(data.sweeps), reason, where)
 
 
 def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | None = None) -> ExternalData:
@@ -116,13 +129,19 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
     check_overlap(time_s, windows)
     sampling = find_sampling(time_s)
     check_scattered(sampling)
-    expected = sampling.count_expected(time_s, sweeps[:, :2]).tolist()
+    rows = find_row_gaps(time_s, readings, sampling, windows)
+    kept = [row.is_usable for row in rows]
+    if 2 * sum(kept) < len(kept) or is_losing(rows):
+        for row, (gaps, window) in enumerate(zip(rows, windows, strict=True), start=1):
+            check_complete(gaps.count, gaps.expected, window, f"sweep {row}")
     turns, rests = [], []
-    for row, (window, speed) in enumerate(zip(windows, sweeps[:, 2].tolist(), strict=True), start=1):
+    for row, (window, speed, gaps) in enumerate(zip(windows, sweeps[:, 2].tolist(), rows, strict=True), start=1):
         within = inside(time_s, window)
-        cut = readings[within]
-        check_complete(len(cut), expected[row - 1], window, f"sweep {row}")
-        mean = average_of(cut, window)
+        if not gaps.is_inside:
+            check_complete(gaps.count, gaps.expected, window, f"sweep {row}")
+        if not gaps.is_usable:
+            continue
+        mean = average_bridged(readings[within], sampling.numbers[within], window, gaps.hidden_rad)
         if temperature_c is not None:
             mean = replace(mean, temperature_c=float(temperature_c[within].mean()))
         if speed == 0:
@@ -130,18 +149,23 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
         else:
             turns.append(_observation(row, mean, speed, axes[row - 1]))
     _check_unit(turns)
-    return ExternalData(tuple(turns), tuple(rests), omitted=tuple(_missing(time_s, sampling, windows)))
+    return ExternalData(tuple(turns), tuple(rests), omitted=tuple(_omitted(rows, windows)))
 
 
-def _missing(time_s: Array, sampling: Sampling, windows: Sequence[Window]) -> Iterator[Omitted]:
-    """Yield the number of readings that are missing within the rows, if there are any."""
-    cuts = [inside(time_s, window) for window in windows]
-    gaps = [cut.start + np.flatnonzero(sampling.missing[cut.start : max(cut.stop - 1, cut.start)]) for cut in cuts]
-    if lost := int(sum(sampling.missing[gap].sum() for gap in gaps)):
-        row = next(row for row, gap in enumerate(gaps) if len(gap))
-        where = f"after {time_s[gaps[row][0]]:.10g} s, in row {row + 1}"
-        total = lost + sum(cut.stop - cut.start for cut in cuts)
-        yield Omitted("readings", lost, total, "lost_samples: they are missing", where)
+def _omitted(rows: Sequence[RowGaps], windows: Sequence[Window]) -> Iterator[Omitted]:
+    """Yield the rows that are left out, and the number of readings that are missing in the others."""
+    lost = [(number, row) for number, row in enumerate(rows, start=1) if not row.is_usable]
+    if lost:
+        number, row = lost[0]
+        start_s = windows[number - 1].start_s if row.first_s is None else row.first_s
+        reason = "lost_samples: what is missing in them may hide a change of the rate"
+        yield Omitted("rows", len(lost), len(rows), reason, f"row {number}, at {start_s:.10g} s")
+    usable = [(number, row) for number, row in enumerate(rows, start=1) if row.is_usable]
+    if missing := sum(row.missing for _, row in usable):
+        number, row = next((number, row) for number, row in usable if row.missing)
+        total = missing + sum(row.count for _, row in usable)
+        where = f"after {row.first_s:.10g} s, in row {number}"
+        yield Omitted("readings", missing, total, "lost_samples: they are missing", where)
 
 
 def _speeds(sweeps: Mapping[str, Array]) -> Array:

@@ -1,19 +1,23 @@
 """Functions for all external files: samples in the order of time, and rows from one time to another."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average
+from rig.observation.gaps import hidden_angles_rad
 from rig.observation.sampling import Sampling
 from rig.observation.statistics.coloured_noise import correlation_inflation, fit_autoregression
-from rig.observation.windows import Window
+from rig.observation.windows import Window, inside
 
 MIN_SAMPLES = 20
 MAX_LOST_FRACTION = 0.01
+MOSTLY = 0.5  # of a row's readings: the least that tell its mean
 
 
 def check_times(time_s: Array, where: str = "the samples") -> None:
@@ -68,6 +72,64 @@ def average_of(readings: Array, window: Window) -> Average:
         temperature_c=float("nan"),
         dof=dof,
     )
+
+
+def average_bridged(readings: Array, numbers: NDArray[np.intp], window: Window, hidden_rad: float) -> Average:
+    """Return the average of a window's readings (n, 3), with `numbers` (n,) that count missing ones.
+
+    Missing readings are interpolated for the mean; its variance includes the rotation that they may hide.
+    """
+    mean = average_of(readings, window)
+    if not hidden_rad:
+        return mean
+    every = np.arange(numbers[0], numbers[-1] + 1)
+    bridged = np.array([np.interp(every, numbers, axis).mean() for axis in readings.T])
+    hidden = (hidden_rad / (window.end_s - window.start_s)) ** 2
+    return replace(mean, mean_rad_s=bridged, variance_rad2_s2=mean.variance_rad2_s2 + hidden)
+
+
+@dataclass(frozen=True, slots=True)
+class RowGaps:
+    """The readings of a row: their `count`, the number `expected`, and that `missing` in `gaps` between them.
+
+    `hidden_rad`: standard deviation of the rotation that the gaps hide; `first_s`: time before the first of them;
+    `is_inside`: whether the recording covers the row.
+    """
+
+    count: int
+    expected: float
+    missing: int
+    gaps: int
+    hidden_rad: float
+    first_s: float | None
+    is_inside: bool
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the readings tell the row's mean: of a gap that hides too much they do not."""
+        mostly = self.count >= max(MIN_SAMPLES, MOSTLY * self.expected)
+        return is_complete(self.count, self.expected) or (mostly and bool(np.isfinite(self.hidden_rad)))
+
+
+def find_row_gaps(time_s: Array, readings: Array, sampling: Sampling, windows: Sequence[Window]) -> list[RowGaps]:
+    """Return the gaps of readings (n, 3), rad/s at times (n,), in the windows."""
+    expected = sampling.count_expected(time_s, np.array([(window.start_s, window.end_s) for window in windows]))
+    rows = []
+    for window, wanted in zip(windows, expected.tolist(), strict=True):
+        cut = inside(time_s, window)
+        gaps = cut.start + np.flatnonzero(sampling.missing[cut.start : max(cut.stop - 1, cut.start)])
+        hidden_rad = float(np.linalg.norm(hidden_angles_rad(time_s, readings, gaps)))
+        beyond_s = max(time_s[0] - window.start_s, 0.0) + max(window.end_s - time_s[-1], 0.0)
+        covered = bool(beyond_s <= MAX_LOST_FRACTION * (window.end_s - window.start_s) + sampling.interval_s)
+        first_s = float(time_s[gaps[0]]) if len(gaps) else None
+        missing = int(sampling.missing[gaps].sum())
+        rows.append(RowGaps(cut.stop - cut.start, wanted, missing, len(gaps), hidden_rad, first_s, covered))
+    return rows
+
+
+def is_losing(rows: Sequence[RowGaps]) -> bool:
+    """Return whether readings are missing all over the rows: a link that loses them, not one that stalls."""
+    return sum(row.gaps for row in rows) > MAX_LOST_FRACTION * sum(row.count for row in rows)
 
 
 ONE_CLOCK = "Check that both files use one clock in seconds, and that no samples are missing"

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.external.attitude_drift import Fixes
+from rig.observation.gaps import find_hiding_gaps
 from rig.observation.sampling import find_sampling
 
 WINDOW_S, SHORTEST_S = (
@@ -216,11 +217,11 @@ def _blind(turning: Turning) -> dict[str, NDArray[np.intp]]:
     angle_rad = np.linalg.norm(readings[:-1] - np.median(readings, axis=0), axis=1) * steps_s
     clipped = np.flatnonzero(_find_clipped(readings))
     adjacent = np.unique(np.clip(np.concatenate([clipped - 1, clipped]), 0, len(steps_s) - 1))
-    lost = find_sampling(turning.time_s).gaps(turning.time_s, GAP)
+    gaps = find_sampling(turning.time_s).gaps(turning.time_s, GAP)
     return {
-        "lost_samples": np.flatnonzero(lost),
+        "lost_samples": find_hiding_gaps(turning.time_s, readings, np.flatnonzero(gaps)),
         "saturation": adjacent,
-        "turned_too_fast": np.flatnonzero((angle_rad > MAX_STEP_RAD) & ~lost),
+        "turned_too_fast": np.flatnonzero((angle_rad > MAX_STEP_RAD) & ~gaps),
     }
 
 

@@ -15,6 +15,7 @@ from rig.observation.arm_rests import estimate_bias_drift
 from rig.observation.average import Average
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.csv_windows import average_of
+from rig.observation.gaps import hidden_angles_rad
 from rig.observation.observe import Observation
 from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window, inside
@@ -22,6 +23,7 @@ from rig.observation.windows import Window, inside
 REACH_S = 0.5  # between the marked end of a turn and the rest that it belongs to
 EDGE_SAMPLES = 2  # either side of an end
 STANDING = 0.25  # of the mean speed: a body slower at both ends started and stopped there
+MOST_HIDDEN_RAD = 0.02  # by missing readings of a turn
 BY_HAND_ANGLE_RAD = float(np.radians(0.3))  # default repeatability of a body turned by hand against its stop
 BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 
@@ -30,7 +32,8 @@ BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 class TurnedData:
     """The input of a solution by increments: the gyroscope, the turns, the numbers of their rows, and the means.
 
-    `noise_dof`, `bias_dof`: degrees of freedom of its noise, and of its bias' change between rests.
+    `noise_dof`, `bias_dof`: degrees of freedom of its noise, and of its bias' change between rests. `hiding`: numbers of
+    rows that are left out, for missing readings may hide a part of the turn.
     """
 
     gyroscope: Gyroscope
@@ -39,6 +42,7 @@ class TurnedData:
     means: tuple[RateMean, ...]
     noise_dof: int
     bias_dof: int
+    hiding: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +64,10 @@ def find_turns(
     resting = rests or [average_of(readings[inside(time_s, window)], window) for window in lying]
     bias = np.median([rest.mean_rad_s for rest in resting], axis=0)
     rates = readings - bias
-    turns, rows, means = [], [], [RateMean(rest.mean_rad_s, rest.variance_rad2_s2, np.zeros(3)) for rest in resting]
+    sampling = find_sampling(time_s)
+    gaps = np.flatnonzero(sampling.missing)
+    turns, rows, hiding = [], [], []
+    means = [RateMean(rest.mean_rad_s, rest.variance_rad2_s2, np.zeros(3)) for rest in resting]
     for sweep in sweeps:
         row = sweep.sweep - 1
         window = _enclosing_window(sweep, lying)
@@ -68,18 +75,25 @@ def find_turns(
             average = sweep.average
             means.append(RateMean(average.mean_rad_s, average.variance_rad2_s2, sweep.speed_rad_s * sweep.axis_flange))
             continue
+        within = gaps[(time_s[gaps + 1] > window.start_s) & (time_s[gaps] < window.end_s)]
+        hidden_rad = float(np.linalg.norm(hidden_angles_rad(time_s, readings, within)))
+        if hidden_rad > MOST_HIDDEN_RAD:
+            hiding.append(sweep.sweep)
+            continue
         angle_std = BY_HAND_ANGLE_RAD if declared.angle_std_rad is None else float(declared.angle_std_rad[row])
         axis_std = BY_HAND_AXIS_RAD if declared.axis_std_rad is None else float(declared.axis_std_rad[row])
         angle = float(declared.angle_rad[row])
+        angle_std = float(np.hypot(angle_std, hidden_rad))
         turns.append(Turn(window.start_s, window.end_s, sweep.axis_flange, angle, angle_std, axis_std))
         rows.append(sweep.sweep)
     if not turns:
         return None
-    interval_s = find_sampling(time_s).interval_s
-    noise = np.sqrt(np.mean([np.square(rest.noise_rad_s) for rest in resting]) * interval_s)
+    noise = np.sqrt(np.mean([np.square(rest.noise_rad_s) for rest in resting]) * sampling.interval_s)
     gyroscope = Gyroscope(time_s, readings, float(noise), np.sqrt(estimate_bias_drift(resting)))
     samples = sum(rest.samples - 1 for rest in resting)
-    return TurnedData(gyroscope, tuple(turns), tuple(rows), tuple(means), samples, max(len(resting) - 1, 1))
+    return TurnedData(
+        gyroscope, tuple(turns), tuple(rows), tuple(means), samples, max(len(resting) - 1, 1), tuple(hiding)
+    )
 
 
 def _find_pauses(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:

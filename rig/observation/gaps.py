@@ -1,0 +1,59 @@
+"""What a gap between readings can hide: the error of bridging it, from how the readings next to it change.
+
+A gap of a rate is bridged by the trapezoidal rule. How wrong that is does not depend on the gap's length alone: of a
+body at rest, or one that turns evenly, it hides nothing; of one that starts or swings, a short one hides much. So the
+same gap is made in the readings on either side, and bridged, and compared with their integral. All functions are pure.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.estimation.arrays import Array
+
+HIDDEN_RAD = 2e-3  # as references of attitude err: a gap that may hide more is not bridged
+LONGEST_S = 1.0  # of a gap: in a longer one a body may be taken up and laid back
+REACH, FEWEST = 4, 12  # lengths of a gap on either side, and at least so many readings
+
+
+def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> Array:
+    """Return the standard deviation (k,) of the rotation over each of the steps `gaps` (k,), if it is bridged.
+
+    readings (n, 3) are rates at rising times (n,); a step is numbered by its first reading. It is infinite for a gap
+    that is too long, or without enough readings next to it.
+    """
+    turned = _integrate(time_s, readings)
+    return np.array([_hidden_rad(time_s, readings, turned, int(gap)) for gap in gaps])
+
+
+def find_hiding_gaps(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return those of the steps `gaps` (k,) that cannot be bridged; otherwise as `hidden_angles_rad`."""
+    return np.asarray(gaps[hidden_angles_rad(time_s, readings, gaps) > HIDDEN_RAD], dtype=np.intp)
+
+
+def _integrate(time_s: Array, readings: Array) -> Array:
+    steps = np.diff(time_s)[:, None] * (readings[1:] + readings[:-1]) / 2
+    return np.vstack([np.zeros((1, readings.shape[1])), np.cumsum(steps, axis=0)])
+
+
+def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> float:
+    lasts_s = float(time_s[gap + 1] - time_s[gap])
+    if lasts_s > LONGEST_S:
+        return np.inf
+    size = REACH * lasts_s
+    first = min(int(np.searchsorted(time_s, time_s[gap] - size)), gap - FEWEST)
+    last = max(int(np.searchsorted(time_s, time_s[gap + 1] + size)), gap + 1 + FEWEST)
+    sides = (slice(max(first, 0), gap + 1), slice(gap + 1, min(last, len(time_s))))
+    errors = [_bridging_rad(time_s[side], readings[side], turned[side], lasts_s) for side in sides]
+    return max((error for error in errors if error is not None), default=np.inf)
+
+
+def _bridging_rad(time_s: Array, readings: Array, turned: Array, lasts_s: float) -> float | None:
+    """Return the rms error of bridging steps of a length in some readings; None if they are too few."""
+    end = np.searchsorted(time_s, time_s + lasts_s * (1 - 1e-9))
+    start = np.flatnonzero(end < len(time_s))
+    if len(start) < 2:
+        return None
+    end = end[start]
+    span_s = (time_s[end] - time_s[start])[:, None]
+    error = turned[end] - turned[start] - span_s * (readings[end] + readings[start]) / 2
+    return float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
