@@ -1,6 +1,6 @@
 """The noise of sensors at rest: the Allan deviation of every rest and dwell, or of a log of another program. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,10 +15,12 @@ from rig.estimation.arrays import Array
 from rig.estimation.statistics.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.observation.arm_rests import still_samples
 from rig.observation.average import Stream, synchronize_stream
-from rig.observation.by_hand.steadiness import check_at_rest, contiguous_slices
+from rig.observation.by_hand.steadiness import check_at_rest, contiguous_slices, fill_missing
 from rig.observation.external.csv_samples import Samples
+from rig.observation.external.omitted import Omitted
 from rig.observation.motion.arm_motion import motion_of
 from rig.observation.reference.dwell_acceleration import accelerations
+from rig.observation.sampling import Sampling, find_sampling
 
 FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 
@@ -41,10 +43,14 @@ class AtRest:
 
 @dataclass(frozen=True, slots=True)
 class SensorAtRest:
-    """A sensor, None if the readings do not name it, and every quantity it measures, or the Fault it ends in."""
+    """A sensor, None if the readings do not name it, and every quantity it measures, or the Fault it ends in.
+
+    `notes` say what was left out of a log, and how its stamps were read.
+    """
 
     sensor: RecordedSensor | None
     quantities: Attempts[Quantity, AtRest]
+    notes: tuple[str, ...] = ()
 
 
 def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
@@ -74,7 +80,8 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
     """
     for quantity, readings in samples.readings.items():
         check_at_rest(samples.time_s, readings, quantity)
-    intervals = [inside for inside in contiguous_slices(samples.time_s) if inside.stop - inside.start > 2]
+    sampling = samples.sampling or find_sampling(samples.time_s)
+    intervals = [inside for inside in contiguous_slices(samples.time_s, sampling) if inside.stop - inside.start > 2]
     return SensorAtRest(
         None,
         attempt_each(
@@ -82,13 +89,21 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
                 quantity: partial(
                     _summarise,
                     [samples.time_s[interval] for interval in intervals],
-                    [readings[interval] for interval in intervals],
+                    [fill_missing(readings[interval], sampling.numbers[interval]) for interval in intervals],
                     quantity,
                 )
                 for quantity, readings in samples.readings.items()
             }
         ),
+        (*(f"left out: {part}" for part in (*samples.omitted, *_missing(samples.time_s, sampling))), *samples.notes),
     )
+
+
+def _missing(time_s: Array, sampling: Sampling) -> Iterator[Omitted]:
+    """Yield the number of readings that are missing, if there are any."""
+    if lost := int(sampling.missing.sum()):
+        first = float(time_s[np.flatnonzero(sampling.missing)[0]])
+        yield Omitted("readings", lost, lost + len(time_s), "lost_samples: they are missing", f"after {first:.10g} s")
 
 
 def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:

@@ -36,7 +36,7 @@ MORE = 1.5  # times the resolution: stamps that are later than this are not only
 SMALLER, OF_NORMAL = 0.85, 0.5204  # quantile of squared normal deviates; mean of those below it over the mean of all
 AVERAGED = 32  # readings whose stamps err either way
 PASSES, SETTLED = 6, 1e-9
-DECIMALS = 7  # of a second, to which stamps may be rounded
+DECIMALS, BITS = 7, 16  # of a second, to which stamps may be rounded
 COUNTED = 50  # missing readings: the number in a longer gap is too inexact to refine the interval
 SEGMENTS, FARTHEST = 24, 1024  # the fewest segments of a log that show a random walk; readings of one at most
 GROWN = (2.5, 12.0)  # range of the factor by which a random walk's variance grows over four segments
@@ -303,11 +303,13 @@ def _slope(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
 
 
 def resolution_s(time_s: Array) -> float:
-    """Return the power of ten of a second that all stamps are multiples of; 0 without one."""
-    for decimals in range(DECIMALS):
-        scaled = (time_s - time_s[0]) * 10**decimals
+    """Return the time that all stamps are multiples of: a power of ten of a second, or of two (float32); 0 if none."""
+    units = sorted((*(10.0**-decimals for decimals in range(DECIMALS)), *(2.0**-bits for bits in range(BITS))))
+    since_s = time_s - time_s[0]
+    for unit_s in reversed(units):
+        scaled = since_s / unit_s
         if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
-            return float(10.0**-decimals)
+            return unit_s
     return 0.0
 
 

@@ -39,6 +39,7 @@ STALE_S, FASTER = 0.1, 0.8  # least delay of a stale reading; largest step of st
 ON_TIME = 1.0  # intervals: a reading that is later than another one soon after it is late
 USUAL = 3.0  # medians of the delay
 EXACT = 1e-6  # tolerance of a whole multiple of a resolution: no rounding makes equal stamps then
+FEW_EQUAL = 2  # pairs of equal coarse stamps: more are made by rounding
 WAITING = 0.5  # fraction of the readings of a long step that come after it, if they waited and were not lost
 REACH = 6  # steps' lengths, in readings, within which a link has caught up after it stalled
 
@@ -269,7 +270,7 @@ def _separate_equal(log: _Log) -> _Log:
     sampling = find_sampling(log.stamps_s)
     interval_s, rounded_s = typical_interval_s(log.stamps_s), resolution_s(log.stamps_s)
     uneven_s = abs(interval_s - rounded_s * round(interval_s / rounded_s)) if rounded_s else 0.0
-    slips = rounded_s > COARSE * interval_s and uneven_s > EXACT * rounded_s
+    slips = rounded_s > COARSE * interval_s and (uneven_s > EXACT * rounded_s or len(equal) > FEW_EQUAL)
     if sampling.width > 1 or sampling.on_arrival or slips:
         return log
     before = np.append(np.inf, steps_s)[equal] > 1.5 * sampling.interval_s

@@ -36,6 +36,8 @@ def print_at_rest(sensors: Mapping[str, SensorAtRest], *, as_json: bool) -> None
                 console.print(plain(line))
         for quantity, fault in sensor.quantities.faults.items():
             console.print(plain(f"{name}, {quantity}: {fault}"))
+        for note in sensor.notes:
+            console.print(plain(note))
 
 
 def document(sensors: Mapping[str, SensorAtRest]) -> dict[str, Any]:
@@ -47,6 +49,7 @@ def document(sensors: Mapping[str, SensorAtRest]) -> dict[str, Any]:
                 **({} if (s := at_rest.sensor) is None else {"part": s.part, "serial_number": s.serial_number}),
                 **{quantity.name: _entry(quantity, result) for quantity, result in at_rest.quantities.results.items()},
                 **{quantity.name: {"error": str(fault)} for quantity, fault in at_rest.quantities.faults.items()},
+                **({"notes": list(at_rest.notes)} if at_rest.notes else {}),
             }
             for name, at_rest in sensors.items()
         },
