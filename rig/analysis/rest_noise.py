@@ -1,6 +1,6 @@
 """The noise of sensors at rest: the Allan deviation of every rest and dwell, or of a log of another program. Pure."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -17,10 +17,9 @@ from rig.observation.arm_rests import still_samples
 from rig.observation.average import Stream, synchronize_stream
 from rig.observation.by_hand.steadiness import check_at_rest, contiguous_slices, fill_missing
 from rig.observation.external.csv_samples import Samples
-from rig.observation.external.omitted import Omitted
 from rig.observation.motion.arm_motion import motion_of
 from rig.observation.reference.dwell_acceleration import accelerations
-from rig.observation.sampling import Sampling, find_sampling
+from rig.observation.sampling import find_sampling
 
 FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 
@@ -95,15 +94,8 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
                 for quantity, readings in samples.readings.items()
             }
         ),
-        (*(f"left out: {part}" for part in (*samples.omitted, *_missing(samples.time_s, sampling))), *samples.notes),
+        (*(f"left out: {part}" for part in samples.omitted), *samples.notes),
     )
-
-
-def _missing(time_s: Array, sampling: Sampling) -> Iterator[Omitted]:
-    """Yield the number of readings that are missing, if there are any."""
-    if lost := int(sampling.missing.sum()):
-        first = float(time_s[np.flatnonzero(sampling.missing)[0]])
-        yield Omitted("readings", lost, lost + len(time_s), "lost_samples: they are missing", f"after {first:.10g} s")
 
 
 def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:

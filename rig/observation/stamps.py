@@ -21,6 +21,7 @@ from rig.observation.sampling import (
     COARSE,
     LONG,
     LONG_STEP,
+    NEAR,
     Sampling,
     even_times,
     find_sampling,
@@ -215,15 +216,15 @@ def _drop_stale(log: _Log) -> _Log:
     """Return the log without the readings at its start that had waited: they come faster than they were taken."""
     interval_s = typical_interval_s(log.stamps_s)
     late_s = log.stamps_s - interval_s * np.arange(len(log.stamps_s))
+    delays_s = late_s - _least_soon(late_s)
     usual_s = _usual_delay_s(late_s, interval_s)
-    on_time = late_s <= _least_soon(late_s) + usual_s
-    first = int(np.argmax(on_time))
+    first = int(np.argmax(delays_s <= np.median(delays_s) + NEAR * interval_s))
     delay_s = float(late_s[0] - late_s[first])
     kept = np.ones(len(late_s), dtype=np.bool_)
     if delay_s > max(STALE_S, LONG_STEP * interval_s, 2 * usual_s):
         step_s = float(log.stamps_s[first] - log.stamps_s[0]) / first
         kept[:first] = step_s >= FASTER * interval_s
-        return log.select(kept, f"they had waited in a buffer: they come every {1e3 * step_s:.3g} ms")
+        return log.select(kept, f"they had waited in a buffer: they come every {1e3 * step_s:.2g} ms")
     return log
 
 

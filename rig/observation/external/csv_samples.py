@@ -185,6 +185,14 @@ def _describe_stamps(ordered: OrderedStamps, total: int) -> Iterator[str]:
         if not finding.left_out:
             yield f"{finding.count} of {total} samples, the first {finding}: {finding.reason}"
     sampling = ordered.sampling
+    gaps = np.flatnonzero(sampling.missing)
+    if len(gaps):
+        longest = int(gaps[np.argmax(sampling.missing[gaps])])
+        lasts_s = ordered.time_s[longest + 1] - ordered.time_s[longest]
+        yield (
+            f"{sampling.missing.sum()} samples are missing in {len(gaps)} gaps, the longest {lasts_s:.3g} s, after "
+            f"sample {ordered.rows[longest] + 1}, at {ordered.time_s[longest]:.10g} s"
+        )
     taken = f"they count as taken every {1e3 * sampling.interval_s:.4g} ms"
     if sampling.late is not None:
         return

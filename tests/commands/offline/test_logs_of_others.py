@@ -366,3 +366,56 @@ def test_the_allan_deviation_of_rounded_stamps_is_that_of_even_ones(
     (rate,) = (each["rate"] for each in json.loads(capsys.readouterr().out)["sensors"].values())
     for walk in rate["random_walk_rad_sqrt_s"]:
         assert walk["value"] == pytest.approx(0.01 / rate_hz**0.5, abs=4 * walk["std"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("gaps", "omitted"),
+    [
+        (((520, 17),), "17 of 3495 readings, lost_samples: they are missing; the first after 4.99 s, in row 2"),
+        (((50, 17), (520, 17), (560, 17), (1600, 17)), "68 of 3495 readings, lost_samples: they are missing"),
+        (((450, 156),), "1 of 12 rows, lost_samples: what is missing in them may hide a change of the rate"),
+    ],
+)
+def test_a_gap_costs_what_it_hides_and_is_named(
+    gaps: tuple[tuple[int, int], ...], omitted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    samples, sweeps = write_rates(tmp_path, swept(104), Stamps(rounded_s=1e-3, gaps=gaps))
+    found = solved(capsys, samples, "--sweeps", sweeps)
+    off, expanded = off_and_u(found)
+    assert (off < 1.6).all() and (expanded < 1e-4).all()
+    assert omitted in in_brief(capsys, samples, "--sweeps", sweeps)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("lasts", "wider", "omitted"),
+    [(17, 0.999, "17 of "), (90, 1.01, "90 of "), (200, 1.2, "1 of 7 rows")],
+)
+def test_a_turn_with_a_gap_is_less_certain_or_left_out(
+    lasts: int, wider: float, omitted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = turned_slowly(0.35, np.array([0.02, -0.01, 0.022]))
+    files = write_rates(tmp_path, log, Stamps(gaps=((1200, lasts),)), "angle_rad")
+    off, expanded = off_and_u(solved(capsys, *_interleave(files)))
+    assert (off < 1).all() and omitted in in_brief(capsys, *_interleave(files))
+    whole = off_and_u(solved(capsys, *_interleave(write_rates(tmp_path, log, None, "angle_rad"))))[1]
+    assert wider < expanded[0] / whole[0] < 1.5
+
+
+@pytest.mark.slow
+def test_what_had_waited_in_a_buffer_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two seconds of readings from before the recording, which come at 400 Hz."""
+    log = swept(104)
+    stale = np.random.default_rng(2).normal(size=(800, 3))
+    stamps = np.concatenate([log.time_s[0] - 0.0025 * np.arange(800, 0, -1), log.time_s])
+    samples = write_table(
+        tmp_path / "samples.csv", ["time_s", *(f"{a}_rad_s" for a in AXES)], stamps, np.vstack([stale, log.readings])
+    )
+    (tmp_path / "plain").mkdir()
+    sweeps = write_rates(tmp_path / "plain", log)[1]
+    found = solved(capsys, samples, "--sweeps", sweeps)
+    assert (off_and_u(found)[0] < 1.6).all()
+    assert " of 7414 samples, they had waited in a buffer: they come every 2.5 ms" in in_brief(
+        capsys, samples, "--sweeps", sweeps
+    )

@@ -24,6 +24,31 @@ FACES = np.array([[1, 0, -1, 0], [1, 0, 1, 0], [1, 1, 0, 0], [1, -1, 0, 0], [2**
 FORCES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
 
 
+def polled(time_s: Array, every_s: float, late_s: float = 0.0, inner_s: float = 0.0, seed: int = 0) -> Array:
+    """The stamps of readings that wait for the next poll, packet or radio event, `late_s` at most behind it."""
+    event = np.ceil(time_s / every_s - 1e-9).astype(int)
+    late = late_s * np.random.default_rng(seed).random(event[-1] + 1)
+    first = np.concatenate([[True], np.diff(event) > 0])
+    index = np.arange(len(time_s))
+    stamps: Array = every_s * event + late[event] + inner_s * (index - np.maximum.accumulate(np.where(first, index, 0)))
+    return stamps
+
+
+def stale_at_first(time_s: Array, count: int, every_s: float = 2.5e-3) -> Array:
+    """The stamps of arrival of a log whose first `count` readings had waited in a buffer."""
+    stamps = time_s.copy()
+    stamps[:count] = time_s[count] - every_s * np.arange(count, 0, -1)
+    return stamps
+
+
+def stalled(time_s: Array, at_s: float, lasts_s: float, every_s: float = 5e-4) -> Array:
+    """The stamps of arrival over a link that stands still, and sends at once what waited meanwhile."""
+    first = int(np.searchsorted(time_s, at_s))
+    stamps = time_s.copy()
+    stamps[first:] = np.maximum(stamps[first:], at_s + lasts_s + every_s * np.arange(len(stamps) - first))
+    return stamps
+
+
 @dataclass(frozen=True)
 class Log:
     """Readings (n, 3) taken at `time_s` (n,), and the `rows` (k, …) that tell the motion."""
