@@ -41,6 +41,7 @@ COUNTED = 50  # missing readings: the number in a longer gap is too inexact to r
 SEGMENTS, FARTHEST = 24, 1024  # the fewest segments of a log that show a random walk; readings of one at most
 GROWN = (2.5, 12.0)  # range of the factor by which a random walk's variance grows over four segments
 WIDEST_BURST = 16  # readings: at least one of them in a row must be on time
+POLLED = 0.045  # fraction of steps over one more period of polling, at least
 WHOLE = 0.01  # of a coarse resolution: tolerance of an interval that is a whole multiple of it
 BEAT, IN_BLOCK, BLOCKS = 0.35, 8, 20  # variance over mean of missing readings; expected ones in a block; fewest blocks
 
@@ -228,13 +229,14 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
 def _is_beat(missing: NDArray[np.intp]) -> bool:
     """Return whether readings seem to be missing (n − 1,) more regularly than by chance.
 
-    Stamps that are whole multiples of a time shorter than the interval, as those of a polled port, show that.
+    Stamps that are whole multiples of a time shorter than the interval, as those of a polled port, show that. A logger
+    that loses every n-th reading shows the same, but hardly so often.
     """
     missing = np.minimum(missing, 1)  # a gap is one
     lost = int(missing.sum())
     size = max(len(missing) * IN_BLOCK // lost, 1) if lost else len(missing) + 1
     blocks = len(missing) // size
-    if blocks < BLOCKS:
+    if blocks < BLOCKS or lost < POLLED * len(missing):
         return False
     counts = missing[: blocks * size].reshape(blocks, size).sum(axis=1)
     return bool(counts.var() < BEAT * counts.mean())

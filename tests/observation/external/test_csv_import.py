@@ -152,8 +152,12 @@ def test_the_refusal_names_the_column_to_convert(tmp_path: Path) -> None:
 
 
 def test_a_gap_in_the_samples_is_named(tmp_path: Path) -> None:
-    with pytest.raises(Fault, match="lost_samples: sweep 1 has"):
-        read_with(tmp_path, lambda lines: [*lines[:100], *lines[120:]])
+    (short,) = read_with(tmp_path, lambda lines: [*lines[:100], *lines[120:]]).omitted
+    assert short.count == 20 and short.first.endswith("in row 1")
+    (long,) = read_with(tmp_path, lambda lines: [*lines[:100], *lines[180:]]).omitted
+    assert (long.what, long.count) == ("rows", 1) and long.first.startswith("row 1, at ")
+    with pytest.raises(Fault, match="lost_samples: sweep 1 has"):  # all over the rows
+        read_with(tmp_path, lambda lines: [lines[0], *(line for row, line in enumerate(lines[1:]) if row % 23)])
 
 
 @pytest.mark.slow
