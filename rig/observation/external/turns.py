@@ -32,8 +32,8 @@ BY_HAND_AXIS_RAD = 0.02  # default tilt during the turn
 class TurnedData:
     """The input of a solution by increments: the gyroscope, the turns, the numbers of their rows, and the means.
 
-    `noise_dof`, `bias_dof`: degrees of freedom of its noise, and of its bias' change between rests. `hiding`: numbers of
-    rows that are left out, for missing readings may hide a part of the turn.
+    `noise_dof`, `bias_dof`: degrees of freedom of its noise, and of its bias' change between rests. `hiding`: numbers
+    of rows that are left out, for missing readings may hide a part of the turn.
     """
 
     gyroscope: Gyroscope
