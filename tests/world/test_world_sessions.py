@@ -19,6 +19,7 @@ from rig.world.ur10e.interfaces.variables import INPUTS, OUTPUTS
 from rig.world.ur10e.robot import Robot
 from rig.world.world_process import World
 from rig.world.world_section import read_world_section
+from support.laboratories.worlds import fresh_host
 from support.paths import DEMO
 from support.wires.damaged_messages import carry_to_world
 
@@ -158,10 +159,9 @@ def test_a_client_may_not_ask_for_more_than_there_is() -> None:
 
 @pytest.mark.parametrize("port", ["socket://127.0.0.1", "socket://127.0.0.1:x", "/dev/ttyACM0"])
 def test_a_board_port_that_is_no_address_is_refused(port: str) -> None:
-    assert LOADED.config.board is not None
-    board = LOADED.config.board.model_copy(update={"port": port})
-    config = LOADED.config.model_copy(
-        update={"board": board, "arm": LOADED.config.arm.model_copy(update={"host": "127.9.9.9"})}
-    )
+    board = LOADED.config.board
+    assert board is not None
+    turner = LOADED.config.arm.model_copy(update={"host": fresh_host()})
+    update = {"board": board.model_copy(update={"port": port}), "turner": turner}
     with pytest.raises(Refused, match="board_port"):
-        World(replace(LOADED, config=config))
+        World(replace(LOADED, config=LOADED.config.model_copy(update=update)))
