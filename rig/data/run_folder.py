@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 CONFIG, SCRIPT, RESULT, CERTIFICATE = "config.yaml", "script.py", "result.json", "certificate.html"
 SCRIPT_IDENTITY = "script.json"
+TRUTH = "truth.json"  # of a simulated laboratory, which writes it for people; nothing that estimates reads it
 WORLD_LATE = "world_late.txt"  # the causes of late steps of the simulated laboratory
 LOG, ARM_LOG = "log.txt", "arm_client.log"
 IDENTITY_MAX_BYTES = 10_000
@@ -50,7 +51,7 @@ def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: Script
 
 def discard(folder: Path) -> None:
     """Remove a new run folder in which nothing was measured; it stays if it holds other files."""
-    begun = [folder / name for name in (CONFIG, SCRIPT, SCRIPT_IDENTITY, WORLD_LATE, LOG, ARM_LOG)]
+    begun = [folder / name for name in (CONFIG, SCRIPT, SCRIPT_IDENTITY, WORLD_LATE, TRUTH, LOG, ARM_LOG)]
     with suppress(OSError):
         for path in [*begun, *(file for readings in _BEGINNINGS for file in recordings(folder, readings))]:
             path.unlink(missing_ok=True)

@@ -13,18 +13,20 @@ from rig.data.run_folder import CONFIG, resuming
 from rig.page.about import About
 from rig.report.findings.result_kind import AxisValues
 from rig.report.kinds.kind_registry import shown
+from rig.report.simulated_truth import TruthRow
 from rig.report.words.printed_values import in_print
 from rig.station.events import Since
 
 Row = dict[str, Any]
 
 
-def outcome_rows(result: ResultDocument, parts: Mapping[str, str]) -> list[Row]:
+def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Sequence[TruthRow] = ()) -> list[Row]:
     """Return a row for each result: its numbers ± U as on the certificate, and its limits.
 
-    `parts` are the sensors' parts and serial numbers.
+    `parts` are the sensors' parts and serial numbers; `true_rows` the truth of a simulated laboratory.
     """
     rows = []
+    true_by_name = {true.row.name: true for true in true_rows}
     for row in shown(result):
         names = row.sensor, row.quantity.name
         scale, bias = (limit_held(result.checks, *names, parameter) for parameter in JUDGED_PARAMETERS)
@@ -38,6 +40,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str]) -> list[Row]:
                 "unit": row.unit.name,
                 "scale": None if row.scale is None else _numbers(row.scale, 1.0, scale),
                 "bias": _numbers(row.numbers, 0.0, None if bias is None else bias / row.unit.size),
+                "truth": _truth(true_by_name.get(row.name)),
             }
         )
     return rows
@@ -88,6 +91,17 @@ def after_verdict(about: About, checks: Sequence[Check], *, passed: bool, stored
 def after_fault(command: str, *, repeats: bool) -> Row:
     """Return the next step after a fault, in words and as a command."""
     return _next("Repeat the refused sweeps" if repeats else "After correcting it, continue", command)
+
+
+def _truth(true: TruthRow | None) -> Row | None:
+    """Return the true values as they are printed, and (result − truth)/U; None without a truth."""
+    if true is None:
+        return None
+    return {
+        name: {"texts": values.truth_texts, "deviations": values.deviations}
+        for name, values in (("scale", true.scale), ("bias", true.bias))
+        if values is not None
+    }
 
 
 def _next(words: str, command: str) -> Row:

@@ -1,4 +1,4 @@
-"""The state of the page, built from a run's events. No thread, no clock, and no file but the reported result."""
+"""The state of the page, built from a run's events. No thread, no clock, and no file but the reported ones."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -16,8 +16,8 @@ from rig.data.recording.hand_events import (
     HandRestRefused,
 )
 from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved
-from rig.data.result_file import read_result
-from rig.data.run_folder import CERTIFICATE, RESULT
+from rig.data.result_file import ResultDocument, read_result
+from rig.data.run_folder import CERTIFICATE, RESULT, TRUTH
 from rig.motion.geometry import NOMINAL
 from rig.motion.steps import Dwell, Rest, Step, Sweep
 from rig.page import by_hand
@@ -26,6 +26,7 @@ from rig.page.arm import connected, geometry, stance
 from rig.page.outcome_screen import after_fault, after_verdict, outcome_rows, since_rows
 from rig.page.recent_readings import PageHistory, round_digits
 from rig.page.rows import Look, dwell_row, observation_row, parameter_rows, projection
+from rig.report.simulated_truth import truth_rows
 from rig.report.words.mounting_words import mount_lines
 from rig.station.events import (
     Advice,
@@ -100,6 +101,7 @@ class PageState:
         self._turns: dict[int, dict[str, Any]] = {}
         self._prompts = 0
         self._solved = False
+        self._result: ResultDocument | None = None
         self.ended = False
 
     @property
@@ -235,11 +237,14 @@ class PageState:
             case DocumentWritten(path) if path.name == CERTIFICATE:
                 self.put("certificate", True)
             case DocumentWritten(path) if path.name == RESULT:
-                result = read_result(path)
+                self._result = result = read_result(path)
                 self.put("parameters", parameter_rows(result))
                 self.put("outcome", outcome_rows(result, self._parts))
                 self.put("mounts", list(mount_lines(result)))
                 self._solved = True
+            case DocumentWritten(path) if path.name == TRUTH and self._result is not None:
+                truth = truth_rows(path.parent, self._result)
+                self.put("outcome", outcome_rows(self._result, self._parts, truth))
             case Failed(error):
                 self._state("refused" if error.exit_status == 2 else "fault", str(error))
             case Interrupted(text):

@@ -1,4 +1,4 @@
-"""`python -m rig.world CONFIG [--until-eof] [--late FILE]`: the simulated laboratory in the foreground, for any client.
+"""`python -m rig.world CONFIG [--until-eof] [--late FILE] [--truth FILE]`: the simulated laboratory in the foreground.
 
 The first line on stdout is JSON: `ready`, and where everything listens. With --until-eof a parent process reads that
 line, so a refusal is reported there too: `ready` is false and `problem` holds the error.
@@ -22,6 +22,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--late", type=Path, metavar="FILE", help="the file for reports of steps that came late (stderr)"
     )
+    parser.add_argument(
+        "--truth", type=Path, metavar="FILE", help="the file for the truth of a run, when it is asked for"
+    )
     options = parser.parse_args(arguments)
     try:
         loaded = load(options.config, sections=None)
@@ -33,7 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
                 f"the simulated laboratory needs the package {error.name}, which is not installed",
                 f"Install it: {install_command('world')}",
             ) from error
-        serve(loaded, options.until_eof, options.late)
+        serve(loaded, options.until_eof, options.late, options.truth)
     except Refused as error:
         if options.until_eof:
             print(json.dumps({"ready": False, "problem": error.problem._asdict()}), flush=True)

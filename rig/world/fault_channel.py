@@ -1,4 +1,6 @@
-"""The control channel: JSON lines with which tests make the world misbehave. No run of the rig uses it.
+"""The control channel: JSON lines with which tests make the world misbehave.
+
+A run of the rig uses it for what a simulated operator does, and to have the truth written at its end.
 
 A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s": …, …}` or `{"ok": false, "error": …}`.
 
@@ -36,6 +38,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     servo_fault held_fast dumb denies voltage_v temperature_c lose spoil   as above; `lose`, `spoil`: replies
     servo_line silent listen                    a line that carries nothing; its port, that closes
     unplug_board · plug_in_board · reset_board · power_dip · silence_board on · host_baud baud (null: the board's own)
+    write_truth windows                         what is true over these windows, into the file that the world was given
 """
 
 import json
@@ -88,6 +91,7 @@ class ControlledWorld(Protocol):
     def unplug_board(self) -> None: ...
     def plug_in_board(self) -> None: ...
     def fit_part(self, part: str) -> None: ...
+    def write_truth(self, windows: Mapping[str, Any]) -> None: ...
 
 
 class ControlSession:
@@ -114,6 +118,7 @@ class ControlSession:
             "sensor_fault": self._sensor_fault,
             "silence_board": self._silence_board,
             "host_baud": self._host_baud,
+            "write_truth": world.write_truth,
             **self._motion_orders(),
         }
 

@@ -8,19 +8,21 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from firmware_host.errors import BoardError
+from rig.config.files.written_file import write_new
 from rig.config.load import Loaded
 from rig.config.models import ArmSection, RigConfig, TurnerSection
 from rig.config.world.laboratory import SimulatedArmSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.serial_line import SerialLine, SerialSession
+from rig.world.board.windowed_truth import SimulatedTruth, truth_document
 from rig.world.clock import PATIENCE_S, WorldClock
 from rig.world.fault_channel import KINDS, ControlSession
 from rig.world.flight_recorder import FlightRecorder
@@ -55,8 +57,10 @@ SCRIPT_PORTS = (script_socket.PRIMARY_PORT, script_socket.SECONDARY_PORT, script
 class World:
     """Laboratory, clock and sockets."""
 
-    def __init__(self, loaded: Loaded) -> None:
+    def __init__(self, loaded: Loaded, truth_file: Path | None = None) -> None:
+        """Open all ports. The world may write its truth into `truth_file`; None: nowhere."""
         section = read_world_section(loaded)
+        self._truth, self._truth_file = SimulatedTruth(loaded.config, section), truth_file
         self.laboratory = Laboratory(loaded.config, section)
         self.line = SerialLine(lambda: self.laboratory.board)
         mounts = self.laboratory.instruments
@@ -185,6 +189,17 @@ class World:
         if self.laboratory.fit(part):
             self.plug_in_board()
 
+    # -- the truth -------------------------------------------------------------------------------------------------
+    def write_truth(self, windows: Mapping[str, Any]) -> None:
+        """Write the truth over the windows of a run (`truth_document`). Raise ValueError if that is not possible."""
+        if self._truth_file is None or self.laboratory.body is not None:
+            raise ValueError("this world was given no file for its truth, or is heated")
+        document = truth_document(self._truth, windows, self.clock.time_s)
+        try:
+            write_new(self._truth_file, json.dumps(document, indent=1) + "\n")
+        except OSError as error:
+            raise ValueError(str(error)) from error
+
     # -- the loop ----------------------------------------------------------------------------------------------------
     def end(self) -> None:
         self._is_ended = True
@@ -298,12 +313,12 @@ def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":
     return PtyPort(line, selector)
 
 
-def serve(loaded: Loaded, until_eof: bool, late: Path | None = None) -> None:
+def serve(loaded: Loaded, until_eof: bool, late: Path | None = None, truth: Path | None = None) -> None:
     """Run the world until end of input (`until_eof`) or Ctrl-C. Raise `Refused` if a port is not available.
 
-    Reports of late steps are written to the file `late`, or to stderr if that is None.
+    Reports of late steps are written to the file `late`, or to stderr if that is None; the truth to the file `truth`.
     """
-    world = World(loaded)
+    world = World(loaded, truth)
     try:
         # Set even if the parent process ignores these. An exception would be lost inside a call of the emulator.
         for number in (signal.SIGTERM, signal.SIGINT):

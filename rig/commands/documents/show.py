@@ -29,7 +29,10 @@ def run(options: Namespace) -> int:
     from rich.console import Console
 
     from rig.data.result_file import read_result
+    from rig.report.simulated_truth import truth_lines, truth_rows
     from rig.report.terminal.result_table import print_checks, print_kept, print_values, print_verdict
+    from rig.report.terminal.truth_table import truth_tables
+    from rig.report.terminal.whole_words import with_whole_words
     from rig.station.plain_text import say
 
     result, sensor = read_result(options.run), options.sensor
@@ -41,14 +44,18 @@ def run(options: Namespace) -> int:
             raise Refused("no_such_sensor", f"{options.run} has no sensor {sensor}", f"Choose one of: {names_in_run}")
         say(scalars[sensor])
         return 0
+    folder = options.run if options.run.is_dir() else options.run.parent
+    truth = truth_rows(folder, result)
     if options.budget or options.all or (sensor is not None and not options.checks):
         print_values(result, console, sensor)
+        for table in truth_tables(truth, sensor):
+            console.print(with_whole_words(table, console.width))
     if options.checks or options.all:
         print_checks(result, console, sensor)
     if options.budget or options.all or options.checks or sensor is not None:
         print_verdict(result, console)
     else:
-        print_kept(options.run if options.run.is_dir() else options.run.parent, result)
+        print_kept(folder, result, [*truth_lines(truth)])
     return 0
 
 

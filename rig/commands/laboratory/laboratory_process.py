@@ -18,16 +18,19 @@ CONTROL_TIMEOUT_S = 30.0
 
 
 @contextmanager
-def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator[str]:
+def simulated_laboratory(config_text: str, late: Path | None = None, truth: Path | None = None) -> Iterator[str]:
     """Run the world of a configuration text for the length of the block; yield the address of its control channel.
 
-    If its steps come late, it writes the causes to the file `late`, or to stderr if that is None.
+    If its steps come late, it writes the causes to the file `late`, or to stderr if that is None. It may be asked to
+    write the truth to the file `truth`.
 
     The world ends when its standard input closes, so it cannot outlive this process, however this process ends. Raise
     Refused: `only_on_linux`, the world's own refusal, or `world_not_ready` if it ends without one.
     """
     refuse_unless_linux("the simulated laboratory")
-    command = [sys.executable, "-P", "-m", "rig.world", "--until-eof", *([] if late is None else ["--late", str(late)])]
+    files = {"--late": late, "--truth": truth}
+    options = [text for option, path in files.items() if path is not None for text in (option, str(path))]
+    command = [sys.executable, "-P", "-m", "rig.world", "--until-eof", *options]
     with (
         write_temporary(config_text) as path,
         # A session of its own: Ctrl-C in the terminal must stop the arm first, not the laboratory under it.

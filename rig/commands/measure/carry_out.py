@@ -11,10 +11,12 @@ from rig.commands.history.run_serials import recall_sensors
 from rig.commands.laboratory.claims import claim_devices
 from rig.commands.laboratory.laboratory_process import make_mounter, simulated_laboratory
 from rig.commands.laboratory.simulated_operator import OperatorListener
+from rig.commands.laboratory.written_truth import write_truth
 from rig.commands.page_arguments import PageWish, serve_operators_page
 from rig.commands.standard_streams import say_where_the_result_is
-from rig.data.run_folder import CONFIG, LOG, RESULT, WORLD_LATE
+from rig.data.run_folder import CONFIG, LOG, RESULT, TRUTH, WORLD_LATE, recordings
 from rig.report.document import document_of
+from rig.report.simulated_truth import truth_lines, truth_rows
 from rig.report.terminal.result_table import print_kept
 from rig.runner.phases import Run
 from rig.station.confirm import ask_operator
@@ -51,10 +53,18 @@ def carry_out(
             with run.report_end():
                 stack.enter_context(claim_devices(configured.loaded.config))
                 if configured.loaded.simulated:
-                    control = stack.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
+                    # Of a resumed run, the windows of the first part are those of another laboratory's clock.
+                    resumed = bool(recordings(folder, "raw"))
+                    (folder / TRUTH).unlink(missing_ok=True)
+                    control = stack.enter_context(
+                        simulated_laboratory(configured.loaded.text, folder / WORLD_LATE, folder / TRUTH)
+                    )
                     station.mount = make_mounter(control)
                     station.listeners = (*station.listeners, OperatorListener(control))
             outcome = run.carry_out(configured.phase)
+            if configured.loaded.simulated and not resumed:
+                for event in write_truth(control, folder, configured.loaded, outcome):
+                    station.event(event)
             try:
                 entered, comparisons = remember(folder, configured.loaded.config.history)
             except KeyboardInterrupt:
@@ -63,7 +73,9 @@ def carry_out(
             if entered is not None:
                 station.event(entered)
             station.event(RunFolderWritten(folder))
-        print_kept(folder, document_of(outcome), describe_changes(comparisons), as_json=as_json)
+        document = document_of(outcome)
+        compared = [*truth_lines(truth_rows(folder, document)), *describe_changes(comparisons)]
+        print_kept(folder, document, compared, as_json=as_json)
         say_where_the_result_is(folder / RESULT)
         page_of_run.stay()
     return 0 if outcome.passed else 1

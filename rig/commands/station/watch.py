@@ -113,7 +113,7 @@ def _replay(recorded: "Iterator[Moment]", feed: "Feed", speed: float) -> None:
 
 
 def _read_ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent]":
-    from rig.data.run_folder import CERTIFICATE, RESULT
+    from rig.data.run_folder import CERTIFICATE, RESULT, TRUTH
     from rig.page.replay import ended
     from rig.station.events import DocumentWritten, Interrupted
 
@@ -123,6 +123,8 @@ def _read_ending(folder: Path, result: "ResultDocument | None") -> "Iterator[Run
         yield Interrupted(read_last_words(folder))
         return
     yield DocumentWritten(folder / RESULT)
+    if (folder / TRUTH).is_file():
+        yield DocumentWritten(folder / TRUTH)
     yield from ended(result)
 
 

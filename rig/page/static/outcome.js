@@ -49,19 +49,21 @@ function triad(what, result, unit, past, kind) {
 }
 
 function table(row, past) {
-  const heading = (of, unit) => (row[of] ? [`${of === "scale" ? "scale factor" : row.scale ? "bias" : "value"} ± U${unit}`, "", ...(past?.[of] ? ["before", "E_n"] : [])] : []);
+  const heading = (of, unit) => (row[of] ? [`${of === "scale" ? "scale factor" : row.scale ? "bias" : "value"} ± U${unit}`, "", ...(past?.[of] ? ["before", "E_n"] : []), ...(row.truth?.[of] ? ["simulated truth", "(result − truth)/U"] : [])] : []);
   const cells = (of, i) => {
-    const [result, then] = [row[of], past?.[of]];
+    const [result, then, truth] = [row[of], past?.[of], row.truth?.[of]];
     if (!result) return [];
     return [make("td", { textContent: `${result.texts[i]} ± ${result.u[i]}` }), make("td", {}, picture(result, then, [i])),
       ...(then ? [make("td", { textContent: then.values[i].toFixed(decimals(result.texts[i])).replace("-", "−") }),
-        make("td", { textContent: then.normalised_error[i].toFixed(1), className: then.changed[i] ? "bad" : "" })] : [])];
+        make("td", { textContent: then.normalised_error[i].toFixed(1), className: then.changed[i] ? "bad" : "" })] : []),
+      ...(truth ? [make("td", { textContent: truth.texts[i] }), make("td", { textContent: signed(truth.deviations[i]) })] : [])];
   };
   const head = ["axis", ...heading("scale", ""), ...heading("bias", `, ${row.unit}`)].map((text) => make("th", { scope: "col", textContent: text }));
   const body = row.bias.values.map((_, i) => make("tr", {}, make("th", { scope: "row", textContent: row.labels[i] }), ...cells("scale", i), ...cells("bias", i)));
   return make("div", { className: "wide" }, make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body)));
 }
 
+const signed = (number) => `${number < 0 ? "−" : "+"}${Math.abs(number).toFixed(2)}`;
 const decimals = (text) => text.split(".")[1]?.length ?? 0;
 
 /** Where values lie between what is allowed, from end to end: a dot with its U, a ring where it was before. */

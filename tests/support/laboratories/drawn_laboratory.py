@@ -1,17 +1,14 @@
 """Simulated laboratories in which everything that can be wrong is, drawn from its distribution, and their truth."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import yaml
 
-from firmware_host.emulator.parts.accelerometer import accelerations
-from firmware_host.emulator.parts.gyroscope import readings
 from rig.config.load import parse
 from rig.config.sensors.sensor_catalogue import PARTS
-from rig.world.board.sensor_truth import SensorTruth
+from rig.world.board.windowed_truth import SimulatedTruth
 from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import merge
@@ -131,47 +128,16 @@ def leaning(rng: np.random.Generator, part: str) -> list[float]:
 def truth(
     document: Mapping[str, Any], name: str, windows_s: Iterable[tuple[float, float]], speed_rad_s: float = SPEED_RAD_S
 ) -> np.ndarray:
-    """(6,) scale at plus and minus a speed and bias without gravity of a sensor, as means over times of the world.
-
-    Made of what the simulated part reads without noise, at rest and turning about each of its axes.
-    """
-    sensor, seed = _sensor_and_seed(document, name)
-    quiet = replace(
-        sensor.gyro,
-        noise_rad_s=0.0,
-        g_sensitivity_rad_s_per_g=(),
-        non_orthogonality_rad=(0.0, 0.0, 0.0),
-        bandwidth_hz=None,
-        delay_s=0.0,
-    )
-    time_s = _times(windows_s)
-
-    def read(rate_rad_s: float) -> np.ndarray:
-        turning = np.full((len(time_s), 3), rate_rad_s)
-        return readings(quiet, time_s, turning, seed, sensor.temperature_c)
-
-    scale = np.mean(2 * speed_rad_s / (read(speed_rad_s) - read(-speed_rad_s)), axis=0)
-    bias = -read(0.0).mean(axis=0)
-    return np.concatenate([scale, bias])
+    """(6,) scale at plus and minus a speed and bias without gravity of a sensor, as means over times of the world."""
+    simulated, windows = _simulated(document), [*windows_s]
+    return np.concatenate([simulated.scale(name, windows, speed_rad_s), simulated.bias_rad_s(name, windows)])
 
 
 def bias_at_0_g(document: Mapping[str, Any], name: str, windows_s: Iterable[tuple[float, float]]) -> np.ndarray:
     """(3,) what the accelerometer in a sensor reads without noise where it feels nothing, as a mean over such times."""
-    sensor, seed = _sensor_and_seed(document, name)
-    assert sensor.accelerometer is not None
-    quiet = replace(sensor.accelerometer, noise_m_s2=0.0, bandwidth_hz=None, delay_s=0.0)
-    time_s = _times(windows_s)
-    read = accelerations(quiet, time_s, np.zeros((len(time_s), 3)), seed, sensor.temperature_c)
-    mean: np.ndarray = read.mean(axis=0)
-    return mean
+    return _simulated(document).bias_m_s2(name, [*windows_s])
 
 
-def _sensor_and_seed(document: Mapping[str, Any], name: str) -> tuple[SensorTruth, np.random.SeedSequence]:
+def _simulated(document: Mapping[str, Any]) -> SimulatedTruth:
     loaded = parse(yaml.safe_dump(dict(document)))
-    world = read_world_section(loaded)
-    sensor = SensorTruth(loaded.config.sensors[name], world.sensors[name])
-    return sensor, np.random.SeedSequence([world.seed, sorted(world.sensors).index(name)])
-
-
-def _times(windows_s: Iterable[tuple[float, float]]) -> np.ndarray:
-    return np.concatenate([np.arange(from_s, to_s, 0.05) for from_s, to_s in sorted(windows_s)])
+    return SimulatedTruth(loaded.config, read_world_section(loaded))

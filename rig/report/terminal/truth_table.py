@@ -1,0 +1,35 @@
+"""The result beside the truth of a simulated laboratory, as tables for the terminal."""
+
+from collections.abc import Iterator, Sequence
+
+from rich.table import Table
+
+from rig.report.simulated_truth import TrueValues, TruthRow
+from rig.report.words.printed_values import in_print
+from rig.station.plain_text import plain
+
+
+def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterator[Table]:
+    """Yield a table for each row of the result with its truth, or for those of one sensor."""
+    for row in rows:
+        if sensor not in (None, row.row.sensor):
+            continue
+        title = f"{row.row.name} beside its simulated truth, d = (result − truth)/U"
+        table = Table(title=plain(title, "table.title"), title_justify="left")
+        columns = [("scale factor", row.scale), (f"{row.row.noun} {row.row.unit.name}", row.bias)]
+        table.add_column("axis")
+        for name, values in columns:
+            for heading in () if values is None else (name, "truth", "d"):
+                table.add_column(heading, justify="right")
+        cells = zip(*(cell for _, values in columns if values is not None for cell in _cells(values)), strict=True)
+        for label, numbers in zip(row.row.labels, cells, strict=True):
+            table.add_row(label, *numbers)
+        yield table
+
+
+def _cells(values: TrueValues) -> Iterator[list[str]]:
+    """Yield three columns: the results, their truths to the same decimals, and the deviations."""
+    numbers = values.result
+    yield [in_print(value, u)[0] for value, u in zip(numbers.values, numbers.expanded, strict=True)]
+    yield values.truth_texts
+    yield [f"{deviation:+.2f}".replace("-", "−") for deviation in values.deviations]
