@@ -1,15 +1,22 @@
 """What comes at each question of a station: its own answers decide, everything else is asked again."""
 
 from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
+from rig.batch.journal import open_journal
+from rig.batch.parts_in_turn import Bench, Desk, Work
 
 from rig.batch.batch_state import BatchPart, Begun, Doubt, Entry, PartBegun, PartEnded, state_of
 from rig.batch.operators import CHOICES, Kind, Operator, Question
 from rig.batch.status import Now, after, update_by_batch
+from rig.config.judging.station_section import StationSection
 from rig.errors import Fault
 from rig.motion.steps import Rest
 from rig.station.events import PhaseRecorded, Progress, SamplesTaken, SensorSamples
+from support.paths import ROOT
 
 AT = "2026-11-25T08:00:00+00:00"
 PART = BatchPart(1, "G-001", "01-G-001", AT)
@@ -82,6 +89,65 @@ def test_an_answer_to_another_question_is_no_serial_number(comes: str) -> None:
 def test_a_number_is_taken_an_empty_line_ends_the_batch_and_so_does_an_operator_who_leaves() -> None:
     assert [Operator(Typist(text)).next_part([]) for text in (*NUMBERS, "")] == [*NUMBERS, None]
     assert Operator(Typist()).next_part([]) is None
+
+
+def test_the_page_for_technicians_has_this_table() -> None:
+    page = (ROOT / "docs" / "how-to" / "at-the-rig" / "station.md").read_text(encoding="utf-8")
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
+    rows = {name: cells for name, *cells in lines if len(cells) == len(COMES) - 2}
+    names = {"mount": "mount", "go": "go", "doubt": "continue anyway?", "again": "again?"}
+    said = {
+        YES: {"it is mounted", "the arm moves", "yes"},
+        NO: {"put aside", "does not start", "no"},
+        AGAIN: {"asked again"},
+    }
+    for kind, name in names.items():
+        empty, y, yes, go, n, no, number = TABLE[kind]
+        assert (y, n) == (yes, no)  # one column of the page
+        for cell, meaning in zip(rows[name], (empty, yes, go, no, number), strict=True):
+            assert cell in said[meaning], (name, cell)
+
+
+class Contrary:
+    """An operator who gives each question everything that does not answer it, and then the answer."""
+
+    def __init__(self, *numbers: str) -> None:
+        self._numbers = iter((*numbers, ""))
+        self._pending = list[str]()
+        self.kinds = list[Kind]()
+
+    def answer(self, question: Question) -> str:
+        if not question.hint:
+            assert not self._pending, f"{self._pending} answered another question than they were for"
+            self.kinds.append(question.kind)
+            self._pending = self._wrong(question.kind)
+        return self._pending.pop(0)
+
+    def _wrong(self, kind: Kind) -> list[str]:
+        if kind == "number":
+            return ["y", "go", "no", next(self._numbers)]
+        wrong = [text for texts, meaning in zip(COMES, TABLE[kind], strict=True) if meaning is AGAIN for text in texts]
+        return [*wrong, {"mount": "", "go": "go"}.get(kind, "yes")]
+
+
+def test_a_batch_loses_no_part_whatever_is_typed_or_scanned_at_each_question(tmp_path: Path) -> None:
+    """One part ends in a fault first, one number comes twice: so every kind of question is asked."""
+    faults = {"G-002": [Fault("board_link_lost", "the cable was pulled out", "Plug it in")]}
+
+    def run(part: BatchPart, folder: Path, desk: Desk) -> PartEnded:
+        assert desk.agrees(("The arm will move.",), "start", None)
+        for fault in faults.pop(part.serial, []):
+            raise fault
+        return PartEnded("pass", AT)
+
+    bench = cast(Bench, SimpleNamespace(simulated=True, today=lambda serial: None, fit=lambda serial: None, run=run))
+    voice = Contrary("G-001", "G-002", "G-001")
+    journal = open_journal(tmp_path / "batch", tmp_path, Begun("A. Person", "W-1", AT))
+    Work(journal, StationSection(), Operator(voice), bench).all_parts()
+    assert [(part.serial, part.ended and part.ended.outcome) for part in journal.batch.parts] == [
+        ("G-001", "pass"), ("G-002", "pass"), ("G-001", "pass"),
+    ]  # fmt: skip
+    assert set(voice.kinds) == {"number", *TABLE}
 
 
 def test_in_doubt_the_first_choice_does_not_go_on() -> None:
