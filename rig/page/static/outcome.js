@@ -1,5 +1,7 @@
 // The results: a row for each sensor with its values ± U, a plot of them, and the values of the calibration before.
 
+import { label } from "./tables.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 const WIDE = 84, LANE = 11; // of a picture, in CSS pixels; a lane for each axis
 const LETTERS = "xyz";
@@ -60,7 +62,9 @@ function table(row, past) {
   };
   const head = ["axis", ...heading("scale", ""), ...heading("bias", `, ${row.unit}`)].map((text) => make("th", { scope: "col", textContent: text }));
   const body = row.bias.values.map((_, i) => make("tr", {}, make("th", { scope: "row", textContent: row.labels[i] }), ...cells("scale", i), ...cells("bias", i)));
-  return make("div", { className: "wide" }, make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body)));
+  const all = make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body));
+  label(all);
+  return make("div", { className: "wide" }, all);
 }
 
 const signed = (number) => `${number < 0 ? "−" : "+"}${Math.abs(number).toFixed(2)}`;
@@ -74,7 +78,7 @@ function picture(result, past, axes) {
   const across = (value) => (WIDE / 2) * (1 + Math.max(-0.97, Math.min(0.97, value / reach)));
   const height = LANE * axes.length;
   const svg = element("svg", { viewBox: `0 0 ${WIDE} ${height}`, width: WIDE, height, role: "img" });
-  svg.setAttribute("aria-label", label(result, axes));
+  svg.setAttribute("aria-label", described(result, axes));
   svg.append(element("line", { x1: WIDE / 2, x2: WIDE / 2, y1: 0, y2: height, class: "nominal" }));
   if (result.limit) for (const side of [-1, 1]) svg.append(element("line", { x1: across(side * result.limit), x2: across(side * result.limit), y1: 0, y2: height, class: "limit" }));
   axes.forEach((i, lane) => {
@@ -86,10 +90,10 @@ function picture(result, past, axes) {
   return svg;
 }
 
-function label(result, axes) {
+function described(result, axes) {
   const from = result.nominal ? `from ${result.nominal}` : "from zero";
-  const deviations = axes.map((i) => `${LETTERS[i]} ${(result.values[i] - result.nominal).toPrecision(3)}`).join(", ");
-  return `${deviations} ${from}` + (result.limit ? `; ${result.limit.toPrecision(3)} is allowed` : "");
+  const each = axes.map((i) => `${LETTERS[i]} ${(result.values[i] - result.nominal).toPrecision(3)}`).join(", ");
+  return `${each} ${from}` + (result.limit ? `; ${result.limit.toPrecision(3)} is allowed` : "");
 }
 
 function element(tag, attributes) {

@@ -28,6 +28,7 @@ const SHOW = {
   },
   state({ kind }) {
     document.body.dataset.kind = kind;
+    document.body.dataset.over = ENDED.includes(kind) ? "yes" : "no";
     if (shown.step) SHOW.step(shown.step);
     buttons();
     tell();
@@ -63,6 +64,7 @@ const SHOW = {
       ["safety", normal(arm.safety, "normal")], ["program", [current ? arm.program : "–", arm.program === "paused"]],
     ];
     facts([["speed", [current ? `${fast.toFixed(1)} °/s` : "–", false]], ...ofController]);
+    $("arm").parentElement.dataset.current = current ? "yes" : "no";
     tables.joints(arm, current);
     drawArm($("arm"), current ? arm : { ...arm, qd_rad_s: arm.q_rad.map(() => 0) });
   },
@@ -172,7 +174,7 @@ function tell() {
   redraw();
 }
 
-const redraw = () => readings.redraw(shown.sensors, past);
+const redraw = () => readings.redraw(shown.sensors, past, ENDED.includes(shown.state?.kind));
 
 function take(name, news) {
   aged(news);
@@ -245,6 +247,7 @@ function paint() {
 $("theme").addEventListener("click", () => { theme = (theme + 1) % 3; paint(); });
 system.addEventListener("change", paint);
 window.addEventListener("resize", paint);
+new ResizeObserver(redraw).observe($("readings"));
 paint();
 window.addEventListener("hashchange", () => window.location.reload()); // another run's token, in the same window
 setInterval(tell, 250);

@@ -10,6 +10,7 @@ const UNITS = { rate_rad_s: ["rate", "rad/s", 3], acceleration_m_s2: ["accelerat
 
 let sensors = []; // as the rig has them
 let past = ""; // how old the readings are, in words; "" while they are of now
+let over = false; // the run has ended: the last reading is of a moment of its own, which no number beside the result should tell
 
 /** Points that came with a frame. They are counted, so that none is taken twice; points that the rig has dropped are dropped. */
 export function add(frame, news) {
@@ -34,9 +35,9 @@ export function add(frame, news) {
 
 let due = false;
 
-/** Draw the plots, once for all that comes before the next picture: of these sensors, whose readings are so old. */
-export function redraw(of, old) {
-  [sensors, past] = [of ?? [], old];
+/** Draw the plots, once for all that comes before the next picture: of these sensors, whose readings are so old, of a run that is `ended` or not. */
+export function redraw(of, old, ended) {
+  [sensors, past, over] = [of ?? [], old, ended];
   if (due) return;
   due = true;
   requestAnimationFrame(() => {
@@ -65,7 +66,8 @@ function draw(name, values) {
   for (const [i, [axis, letter]] of axes.entries()) {
     $(`${id}-${axis}`).textContent = `${letter}${last ? signed(last[i], digits).padStart(digits + 4, "\u2007") : "–"}`;
   }
-  if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; ${past || "now"} ${axes.map(([, letter], i) => `${letter}${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
+  if (over) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute of the run`);
+  else if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; ${past || "now"} ${axes.map(([, letter], i) => `${letter}${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
   plot(canvas, points.times, values, past ? "last" : "now");
 }
 

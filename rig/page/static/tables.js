@@ -27,6 +27,14 @@ function fill(id, rows) {
     panel.dataset.folded = "yes";
   }
   body.replaceChildren(...rows);
+  label(body.closest("table"));
+}
+
+/** Give each cell the heading of its column, which a narrow screen shows beside it. */
+export function label(table) {
+  const headings = [...table.tHead.rows[0].cells].map((cell) => cell.textContent);
+  for (const { cells } of table.tBodies[0].rows)
+    for (const cell of cells) if (cell.colSpan === 1) cell.dataset.label = headings[cell.cellIndex];
 }
 
 export const minus = (text) => text.replace("-", "−");
