@@ -5,8 +5,11 @@ The source folder is the repository: a page may link to whatever lies in it, as 
 
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+from docutils import nodes
+from sphinx import addnodes
 from sphinx.application import Sphinx
 
 ROOT = Path(__file__).parents[1]
@@ -20,7 +23,7 @@ html_title = f"{project} {release}"
 
 root_doc = "docs/README"
 include_patterns = ["*.md", "docs/**", "firmware_host/**/README.md"]
-exclude_patterns = [".venv", "build", "runs", "docs/site"]
+exclude_patterns = [".venv", "build", "runs", "docs/site", "docs/site_style"]
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton"]
 myst_heading_anchors = 4
@@ -32,6 +35,9 @@ autodoc_member_order = "bysource"
 default_role = "code"
 
 html_theme = "furo"
+html_static_path = ["site_style"]
+html_css_files = ["cards.css"]
+html_search_scorer = str(ROOT / "docs" / "site_style" / "scorer.js")
 html_extra_path = ["site", "config.schema.json"]  # site/index.html leads to the first page; editors fetch the schema
 html_show_sourcelink = False
 
@@ -58,6 +64,46 @@ def with_contents(app: Sphinx, name: str, source: list[str]) -> None:
             source[0] += f"\n\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{pages}\n```\n"
 
 
+ENTRIES = {"docs/errors": "error", "docs/checks": "check", "docs/configuration": "key", "docs/commands": "command"}
+
+
+def add_entries(app: Sphinx, document: nodes.document) -> None:
+    """Give each error, check, key and command an anchor, and an entry of its own in the search and the index."""
+    kind = ENTRIES.get(app.env.docname)
+    entries: dict[str, nodes.Element] = {}
+    for name, node in _entries(document, kind) if kind else ():
+        entries.setdefault(name, node)  # a key of several procedures has the entry of the first
+    for name, node in entries.items():
+        anchor = nodes.make_id(f"{kind} {name}")
+        node["ids"].append(anchor)
+        app.env.domains.standard_domain.note_object(kind, name, anchor, location=node)
+        index = addnodes.index(entries=[("single", name, anchor, "", None)])
+        node.insert(0, index)
+
+
+def _entries(document: nodes.document, kind: str) -> Iterator[tuple[str, nodes.Element]]:
+    """Yield names and their places: sections of commands, else the first cells of the tables' rows."""
+    if kind == "command":
+        for section in document.findall(nodes.section):
+            title = section.next_node(nodes.title).astext()
+            if title.startswith("rig "):
+                yield title, section
+        return
+    for row in document.findall(nodes.row):
+        if not isinstance(row.parent, nodes.tbody) or not (names := list(row[0].findall(nodes.literal))):
+            continue
+        section = row
+        while not isinstance(section, nodes.section):
+            section = section.parent
+        heading = section.next_node(nodes.title)
+        path = f"{(heading.next_node(nodes.literal) or heading).astext()}." if kind == "key" else ""
+        for name in names:
+            yield path + name.astext(), row[0]
+
+
 def setup(app: Sphinx) -> None:
+    for kind in ENTRIES.values():
+        app.add_object_type(kind, f"rig-{kind}", objname=kind)
+    app.connect("doctree-read", add_entries)
     app.connect("source-read", without_folders)
     app.connect("source-read", with_contents)

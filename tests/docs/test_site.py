@@ -5,15 +5,20 @@ import re
 import runpy
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
+from selenium.webdriver.common.by import By
 
 import rig
 import rig.procedure
 from rig.config.judging.verdict_limits import LIMITS
 from rig.report.words.check_words import check_words
+from support.page.browser import browser, needs_browser
 from support.paths import DOCS, ROOT
+from support.processes.waiting import wait_for
 
 
 def test_every_public_name_stands_on_the_api_page() -> None:
@@ -38,15 +43,46 @@ def test_the_drawings_are_those_the_script_makes(monkeypatch: pytest.MonkeyPatch
     assert {name: (DOCS / "drawings" / name).read_text(encoding="utf-8") for name in drawn} == drawn, "make drawings"
 
 
-@pytest.mark.thorough
-@pytest.mark.slow
-def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
-    """As `make docs` does it, but for the notebook, which is executed by tests/notebook/test_first_look.py."""
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site as `make docs` builds it, but for the notebook, which tests/notebook/test_first_look.py executes."""
+    folder = tmp_path_factory.mktemp("docs")
     command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", "-c", str(DOCS)]
-    command += ["-D", "nb_execution_mode=off", "-d", str(tmp_path / "doctrees"), str(ROOT), str(tmp_path / "site")]
+    command += ["-D", "nb_execution_mode=off", "-d", str(folder / "doctrees"), str(ROOT), str(folder / "site")]
     made = subprocess.run(
         command, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False
     )
     assert made.returncode == 0, made.stderr
-    assert "README.html" in (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
-    assert "rig.load" in (tmp_path / "site" / "docs" / "api.html").read_text(encoding="utf-8")
+    return folder / "site"
+
+
+@pytest.mark.thorough
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning(site: Path) -> None:
+    assert "README.html" in (site / "index.html").read_text(encoding="utf-8")
+    assert "rig.load" in (site / "docs" / "how-to" / "with-code" / "api.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.thorough
+@pytest.mark.slow
+@needs_browser
+def test_the_search_answers_questions_and_finds_names(site: Path) -> None:
+    answers = {
+        "how do I stop the arm": "docs/how-to/at-the-rig/operators-page.html#stop-the-arm-stop-the-run",
+        "calibrate by hand": "docs/how-to/without-an-arm/by-hand.html",
+        "resume an interrupted run": "docs/how-to/at-the-rig/resume-and-repeat.html",
+        "arm_moved": "docs/errors.html#error-arm-moved",
+        "scale_changed": "docs/checks.html#check-scale-changed",
+        "rig verify": "docs/commands.html#rig-verify",
+        "arm.payload_kg": "docs/configuration.html#key-arm-payload-kg",
+    }
+    with browser() as driver:
+        for question, page in answers.items():
+            driver.get(f"{(site / 'search.html').as_uri()}?q={quote(question)}")
+            first = wait_for(
+                partial(driver.find_elements, By.CSS_SELECTOR, "#search-results ul.search li > a"), "a result"
+            )[0]
+            wait_for(lambda: "found" in driver.find_element(By.CLASS_NAME, "search-summary").text, "all results")
+            assert page in (first.get_attribute("href") or "").replace("?highlight=", ""), question
+    for page, name in (("errors", "error-arm-moved"), ("checks", "check-bias"), ("configuration", "key-arm-host")):
+        assert f'id="{name}"' in (site / "docs" / f"{page}.html").read_text(encoding="utf-8")
