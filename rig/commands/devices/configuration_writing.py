@@ -42,7 +42,8 @@ def write_checked(path: Path, answers: "Answers") -> int:
     except ConfigurationRefused as refused:
         say("to be filled in:")
         for problem in refused.problems:
-            say(f"  {problem}")
+            key, unknown, _ = str(problem).partition(": '?': ")
+            say(f'  {key}: write the value in place of "?"' if unknown else f"  {problem}")
         say(f"then: rig check {path}")
         return 1
     say("checked: it is complete; every line can be changed")

@@ -103,7 +103,8 @@ def look_at_device(
 ) -> str:
     """Look at a device for ten seconds and return its section as YAML; print what the lines show.
 
-    Raise Refused as `listen`, and `lines_no_pattern` if its lines have nothing in common.
+    Raise Refused as `listen`, `lines_no_pattern` if its lines have nothing in common, and, for a configuration by
+    hand, `lines_not_turned` if no columns look like a gyroscope's.
     """
     from rig.commands.laboratory.claims import claim_sensor
     from rig.sensors.lines.guessed_section import section
@@ -124,6 +125,14 @@ def look_at_device(
         _tell(reason)
     for gap in layout.gaps:
         _tell(f"CANNOT TELL {gap}")
+    if user.by_hand and "gx" not in layout.columns:
+        still, turned = seconds
+        raise Refused(
+            "lines_not_turned",
+            f"{port}: no three columns read nothing at rest and much when it is turned, so nothing was written",
+            "Run it again, and when it says so turn the device about every axis, by half a turn and back; "
+            f"--seconds {still:g} {2 * turned:g} gives more time",
+        )
     return printable_lines(section(shape, layout, port, baud, name, user=user))
 
 
