@@ -9,6 +9,8 @@ from rig.commands.offline import solve_external
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
 
+SAMPLES = {".csv", ".tsv", ".txt", ".ulg", ".db3", ".mcap"}  # of files that are no recordings of the rig
+
 
 def add(solve: ArgumentParser) -> None:
     """Add the arguments of `rig solve`."""
@@ -54,10 +56,21 @@ def run(options: Namespace) -> int:
             raise Refused("bad_option", "--out is for samples with their motion", "Use rig report RUN --out DIR")
         if options.columns is not None:
             raise Refused("bad_option", "--columns is for samples as CSV", "Give --attitudes or --sweeps too")
+        _refuse_samples(options.run)
         return _solve_recording(options)
     if options.overrides:
         raise Refused("unknown_setting", "samples as CSV have no settings", "Leave out --set")
     return solve_external.run(options)
+
+
+def _refuse_samples(path: Path) -> None:
+    """Raise Refused `bad_option` for a file of samples: none of the options says how the sensor was turned."""
+    if path.is_file() and path.suffix.lower() in SAMPLES:
+        raise Refused(
+            "bad_option",
+            f"{path} holds samples, and no option says how the sensor was turned",
+            "Give --turns (by hand on a table), --sweeps CSV or --attitudes CSV; of a sensor at rest: rig allan",
+        )
 
 
 def _solve_recording(options: Namespace) -> int:

@@ -4,6 +4,7 @@ import os
 import pty
 import subprocess
 import sys
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from rig.config.config_schema import config_schema
 from rig.config.first_configuration import Answers
 from rig.config.load import load
 from support.processes.waiting import PATIENCE_S
+from support.wires.printed_lines import pty_printing
 
 ON_BOARD = ("--sensor", "board", "--part", "lsm9ds1", "--port", "/dev/ttyACM0", "--serial-number", "G-1")
 ARM = ("--turner", "arm", "--host", "10.0.0.3", "--model", "ur5e", "--payload-kg", "0.4")
@@ -101,3 +103,17 @@ def test_at_a_terminal_it_asks_until_the_answer_can_be_used(tmp_path: Path) -> N
     os.close(operator)
     assert "type a number from 1 to 3" in said and "plain ASCII" in said and "checked: it is complete" in said
     assert load(tmp_path / "my.yaml").config.sensors["gyro"].serial_number == "G-1"
+
+
+@pytest.mark.slow
+def test_of_a_device_that_was_not_turned_no_file_is_written_and_the_remedy_is_to_turn_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    at_rest = (f"{10_000 * n},0.{n % 3},0.{n % 2},-0.1,0.01,-0.02,1.00{n % 4}\r\n".encode() for n in count())
+    with pty_printing(at_rest) as (port, _):
+        stated = ("--baud", "115200", "--serial-number", "E-1", "--range-deg-s", "500", "--range-g", "8")
+        command = ["lines", port, "--seconds", "1", "1", "--write", str(tmp_path / "my.yaml"), *stated]
+        assert main(command) == 2
+    said = capsys.readouterr().err
+    assert "lines_not_turned" in said and "turn the device about every axis" in said
+    assert not (tmp_path / "my.yaml").exists()

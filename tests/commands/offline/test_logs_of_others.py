@@ -419,3 +419,13 @@ def test_what_had_waited_in_a_buffer_is_left_out(tmp_path: Path, capsys: pytest.
     assert " of 7414 samples, they had waited in a buffer: they come every 2.5 ms" in in_brief(
         capsys, samples, "--sweeps", sweeps
     )
+
+
+@pytest.mark.parametrize("name", ["log.csv", "flight.ULG", "imu.txt"])
+def test_a_log_alone_is_told_the_options_that_say_how_it_was_turned(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / name).write_text("time_s,x_rad_s,y_rad_s,z_rad_s\n0,0,0,0\n", encoding="utf-8")
+    assert main(["solve", str(tmp_path / name)]) == 2
+    said = capsys.readouterr().err
+    assert all(option in said for option in ("bad_option", "--turns", "--sweeps", "--attitudes", "rig allan"))
