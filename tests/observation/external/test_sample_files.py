@@ -19,6 +19,7 @@ from rig.observation.external.from_files import Files, build_recording
 from rig.observation.formats.csv_table import read_columns
 from rig.observation.formats.sample_files import entry_of
 from rig.report.document import document_of
+from support.external.loggers import stale_at_first
 from support.external.ulog_writer import write_ulog
 from support.paths import DOCS
 
@@ -101,6 +102,29 @@ def test_a_session_solves_to_the_same_numbers_from_all_three(tmp_path: Path) -> 
     csv, bag, log = (solved(tmp_path / name, tmp_path / "sweeps.csv") for name in ("samples.csv", "bag", "log.ulg"))
     assert bag == pytest.approx(csv, rel=1e-6, abs=1e-15)
     assert log == pytest.approx(csv, rel=1e-6, abs=1e-15)
+
+
+@pytest.mark.slow
+def test_stamps_are_put_in_order_alike_in_all_three(tmp_path: Path) -> None:
+    """Stale readings first, a gap, and a row twice, which a log of PX4 never holds."""
+    rng, time_s = np.random.default_rng(1), np.arange(1000) / 100
+    stamps_s = stale_at_first(time_s, 300)
+    rows = np.sort(np.append(np.delete(np.arange(1000), np.s_[600:617]), 700))
+    rates = rng.normal(size=(1000, 3)).astype(np.float32).astype(float)[rows]
+    at_us = np.round((stamps_s - stamps_s[0])[rows] * 1e6).astype(int)
+    table = {TIME: at_us * 1e-6, **dict(zip(RATE.columns, rates.T, strict=True))}
+    as_csv(tmp_path / "samples.csv", table)
+    write_bag(tmp_path / "bag", table)
+    write_ulog(tmp_path / "log.ulg", at_us + 5_000_000, rates, np.tile([0.0, 0.0, 9.8], (len(rates), 1)))
+    csv, bag, log = (read_samples(tmp_path / name) for name in ("samples.csv", "bag", "log.ulg"))
+    assert [part.count for part in csv.omitted] == [part.count for part in bag.omitted] == [1, 300]
+    assert [part.count for part in log.omitted] == [300]
+    for samples in (csv, bag, log):
+        assert samples.sampling is not None and samples.sampling.missing.sum() == 17
+        assert samples.time_s - samples.time_s[0] == pytest.approx(csv.time_s - csv.time_s[0], abs=1e-6)
+        assert samples.notes[0].startswith(
+            "17 samples are missing in 1 gaps, the longest 0.18 s, after sample 600, at "
+        )
 
 
 @pytest.mark.slow
