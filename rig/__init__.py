@@ -9,6 +9,7 @@ In a notebook:
     result = rig.solve(run)                                       # or rig.load_result(run.path)
     result["gyro"].scale, result["gyro"].scale_expanded           # ± U
     result["gyro"].apply(readings)                                # (n, 3) rad/s of one's own
+    rig.read_log("log.csv", "columns.yaml").to_frame()            # a log of another program, in SI units
     rig.changes(rig.load("runs/of_last_year"), run)               # E_n
     rig.calibrations("LSM9DS1-001").to_frame()                    # all of a sensor, out of the history
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from rig.notebook.notebook_history import Calibrations, Changes, SensorChanges, calibrations, changes
     from rig.notebook.readings import Readings, Signal
     from rig.notebook.results import Result, load_result, solve
-    from rig.notebook.runs import Run, load
+    from rig.notebook.runs import Run, load, read_log
     from rig.report.terminal.plan_table import DryRun
 
 __version__ = VERSION
@@ -57,6 +58,7 @@ __all__ = [
     "load_result",
     "open_history",
     "plan",
+    "read_log",
     "run",
     "solve",
     "write_certificate",
@@ -73,7 +75,7 @@ _PLACES = {
     ),
     **dict.fromkeys(("Readings", "Signal"), "rig.notebook.readings"),
     **dict.fromkeys(("Result", "load_result", "solve"), "rig.notebook.results"),
-    **dict.fromkeys(("Run", "load"), "rig.notebook.runs"),
+    **dict.fromkeys(("Run", "load", "read_log"), "rig.notebook.runs"),
     "DryRun": "rig.report.terminal.plan_table",
 }
 

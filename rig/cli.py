@@ -110,6 +110,12 @@ COMMANDS = {
         "how-to/at-the-rig/bias-drift.md",
         "reading the recording",
     ),
+    "look": Command(
+        "rig.commands.offline.look",
+        "what a log of another program holds, which solutions it allows, and the map of its columns",
+        "how-to/without-an-arm/from-a-robots-log.md",
+        "reading the file",
+    ),
     "reversal": Command(
         "rig.commands.offline.reversal",
         "a magnetometer's own bias, from runs between which it was turned over",

@@ -3,9 +3,15 @@
 from argparse import ArgumentParser, ArgumentTypeError, _ActionsContainer
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rig.errors import Refused
+
+if TYPE_CHECKING:
+    from rig.config.column_map import ColumnMap
+
+RUN_SUFFIXES = (".h5", ".hdf5", ".json")
+TABLE_SUFFIXES = (".csv", ".csv.gz", ".txt")
 
 
 def add_config(parser: ArgumentParser) -> None:
@@ -49,6 +55,40 @@ def _complete_runs(prefix: str, **_: Any) -> Iterator[str]:
 
     yield LATEST
     yield from FilesCompleter()(prefix)
+
+
+def add_columns(parser: _ActionsContainer) -> None:
+    """Add the argument `--columns`, the same for all commands that read files of others."""
+    parser.add_argument(
+        "--columns",
+        type=Path,
+        metavar="YAML",
+        help="map of the files' columns, if they have names and units of their own; rig look FILE --write YAML writes "
+        "one",
+    )
+
+
+def read_column_map(path: Path | None) -> "ColumnMap":
+    """Return the map that `--columns` names, an empty one if none is given. Raise Refused as `load_as`."""
+    from rig.config.column_map import AS_NAMED, ColumnMap
+    from rig.config.load import load_as
+
+    return AS_NAMED if path is None else load_as(ColumnMap, path)
+
+
+def find_logs(path: Path) -> list[Path]:
+    """Return a path that names a log of another program, or the logs in a folder of `rig record`; none for a run."""
+    from rig.observation.formats.sample_files import is_in_format, whole
+
+    if is_in_format(path):
+        return [path]
+    if path.is_dir():
+        return [] if any(path.glob("*.h5")) else sorted(file for file in path.iterdir() if _is_table(file))
+    return [path] if whole(path).is_file() and path.suffix.lower() not in RUN_SUFFIXES else []
+
+
+def _is_table(path: Path) -> bool:
+    return path.name.lower().endswith(TABLE_SUFFIXES)
 
 
 def add_json(parser: _ActionsContainer) -> None:

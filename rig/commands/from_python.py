@@ -110,17 +110,21 @@ def write_certificate(
     return files
 
 
-def export(run: Run | str | Path, format: str, *, out: str | Path | None = None) -> list[Path]:
+def export(
+    run: Run | str | Path, format: str, *, out: str | Path | None = None, columns: str | Path | None = None
+) -> list[Path]:
     """Write readings or calibrations of a run in other programs' formats, as `rig export`; print the file names.
 
     `format` is one of csv, parquet, mat, ros2, imucal, px4, ardupilot, kalibr; `out` is a folder, by default one in the
-    run's. Return the files. Raise Refused `bad_option` for another format, and as `rig export` does.
+    run's. `run` may be a log of another program, and `columns` the file that says what its columns are. Return the
+    files. Raise Refused `bad_option` for another format, and as `rig export` does.
     """
     from rig.commands.documents.export import add, export_files
 
     if format not in FORMATS:
         raise Refused("bad_option", f"there is no format {format!r}", f"Choose one of: {', '.join(FORMATS)}")
     words = ["--format", format, *([] if out is None else ["--out", str(out)])]
+    words += [] if columns is None else ["--columns", str(columns)]
     return export_files(_parse("export", add, words, _folder(run)))
 
 

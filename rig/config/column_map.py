@@ -9,6 +9,7 @@ from rig.config.units import ACCELERATION, ANGLE, FIELD, NUMBER, PRESSURE, RATE,
 
 # Files tell no pressure, and a column of theirs is multiplied by its unit alone.
 ALLOWED = tuple(name for name, unit in UNITS.items() if unit.quantity != PRESSURE and not unit.zero)
+TIMES = ("time_s", "start_s", "end_s")
 SUFFIXES = (
     ("_rad_s", RATE),
     ("_m_s2", ACCELERATION),
@@ -17,27 +18,60 @@ SUFFIXES = (
     ("_t", FIELD),
     ("_c", TEMPERATURE),
 )
+LEAST_FACTOR = 1e-15
 AxisDirection = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
 
 class ColumnSection(Section):
-    """One column of the file."""
+    """One column of the file.
 
-    column: Annotated[str, Field(min_length=1, max_length=200)] = Field(description="its name in the file's heading")
-    unit: str = Field(description="the unit of its numbers")
+    Its numbers × `factor`, or ÷ `lsb_per_unit`, are in `unit`. A mirrored axis has a negative factor.
+    """
+
+    column: Annotated[str, Field(min_length=1, max_length=200)] = Field(
+        description="its name in the file's heading, or its number, from 1"
+    )
+    unit: str | None = Field(default=None, description="the unit of its numbers; by default that of the key")
+    factor: float | None = Field(default=None, description="units in one step of its numbers; -1 mirrors an axis")
+    lsb_per_unit: float | None = Field(default=None, description="steps of its numbers in one unit")
+    wraps_at: Positive | None = Field(
+        default=None, description="the number at which a counter of time begins at 0 again, for example 4294967296"
+    )
+
+    @field_validator("column", mode="before")
+    @classmethod
+    def number_as_text(cls, value: object) -> object:
+        """Return a column's number as the text that a file has."""
+        return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
     @field_validator("unit")
     @classmethod
-    def unit_exists(cls, value: str) -> str:
+    def unit_exists(cls, value: str | None) -> str | None:
         """Refuse a unit that is not in the table, as nothing can be converted from it."""
-        if value not in ALLOWED:
+        if value is not None and value not in ALLOWED:
             raise ValueError(f"this unit is not known; allowed: {', '.join(ALLOWED)}")
         return value
 
+    @field_validator("factor", "lsb_per_unit")
+    @classmethod
+    def not_nothing(cls, value: float | None) -> float | None:
+        """Refuse zero, and numbers that no unit of a sensor can have."""
+        if value is not None and not LEAST_FACTOR < abs(value) < 1 / LEAST_FACTOR:
+            raise ValueError(f"must be between {LEAST_FACTOR:g} and {1 / LEAST_FACTOR:g}, of either sign")
+        return value
+
+    @model_validator(mode="after")
+    def one_factor(self) -> Self:
+        """Refuse both ways to state the size of a step."""
+        if self.factor is not None and self.lsb_per_unit is not None:
+            raise ValueError("give factor or lsb_per_unit, not both")
+        return self
+
     @property
-    def factor(self) -> float:
+    def to_si(self) -> float:
         """The factor that converts its numbers to SI units."""
-        return UNITS[self.unit].size
+        step = 1 / self.lsb_per_unit if self.lsb_per_unit is not None else 1.0 if self.factor is None else self.factor
+        return step * (1.0 if self.unit is None else UNITS[self.unit].size)
 
 
 class AxisSection(Section):
@@ -71,6 +105,8 @@ class TableSection(Section):
     def rates_of_all_axes_or_none(self) -> Self:
         """Refuse rates of some axes only: the item's rate needs those of all."""
         _fit("time", self.time, TIME)
+        if any(column.unit is None for axis in self.axes for column in (self.time, axis.angle, axis.rate) if column):
+            raise ValueError("say the unit of every column of a table")
         if len({axis.rate is None for axis in self.axes}) > 1:
             raise ValueError("give the rate of every axis, or of none")
         return self
@@ -80,7 +116,12 @@ class ColumnMap(Section):
     """The columns of files: `samples` of the readings; `motion` of sweeps or attitudes, or the log of a `table`.
 
     The keys of `samples` and `motion` are the rig's own names of columns. A column that already has such a name need
-    not be named; columns that are not named are left out. `…_skip_lines` precede the heading.
+    not be named; columns that are not named are left out.
+
+    - …_skip_lines: lines before the heading.
+    - …_rate_hz: rows per second of a file without a column of time.
+    - …_missing: texts that stand for a missing value, as an empty cell does.
+    - motion_inverse: the quaternions take table to body coordinates, and are inverted.
     """
 
     samples: dict[str, ColumnSection] = Field(default_factory=dict)
@@ -88,20 +129,32 @@ class ColumnMap(Section):
     table: TableSection | None = None
     samples_skip_lines: int = Field(default=0, ge=0, le=1000)
     motion_skip_lines: int = Field(default=0, ge=0, le=1000)
+    samples_rate_hz: Positive | None = None
+    motion_rate_hz: Positive | None = None
+    samples_missing: tuple[str, ...] = ()
+    motion_missing: tuple[str, ...] = ()
+    motion_inverse: bool = False
 
     @model_validator(mode="after")
     def fits_together(self) -> Self:
         """Refuse a column if its unit and the unit in its name are of different quantities."""
-        for section in (self.samples, self.motion):
+        for section, rate_hz in ((self.samples, self.samples_rate_hz), (self.motion, self.motion_rate_hz)):
             for name, column in section.items():
                 _fit(name, column, next((what for suffix, what in SUFFIXES if name.endswith(suffix)), NUMBER))
+            if rate_hz is not None and (timed := [name for name in section if name in TIMES]):
+                raise ValueError(f"give the column of {timed[0]} or a rate, not both")
         if self.table is not None and self.motion:
             raise ValueError("give motion or table: a file tells attitudes, or the angles of axes")
         return self
 
 
+AS_NAMED = ColumnMap()  # every column has the rig's name
+
+
 def _fit(name: str, column: ColumnSection, wanted: str) -> None:
-    quantity = UNITS[column.unit].quantity
+    if column.wraps_at is not None and wanted != TIME:
+        raise ValueError(f"{name} is {_one(wanted)}, and only a counter of time has wraps_at")
+    quantity = wanted if column.unit is None else UNITS[column.unit].quantity
     if quantity != wanted:
         raise ValueError(f"{name} is {_one(wanted)}, and {column.unit} is the unit of {_one(quantity)}")
 

@@ -17,9 +17,16 @@ MAX_SCALE = 4.0  # either way: a wrong unit gives more, no sensor does
 STUCK = 0.01  # of the axis that reads most
 MIN_ALIGNMENT = 0.7  # cosine between an axis and where it should point; beyond 45° it is another axis
 CONFUSED = (  # ratios of reading over true value for wrong units
-    (180 / np.pi, "the readings look like degrees per second given as rad/s"),
-    (np.pi / 180, "the rates look like degrees per second given as rad/s"),
+    (
+        180 / np.pi,
+        "the readings look like degrees per second given as rad/s",
+    ),
+    (
+        np.pi / 180,
+        "the readings look like rad/s declared as °/s, or the rates like degrees per second given as rad/s",
+    ),
     (1 / 9.80665, "the readings look like g given as m/s²"),
+    (9.80665, "the readings look like m/s² declared as g"),
 )
 MIN_SIDE = 0.05  # cosine between the reference and the direction that determines its sign
 NO_FIT = "the readings contradict the attitudes so much that no fit converges"
@@ -161,7 +168,10 @@ def check_axes(axes: Array, nominal: Array | None) -> None:
     `nominal` (3, 3) holds the expected rows; without it only a left-handed sensor is refused. Raise Fault
     `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
     """
-    remedy = "Correct the sensor's mounting in the configuration, the order of its axes, or how it is fixed"
+    remedy = (
+        "Correct the sensor's mounting in the configuration (in a file by --columns, factor: -1), the order of its "
+        "axes, or how it is fixed"
+    )
     if nominal is not None:
         cosines = axes @ nominal.T
         where = np.argmax(np.abs(cosines), axis=1)
@@ -179,9 +189,18 @@ def check_axes(axes: Array, nominal: Array | None) -> None:
                 "wrong_mounting", f"the sensor's {'xyz'[worst]} axis lies {angle:.0f}° off its mounting", remedy
             )
     if _is_left_handed(axes):
-        raise Fault(
-            "mirrored_axis", "the sensor's axes form a left-handed frame: one is mirrored or two swapped", remedy
-        )
+        raise Fault("mirrored_axis", _describe_left_handed(axes), remedy)
+
+
+def _describe_left_handed(axes: Array) -> str:
+    """Return what axes, rows of (3, 3) in the body's frame, read of the body's, if they lie along these."""
+    cosines = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    where = np.argmax(np.abs(cosines), axis=1)
+    what = "the sensor's axes form a left-handed frame: "
+    if sorted(where) != [0, 1, 2] or np.abs(cosines[np.arange(3), where]).min() < MIN_ALIGNMENT:
+        return f"{what}one is mirrored or two are swapped"
+    mirrored = [f"-{'xyz'[j]}" if cosines[i, j] < 0 else "xyz"[j] for i, j in enumerate(where.tolist())]
+    return f"{what}x, y, z read the body's {', '.join(mirrored)}"
 
 
 def _is_left_handed(matrix: Array) -> bool:
@@ -216,8 +235,9 @@ def check_handedness(matrix: Array) -> None:
     if _is_left_handed(matrix):
         raise Fault(
             "mirrored_axis",
-            "the sensor's axes form a left-handed frame: one is mirrored or two are swapped",
-            "Correct the order and signs of the sensor's axes, or the side the reference points to",
+            _describe_left_handed(matrix),
+            "Correct the order and signs of the sensor's axes (in a file by --columns, factor: -1), or the side the "
+            "reference points to",
         )
 
 

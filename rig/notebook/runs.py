@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from rig.analysis.outcome import Outcome
+from rig.config.column_map import AS_NAMED, ColumnMap
+from rig.config.load import load_as
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.settings import RunSettings
 from rig.notebook.html import table
 from rig.notebook.readings import HEADINGS, NoSuchSensor, Readings
+from rig.observation.external.from_files import read_log as read_external_log
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.plans.recorded_run import RecordedRun, judged, open_run
 
@@ -94,3 +97,14 @@ def load(path: str | Path, script: str | Path | None = None) -> Run:
     `load_script`.
     """
     return Run(open_run(Path(path), None if script is None else Path(script)))
+
+
+def read_log(path: str | Path, columns: str | Path | None = None) -> Readings:
+    """Read a log of another program as `rig solve` does: CSV, a bag, `.ulg`, `.mat`. Values are in SI units.
+
+    `columns` names the file of `--columns`, if the log has names and units of its own. Raise Refused as `rig solve`.
+    """
+    column_map = AS_NAMED if columns is None else load_as(ColumnMap, Path(columns))
+    recording = read_external_log(Path(path), column_map)
+    ((name, sensor),) = recording.sensors.items()
+    return Readings(name, sensor, [recording])

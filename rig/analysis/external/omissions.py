@@ -31,6 +31,8 @@ def list_omitted(
 
 def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
     """Yield what was done to the files' times and rows."""
+    if read.note:
+        yield read.note
     yield from samples.notes
     if read.origin_s:
         yield f"times count from {read.origin_s} s of the files' clock"

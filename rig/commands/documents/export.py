@@ -1,22 +1,26 @@
 """`rig export`: a run in the formats of other programs."""
 
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.config_arguments import add_run
+from rig.commands.config_arguments import add_columns, add_run, find_logs, read_column_map
 from rig.config.files.safe_writing import replace_together, write_new
 from rig.errors import Refused
 from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibrations, writer_of_readings
 from rig.station.plain_text import say, say_on_terminal
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.data.recording.run_file import RunData
     from rig.report.exports.exported_corrections import ExportedCalibrations
 
 
 def add(parser: ArgumentParser) -> None:
     """Add the arguments of `rig export`."""
-    add_run(parser, "run", "a run folder")
+    add_run(parser, "run", "a run folder; for the formats of readings also a log of another program")
     parser.add_argument(
         "--format",
         choices=FORMATS,
@@ -26,6 +30,7 @@ def add(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of the files (default: export/FORMAT in the run folder)"
     )
+    add_columns(parser)
     parser.add_argument(
         "--at-temperature",
         nargs=2,
@@ -44,22 +49,23 @@ def export_files(options: Namespace) -> list[Path]:
     """Write readings of the first movement with its motion, or the calibrations of a passed run, into `--out`.
 
     `--at-temperature`: a temperature in °C, and the run of `bias_drift` with the slopes. Return the files. Raise
-    Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links`; for readings as `open_run` and
-    `exported`; for calibrations as `read_passed_result`, `at_temperature` and the format.
+    Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links`; for readings as `open_run`, `read_log`
+    and `exported`; for calibrations as `read_passed_result`, `at_temperature` and the format.
     """
-    from rig.plans.recorded_run import open_run
     from rig.report.exports.exported_recording import exported
 
     run, name, out = options.run, options.format, options.out
     moved: tuple[str, str] | None = options.at_temperature
     if moved is not None and name in OF_READINGS:
         raise Refused("bad_option", f"--at-temperature is for calibrations, and {name} holds readings", "Leave it out")
+    if options.columns is not None and name not in OF_READINGS:
+        raise Refused("bad_option", f"--columns is for readings, and {name} holds calibrations", "Leave it out")
     folder: Path = out or (run if run.is_dir() else run.parent) / "export" / name
     try:
         if name in OF_READINGS:
             write = writer_of_readings(name)
             say_on_terminal("reading the recordings")
-            recordings = exported(open_run(run).movement)
+            recordings = exported(_read_recordings(run, options.columns))
             _make_folder(folder, named_by_user=out is not None)
             with replace_together():
                 written = write(recordings, folder)
@@ -75,6 +81,26 @@ def export_files(options: Namespace) -> list[Path]:
     for path in written:
         say(str(path))
     return written
+
+
+def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
+    """Return the recordings of a run, or of a log of another program. Raise Refused `bad_option`, and as each of them.
+
+    A folder of `rig record` is one of several logs, and no run.
+    """
+    from rig.observation.external.from_files import read_log
+    from rig.observation.formats.sample_files import is_in_format
+    from rig.plans.recorded_run import open_run
+
+    logs = [] if run.is_dir() and not is_in_format(run) else find_logs(run)
+    if not logs:
+        if columns is not None:
+            raise Refused("bad_option", "--columns is for a log, and a run needs no map", "Leave it out")
+        return open_run(run).movement
+    recording = read_log(logs[0], read_column_map(columns))
+    if recording.external is not None and recording.external.note:
+        say(recording.external.note, sys.stderr)
+    return [recording]
 
 
 def _make_folder(folder: Path, *, named_by_user: bool) -> None:

@@ -6,57 +6,54 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.config_arguments import add_json, add_run
+from rig.commands.config_arguments import add_columns, add_json, add_run, find_logs, read_column_map
 from rig.errors import Refused, raised_as
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     from rig.analysis.rest_noise import SensorAtRest
 
-CSV = (".csv", ".csv.gz")
-
 
 def add(parser: ArgumentParser) -> None:
     """Add the arguments of `rig allan`."""
-    what = "a run folder, its run.h5, a log of a sensor at rest as CSV, or what `rig record` wrote"
+    what = "a run folder, its run.h5, a log of a sensor at rest (CSV, bag, .ulg, .mat), or what `rig record` wrote"
     add_run(parser, "run", what, metavar="RECORDING")
     parser.add_argument("--plot", type=Path, metavar="DIR", help="draw the curves into this folder")
+    add_columns(parser)
     add_json(parser)
 
 
 def run(options: Namespace) -> int:
-    """Print the Allan deviations of a run folder, a run file or a log as CSV; draw them into the folder `--plot`.
+    """Print the Allan deviations of a run folder, a run file or a log; draw them into the folder `--plot`.
 
     Return 0. Raise Refused `report_folder`, `missing_extra`, `not_at_rest`; for a log as `read_samples`; for a run
-    `no_raw_readings`, and as `open_run` and `at_rest`.
+    `bad_option`, `no_raw_readings`, and as `open_run` and `at_rest`.
     """
     from rig.report.figures.allan import print_at_rest
 
     with raised_as(Refused):  # no arm moves: wrong data is a refusal
-        logs = _find_logs(options.run)
-        sensors = _analyse_logs(logs) if logs else _analyse_run(options.run)
+        logs = find_logs(options.run)
+        if not logs and options.columns is not None:
+            raise Refused("bad_option", "--columns is for a log, and a run needs no map", "Leave it out")
+        sensors = _analyse_logs(logs, options.columns) if logs else _analyse_run(options.run)
     print_at_rest(sensors, as_json=options.json)
     if options.plot is not None:
         _draw(sensors, options.plot)
     return 0
 
 
-def _find_logs(path: Path) -> list[Path]:
-    """Return the log, or the logs in a folder that `rig record` wrote; none for a run."""
-    if path.is_dir() and not any(path.glob("*.h5")):
-        return sorted(file for file in path.iterdir() if _is_log(file))
-    return [path] if _is_log(path) else []
-
-
-def _is_log(path: Path) -> bool:
-    return path.name.lower().endswith(CSV)
-
-
-def _analyse_logs(paths: Sequence[Path]) -> "dict[str, SensorAtRest]":
+def _analyse_logs(paths: Sequence[Path], columns: Path | None) -> "dict[str, SensorAtRest]":
     from rig.analysis.rest_noise import log_at_rest
-    from rig.observation.external.csv_samples import read_samples
+    from rig.observation.external.csv_samples import read_sample_table, samples_in
+    from rig.observation.formats.column_selection import map_samples
 
-    return {path.stem: log_at_rest(read_samples(path)) for path in paths}
+    mapped, sensors = map_samples(read_column_map(columns)), {}
+    for path in paths:
+        table = read_sample_table(path, (), mapped)
+        if table.note:
+            say(table.note, sys.stderr)
+        sensors[path.stem] = log_at_rest(samples_in(table.columns, str(path)))
+    return sensors
 
 
 def _analyse_run(path: Path) -> "dict[str, SensorAtRest]":

@@ -14,7 +14,12 @@ SAMPLES = {".csv", ".tsv", ".txt", ".ulg", ".db3", ".mcap"}  # of files that are
 
 def add(solve: ArgumentParser) -> None:
     """Add the arguments of `rig solve`."""
-    add_run(solve, "run", "a run folder or its run.h5; with --sweeps, --attitudes or --turns, samples as CSV")
+    add_run(
+        solve,
+        "run",
+        "a run folder or its run.h5; with --sweeps, --attitudes or --turns, samples of another program: CSV, a bag, "
+        ".ulg, .mat",
+    )
     motion = solve.add_mutually_exclusive_group()
     motion.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples of another program")
     motion.add_argument(
@@ -55,11 +60,13 @@ def run(options: Namespace) -> int:
         if options.out is not None:
             raise Refused("bad_option", "--out is for samples with their motion", "Use rig report RUN --out DIR")
         if options.columns is not None:
-            raise Refused("bad_option", "--columns is for samples as CSV", "Give --attitudes or --sweeps too")
+            raise Refused(
+                "bad_option", "--columns is for samples of another program", "Give --attitudes, --sweeps or --turns too"
+            )
         _refuse_samples(options.run)
         return _solve_recording(options)
     if options.overrides:
-        raise Refused("unknown_setting", "samples as CSV have no settings", "Leave out --set")
+        raise Refused("unknown_setting", "samples of another program have no settings", "Leave out --set")
     return solve_external.run(options)
 
 

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.commands.config_arguments import add_columns, read_column_map
 from rig.commands.history.named_history import add_history, read_history_name
 from rig.errors import Refused, raised_as
 from rig.errors.quoting import shorten
@@ -15,7 +16,6 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.analysis.outcome import Outcome
     from rig.commands.history.remember import CalibrationComparison
-    from rig.config.column_map import ColumnMap
     from rig.data.recording.motion_file import Columns
     from rig.data.recording.run_file import RunData
 
@@ -25,12 +25,7 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 def add(solve: ArgumentParser) -> None:
     """Add the arguments for readings of other programs."""
     group = solve.add_argument_group("with --sweeps, --attitudes or --turns")
-    group.add_argument(
-        "--columns",
-        type=Path,
-        metavar="YAML",
-        help="map of the files' columns, if they have names and units of their own",
-    )
+    add_columns(group)
     group.add_argument("--out", type=Path, metavar="DIR", help="new run folder for result, certificate, pictures")
     group.add_argument(
         "--only",
@@ -174,7 +169,7 @@ def _build_recording(options: Namespace) -> "RunData":
     recorded: datetime | None = options.recorded
     if recorded is not None and recorded.tzinfo is None:
         recorded = recorded.replace(tzinfo=UTC)
-    column_map = _read_columns(options.columns)
+    column_map = read_column_map(options.columns)
     if options.turns:
         files = Files(options.run, _read_turn_options(options), "turns", item, recorded, column_map)
     elif options.sweeps is not None:
@@ -217,14 +212,6 @@ def _read_only(options: Namespace) -> tuple[str, ...]:
             f"Give one of: {', '.join(allowed)}",
         )
     return tuple(dict.fromkeys(options.only))
-
-
-def _read_columns(path: Path | None) -> "ColumnMap":
-    """Return the map of columns, an empty one if none is given. Raise Refused as `load_as`."""
-    from rig.config.column_map import ColumnMap
-    from rig.config.load import load_as
-
-    return ColumnMap() if path is None else load_as(ColumnMap, path)
 
 
 def _read_turn_options(options: Namespace) -> "Columns":

@@ -115,7 +115,8 @@ class ReadElsewhere:
     """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes of its `motion`, by column.
 
     For "turns" by hand the readings show the motion: then there is one row, of what the user declared. Times count from
-    `origin_s` of the files' clock. `other_rows` of the readings' file hold readings of other sensors alone.
+    `origin_s` of the files' clock. `other_rows` of the readings' file hold readings of other sensors alone. `note` is
+    what the file's format does not say of its readings, "" if it says all.
     """
 
     item: Item
@@ -124,6 +125,7 @@ class ReadElsewhere:
     motion: Columns
     origin_s: int = 0
     other_rows: int = 0
+    note: str = ""
 
     @property
     def sensor(self) -> RecordedSensor:
@@ -162,3 +164,4 @@ class ExternalHeader:
     tells: MotionKind
     origin_s: int = 0
     other_rows: Annotated[int, Field(ge=0)] = 0
+    note: Annotated[str, Field(max_length=500)] = ""

@@ -237,7 +237,8 @@ def write_elsewhere(path: Path, run: RunData) -> None:
     assert read is not None, "external readings"
     provenance = json.dumps(run.provenance.document())
     texts = {"config": run.config, "settings": run.settings.to_json(), "provenance": provenance}
-    texts["elsewhere"] = json.dumps(asdict(ExternalHeader(read.item, read.tells, read.origin_s, read.other_rows)))
+    header = ExternalHeader(read.item, read.tells, read.origin_s, read.other_rows, read.note)
+    texts["elsewhere"] = json.dumps(asdict(header))
     tables = {"readings": table_of(read.readings), "motion": table_of(read.motion)}
     lay_out(path, replace(empty(SCHEMA_ELSEWHERE, texts, {}), tables=tables), swmr=False)
 
@@ -312,7 +313,7 @@ def _elsewhere(contents: Contents) -> ReadElsewhere:
     header = validate(ExternalHeader, parse_json(contents.texts["elsewhere"]), "elsewhere")
     samples_header().check(readings)
     MOTIONS[header.tells].check(motion)
-    return ReadElsewhere(header.item, readings, header.tells, motion, header.origin_s, header.other_rows)
+    return ReadElsewhere(header.item, readings, header.tells, motion, header.origin_s, header.other_rows, header.note)
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:

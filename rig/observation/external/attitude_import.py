@@ -2,9 +2,9 @@
 
 samples: see `rig.observation.external.csv_samples`.
 
-attitudes: `start_s`, `end_s` on the same clock and `qw qx qy qz`, the unit quaternion that takes body to table
-coordinates; while the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates; and
-`attitude_std_rad` about each axis, if it is known. While the table turns, a row holds for its middle and should be
+attitudes: `start_s`, `end_s` on the same clock, or `time_s` alone, and `qw qx qy qz`, the unit quaternion that takes
+body to table coordinates; while the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates;
+and `attitude_std_rad` about each axis, if it is known. While the table turns, a row holds for its middle and should be
 short: down to one sample, whose noise is then estimated from the scatter of all rows about the model. Only a gyroscope
 is solved from rows in which the body moves; accelerometers and magnetometers use those at rest
 (`rig.observation.external.placements`).
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import RATE, Quantity
-from rig.data.recording.motion_file import MOTIONS
+from rig.data.recording.motion_file import MOTIONS, TIME, Header
 from rig.errors import Fault, Refused, or_fault
 from rig.estimation.arrays import Array
 from rig.observation.external.csv_samples import Samples
@@ -43,8 +43,9 @@ from rig.observation.external.omission import Omitted
 from rig.observation.external.placement_account import AttitudeRows
 from rig.observation.external.placements import MOSTLY, Placements, find_placements
 from rig.observation.external.table_motion import TableMotion
-from rig.observation.formats.csv_table import Mapped, read_columns
-from rig.observation.formats.sample_files import attitudes_in
+from rig.observation.formats.column_selection import Mapped
+from rig.observation.formats.csv_table import read_columns
+from rig.observation.formats.sample_files import attitudes_in, rows_around
 from rig.observation.sampling import find_sampling
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window, inside
@@ -53,6 +54,9 @@ RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
 STD_COLUMN = "attitude_std_rad"
 ATTITUDES_MB = 32  # an hour's table at 50 Hz
 NORM_TOLERANCE = 1e-3
+MOMENTS = Header(  # as a file may have them: rows that last, or a moment in each
+    ("qw", "qx", "qy", "qz"), (TIME, "start_s"), (("start_s", "end_s"), *MOTIONS["attitudes"].optional)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,16 +96,25 @@ class PlacedReadings:
     unsampled: tuple[Omitted, ...] = ()
 
 
-def read_attitudes(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
+def read_attitudes(
+    path: Path, mapped: Mapped | None = None, origin_s: int = 0, *, inverse: bool = False
+) -> dict[str, Array]:
     """Return the columns (N,) of a file of attitudes in any format; `mapped` if its columns have other names.
 
-    Times of a text table count from `origin_s`. Raise as `attitudes_in`; Refused `no_file`, `wrong_columns`,
-    `wrong_unit`, `not_a_number`.
+    Times of a text table count from `origin_s`. A table with `time_s` in place of `start_s` and `end_s` has a moment in
+    each row. `inverse` quaternions take table to body coordinates. Raise as `attitudes_in`; Refused `no_file`,
+    `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
-    columns = attitudes_in(path)
-    return (
-        read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB, mapped, origin_s) if columns is None else dict(columns)
-    )
+    in_format = attitudes_in(path)
+    if in_format is None:
+        columns = read_columns(path, MOMENTS, ATTITUDES_MB, mapped, origin_s)
+        if TIME in columns:
+            columns |= rows_around(columns.pop(TIME), path)
+    else:
+        columns = dict(in_format)
+    if inverse:
+        columns |= {name: -columns[name] for name in ("qx", "qy", "qz")}
+    return columns
 
 
 def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:

@@ -40,7 +40,8 @@ from rig.observation.external.csv_windows import (
 )
 from rig.observation.external.omission import Omitted
 from rig.observation.external.turns import DeclaredTurns, TurnedData, find_turns
-from rig.observation.formats.csv_table import Mapped, read_columns
+from rig.observation.formats.column_selection import Mapped
+from rig.observation.formats.csv_table import read_columns
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.sampling import find_sampling
 from rig.observation.stuck_check import check_reads

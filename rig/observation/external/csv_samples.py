@@ -19,10 +19,12 @@ from rig.data.installed_kinds import quantities
 from rig.data.quantity import TEMPERATURE, Quantity
 from rig.data.recording.motion_file import TIME, Columns, samples_header
 from rig.errors import Refused
+from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
 from rig.observation.external.csv_windows import check_times
 from rig.observation.external.omission import Omitted
-from rig.observation.formats.csv_table import CsvTable, Mapped, blank_cell, read_table
+from rig.observation.formats.column_selection import Mapped
+from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import readings_in
 from rig.observation.sampling import Sampling
 from rig.observation.stamps import OrderedStamps, order_stamps
@@ -34,12 +36,14 @@ SAMPLES_MB = 256  # an hour at 1 kHz
 class SampleTable:
     """The `columns` (n,) of a file of readings by name, without a blank; times count from `origin_s`.
 
-    `others`: number of further rows of the file without the readings that were wanted.
+    `others`: number of further rows of the file without the readings that were wanted. `note`: what the readings lack,
+    "" if nothing.
     """
 
     columns: Columns
     origin_s: int = 0
     others: int = 0
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,18 +80,40 @@ def read_sample_table(
     """
     readings = readings_in(path)
     if readings is not None:
-        columns, others = readings
+        columns = _convert(path, readings.columns, mapped)
         for quantity in needed:
             if quantity.columns[0] not in columns:
                 raise Refused(
-                    "wrong_columns", f"{path} holds no {' '.join(quantity.columns)}", "Name a recording that holds them"
+                    "wrong_columns",
+                    f"{path} holds no {' '.join(quantity.columns)}; it holds {', '.join(columns)}"
+                    + (f": {readings.note}" if readings.note else ""),
+                    "Name a recording, or a part of it behind ::, that holds them",
                 )
-        return SampleTable(columns, others=others)
+        return SampleTable(columns, others=readings.others, note=readings.note)
     table = read_table(path, samples_header(needed), SAMPLES_MB, mapped)
     present = [quantity for quantity in quantities().values() if quantity.columns[0] in table.columns]
     read = {quantity: _read(path, table, quantity) for quantity in present}
     wanted = [quantity for quantity in present if quantity.sensor in only] or present
     return _drop_blanks(path, table, read, wanted)
+
+
+def _convert(path: Path, columns: Columns, mapped: Mapped | None) -> Columns:
+    """Return the columns of a file that names them as the rig does, in the order and with the factors of a map.
+
+    So an axis that is mirrored, or a topic in another unit, can be stated. Raise Refused `wrong_columns`.
+    """
+    if mapped is None:
+        return columns
+    converted = dict(columns)
+    for name, (column, factor) in mapped.columns.items():
+        if column not in columns:
+            raise Refused(
+                "wrong_columns",
+                f"{path} has no column {quote(column)}, which is to be {name}",
+                f"Name one of its columns: {', '.join(columns)}",
+            )
+        converted[name] = factor * columns[column]
+    return converted
 
 
 def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:

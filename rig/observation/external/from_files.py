@@ -1,29 +1,30 @@
 """A recording of external readings, from a file of them and, mostly, one of their motion."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
-from rig.config.column_map import ColumnMap, ColumnSection
+from rig.config.column_map import AS_NAMED, ColumnMap
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
 from rig.data.recording.motion_file import TIME, Columns, Item, MotionKind, ReadElsewhere
-from rig.data.recording.provenance import provenance_of_files
+from rig.data.recording.provenance import Provenance, provenance_of_files
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import Elsewhere, ObservationThresholds, RunSettings, Site
 from rig.errors import Refused
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.motion.turner_state import ARM_STATE_DTYPE
 from rig.observation.external.attitude_import import read_attitudes
 from rig.observation.external.csv_import import read_sweeps
 from rig.observation.external.csv_samples import read_sample_table, samples_in
 from rig.observation.external.table_log import read_table_log
-from rig.observation.formats.csv_table import Mapped
+from rig.observation.formats.column_selection import map_motion, map_samples
 from rig.observation.formats.sample_files import entry_of, whole
 
-AS_NAMED_HERE = ColumnMap()
+UNNAMED = Item("imu")
 USED: Mapping[MotionKind, tuple[str, ...]] = {  # the sensors that the solution uses; all if none is named
     "sweeps": (RATE.sensor,),
     "turns": (RATE.sensor, ACCELERATION.sensor),
@@ -45,7 +46,7 @@ class Files:
     tells: MotionKind
     item: Item
     recorded: datetime | None = None
-    columns: ColumnMap = AS_NAMED_HERE
+    columns: ColumnMap = AS_NAMED
 
 
 def build_recording(
@@ -57,7 +58,7 @@ def build_recording(
     """
     column_map = files.columns
     needed = () if files.tells == "attitudes" else [RATE]
-    mapped = _build_map(column_map.samples, column_map.samples_skip_lines)
+    mapped = map_samples(column_map)
     table = read_sample_table(files.readings, needed, mapped, request.only or USED[files.tells])
     samples = samples_in(table.columns, str(files.readings))  # as they will be solved
     if missing := [
@@ -73,10 +74,10 @@ def build_recording(
     columns = {name: table.columns[name] for name in names if name in table.columns}
     start = files.recorded or datetime.fromtimestamp(whole(files.readings).stat().st_mtime, UTC)
     motion = _motion(files, table.origin_s)
-    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, motion, table.origin_s, table.others)
-    return RunData(
-        config="",
-        settings=RunSettings(
+    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, motion, table.origin_s, table.others, table.note)
+    return _recording(
+        read_elsewhere,
+        RunSettings(
             procedure=files.tells,
             then_verify=False,
             observation=NOTHING_LOST,
@@ -91,18 +92,53 @@ def build_recording(
             elsewhere=request,
             reference_c=reference_c,
         ),
-        provenance=provenance_of_files(
+        provenance_of_files(
             entry_of(files.readings),
             entry_of(files.motion) if isinstance(files.motion, Path) else None,
             files.item,
             start,
         ),
-        sensors={files.item.name: read_elsewhere.sensor},
-        samples={files.item.name: read_elsewhere.samples},
+    )
+
+
+def read_log(path: Path, columns: ColumnMap = AS_NAMED, item: Item = UNNAMED) -> RunData:
+    """Return the readings of a file without any motion, to be shown or exported, as `rig solve` reads them.
+
+    Raise Refused as `read_sample_table` and `samples_in`.
+    """
+    table = read_sample_table(path, (), map_samples(columns))
+    samples_in(table.columns, str(path))
+    read_elsewhere = ReadElsewhere(item, table.columns, "turns", {}, table.origin_s, table.others, table.note)
+    written = datetime.fromtimestamp(whole(path).stat().st_mtime, UTC)
+    settings = RunSettings(
+        procedure="turns",
+        then_verify=False,
+        observation=NOTHING_LOST,
+        limits=None,
+        to_calibrate=(),
+        reference=None,
+        home_q_rad=(),
+        planned_sweeps=(),
+        site=Site(up=(0.0, 0.0, 1.0), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None),
+        uncertainty=None,
+        second_order=False,
+        elsewhere=None,
+        reference_c=None,
+    )
+    return _recording(read_elsewhere, settings, provenance_of_files(entry_of(path), None, item, written))
+
+
+def _recording(read: ReadElsewhere, settings: RunSettings, provenance: Provenance) -> RunData:
+    return RunData(
+        config="",
+        settings=settings,
+        provenance=provenance,
+        sensors={read.item.name: read.sensor},
+        samples={read.item.name: read.samples},
         turner=None,
         states=np.empty(0, ARM_STATE_DTYPE),
         events=(),
-        external=read_elsewhere,
+        external=read,
     )
 
 
@@ -117,13 +153,8 @@ def _motion(files: Files, origin_s: int) -> Columns:
     if column_map.table is not None:
         if files.tells == "sweeps":
             raise Refused("bad_option", "the columns are those of a table's log", "Give that log with --attitudes")
-        return read_table_log(files.motion, column_map.table, column_map.motion_skip_lines, origin_s)
-    read: Callable[[Path, Mapped | None, int], Columns] = read_sweeps if files.tells == "sweeps" else read_attitudes
-    return read(files.motion, _build_map(column_map.motion, column_map.motion_skip_lines), origin_s)
-
-
-def _build_map(columns: Mapping[str, ColumnSection], skip_lines: int) -> Mapped | None:
-    """Return the map of a file's columns; None without one: then an unknown column is an error."""
-    if not columns and not skip_lines:
-        return None
-    return Mapped({name: (section.column, section.factor) for name, section in columns.items()}, skip_lines)
+        return read_table_log(files.motion, column_map.table, column_map, origin_s)
+    mapped = map_motion(column_map)
+    if files.tells == "sweeps":
+        return read_sweeps(files.motion, mapped, origin_s)
+    return read_attitudes(files.motion, mapped, origin_s, inverse=column_map.motion_inverse)

@@ -4,25 +4,24 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.config.column_map import AxisSection, TableSection
+from rig.config.column_map import AS_NAMED, AxisSection, ColumnMap, TableSection
 from rig.data.recording.motion_file import TIME, Columns, Header
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.external.attitude_import import ATTITUDES_MB, RATE_COLUMNS, STD_COLUMN
-from rig.observation.formats.csv_table import Mapped, read_columns
+from rig.observation.formats.column_selection import map_table_log
+from rig.observation.formats.csv_table import read_columns
 
 
-def read_table_log(path: Path, table: TableSection, skip_lines: int = 0, origin_s: int = 0) -> dict[str, Array]:
+def read_table_log(
+    path: Path, table: TableSection, columns: ColumnMap = AS_NAMED, origin_s: int = 0
+) -> dict[str, Array]:
     """Return the columns of attitudes (`motion_file.MOTIONS`) from the log of a table, times from `origin_s` on.
 
     Raise Refused `no_file`, `wrong_columns`, `not_a_number`, `time_not_increasing`.
     """
-    columns = {TIME: (table.time.column, table.time.factor)}
-    for index, axis in enumerate(table.axes):
-        columns[f"angle_{index}"] = axis.angle.column, axis.angle.factor
-        if axis.rate is not None:
-            columns[f"rate_{index}"] = axis.rate.column, axis.rate.factor
-    log = read_columns(path, Header(tuple(columns)), ATTITUDES_MB, Mapped(columns, skip_lines), origin_s)
+    mapped = map_table_log(table, columns)
+    log = read_columns(path, Header(tuple(mapped.columns)), ATTITUDES_MB, mapped, origin_s)
     if len(log[TIME]) < 2 or not (np.diff(log[TIME]) > 0).all():
         raise Refused(
             "time_not_increasing",

@@ -1,4 +1,4 @@
-"""Readings and attitudes from a ROS 2 bag, without ROS: `sensor_msgs/Imu` and `MagneticField`, and poses.
+"""Readings and attitudes from a bag of ROS 2 or ROS 1, without ROS: `sensor_msgs/Imu` and `MagneticField`, and poses.
 
 A reading has the time in its message's header, so readings and poses are on the clock that stamped them. A pose
 (`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in the room. The reader runs in a process of its own
@@ -17,7 +17,7 @@ from rig.data.recording.motion_file import TIME
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.errors.quoting import listing, quote, shorten
-from rig.observation.formats.table_parts import LEFT_OUT, in_blocks
+from rig.observation.formats.table_parts import LEFT_OUT, NOTE, in_blocks
 
 IMU, MAGNETIC = "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField"
 POSES = (
@@ -28,6 +28,7 @@ POSES = (
 QUATERNION = ("qw", "qx", "qy", "qz")
 NOT_PROVIDED = -1.0  # sensor_msgs/Imu: first element of the covariance of a quantity that a message does not hold
 SUFFIXES = (".mcap", ".db3")
+ROS_1 = ".bag"
 METADATA = "metadata.yaml"
 METADATA_BYTES = 4_000_000  # of two thousand topics with all their settings of quality of service
 METADATA_VALUES = 50_000  # of a thousand topics; rosbags takes 50 µs for each
@@ -37,12 +38,17 @@ NANO = 10**9
 
 def is_bag(path: Path) -> bool:
     """Return whether a path is a bag: a folder with its metadata, or one of its files."""
-    return (path / METADATA).exists() if path.is_dir() else path.suffix in SUFFIXES
+    return (path / METADATA).exists() if path.is_dir() else path.suffix.lower() in (*SUFFIXES, ROS_1)
 
 
 def bag_of(path: Path) -> Path:
     """Return the folder of a bag, of which `path` may be a file; a file without metadata next to it is a bag itself."""
-    return path if path.is_dir() or not (path.parent / METADATA).exists() else path.parent
+    is_alone = path.is_dir() or _is_ros_1(path) or not (path.parent / METADATA).exists()
+    return path if is_alone else path.parent
+
+
+def _is_ros_1(path: Path) -> bool:
+    return path.suffix.lower() == ROS_1 and not path.is_dir()
 
 
 def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
@@ -59,7 +65,7 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
             yield from in_blocks(fields, [TIME, *FIELD.columns])
             return
         columns: list[str | None] = [TIME, *RATE.columns, *ACCELERATION.columns]
-        counts = {LEFT_OUT: 0}
+        counts: dict[str, Any] = {LEFT_OUT: 0}
         yield from in_blocks(_inertial(_read_messages(reader, chosen), columns, counts), columns, counts)
 
 
@@ -72,7 +78,7 @@ def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
 
 
 def _inertial(
-    messages: Iterator[tuple[float, Any]], columns: list[str | None], counts: dict[str, int]
+    messages: Iterator[tuple[float, Any]], columns: list[str | None], counts: dict[str, Any]
 ) -> Iterator[tuple[float, ...]]:
     """Yield the time, rate and acceleration of `sensor_msgs/Imu`; set columns that the messages do not hold to None.
 
@@ -101,6 +107,7 @@ def _inertial(
         )
     if not has_rates:
         columns[1:4] = [None] * 3
+        counts[NOTE] = "the messages say by their covariance (-1) that no angular velocity was measured"
     elif not all_forces:
         columns[4:] = [None] * 3
     yield from forces
@@ -110,12 +117,12 @@ def _inertial(
 def _open_bag(path: Path) -> Iterator[Any]:
     """Open the bag's reader. Raise Refused `missing_extra`."""
     try:
-        from rosbags.rosbag2 import Reader
+        from rosbags import rosbag1, rosbag2
     except ImportError as error:
         raise missing_extra(error, "ros2") from error
     if path.is_dir():
         _check_metadata(path / METADATA)
-    with Reader(path) as reader:
+    with (rosbag1 if _is_ros_1(path) else rosbag2).Reader(path) as reader:
         yield reader
 
 
@@ -161,11 +168,13 @@ def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]
     """
     from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    is_ros_1 = _is_ros_1(reader.path)
+    store = get_typestore(Stores.ROS1_NOETIC if is_ros_1 else Stores.ROS2_JAZZY)
     _check_layout(store, connections)
+    deserialize = store.deserialize_ros1 if is_ros_1 else store.deserialize_cdr
     began_ns, count = int(reader.start_time), 0
     for connection, _, data in reader.messages(connections=connections):
-        message: Any = store.deserialize_cdr(data, connection.msgtype)
+        message: Any = deserialize(data, connection.msgtype)
         stamp = message.header.stamp
         yield (int(stamp.sec) * NANO + int(stamp.nanosec) - began_ns) / NANO, message
         count += 1
@@ -176,7 +185,7 @@ def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]
 
 
 def _check_layout(store: Any, connections: Any) -> None:
-    """Raise ValueError if the definition that comes with the messages differs from that of ROS 2.
+    """Raise ValueError if the definition that comes with the messages differs from that of ROS.
 
     The definition is only compared: rosbags would write a program from it and run that.
     """
@@ -197,7 +206,7 @@ def _check_layout(store: Any, connections: Any) -> None:
         if other := sorted(
             name for name in fields if name in store.fielddefs and fields[name] != store.fielddefs[name]
         ):
-            raise ValueError(f"its {listing(map(shorten, other))} is none of ROS 2")
+            raise ValueError(f"its {listing(map(shorten, other))} is none of ROS")
 
 
 def _orientation(message: Any) -> Any:

@@ -1,11 +1,20 @@
-"""Cells of a text file as numbers in SI units: exact times from any origin, and units in their usual spellings."""
+"""Cells of a text file as numbers in SI units: exact times from any origin, and units in their usual spellings.
 
+A time may be a number, a date with the time of day (ISO 8601; UTC if no zone is stated), or the time of day alone.
+"""
+
+import re
 from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
 from decimal import Decimal
 
 from rig.config.units import UNITS, Unit
 
-TIMES = ("time_s", "start_s", "end_s")
+DAY_S = 86_400
+TIME_OF_DAY = re.compile(
+    r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?\s*(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,]\d+)?)"
+    r"\s*(?P<half>[AaPp][Mm])?\s*(?P<zone>Z|[+-]\d\d:?\d\d)?"
+)
 LONG_AGO_S = 1e6  # a clock that shows more began long before the recording: a float may lose microseconds
 SPELLINGS = (("^", ""), ("sec", "s"), ("²", "2"))  # of units, in addition to those of the table
 
@@ -19,6 +28,38 @@ def is_number(cell: str) -> bool:
     return True
 
 
+def is_value(cell: str) -> bool:
+    """Return whether a cell holds a number or a time."""
+    return is_number(cell) or TIME_OF_DAY.fullmatch(cell.strip()) is not None
+
+
+def is_time_of_day(cell: str) -> bool:
+    """Return whether a cell holds the time of day without a date: it begins again at midnight."""
+    match = TIME_OF_DAY.fullmatch(cell.strip())
+    return match is not None and match["date"] is None
+
+
+def seconds_of(cell: str, factor: float) -> Decimal:
+    """Return the time in a cell: a number in units of `factor` s, or a text, from 1970 or from midnight.
+
+    Raise ValueError or ArithmeticError if it is neither, or if a text has a unit.
+    """
+    match = TIME_OF_DAY.fullmatch(cell.strip())
+    if match is None:
+        return Decimal(cell) * Decimal(repr(factor))
+    if factor != 1.0:
+        raise ValueError("a time in text has no unit")
+    hour = int(match["h"] or 0)
+    if match["half"] is not None:
+        hour = hour % 12 + (12 if match["half"].lower() == "pm" else 0)
+    time_s = 3600 * hour + 60 * int(match["m"]) + Decimal(match["s"].replace(",", "."))
+    if match["date"] is None:
+        return time_s
+    zone = datetime.strptime(match["zone"], "%z").tzinfo if match["zone"] else UTC
+    midnight = datetime.fromisoformat(match["date"].replace("/", "-")).replace(tzinfo=zone)
+    return int(midnight.timestamp()) + time_s
+
+
 def origin_of(times_s: Iterable[float]) -> int:
     """Return the whole seconds from which times are to count, by the first of them: 0 for those of a young clock."""
     first_s = next(iter(times_s), 0.0)
@@ -26,8 +67,11 @@ def origin_of(times_s: Iterable[float]) -> int:
 
 
 def since(cell: str, factor: float, origin_s: int) -> float:
-    """Return the time in a cell, in units of `factor` s, counted from `origin_s`, without loss of a digit."""
-    return float(Decimal(cell) * Decimal(repr(factor)) - origin_s)
+    """Return the time in a cell, in units of `factor` s, counted from `origin_s`, without loss of a digit.
+
+    Raise as `seconds_of`.
+    """
+    return float(seconds_of(cell, factor) - origin_s)
 
 
 def unit_of(cell: str) -> Unit | None:

@@ -1,35 +1,37 @@
 """Columns of numbers from another program's CSV file: within bounds, or refused by name."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.config.column_map import TIMES
 from rig.data.processes.reading_process import Part
-from rig.data.recording.motion_file import LARGEST_NUMBER, Header
+from rig.data.recording.motion_file import LARGEST_NUMBER, TIME, Header
 from rig.errors import Refused
-from rig.errors.quoting import quote, shorten
+from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
-from rig.observation.formats.csv_cells import TIMES, find_wrong_unit, is_number, origin_of, since, unit_of
+from rig.observation.formats.column_selection import Mapped, check_headings, select_columns, unwrap_times
+from rig.observation.formats.csv_cells import (
+    find_wrong_unit,
+    is_number,
+    is_time_of_day,
+    is_value,
+    origin_of,
+    seconds_of,
+    since,
+    unit_of,
+)
 from rig.observation.formats.csv_text import is_harmless, read_rows
+from rig.observation.formats.mat_table import is_mat, read_mat_rows
 from rig.observation.formats.table_parts import columns_of, in_blocks, parts_read_apart
 
 BLANK = float("nan")
 LINE = "line"  # an additional column: the line of each row
-
-
-@dataclass(frozen=True, slots=True)
-class Mapped:
-    """The columns of another program's file: by the rig's name of a column, its name in the file and the factor to SI.
-
-    `skip_lines` precede the heading.
-    """
-
-    columns: Mapping[str, tuple[str, float]]
-    skip_lines: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,74 +78,102 @@ def read_table(
     can do no harm. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`, `wrong_columns`, `wrong_unit`,
     `not_a_number`.
     """
-    if is_harmless(path, largest_mb):
+    rate_hz = None if mapped is None else mapped.rate_hz
+    if rate_hz is not None:
+        header = replace(header, needed=tuple(name for name in header.needed if name != TIME))
+    if not is_mat(path) and is_harmless(path, largest_mb):
         parts = [*_parts(path, header, largest_mb, mapped, origin_s)]
     else:
         arguments = {
             "names": [header.needed, header.one_of, header.optional],
             "largest_mb": largest_mb,
-            "mapped": None if mapped is None else [dict(mapped.columns), mapped.skip_lines],
+            "mapped": None if mapped is None else asdict(mapped),
             "origin_s": origin_s,
         }
         reader = "rig.observation.formats.csv_table:csv_parts"
-        parts = parts_read_apart(reader, path, arguments, else_="cannot be read", remedy="Give a CSV file")
+        remedy = "Save it anew from MATLAB" if is_mat(path) else "Give a CSV file"
+        parts = parts_read_apart(reader, path, arguments, else_="cannot be read", remedy=remedy)
     *rows, last = parts
     columns = columns_of(rows)
     lines = columns.pop(LINE).astype(np.int64)
-    return CsvTable(columns, lines, cast("dict[str, int]", last)["origin_s"])
+    notes = cast("dict[str, int]", last)
+    columns = unwrap_times(columns, mapped, by_day=bool(notes["by_day"]))
+    if rate_hz is not None:
+        columns = {TIME: np.arange(len(lines)) / rate_hz, **columns}
+    return CsvTable(columns, lines, notes["origin_s"])
 
 
 def csv_parts(
-    path: Path, names: Sequence[Any], largest_mb: int, mapped: tuple[dict[str, Any], int] | None, origin_s: int | None
+    path: Path, names: Sequence[Any], largest_mb: int, mapped: dict[str, Any] | None, origin_s: int | None
 ) -> Iterator[Part]:
     """Yield the parts that `read_table` reads; `names` are fields of a header, `mapped` those of a map.
 
-    The rows come in blocks, with the line of each as an additional column; `origin_s` comes last.
+    The rows come in blocks, with the line of each as an additional column; `origin_s` and whether times are of the day
+    come last.
     """
-    return _parts(path, Header(*names), largest_mb, None if mapped is None else Mapped(*mapped), origin_s)
+    return _parts(path, Header(*names), largest_mb, None if mapped is None else Mapped(**mapped), origin_s)
 
 
 def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, origin_s: int | None) -> Iterator[Part]:
     skipped = 0 if mapped is None else mapped.skip_lines
-    rows = read_rows(path, largest_mb, skipped)
-    headings = [name.strip() for name in next(rows, [])]
-    _check_headings(path, headings)
-    named = dict(enumerate(headings)) if mapped is None else _select_columns(path, headings, header, mapped)
-    _check_columns(path, [*named.values()], header.needed, header.one_of, header.optional)
+    rows = read_mat_rows(path, header, mapped) if is_mat(path) else read_rows(path, largest_mb, skipped)
+    headings, first = [name.strip() for name in next(rows, [])], next(rows, [])
+    first_line = skipped + 2
+    if mapped is not None and mapped.is_by_number and all(is_value(cell) for cell in headings if cell):
+        rows, headings, first_line = chain([headings, first], rows), [""] * len(headings), skipped + 1
+    else:
+        check_headings(path, headings)
+        rows = chain([first], rows)
+    by_number = mapped is not None and mapped.is_by_number
+    width = max(len(headings), len(first)) if by_number else len(headings)
+    selected = select_columns(path, headings, width, header, mapped)
     factors = {} if mapped is None else {name: factor for name, (_, factor) in mapped.columns.items()}
-    wanted = _Wanted(path, len(headings), named, tuple(factors.get(name, 1.0) for name in named.values()))
+    wanted = _Wanted(
+        path,
+        width,
+        selected,
+        tuple(factors.get(name, 1.0) for name in selected.values()),
+        frozenset() if mapped is None else frozenset(mapped.missing),
+    )
+    by_day = False
 
     def number_rows() -> Iterator[Sequence[float]]:
-        nonlocal origin_s
+        nonlocal origin_s, by_day
         has_rows = False
-        for line, row in enumerate(rows, start=skipped + 2):
+        for line, row in enumerate(rows, start=first_line):
             numbers = () if origin_s != 0 else wanted.plain_numbers(row)
             if not numbers:
                 if not any(map(str.strip, row)) or (not has_rows and wanted.names_units(line, row)):
                     continue
                 cells = wanted.cells(line, row)
+                if not has_rows:
+                    by_day = wanted.is_by_day(cells)
                 if origin_s is None:
                     origin_s = wanted.origin_s(cells)
                 numbers = wanted.numbers(line, cells, origin_s)
             has_rows = True
             yield line, *numbers
 
-    yield from in_blocks(number_rows(), [LINE, *named.values()])
-    yield {"origin_s": origin_s or 0}
+    yield from in_blocks(number_rows(), [LINE, *selected.values()])
+    yield {"origin_s": origin_s or 0, "by_day": by_day}
 
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """The columns to read from a file: their `names` by index, out of `width`, and their `factors` to SI."""
+    """The columns to read from a file: their `names` by index, out of `width`, and their `factors` to SI.
+
+    A cell with a text of `missing` is blank.
+    """
 
     path: Path
     width: int
     names: Mapping[int, str]
     factors: tuple[float, ...]
+    missing: frozenset[str] = frozenset()
 
     def plain_numbers(self, row: Sequence[str]) -> Sequence[float]:
         """Return a row's numbers in SI units, quickly; none for a row that needs a closer look."""
-        if len(row) != self.width:
+        if len(row) != self.width or not self.missing.isdisjoint(map(str.strip, row)):
             return ()
         try:
             numbers = [float(row[index]) * factor for index, factor in zip(self.names, self.factors, strict=True)]
@@ -153,7 +183,7 @@ class _Wanted:
 
     def names_units(self, line: int, row: Sequence[str]) -> bool:
         """Return whether a row below the heading holds units, and no number. Raise Refused `wrong_unit`."""
-        if any(map(is_number, row)):
+        if any(map(is_value, row)):
             return False
         cells = [row[index] if index < len(row) else "" for index in self.names]
         if not any(map(unit_of, cells)):
@@ -177,19 +207,29 @@ class _Wanted:
                 "Write a name for every column into the heading (col.names=NA in R's write.table), or a decimal point "
                 "where a comma divides the columns",
             )
-        return [row[index] if index < len(row) else "" for index in self.names]
+        cells = [row[index] if index < len(row) else "" for index in self.names]
+        return ["" if cell.strip() in self.missing else cell for cell in cells]
+
+    def is_by_day(self, cells: Sequence[str]) -> bool:
+        """Return whether the first row holds a time of the day."""
+        return any(
+            name in TIMES and is_time_of_day(cell) for cell, name in zip(cells, self.names.values(), strict=True)
+        )
 
     def origin_s(self, cells: Sequence[str]) -> int:
         """Return the seconds from which times are to count, by the first row; 0 if it holds no time."""
-        timed = [index for index, name in enumerate(self.names.values()) if name in TIMES and is_number(cells[index])]
-        return origin_of(float(cells[index]) * self.factors[index] for index in timed)
+        timed = [index for index, name in enumerate(self.names.values()) if name in TIMES and is_value(cells[index])]
+        try:
+            return origin_of(float(seconds_of(cells[index], self.factors[index])) for index in timed)
+        except (ValueError, ArithmeticError):  # the row is refused as a whole
+            return 0
 
     def numbers(self, line: int, cells: Sequence[str], origin_s: int) -> list[float]:
         """Return a row's numbers in SI units, NaN for a blank cell. Raise Refused `not_a_number`."""
         try:
             numbers = [
                 since(cell, factor, origin_s)
-                if origin_s and name in TIMES and cell.strip()
+                if name in TIMES and cell.strip() and (origin_s or not is_number(cell))
                 else float(cell) * factor
                 if cell.strip()
                 else BLANK
@@ -203,82 +243,7 @@ class _Wanted:
                 "not_a_number",
                 f"{self.path}, line {line}: {quote(','.join(cells))} is not {len(cells)} numbers below "
                 f"{LARGEST_NUMBER:g}",
-                "Write plain decimal numbers with a point, no NaN, one for each column",
+                "Write plain decimal numbers with a point, no NaN, one for each column; or state the text of a missing "
+                "value with --columns",
             )
         return numbers
-
-
-def _select_columns(path: Path, headings: Sequence[str], header: Header, mapped: Mapped) -> dict[int, str]:
-    """Return the rig's names of the columns to read, by their indices. Raise Refused `wrong_columns`."""
-    mapped_names: dict[int, str] = {}
-    for name, (column, _) in mapped.columns.items():
-        if headings.count(column) != 1:
-            how = "twice" if column in headings else "nowhere"
-            raise Refused(
-                "wrong_columns",
-                f"{path} has the column {quote(column)} {how}, which is to be {name}",
-                f"Name one of its columns: {shorten(', '.join(headings))}; or say how many lines stand before them",
-            )
-        mapped_names[headings.index(column)] = name
-    own_names = (*header.needed, *header.one_of, *(name for group in header.optional for name in group))
-    unmapped_names = {
-        index: name for index, name in enumerate(headings) if name in own_names and name not in mapped.columns
-    }
-    return {**unmapped_names, **mapped_names}
-
-
-def _check_headings(path: Path, headings: Sequence[str]) -> None:
-    """Raise Refused `wrong_columns` for a first row that cannot be one of names."""
-    what = None
-    if len(headings) == 1 and len(headings[0].split()) > 1:
-        what = f"divides its columns neither by commas nor by semicolons nor by tabs: {shorten(headings[0])}"
-    elif headings and all(map(is_number, headings)):
-        what = f"has numbers in its first row and no names of columns: {shorten(', '.join(headings))}"
-    if what is not None:
-        raise Refused(
-            "wrong_columns",
-            f"{path} {what}",
-            "Write the columns' names into the first row, divided as all rows are, by commas, semicolons or tabs; "
-            "or say with --columns how many lines stand before it",
-        )
-
-
-def _check_columns(
-    path: Path,
-    names: Sequence[str],
-    columns: Sequence[str],
-    alternatives: Sequence[str],
-    optional: Sequence[Sequence[str]],
-) -> None:
-    own_names = (*columns, *alternatives, *(name for group in optional for name in group))
-    for name in names:
-        alike = [column for column in own_names if _quantity(column) == _quantity(name) and column not in names]
-        meant = [column for column in alike if column in columns] or alike
-        if name not in own_names and "_" in name and meant and not name.startswith("axis"):
-            raise Refused(
-                "wrong_unit",
-                f"{path} has a column {shorten(name)} where {' or '.join(meant)} belongs",
-                f"Convert it to the unit in the name {' or '.join(meant)}, or say its unit with --columns",
-            )
-    needed = [*columns, *(name for group in optional if set(group) & set(names) for name in group)]
-    problems = [f"lacks {name}" for name in needed if name not in names]
-    problems += [f"names {name} twice" for name in own_names if names.count(name) > 1]
-    present = [name for name in names if name in alternatives]
-    if alternatives and len(set(present)) != 1:
-        problems.append(f"has {' and '.join(present) or 'none'} of {', '.join(alternatives)}")
-    if "" in names:
-        problems.append("has a column without a name")
-    unknown = ", ".join(name for name in names if name and name not in own_names)
-    if unknown:
-        problems.append(f"has the unknown {shorten(unknown)}")
-    if problems:
-        wanted = ", ".join(columns) + (f" and one of {', '.join(alternatives)}" if alternatives else "")
-        more = "".join(f"; {', '.join(group)} may stand there too" for group in optional)
-        remedy = f"Its first row must name {wanted}{more}; or say with --columns which of its columns is what"
-        raise Refused("wrong_columns", f"{path} {', '.join(problems)}", remedy)
-
-
-def _quantity(name: str) -> str:
-    """Return the quantity in a column's name: `rate_x` of `rate_x_rad_s`, `x` of `x_rad_s`."""
-    words = name.split("_")
-    return "_".join(words[:2]) if words[0] == "rate" else words[0]

@@ -14,11 +14,13 @@ from typing import BinaryIO
 
 from rig.config.files.regular_file import UnfitFile, open_regular_file
 from rig.errors import Refused
+from rig.observation.formats.csv_cells import is_value
 
 HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which take four times that in memory
 LONGEST_LINE = 10_000  # characters: a hundred columns, while there are at most twenty
 GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 MARKS = ";\t"
+COMMENT_MARKS = "#%"  # before the heading of a table that NumPy or MATLAB wrote
 
 
 def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
@@ -27,11 +29,21 @@ def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[st
         lines = _lines(text, largest_mb * 1_000_000)
         first = next(islice(lines, skipped, None), "")
         second = next(lines, "")
+        first = first.lstrip(f"{COMMENT_MARKS} ") or first
         delimiter = next((mark for mark in MARKS if mark in first and (mark in second or "," not in first)), None)
+        if delimiter is None and is_divided_by_spaces(second):
+            yield from (line.split() for line in chain([first, second], lines))
+            return
         rows = csv.reader(chain([first, second], lines), delimiter=delimiter or ",")
-        yield from islice(rows, 1)
-        for row in rows:
-            yield row if delimiter is None else [cell.replace(",", ".") for cell in row]
+        for number, row in enumerate(rows):
+            points = row if delimiter is None else [cell.replace(",", ".") for cell in row]
+            yield points if number or all(map(is_value, points)) else row
+
+
+def is_divided_by_spaces(line: str) -> bool:
+    """Return whether a line of readings holds values with spaces between them, and no other mark."""
+    cells = line.split()
+    return len(cells) > 1 and not any(mark in line for mark in f"{MARKS},") and all(map(is_value, cells))
 
 
 def is_harmless(path: Path, largest_mb: int) -> bool:

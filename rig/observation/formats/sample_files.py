@@ -1,4 +1,4 @@
-"""Files of readings and attitudes that are not CSV, each with its reader, recognized by their look. One entry a format.
+"""Files of readings and attitudes that are no tables, each with its reader, recognized by their look.
 
 A path may select a part of the file behind two colons: `session::/imu/data` is a topic of a bag, `flight.ulg::1` an
 instance in PX4's log.
@@ -17,10 +17,11 @@ from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.observation.formats.bag_samples import bag_of, is_bag
-from rig.observation.formats.table_parts import columns_of, count_omitted_rows, parts_read_apart
+from rig.observation.formats.table_parts import columns_of, count_omitted_rows, note_of, parts_read_apart
 from rig.observation.formats.ulog_samples import is_ulog
 
 INSIDE = "::"
+LONGEST_MOMENT_S = 0.4  # a row of attitudes that lasts longer declares a rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ FORMATS = (
     Format(
         "bag",
         is_bag,
-        "Name the folder of the bag, with its metadata.yaml; `ros2 bag reindex FOLDER` writes one",
+        "Name the folder of the bag, with its metadata.yaml, which `ros2 bag reindex FOLDER` writes; of ROS 1 the file",
         "rig.observation.formats.bag_samples:bag_readings",
         "rig.observation.formats.bag_samples:bag_attitudes",
         bag_of,
@@ -54,13 +55,30 @@ FORMATS = (
 )
 
 
+def is_in_format(path: Path) -> bool:
+    """Return whether a path names a file in a format of `FORMATS`, or a part of one."""
+    return _format(path) is not None
+
+
 def whole(path: Path) -> Path:
     """Return the file or folder itself, without the part inside that a path may select."""
     return Path(str(path).partition(INSIDE)[0])
 
 
-def readings_in(path: Path) -> tuple[Columns, int] | None:
-    """Return the readings of a file that is not CSV, ordered by time, and the number of rows without any; None for CSV.
+@dataclass(frozen=True, slots=True)
+class FormatColumns:
+    """The `columns` (n,) of a file, ordered by time, the number of `others`: rows without any, and the reader's `note`.
+
+    The note says what the readings lack, "" if nothing.
+    """
+
+    columns: Columns
+    others: int = 0
+    note: str = ""
+
+
+def readings_in(path: Path) -> FormatColumns | None:
+    """Return the readings of a file in a format of `FORMATS`; None for a table.
 
     Raise Refused as its reader does, and `no_file`, `file_too_costly`, `temporary_folder_full`.
     """
@@ -69,15 +87,14 @@ def readings_in(path: Path) -> tuple[Columns, int] | None:
 
 
 def attitudes_in(path: Path) -> Columns | None:
-    """Return the attitudes in a file that is not CSV; None for CSV.
+    """Return the attitudes in a file in a format of `FORMATS`, as `rows_around` their times; None for a table.
 
-    An attitude holds from half-way to the one before until half-way to the next. Raise Refused as `readings_in`, and
-    `no_attitudes` if the file holds none.
+    Raise Refused as `readings_in`, and `no_attitudes` if the file holds none.
     """
     form = _format(path)
     if form is None:
         return None
-    columns = {} if form.attitudes is None else _read(form, form.attitudes, path)[0]
+    columns = {} if form.attitudes is None else dict(_read(form, form.attitudes, path).columns)
     if not columns:
         raise Refused(
             "no_attitudes",
@@ -85,11 +102,23 @@ def attitudes_in(path: Path) -> Columns | None:
             "Give the attitudes as CSV, or as poses in a ROS 2 bag",
         )
     time_s = columns.pop(TIME)
+    return {**rows_around(time_s, path), **columns}
+
+
+def rows_around(time_s: Array, path: Path) -> dict[str, Array]:
+    """Return `start_s` and `end_s` (n,) of rows, each of which holds for a moment in its middle.
+
+    A row reaches half-way to its neighbours, but never so far that it would say that the body lay still. Raise Refused
+    `no_attitudes` for a single one.
+    """
     if len(time_s) < 2:
         raise Refused("no_attitudes", f"{path} holds one pose", "Record the poses while the sensor is turned")
-    middles_s = (time_s[1:] + time_s[:-1]) / 2
-    first, last = time_s[0] - (middles_s[0] - time_s[0]), time_s[-1] + (time_s[-1] - middles_s[-1])
-    return {"start_s": np.append(first, middles_s), "end_s": np.append(middles_s, last), **columns}
+    steps_s = np.abs(np.diff(time_s))
+    most_s = min(LONGEST_MOMENT_S, float(np.median(steps_s))) / 2
+    before_s = np.minimum(np.append(steps_s[:1], steps_s) / 2, most_s)
+    after_s = np.minimum(np.append(steps_s, steps_s[-1:]) / 2, most_s)
+    half_s = np.minimum(before_s, after_s)
+    return {"start_s": time_s - half_s, "end_s": time_s + half_s}
 
 
 def entry_of(path: Path) -> FileEntry:
@@ -105,8 +134,8 @@ def entry_of(path: Path) -> FileEntry:
     return FileEntry(name=printable(name), sha256=digest.hexdigest())  # a name may be no UTF-8, which no document takes
 
 
-def _read(form: Format, reader: str, path: Path) -> tuple[dict[str, Array], int]:
-    """Return the columns, ordered by time, and the number of rows without any. Raise Refused as `readings_in`."""
+def _read(form: Format, reader: str, path: Path) -> FormatColumns:
+    """Return the columns, ordered by time. Raise Refused as `readings_in`."""
     source = form.reads(whole(path))
     parts = parts_read_apart(
         reader, source, {"inside": _inside(path)}, else_=f"is no {form.name} that can be read", remedy=form.remedy
@@ -116,7 +145,7 @@ def _read(form: Format, reader: str, path: Path) -> tuple[dict[str, Array], int]
     if (np.diff(time_s) < 0).any():
         order = np.argsort(time_s, kind="stable")
         columns = {name: column[order] for name, column in columns.items()}
-    return columns, count_omitted_rows(parts)
+    return FormatColumns(columns, count_omitted_rows(parts), note_of(parts))
 
 
 def _format(path: Path) -> Format | None:

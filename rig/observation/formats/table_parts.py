@@ -16,15 +16,16 @@ BLOCK_ROWS = 16_384
 
 
 LEFT_OUT = "left_out"  # the number of rows of the file that hold none of the columns
+NOTE = "note"  # what the readings lack, in words
 
 
 def in_blocks(
-    rows: Iterable[Sequence[float]], columns: Sequence[str | None], counts: Mapping[str, int] | None = None
+    rows: Iterable[Sequence[float]], columns: Sequence[str | None], counts: Mapping[str, Any] | None = None
 ) -> Iterator[Part]:
     """Yield the rows, a number for each of the columns, in blocks (n, columns), then the names of the columns.
 
     The names are read after the last row: None marks a column that is left out. So are `counts`, which may hold the
-    number of rows that were `LEFT_OUT`.
+    number of rows that were `LEFT_OUT`, and a `NOTE`.
     """
     values, width = array("d"), len(columns)
     for row in rows:
@@ -50,6 +51,11 @@ def columns_of(parts: Iterable[Part]) -> dict[str, Array]:
 def count_omitted_rows(parts: Sequence[Part]) -> int:
     """Return the number of rows of the file that such parts leave out."""
     return int(cast("dict[str, Any]", parts[-1]).get(LEFT_OUT, 0))
+
+
+def note_of(parts: Sequence[Part]) -> str:
+    """Return what the readings in such parts lack, "" if nothing."""
+    return str(cast("dict[str, Any]", parts[-1]).get(NOTE, ""))
 
 
 def parts_read_apart(reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str) -> list[Part]:

@@ -22,6 +22,7 @@ COUNTS_PER_G = (1024, 2048, 4096, 8192, 16384, 32768)
 COUNTS = (1 / 131, 1 / 65.5, 1 / 32.8, 1 / 16.4, 0.00875, 0.0175, 0.035, 0.07, 0.00625, 0.025, 0.1)
 SAME_SCALE = 0.03
 ROTATION_RATIO = 10.0  # least scatter of a gyroscope in rotation, relative to that at rest
+NOISE_QUANTILE, OF_STEPS = 0.9, 1.645 * 2**0.5  # of steps of noise, and their size over its standard deviation
 FLAT_S = 0.02  # interval of gravity's mean direction: in twice this the device rotates by a fifth of a radian at most
 TIMES = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
 _NAMES = {
@@ -87,6 +88,22 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
         decimals = {shape.decimals[index] for index in indices}
         if len(decimals) == 1 and min(decimals) >= 0:
             unit["decimals"] = decimals.pop()
+    return result
+
+
+def guess_triads(names: tuple[str, ...], values: Array, still: Flags, rate_hz: float) -> Guess:
+    """Guess which columns of readings (n, k) at a rate are triads of sensors, and their units; time is known.
+
+    `still` (n,) are the rows at rest; if there are none, all count.
+    """
+    count = values.shape[1]
+    still = still if still.any() else np.ones(len(values), dtype=np.bool_)
+    shape = Shape("", "", (), False, names, values, np.arange(len(values)) / rate_hz, (-1,) * count, 0)
+    result = Guess(["-"] * count, rate_hz)
+    for index, name in _match_names(names).items():
+        result.columns[index] = "-" if name in ("time", "sequence") else name
+    _find_triads(shape, result, still)
+    _find_temperature(shape, result, still)
     return result
 
 
@@ -194,7 +211,10 @@ def _kind(values: Array, still: Flags) -> str | None:
     rest, moving = values[still], values[~still]
     sizes = np.linalg.norm(values, axis=1)
     level = float(np.median(sizes[still]))
-    scatter = float(np.linalg.norm(rest.std(axis=0)))
+    if not len(moving):
+        return "a" if _gravity(level) is not None else None
+    # From one reading to the next: a log may have rests in several attitudes.
+    scatter = float(np.linalg.norm(np.quantile(np.abs(np.diff(rest, axis=0)), NOISE_QUANTILE, axis=0))) / OF_STEPS
     if (
         np.linalg.norm(moving.std(axis=0)) > ROTATION_RATIO * max(scatter, 1e-9)
         and np.percentile(sizes[~still], 90) > 4 * level

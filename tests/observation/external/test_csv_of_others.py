@@ -11,7 +11,8 @@ from rig.data.quantity import RATE
 from rig.data.recording.motion_file import Header
 from rig.errors import Refused
 from rig.observation.external.csv_samples import read_samples
-from rig.observation.formats.csv_table import Mapped, read_columns
+from rig.observation.formats.column_selection import Mapped
+from rig.observation.formats.csv_table import read_columns
 
 HEAD = ["time_s", "x_rad_s", "y_rad_s", "z_rad_s"]
 ROWS = [f"{n / 10},0.{n},-1.5,{n}" for n in range(30)]
@@ -39,8 +40,18 @@ def read(path: Path, mapped: Mapped | None = None) -> np.ndarray:
         lambda text: text.replace("\n", "\r\r\n").encode(),
         lambda text: (text + "\n\r\n").encode(),
         lambda text: text.replace(",", ";").replace(".", ",").encode("utf-8-sig"),
+        lambda text: ("# " + text.replace(",", "   ")).encode(),
+        lambda text: b"% " + text.encode(),
     ],
-    ids=["gzip", "UTF-16 and tabs", "two carriage returns", "empty rows at the end", "semicolons and BOM"],
+    ids=[
+        "gzip",
+        "UTF-16 and tabs",
+        "two carriage returns",
+        "empty rows at the end",
+        "semicolons and BOM",
+        "NumPy's spaces",
+        "MATLAB's comment",
+    ],
 )
 def test_what_others_write_is_read(tmp_path: Path, as_written: Callable[[str], bytes]) -> None:
     assert np.array_equal(read(written(tmp_path, as_written(PLAIN))), NUMBERS)
@@ -59,7 +70,7 @@ def test_headings_of_a_german_logger_are_found_in_any_encoding(tmp_path: Path, e
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (PLAIN.replace(",", " ").encode(), "wrong_columns: .*neither by commas nor by semicolons nor by tabs"),
+        (b"Device 7\n" + PLAIN.encode(), "wrong_columns: .*neither by commas nor by semicolons, tabs or spaces"),
         ("\n".join(ROWS).encode(), "wrong_columns: .*numbers in its first row and no names"),
         (PLAIN.replace("\n", ",\n").encode(), "wrong_columns: .*a column without a name"),
         (PLAIN.replace("time_s", "Zeit").encode(), "lacks time_s, has the unknown Zeit.* --columns"),

@@ -234,3 +234,41 @@ def test_a_name_that_is_no_utf_8_is_recorded_as_it_is_shown(tmp_path: Path) -> N
     path = tmp_path / os.fsdecode(b"imu\xff\x1b[31m.csv")
     path.write_text("time_s\n", encoding="utf-8")
     assert entry_of(path).name == "imu\\udcff\\x1b[31m.csv"
+
+
+@pytest.mark.slow
+def test_a_bag_of_ros_1_is_read(tmp_path: Path) -> None:
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    types = {name.rpartition("/")[2]: kind for name, kind in store.types.items()}
+    zeros, vector = np.zeros(9), types["Vector3"]
+    time_ns = BEGAN_NS + np.arange(100) * 10**7
+    with Writer(tmp_path / "LOG.BAG") as bag:
+        imu = bag.add_connection("/imu/data_raw", "sensor_msgs/msg/Imu", typestore=store)
+        for number, at_ns in enumerate(time_ns.tolist()):
+            header = types["Header"](
+                number, store.types["builtin_interfaces/msg/Time"](at_ns // 10**9, at_ns % 10**9), "imu"
+            )
+            still = types["Quaternion"](0.0, 0.0, 0.0, 1.0)
+            message = types["Imu"](header, still, zeros, vector(number, 2.0, 3.0), zeros, vector(0.0, 0.0, 9.8), zeros)
+            bag.write(imu, at_ns, store.serialize_ros1(message, "sensor_msgs/msg/Imu"))
+    samples = read_samples(tmp_path / "LOG.BAG")
+    assert samples.readings[RATE][:, 0].tolist() == [*range(100)]
+    assert np.diff(samples.time_s) == pytest.approx(np.full(99, 0.01))
+
+
+@pytest.mark.slow
+def test_sensor_combined_is_read_where_px4_logged_the_gyroscope_rarely(tmp_path: Path) -> None:
+    """PX4's default profile: the raw topics once a second."""
+    time_us = np.arange(400) * 5000 + 10**6
+    rates, forces = np.tile([0.1, 0.2, 0.3], (400, 1)), np.tile([0.0, 0.0, -9.8], (400, 1))
+    write_ulog(tmp_path / "FLIGHT.ULG", time_us, rates, forces, raw_every=200)
+    table = read_sample_table(tmp_path / "FLIGHT.ULG")
+    assert len(table.columns[TIME]) == 400 and "corrected by the autopilot" in table.note
+    assert table.columns["z_rad_s"] == pytest.approx(np.full(400, 0.3))
+    raw = read_sample_table(Path(f"{tmp_path / 'FLIGHT.ULG'}::0"))
+    assert len(raw.columns[TIME]) == 2 and raw.note == ""
+    with pytest.raises(Refused, match=r"ulog_topic: .*sensor_combined 0 at 200 Hz.*sensor_gyro 0 at 1 Hz"):
+        read_sample_table(Path(f"{tmp_path / 'FLIGHT.ULG'}::3"))

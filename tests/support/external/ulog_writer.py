@@ -9,8 +9,17 @@ FORMATS = {name: f"{name}:uint64_t timestamp;uint64_t timestamp_sample;uint32_t 
            "float temperature;uint8_t[4] _padding0;" for name in ("sensor_gyro", "sensor_accel")}  # fmt: skip
 
 
-def write_ulog(path: Path, time_us: np.ndarray, rates: np.ndarray, forces: np.ndarray) -> None:
-    """A log of one IMU, its readings (n, 3) rad/s and m/s² at times (n,) in µs."""
+COMBINED = (
+    "sensor_combined:uint64_t timestamp;float[3] gyro_rad;uint32_t gyro_integral_dt;"
+    "int32_t accelerometer_timestamp_relative;float[3] accelerometer_m_s2;uint32_t accelerometer_integral_dt;"
+)
+
+
+def write_ulog(path: Path, time_us: np.ndarray, rates: np.ndarray, forces: np.ndarray, raw_every: int = 1) -> None:
+    """A log of one IMU, its readings (n, 3) rad/s and m/s² at times (n,) in µs.
+
+    With `raw_every` > 1 the raw topics hold one of so many readings, and `sensor_combined` all.
+    """
     with path.open("wb") as file:
         file.write(b"ULog\x01\x12\x35\x01" + pack("<Q", int(time_us[0])))
 
@@ -20,8 +29,15 @@ def write_ulog(path: Path, time_us: np.ndarray, rates: np.ndarray, forces: np.nd
         message(b"B", bytes(40))
         for form in FORMATS.values():
             message(b"F", form.encode())
+        message(b"F", COMBINED.encode())
+        if raw_every > 1:
+            message(b"A", pack("<BH", 0, len(FORMATS)) + b"sensor_combined")
         for number, name in enumerate(FORMATS):
             message(b"A", pack("<BH", 0, number) + name.encode())
-        for at, rate, force in zip(time_us.tolist(), rates.tolist(), forces.tolist(), strict=True):
+        for row, (at, rate, force) in enumerate(zip(time_us.tolist(), rates.tolist(), forces.tolist(), strict=True)):
+            if raw_every > 1:
+                message(b"D", pack("<HQ3fIi3fI", len(FORMATS), at, *rate, 5000, 0, *force, 5000))
+            if row % raw_every:
+                continue
             for number, reading in enumerate((rate, force)):
                 message(b"D", pack("<HQQI4f", number, at + 300, at, 1234, *reading, 25.0))

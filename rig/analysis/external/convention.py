@@ -1,0 +1,126 @@
+"""The convention of a reference's quaternions, by the readings of a gyroscope that was turned with it.
+
+A quaternion may take body to room coordinates or the other way. Under the right convention the body's rates are a
+linear function of the gyroscope's readings. Whether the scalar part stands first or last changes the frames of body and
+room by a constant rotation, so no readings show it: of two that fit, that with an upright z axis counts, by the
+accelerometer. The other one leads to the same calibration, in other axes of the body.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.recording.motion_file import Columns
+from rig.estimation.arrays import Array
+from rig.observation.external.csv_samples import Samples
+
+QUATERNION = ("qw", "qx", "qy", "qz")
+COARSE_S, FINE_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.0201, 0.002)  # lags to try
+FEWEST, MOST = 30, 3000  # pairs of rows
+LONGEST_S = 1.0  # between two rows of a pair
+LEAST_RAD_S = 0.05  # rms of the rate: less shows nothing
+EXPLAINED, MARGIN = 0.7, 0.1  # least fraction of the rates' variance, and lead over the other direction
+UPRIGHT = 0.97  # component of gravity along an axis of the room that is upright
+
+
+@dataclass(frozen=True, slots=True)
+class Convention:
+    """The convention under which the gyroscope explains a fraction of the rates, `lag_s` after the attitudes.
+
+    `scalar_last`: the column read as qw holds qx, and so on. `inverse`: the quaternions take room to body coordinates.
+    `up`: the axis of the room that points upwards, as `--up` takes it; "" if no accelerometer shows it.
+    """
+
+    scalar_last: bool
+    inverse: bool
+    lag_s: float
+    explained: float
+    up: str = ""
+
+
+def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: bool) -> Convention | None:
+    """Return the convention of attitudes (N,) on the clock of the samples; None if the motion does not show one.
+
+    `is_order_named`: the file says which number is the scalar part.
+    """
+    if RATE not in samples.readings:
+        return None
+    middles_s = (attitudes["start_s"] + attitudes["end_s"]) / 2
+    order = np.argsort(middles_s)
+    inside = order[(middles_s[order] > samples.time_s[0] + 0.5) & (middles_s[order] < samples.time_s[-1] - 0.5)]
+    inside = inside[: MOST + 1]
+    if len(inside) <= FEWEST:
+        return None
+    quaternions = np.column_stack([attitudes[name][inside] for name in QUATERNION])
+    conventions = []
+    for scalar_last in (False,) if is_order_named else (False, True):
+        fits = [
+            _fit(samples, middles_s[inside], quaternions, scalar_last=scalar_last, inverse=inverse)
+            for inverse in (False, True)
+        ]
+        best, other = sorted(fits, key=lambda fit: -fit.explained)
+        if best.explained >= max(EXPLAINED, other.explained + MARGIN):
+            conventions.append(best)
+    return max(conventions, key=lambda convention: "z" in convention.up, default=None)
+
+
+def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bool, inverse: bool) -> Convention:
+    from scipy.spatial.transform import Rotation
+
+    rotations = Rotation.from_quat(quaternions if scalar_last else np.roll(quaternions, -1, axis=1))
+    rotations = rotations.inv() if inverse else rotations
+    steps_s = np.diff(time_s)
+    close = (steps_s > 0) & (steps_s < LONGEST_S)
+    rates = (rotations[:-1].inv() * rotations[1:]).as_rotvec()[close] / steps_s[close, None]
+    if len(rates) < FEWEST or np.sqrt(np.mean(rates**2)) < LEAST_RAD_S:
+        return Convention(scalar_last, inverse, 0.0, 0.0)
+    readings = samples.readings[RATE]
+    steps = (readings[1:] + readings[:-1]) / 2 * np.diff(samples.time_s)[:, None]
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
+    def fit_at(lag_s: float) -> float:
+        return _explain(rates, _mean_rates(samples.time_s, total, time_s + lag_s, close))[0]
+
+    coarse_s = max(COARSE_S.tolist(), key=fit_at)
+    lag_s = max((coarse_s + FINE_S).tolist(), key=fit_at)
+    fraction, matrix = _explain(rates, _mean_rates(samples.time_s, total, time_s + lag_s, close))
+    up = ""
+    if ACCELERATION in samples.readings:
+        forces = np.column_stack(
+            [np.interp(time_s + lag_s, samples.time_s, axis) for axis in samples.readings[ACCELERATION].T]
+        )
+        up = _find_up(rotations.apply(forces @ _nearest_orthogonal(matrix).T))
+    return Convention(scalar_last, inverse, lag_s, fraction, up)
+
+
+def _mean_rates(time_s: Array, total: Array, edges_s: Array, close: NDArray[np.bool_]) -> Array:
+    angles = np.column_stack([np.interp(edges_s, time_s, axis) for axis in total.T])
+    means: Array = np.diff(angles, axis=0)[close] / np.diff(edges_s)[close, None]
+    return means
+
+
+def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
+    """Return the fraction of the rates' variance (n, 3) that a linear function of readings (n, 3) explains, and it."""
+    design = np.column_stack([readings, np.ones(len(readings))])
+    fit = np.linalg.lstsq(design, rates, rcond=None)[0]
+    residuals = rates - design @ fit
+    return 1 - float(np.mean(residuals**2) / np.mean((rates - rates.mean(axis=0)) ** 2)), np.asarray(
+        fit[:3].T, dtype=np.float64
+    )
+
+
+def _nearest_orthogonal(matrix: Array) -> Array:
+    outputs, _, inputs = np.linalg.svd(matrix)
+    return np.asarray(outputs @ inputs, dtype=np.float64)
+
+
+def _find_up(forces: Array) -> str:
+    """Return the axis of the room along which forces (n, 3) point in the mean, or ""."""
+    mean = forces.mean(axis=0)
+    mean /= max(float(np.linalg.norm(forces, axis=1).mean()), 1e-9)
+    axis = int(np.argmax(np.abs(mean)))
+    if abs(mean[axis]) < UPRIGHT:
+        return ""
+    return f"{'+' if mean[axis] > 0 else '-'}{'xyz'[axis]}"

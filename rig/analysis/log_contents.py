@@ -1,0 +1,209 @@
+"""A look at a file of another program: what it holds, by the functions that solve it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.analysis.analyses import calibrate
+from rig.config.column_map import AS_NAMED, TIMES, ColumnMap
+from rig.config.units import UNITS
+from rig.data.quantity import RATE, Quantity
+from rig.data.recording.motion_file import TIME, Columns, Header, Item
+from rig.data.recording.settings import Elsewhere, Site
+from rig.errors import Refused, RigError
+from rig.estimation.arrays import Array
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
+from rig.observation.by_hand.steadiness import check_at_rest
+from rig.observation.external.attitude_import import read_attitudes
+from rig.observation.external.csv_samples import SAMPLES_MB, Samples, read_sample_table, samples_in
+from rig.observation.external.from_files import Files, build_recording
+from rig.observation.external.log_survey import LogSurvey, survey_log
+from rig.observation.formats.column_selection import Mapped, map_motion, map_samples
+from rig.observation.formats.csv_table import read_table
+from rig.observation.formats.sample_files import is_in_format
+from rig.observation.formats.table_layout import TableLayout, find_layout
+from rig.sensors.lines.log_columns import OPEN, LogColumns, guess_columns
+
+
+@dataclass(frozen=True, slots=True)
+class LookedFile:
+    """What a file holds.
+
+    - layout, guess: of a table; None for a bag or a log of an autopilot.
+    - columns: the map of its columns, as `--columns` takes it, to be completed if it has "?".
+    - samples, survey: its readings, if it has any that can be read; others: rows without any; note: what they lack.
+    - attitudes: the rows of its reference, if it has one.
+    - refusals: why readings or attitudes could not be read.
+    """
+
+    path: Path
+    layout: TableLayout | None
+    guess: LogColumns | None
+    columns: Mapping[str, Any]
+    samples: Samples | None = None
+    survey: LogSurvey | None = None
+    others: int = 0
+    note: str = ""
+    attitudes: Columns | None = None
+    refusals: tuple[RigError, ...] = ()
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The quantities of its readings."""
+        return () if self.samples is None else tuple(self.samples.readings)
+
+
+def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
+    """Return what a file holds, by its own headings and numbers, or by a `stated` map of its columns.
+
+    Raise Refused as `find_layout` does for a file that is no table.
+    """
+    if is_in_format(path):
+        return _read_contents(LookedFile(path, None, None, {}), AS_NAMED, has_readings=True, has_attitudes=True)
+    if stated is not None:
+        looked = LookedFile(path, None, None, {})
+        return _read_contents(looked, stated, has_readings=True, has_attitudes=bool(stated.motion))
+    layout = find_layout(path, SAMPLES_MB)
+    values, time = _read_numbers(path, layout)
+    guess = guess_columns(layout, values, time)
+    columns = _map_of(layout, guess)
+    looked = LookedFile(path, layout, guess, columns)
+    if is_incomplete(columns):
+        return looked
+    column_map = ColumnMap.model_validate(columns)
+    return _read_contents(looked, column_map, has_readings=len(guess.samples) > 1, has_attitudes=len(guess.motion) > 1)
+
+
+def is_incomplete(columns: Mapping[str, Any]) -> bool:
+    """Return whether a map has "?" where a number is still to be stated."""
+    return OPEN in columns.values() or any(
+        OPEN in entry.values()
+        for section in columns.values()
+        if isinstance(section, dict)
+        for entry in section.values()
+    )
+
+
+def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]:
+    """Return all numbers (n, k) of a table, NaN in columns without any, and its times (n,) in their unit, or None."""
+    unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
+    columns = {f"column_{index}": (str(index + 1), 1.0) for index in layout.numbers if index != layout.time}
+    if layout.time is not None:
+        columns[TIME] = (str(layout.time + 1), unit_s)
+    mapped = Mapped(columns, layout.skip_lines, missing=layout.missing)
+    table = read_table(path, Header(tuple(columns)), SAMPLES_MB, mapped, None if layout.time_unit is None else 0)
+    values = np.full((len(table.lines), len(layout.headings)), np.nan)
+    for index in layout.numbers:
+        if index != layout.time:
+            values[:, index] = table.columns[f"column_{index}"]
+    return values, None if layout.time is None else table.columns[TIME] / unit_s
+
+
+def _map_of(layout: TableLayout, guess: LogColumns) -> dict[str, Any]:
+    """Return the map of a table's columns, without those that have the rig's names and units."""
+    columns: dict[str, Any] = {}
+    sections = {"samples": guess.samples, "motion": guess.motion}
+    for section, entries in sections.items():
+        if not entries:
+            continue
+        named = {name: dict(entry) for name, entry in entries.items() if entry["column"] != name}
+        rows = [heading for heading in layout.headings if heading in TIMES]
+        if section == "motion" and "start_s" in rows:  # the rig's own file of attitudes has two times
+            named.pop(TIME, None)
+        if named:
+            columns[section] = named
+        if layout.skip_lines:
+            columns[f"{section}_skip_lines"] = layout.skip_lines
+        if layout.missing:
+            columns[f"{section}_missing"] = list(layout.missing)
+        if TIME not in entries and not set(rows) & {TIME, "start_s"}:
+            columns[f"{section}_rate_hz"] = OPEN
+    return columns
+
+
+def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: bool, has_attitudes: bool) -> LookedFile:
+    refusals: list[RigError] = []
+    if has_readings:
+        try:
+            looked = _read_samples(looked, column_map)
+        except RigError as error:
+            refusals.append(error)
+    if has_attitudes:
+        try:
+            attitudes = read_attitudes(looked.path, map_motion(column_map), inverse=column_map.motion_inverse)
+            looked = replace(looked, attitudes=attitudes)
+        except RigError as error:
+            refusals.append(error)
+    if looked.layout is None and (looked.samples is not None or looked.attitudes is not None):
+        refusals = []  # a bag need not hold both
+    return replace(looked, refusals=tuple(refusals))
+
+
+def _read_samples(looked: LookedFile, column_map: ColumnMap) -> LookedFile:
+    mapped = map_samples(column_map)
+    try:
+        table = read_sample_table(looked.path, (), mapped)
+    except Refused as error:
+        if error.name != "blank_cells":
+            raise
+        table = read_sample_table(looked.path, (), mapped, [RATE.sensor])
+    samples = samples_in(table.columns, str(looked.path))
+    return replace(looked, samples=samples, survey=survey_log(samples), others=table.others, note=table.note)
+
+
+def find_allan_obstacle(samples: Samples) -> RigError | None:
+    """Return why the readings of a log are not those of a sensor at rest; None if they are."""
+    try:
+        for quantity, readings in samples.readings.items():
+            check_at_rest(samples.time_s, readings, quantity)
+    except RigError as error:
+        return error
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A solution that was tried: `only` of its sensors, all if empty; the `obstacle` in its way, None without one."""
+
+    only: tuple[str, ...] = ()
+    obstacle: str | None = None
+
+
+def try_turns(path: Path, column_map: ColumnMap) -> Trial:
+    """Solve a log as that of a sensor turned by hand (`--turns`)."""
+    options = {
+        "clock_ppm": 50.0,
+        "box_rad": float(np.radians(0.2)),
+        "closure": 1.0,
+        "gravity_m_s2": STANDARD_GRAVITY_M_S2,
+    }
+    motion = {name: np.array([value]) for name, value in options.items()}
+    files = Files(path, motion, "turns", Item("imu"), None, column_map)
+    return Trial(obstacle=_find_obstacle(files, Elsewhere(), "+z"))
+
+
+def try_attitudes(
+    path: Path, reference: Path, column_map: ColumnMap, up: str, *, find_clock: bool, sensors: Sequence[str]
+) -> Trial:
+    """Solve a log in the attitudes of a reference, all its sensors, or else the gyroscope alone."""
+    files = Files(path, reference, "attitudes", Item("imu"), None, column_map)
+    trial = Trial()
+    for only in ((), (RATE.sensor,)) if len(sensors) > 1 and RATE.sensor in sensors else ((),):
+        trial = Trial(only, _find_obstacle(files, Elsewhere(any_mounting=True, find_clock=find_clock, only=only), up))
+        if trial.obstacle is None:
+            return trial
+    return trial
+
+
+def _find_obstacle(files: Files, request: Elsewhere, up: str) -> str | None:
+    x, y, z = ((1.0 if up[0] == "+" else -1.0) * np.eye(3)["xyz".index(up[1])]).tolist()
+    site = Site(up=(x, y, z), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None)
+    try:
+        outcome = calibrate([build_recording(files, site, request)])
+    except RigError as error:
+        return f"{error.name}: {error.what}"
+    failed = [check.name for check in outcome.checks if not check.passed]
+    return f"checks fail: {', '.join(failed)}" if failed else None

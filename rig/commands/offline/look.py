@@ -1,0 +1,155 @@
+"""`rig look FILE`: what a log of another program holds, which solutions it allows, and the map of its columns."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.commands.config_arguments import add_columns, read_column_map
+from rig.errors import Refused
+from rig.errors.quoting import printable
+from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    from rig.analysis.external.convention import Convention
+    from rig.analysis.log_contents import LookedFile
+    from rig.config.column_map import ColumnMap
+    from rig.report.terminal.look_lines import TriedSolutions
+
+HEAD = """\
+# The columns of {files}, as `rig look` found them: check the units.
+# docs/how-to/without-an-arm/from-a-robots-log.md explains every key.
+"""
+
+
+def add(parser: ArgumentParser) -> None:
+    """Add the arguments of `rig look`."""
+    parser.add_argument(
+        "files",
+        type=Path,
+        nargs="+",
+        metavar="FILE",
+        help="a log of readings (CSV, text, a bag, .ulg, .mat), one of attitudes, or one of each",
+    )
+    add_columns(parser)
+    parser.add_argument("--write", type=Path, metavar="NEW", help="write the map of the columns to a new file")
+
+
+def run(options: Namespace) -> int:
+    """Print what the files hold and what they allow; write the map of their columns with `--write`. Return 0.
+
+    Raise Refused `bad_option`, `configuration_not_written`, and as the files' readers do.
+    """
+    from rig.analysis.log_contents import look_at
+
+    if len(options.files) > 2:
+        raise Refused("bad_option", f"{len(options.files)} files are given", "Give a log, or a log and its attitudes")
+    if options.write is not None and options.columns is not None:
+        raise Refused("bad_option", "--write makes a map, and --columns gives one", "Give one of them")
+    stated = None if options.columns is None else read_column_map(options.columns)
+    looks = [look_at(path, stated) for path in options.files]
+    columns: dict[str, Any] = {}
+    for looked in reversed(looks):  # of two files the first has the readings
+        columns |= looked.columns
+    _print(looks, columns, stated, options.write or options.columns)
+    if options.write is not None:
+        _write(options.write, looks, columns)
+    return 0
+
+
+def _print(
+    looks: "Sequence[LookedFile]", columns: dict[str, Any], stated: "ColumnMap | None", named: Path | None
+) -> None:
+    """Print the files and what they allow; change `columns` to the convention that the gyroscope shows."""
+    from rig.report.terminal.look_lines import describe_convention, describe_file, describe_solutions
+
+    for looked in looks:
+        for line in describe_file(looked):
+            say(line)
+    log = next((looked for looked in looks if looked.samples is not None), None)
+    reference = next((looked for looked in looks if looked.attitudes is not None), None)
+    convention = None
+    if log is not None and reference is not None:
+        convention = _find_convention(log, reference)
+        for line in describe_convention(convention):
+            say(line)
+        if convention is not None and stated is None:
+            _adopt(columns, inverse=convention.inverse, scalar_last=convention.scalar_last)
+    tried = _try_solutions(log, reference, convention, stated, columns)
+    needs_map = bool(columns) or stated is not None
+    name = (named or Path("columns.yaml")) if needs_map else None
+    for line in describe_solutions(log, reference, replace(tried, columns=name)):
+        print(printable(line))  # a command is not broken
+    if needs_map and named is None:
+        say("--write columns.yaml writes the map of these columns")
+
+
+def _find_convention(log: "LookedFile", reference: "LookedFile") -> "Convention | None":
+    from rig.analysis.external.convention import QUATERNION, find_convention
+
+    assert log.samples is not None and reference.attitudes is not None, "both were read"
+    headings = () if reference.layout is None else reference.layout.headings
+    is_order_named = reference.layout is None or all(name in headings for name in QUATERNION)
+    return find_convention(log.samples, reference.attitudes, is_order_named=is_order_named)
+
+
+def _try_solutions(
+    log: "LookedFile | None",
+    reference: "LookedFile | None",
+    convention: "Convention | None",
+    stated: "ColumnMap | None",
+    columns: Mapping[str, Any],
+) -> "TriedSolutions":
+    from rig.analysis.log_contents import find_allan_obstacle, try_attitudes, try_turns
+    from rig.config.column_map import ColumnMap
+    from rig.data.quantity import RATE
+    from rig.report.terminal.look_lines import TriedSolutions
+
+    if log is None or log.samples is None:
+        return TriedSolutions(None, None, "", finds_clock=False, turns=None, attitudes=None)
+    column_map = stated if stated is not None else ColumnMap.model_validate(dict(columns))
+    turns = try_turns(log.path, column_map) if RATE in log.quantities else None
+    up, finds_clock, attitudes = "" if convention is None else convention.up, False, None
+    if reference is not None and reference.attitudes is not None:
+        rows, time_s = reference.attitudes, log.samples.time_s
+        finds_clock = not (rows["start_s"].min() < time_s[-1] and rows["end_s"].max() > time_s[0])
+        sensors = [quantity.sensor for quantity in log.quantities]
+        attitudes = try_attitudes(
+            log.path, reference.path, column_map, up or "+z", find_clock=finds_clock, sensors=sensors
+        )
+    return TriedSolutions(
+        None, find_allan_obstacle(log.samples), up, finds_clock=finds_clock, turns=turns, attitudes=attitudes
+    )
+
+
+def _adopt(columns: dict[str, Any], *, inverse: bool, scalar_last: bool) -> None:
+    """Change the map of a reference's columns to the convention of its quaternions."""
+    if inverse:
+        columns["motion_inverse"] = True
+    if scalar_last:
+        motion = dict(columns.get("motion", {}))
+        read = [motion.get(name, {"column": name}) for name in ("qw", "qx", "qy", "qz")]
+        columns["motion"] = {**motion, **dict(zip(("qx", "qy", "qz", "qw"), read, strict=True))}
+
+
+def _write(path: Path, looks: "Sequence[LookedFile]", columns: Mapping[str, Any]) -> None:
+    """Write the map to a new file. Raise Refused `bad_option` if there is none, `configuration_not_written`."""
+    import yaml
+
+    from rig.config.files.safe_writing import write_new
+
+    if not columns:
+        say("no map is needed: the columns have the rig's own names")
+        return
+    if path.exists() or path.is_symlink():
+        raise Refused("configuration_not_written", f"{path} is there already", "Choose another with --write")
+    files = " and ".join(looked.path.name for looked in looks)
+    text = yaml.safe_dump(dict(columns), sort_keys=False, allow_unicode=True, default_flow_style=None, width=100)
+    try:
+        write_new(path, HEAD.format(files=files) + text)
+    except OSError as error:
+        raise Refused(
+            "configuration_not_written", f"{path} cannot be written: {error}", "Choose another with --write"
+        ) from error
+    say(f"written: {path}")

@@ -1,0 +1,105 @@
+"""A survey of a log's readings: how they were sampled, where the body lay still, and how it was turned."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rig.data.quantity import ACCELERATION, RATE, Quantity
+from rig.estimation.arrays import Array
+from rig.observation.by_hand.rests import find_rests
+from rig.observation.external.csv_samples import Samples
+from rig.observation.sampling import Sampling, find_sampling
+from rig.observation.windows import Window, inside
+
+LEAST_TURN_RAD = 0.3  # between two rests: less is no turn
+MOSTLY = 0.9  # of a turn's angle about one axis
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A step between two readings that others are missing from: from `start_s`, lasting `lasts_s`, and its row."""
+
+    row: int
+    start_s: float
+    lasts_s: float
+    missing: int
+
+
+@dataclass(frozen=True, slots=True)
+class LogSurvey:
+    """A log's sampling, rests and turns.
+
+    - gaps: where readings are missing. rests: windows in which the body lay still.
+    - turns: by axis ("+x"), "other" without one, the number of turns from rest to rest.
+    - at_rest: by quantity, the mean norm of the readings at rest less the bias of rates; largest: by quantity.
+    - faces: number of directions of gravity at rest that differ by more than 45°.
+    """
+
+    span_s: float
+    sampling: Sampling
+    gaps: tuple[Gap, ...]
+    rests: tuple[Window, ...]
+    turns: dict[str, int]
+    at_rest: dict[Quantity, float]
+    largest: dict[Quantity, float]
+    faces: int
+
+
+def survey_log(samples: Samples) -> LogSurvey:
+    """Return the survey of a log's readings."""
+    time_s, readings = samples.time_s, samples.readings
+    sampling = samples.sampling or find_sampling(time_s)
+    steps = np.flatnonzero(sampling.gaps(time_s))
+    gaps = [
+        Gap(int(step) + 1, float(time_s[step]), float(time_s[step + 1] - time_s[step]), int(sampling.missing[step]))
+        for step in steps
+    ]
+    rests = find_rests(time_s, {quantity: readings[quantity] for quantity in readings})
+    cuts = [inside(time_s, rest) for rest in rests]
+    at_rest = {
+        quantity: float(np.median([np.linalg.norm(values[cut].mean(axis=0)) for cut in cuts]))
+        for quantity, values in readings.items()
+        if cuts
+    }
+    return LogSurvey(
+        span_s=float(time_s[-1] - time_s[0]),
+        sampling=sampling,
+        gaps=tuple(gaps),
+        rests=rests,
+        turns=_count_turns(time_s, readings[RATE], rests) if RATE in readings else {},
+        at_rest=at_rest,
+        largest={quantity: float(np.abs(values).max()) for quantity, values in readings.items()},
+        faces=_count_faces([readings[ACCELERATION][cut].mean(axis=0) for cut in cuts])
+        if ACCELERATION in readings
+        else 0,
+    )
+
+
+def _count_turns(time_s: Array, rates: Array, rests: Sequence[Window]) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for before, after in pairwise(rests):
+        bias = np.mean([rates[inside(time_s, rest)].mean(axis=0) for rest in (before, after)], axis=0)
+        cut = inside(time_s, Window(before.end_s, after.start_s))
+        if cut.stop - cut.start < 2:
+            continue
+        turned = rates[cut] - bias
+        angles = ((turned[1:] + turned[:-1]) / 2 * np.diff(time_s[cut])[:, None]).sum(axis=0)
+        size = float(np.linalg.norm(angles))
+        if size < LEAST_TURN_RAD:
+            continue
+        axis = int(np.argmax(np.abs(angles)))
+        is_about_one = abs(angles[axis]) >= MOSTLY * size
+        name = f"{'+' if angles[axis] > 0 else '-'}{'xyz'[axis]}" if is_about_one else "other"
+        counts[name] = counts.get(name, 0) + 1
+    return dict(sorted(counts.items(), key=lambda item: (item[0][-1], item[0])))
+
+
+def _count_faces(directions: Sequence[Array]) -> int:
+    faces: list[Array] = []
+    for direction in directions:
+        unit = direction / np.linalg.norm(direction)
+        if all(float(unit @ face) < np.cos(np.pi / 4) for face in faces):
+            faces.append(unit)
+    return len(faces)

@@ -1,0 +1,208 @@
+"""The columns of another program's file that are wanted: by its heading, or by the map that `--columns` names."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from rig.config.column_map import TIMES, ColumnMap, ColumnSection, TableSection
+from rig.data.recording.motion_file import TIME, Header
+from rig.errors import Refused
+from rig.errors.quoting import quote, shorten
+from rig.estimation.arrays import Array
+from rig.observation.formats.csv_cells import DAY_S, is_value
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """The columns of another program's file.
+
+    - columns: by the rig's name of a column, its name in the file or its number from 1, and the factor to SI.
+    - skip_lines: lines before the heading.
+    - wraps: by the rig's name of a time, the number at which its counter begins again at 0.
+    - rate_hz: rows per second, for a file without times.
+    - missing: texts that stand for a blank cell.
+    """
+
+    columns: Mapping[str, tuple[str, float]]
+    skip_lines: int = 0
+    wraps: Mapping[str, float] = field(default_factory=dict)
+    rate_hz: float | None = None
+    missing: Sequence[str] = ()
+
+    @property
+    def is_by_number(self) -> bool:
+        """Whether all columns are named by their numbers, so that the file needs no heading."""
+        return bool(self.columns) and all(column.isdecimal() for column, _ in self.columns.values())
+
+
+def map_samples(columns: ColumnMap) -> Mapped | None:
+    """Return the map of a file of readings; None without one: then an unknown column is an error."""
+    return _unless_empty(
+        _build_map(columns.samples, columns.samples_skip_lines, columns.samples_rate_hz, columns.samples_missing)
+    )
+
+
+def map_motion(columns: ColumnMap) -> Mapped | None:
+    """Return the map of a file of sweeps or attitudes, as `map_samples`."""
+    return _unless_empty(
+        _build_map(columns.motion, columns.motion_skip_lines, columns.motion_rate_hz, columns.motion_missing)
+    )
+
+
+def map_table_log(table: TableSection, columns: ColumnMap) -> Mapped:
+    """Return the map of a rate table's log: `time_s`, and `angle_0`, `rate_0` and so on of its axes."""
+    sections = {TIME: table.time}
+    for index, axis in enumerate(table.axes):
+        sections[f"angle_{index}"] = axis.angle
+        if axis.rate is not None:
+            sections[f"rate_{index}"] = axis.rate
+    return _build_map(sections, columns.motion_skip_lines, None, columns.motion_missing)
+
+
+def _unless_empty(mapped: Mapped) -> Mapped | None:
+    is_needed = mapped.columns or mapped.skip_lines or mapped.rate_hz is not None or mapped.missing
+    return mapped if is_needed else None
+
+
+def _build_map(
+    sections: Mapping[str, ColumnSection], skip_lines: int, rate_hz: float | None, missing: Sequence[str]
+) -> Mapped:
+    return Mapped(
+        {name: (section.column, section.to_si) for name, section in sections.items()},
+        skip_lines,
+        {name: section.wraps_at for name, section in sections.items() if section.wraps_at is not None},
+        rate_hz,
+        tuple(missing),
+    )
+
+
+def unwrap_times(columns: Mapping[str, Array], mapped: Mapped | None, *, by_day: bool) -> dict[str, Array]:
+    """Return the columns with times that go on where a counter began again at 0, or a time of day `by_day`."""
+    unwrapped = dict(columns)
+    for name in TIMES:
+        period_s: float | None = DAY_S if by_day else None
+        if mapped is not None and name in mapped.wraps:
+            period_s = mapped.wraps[name] * mapped.columns[name][1]
+        if period_s is not None and name in columns:
+            unwrapped[name] = _unwrap(columns[name], period_s)
+    return unwrapped
+
+
+def _unwrap(time_s: Array, period_s: float) -> Array:
+    present = ~np.isnan(time_s)
+    falls = np.diff(time_s[present], prepend=time_s[present][:1]) < -period_s / 2
+    unwrapped = time_s.copy()
+    unwrapped[present] += period_s * np.cumsum(falls)
+    return unwrapped
+
+
+def select_columns(
+    path: Path, headings: Sequence[str], width: int, header: Header, mapped: Mapped | None
+) -> dict[int, str]:
+    """Return the rig's names of the columns to read, by their indices, out of `width`.
+
+    Raise Refused `wrong_columns`, `wrong_unit`.
+    """
+    selected = dict(enumerate(headings)) if mapped is None else _select_mapped(path, headings, width, header, mapped)
+    _check_columns(path, [*selected.values()], header.needed, header.one_of, header.optional)
+    return selected
+
+
+def _select_mapped(path: Path, headings: Sequence[str], width: int, header: Header, mapped: Mapped) -> dict[int, str]:
+    indices = {name: _find_column(path, headings, width, name, column) for name, (column, _) in mapped.columns.items()}
+    if len(set(indices.values())) < len(indices):
+        names = [name for name, index in indices.items() if [*indices.values()].count(index) > 1]
+        raise Refused(
+            "wrong_columns",
+            f"one column of {path} is to be {' and '.join(names)}",
+            "Name another column for each of them",
+        )
+    own_names = (*header.needed, *header.one_of, *(name for group in header.optional for name in group))
+    unmapped_names = {
+        index: name for index, name in enumerate(headings) if name in own_names and name not in mapped.columns
+    }
+    return {**unmapped_names, **{index: name for name, index in indices.items()}}
+
+
+def _find_column(path: Path, headings: Sequence[str], width: int, name: str, column: str) -> int:
+    """Return the index of a column that is named by the heading, or by its number from 1."""
+    named = [index for index, heading in enumerate(headings) if heading == column]
+    named = named or [index for index, heading in enumerate(headings) if heading.strip() == column.strip(" #%")]
+    if not named and column.isdecimal():
+        if not 1 <= int(column) <= width:
+            what = f"{path} has {width} columns, and column {column} is to be {name}"
+            raise Refused("wrong_columns", what, "Count its columns from 1")
+        return int(column) - 1
+    if len(named) != 1:
+        numbers = " and ".join(str(index + 1) for index in named[:5])
+        how = f"{len(named)} times, as columns {numbers}" if named else "nowhere"
+        remedy = f"Name one of its columns: {shorten(', '.join(headings))}; or say how many lines stand before them"
+        raise Refused(
+            "wrong_columns",
+            f"{path} has the column {quote(column)} {how}, which is to be {name}",
+            "Give the number of the one that is meant in place of its name" if named else remedy,
+        )
+    return named[0]
+
+
+def check_headings(path: Path, headings: Sequence[str]) -> None:
+    """Raise Refused `wrong_columns` for a first row that cannot be one of names."""
+    what = None
+    if len(headings) == 1 and len(headings[0].split()) > 1:
+        what = f"divides its columns neither by commas nor by semicolons, tabs or spaces: {shorten(headings[0])}"
+    elif headings and all(map(is_value, headings)):
+        what = f"has numbers in its first row and no names of columns: {shorten(', '.join(headings))}"
+    if what is not None:
+        raise Refused(
+            "wrong_columns",
+            f"{path} {what}",
+            "Write the columns' names into the first row, divided as all rows are, by commas, semicolons or tabs; "
+            "or say with --columns how many lines stand before it, or the columns by their numbers; "
+            "rig look FILE shows what is in it",
+        )
+
+
+def _check_columns(
+    path: Path,
+    names: Sequence[str],
+    columns: Sequence[str],
+    alternatives: Sequence[str],
+    optional: Sequence[Sequence[str]],
+) -> None:
+    own_names = (*columns, *alternatives, *(name for group in optional for name in group))
+    for name in names:
+        alike = [column for column in own_names if _quantity(column) == _quantity(name) and column not in names]
+        meant = [column for column in alike if column in columns] or alike
+        if name not in own_names and "_" in name and meant and not name.startswith("axis"):
+            raise Refused(
+                "wrong_unit",
+                f"{path} has a column {shorten(name)} where {' or '.join(meant)} belongs",
+                f"Convert it to the unit in the name {' or '.join(meant)}, or say its unit with --columns",
+            )
+    needed = [*columns, *(name for group in optional if set(group) & set(names) for name in group)]
+    problems = [f"lacks {name}" for name in needed if name not in names]
+    problems += [f"names {name} twice" for name in own_names if names.count(name) > 1]
+    present = [name for name in names if name in alternatives]
+    if alternatives and len(set(present)) != 1:
+        problems.append(f"has {' and '.join(present) or 'none'} of {', '.join(alternatives)}")
+    if "" in names:
+        problems.append("has a column without a name")
+    unknown = ", ".join(name for name in names if name and name not in own_names)
+    if unknown:
+        problems.append(f"has the unknown {shorten(unknown)}")
+    if problems:
+        wanted = ", ".join(columns) + (f" and one of {', '.join(alternatives)}" if alternatives else "")
+        more = "".join(f"; {', '.join(group)} may stand there too" for group in optional)
+        remedy = (
+            f"Its first row must name {wanted}{more}; or say with --columns which of its columns is what: "
+            "rig look FILE --write columns.yaml writes it"
+        )
+        raise Refused("wrong_columns", f"{path} {', '.join(problems)}", remedy)
+
+
+def _quantity(name: str) -> str:
+    """Return the quantity in a column's name: `rate_x` of `rate_x_rad_s`, `x` of `x_rad_s`."""
+    words = name.split("_")
+    return "_".join(words[:2]) if words[0] == "rate" else words[0]

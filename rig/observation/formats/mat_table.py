@@ -1,0 +1,153 @@
+"""MATLAB's files (`.mat`) as tables: each column of a variable, or of a struct's field, is a column of the table.
+
+Columns have the names by which MATLAB knows them: `t` of a vector, `gyro(:,2)` of a matrix, `imu.gyro(:,2)` of a
+struct. SciPy reads versions 4 to 7, h5py version 7.3. Both run in a process of its own, and read numbers only: no
+object, no function, no link to another file.
+"""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.data.recording.motion_file import Header
+from rig.errors import Refused
+from rig.errors.quoting import listing, quote, shorten
+from rig.estimation.arrays import Array
+from rig.observation.formats.column_selection import Mapped
+
+SUFFIX = ".mat"
+HDF5_HEADER = b"MATLAB 7.3"
+DEEPEST = 4  # structs inside structs
+MOST_COLUMNS = 1000
+BLOCK_ROWS = 8192  # whose cells are in memory at a time
+OBJECT = ("s0", "s1", "s2", "arr")  # fields of what SciPy reads of a MATLAB object
+
+
+def is_mat(path: Path) -> bool:
+    """Return whether a path is such a file."""
+    return path.suffix.lower() == SUFFIX
+
+
+def read_mat_rows(path: Path, header: Header, mapped: Mapped | None) -> Iterator[list[str]]:
+    """Yield the names of all columns of a file, then its rows, whose cells are blank but for those that are wanted.
+
+    Wanted are the columns of the map, and those with the rig's own names. Raise Refused `wrong_columns` if they differ
+    in length; for a damaged file whatever its parser raises.
+    """
+    columns = read_mat_columns(path)
+    names = [*columns]
+    yield names
+    usual = {*header.needed, *header.one_of, *(name for group in header.optional for name in group)}
+    if mapped is not None:
+        in_map = [column for column, _ in mapped.columns.values()]
+        usual |= {*in_map, *(names[int(column) - 1] for column in in_map if _is_number_of(column, names))}
+    wanted = [name for name in names if name in usual]
+    for first, second in pairwise(wanted):
+        if len(columns[first]) != len(columns[second]):
+            raise Refused(
+                "wrong_columns",
+                f"{path}: {quote(first)} has {len(columns[first])} rows, and {quote(second)} {len(columns[second])}",
+                "Name columns of one table, with one time",
+            )
+    count = len(columns[wanted[0]]) if wanted else 0
+    for start in range(0, count, BLOCK_ROWS):
+        block = slice(start, start + BLOCK_ROWS)
+        blank = [""] * (min(count, start + BLOCK_ROWS) - start)
+        cells = [[*map(repr, columns[name][block].tolist())] if name in wanted else blank for name in names]
+        yield from map(list, zip(*cells, strict=True))
+
+
+def _is_number_of(column: str, names: list[str]) -> bool:
+    return column.isdecimal() and column not in names and 1 <= int(column) <= len(names)
+
+
+def read_mat_columns(path: Path) -> dict[str, Array]:
+    """Return all columns of numbers in a file, by name. Raise Refused `wrong_columns` for a file without any."""
+    with path.open("rb") as file:
+        is_hdf5 = file.read(len(HDF5_HEADER)) == HDF5_HEADER
+    objects: list[str] = []
+    columns: dict[str, Array] = {}
+    for name, values in _read_hdf5(path, objects) if is_hdf5 else _read_classic(path, objects):
+        for column, numbers in _split(name, values):
+            columns[column] = numbers
+            if len(columns) > MOST_COLUMNS:
+                raise ValueError(f"it holds more than {MOST_COLUMNS} columns")
+    if not columns:
+        what = (
+            f"holds no numbers but in objects, which MATLAB alone can read: {listing(map(shorten, objects))}"
+            if objects
+            else "holds no numbers"
+        )
+        raise Refused(
+            "wrong_columns",
+            f"{path} {what}",
+            "Save plain matrices, or write tables from MATLAB: writetimetable(T, 'log.csv'), writetable(T, 'log.csv')",
+        )
+    return columns
+
+
+def _split(name: str, values: Array) -> Iterator[tuple[str, Array]]:
+    """Yield the columns of a matrix, or its rows if it is wider than high, by MATLAB's names."""
+    if min(values.shape) == 1:
+        yield name, values.ravel()
+    elif values.shape[0] >= values.shape[1]:
+        yield from ((f"{name}(:,{index + 1})", values[:, index]) for index in range(values.shape[1]))
+    else:
+        yield from ((f"{name}({index + 1},:)", values[index]) for index in range(values.shape[0]))
+
+
+def _read_classic(path: Path, objects: list[str]) -> Iterator[tuple[str, Array]]:
+    """Yield the matrices (r, c) of a file of version 4 to 7; append the names of objects."""
+    from scipy.io import loadmat
+
+    contents: dict[str, Any] = loadmat(str(path), appendmat=False)
+    for name, value in contents.items():
+        if not name.startswith("__"):
+            yield from _walk(name, value, objects)
+
+
+def _walk(name: str, value: Any, objects: list[str], depth: int = 0) -> Iterator[tuple[str, Array]]:
+    fields = value.dtype.names if isinstance(value, np.ndarray) else None
+    if fields is None:
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim == 2 and value.size > 1:
+            yield name, value.astype(np.float64)
+    elif fields == OBJECT:
+        objects.append(str(value["s0"].flat[0].decode()) if name == "None" else name)
+    elif value.size == 1 and depth < DEEPEST:
+        for field in fields:
+            yield from _walk(f"{name}.{field}", value[field].flat[0], objects, depth + 1)
+
+
+def _read_hdf5(path: Path, objects: list[str]) -> Iterator[tuple[str, Array]]:
+    """Yield the matrices (r, c) of a file of version 7.3; append the names of objects."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        yield from _walk_group(file, "", objects)
+
+
+def _walk_group(group: Any, prefix: str, objects: list[str], depth: int = 0) -> Iterator[tuple[str, Array]]:
+    import h5py
+
+    for name in group:
+        if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        member, full_name = group[name], f"{prefix}{name}"
+        if "MATLAB_object_decode" in member.attrs:
+            objects.append(full_name)
+        elif isinstance(member, h5py.Group):
+            if depth < DEEPEST:
+                yield from _walk_group(member, f"{full_name}.", objects, depth + 1)
+        elif (
+            isinstance(member, h5py.Dataset)
+            and member.dtype.kind in "fiub"
+            and member.ndim == 2
+            and member.size > 1
+            and not member.external
+            and not member.is_virtual
+            and member.attrs.get("MATLAB_class", b"double") not in (b"char", b"cell")
+        ):
+            yield full_name, np.asarray(member[()], dtype=np.float64).T

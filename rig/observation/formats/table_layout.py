@@ -1,0 +1,236 @@
+"""The layout of a text table of unknown origin: its heading, its columns of numbers, and its column of time."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from rig.config.column_map import ALLOWED
+from rig.config.units import TIME, UNITS
+from rig.data.processes.reading_process import Part
+from rig.data.recording.motion_file import LARGEST_NUMBER
+from rig.errors import Refused
+from rig.observation.formats.csv_cells import is_number, is_value, seconds_of, unit_of
+from rig.observation.formats.csv_text import is_harmless, read_rows
+from rig.observation.formats.mat_table import is_mat, read_mat_columns
+from rig.observation.formats.table_parts import parts_read_apart
+
+MOST_SKIPPED = 100  # lines before the heading
+SAMPLED_ROWS = 400
+MISSING = frozenset({"NaN", "nan", "NAN", "NA", "N/A", "null", "None", "-", "--"})
+TIME_NAME = re.compile(
+    r"(sys|sample|sensor|elapsed|header|gps)?_?(time|timestamp|t|ts|stamp|millis|micros|sec|seconds)_?\w{0,3}"
+)
+IN_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
+AFTER_UNDERSCORE = re.compile(r"_(deg_s|dps|mdps|rad_s|m_s2|mg|g|ms|us|ns|s|deg|rad|t|ut|c)$", re.IGNORECASE)
+UNDERSCORED = {"deg_s": "deg/s", "rad_s": "rad/s", "m_s2": "m/s2", "t": "T", "ut": "uT", "c": "C"}
+LIKELY_HZ = 100.0  # the sample rate that a unit of time is chosen for
+EPOCH_S = (9e8, 4.2e9)  # seconds since 1970: from 1998 to 2103
+
+
+@dataclass(frozen=True, slots=True)
+class TableLayout:
+    """The layout of a table.
+
+    - skip_lines: lines before the heading.
+    - headings: the names of the columns, "" without one; units: as the heading or the row below it says, or "".
+    - numbers: the indices of the columns of numbers; texts: of the others that are not blank.
+    - time: the index of the column of time, or None; time_unit: of its numbers, None if it is a text.
+    - missing: the texts that stand for missing values.
+    - rows: their number.
+    """
+
+    skip_lines: int
+    headings: tuple[str, ...]
+    units: tuple[str, ...]
+    numbers: tuple[int, ...]
+    texts: tuple[int, ...]
+    time: int | None
+    time_unit: str | None
+    missing: tuple[str, ...]
+    rows: int
+    is_shifted: bool = False  # rows have a cell more than the heading has names
+
+    @property
+    def has_heading(self) -> bool:
+        """Whether the file names its columns."""
+        return any(self.headings)
+
+    def name(self, index: int) -> str | int:
+        """Return how a map of columns names one of them: by its heading, or by its number from 1."""
+        heading = self.headings[index]
+        is_name = heading and self.headings.count(heading) == 1 and not self.is_shifted
+        return heading if is_name else index + 1
+
+
+def find_layout(path: Path, largest_mb: int) -> TableLayout:
+    """Return the layout of a text table or a `.mat` file. Raise Refused as `read_table`."""
+    arguments = {"largest_mb": largest_mb}
+    if not is_mat(path) and is_harmless(path, largest_mb):
+        (part,) = layout_parts(path, **arguments)
+    else:
+        reader = "rig.observation.formats.table_layout:layout_parts"
+        (part,) = parts_read_apart(reader, path, arguments, else_="cannot be read", remedy="Give a table of readings")
+    layout: Any = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in cast("dict[str, Any]", part).items()
+    }
+    return TableLayout(**layout)
+
+
+def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
+    """Yield the layout of a file as one part. Raise Refused `wrong_columns` if no rows of numbers are in it."""
+    if is_mat(path):
+        columns = read_mat_columns(path)
+        rows = max(map(len, columns.values()))
+        columns = {name: column for name, column in columns.items() if len(column) == rows}
+        count = min(rows, SAMPLED_ROWS)
+        cells = list(
+            map(list, zip(*([*map(repr, column[:count].tolist())] for column in columns.values()), strict=True))
+        )
+        yield _describe(0, [*columns], [""] * len(columns), cells, ["nan"] if _have_nan(columns) else [], rows)
+        return
+    skip, heading = _find_beginning(path, largest_mb)
+    data = read_rows(path, largest_mb, skip)
+    if heading:
+        next(data)
+    sampled: list[list[str]] = []
+    units, missing, count = [""] * len(heading), set[str](), 0
+    for row in data:
+        if not any(map(str.strip, row)):
+            continue
+        if not count and not any(map(is_value, row)) and any(map(unit_of, row)):
+            units = [cell.strip() for cell in row]
+            continue
+        count += 1
+        missing |= MISSING.intersection(map(str.strip, row))
+        if len(sampled) < SAMPLED_ROWS:
+            sampled.append(row)
+    width = max([len(heading), *(len(row) for row in sampled[:2])])
+    shift = width - len(heading) if heading and len(heading) == width - 1 else 0  # R names no column of row numbers
+    headings = [""] * shift + [name.strip() for name in heading]
+    headings += [""] * (width - len(headings))
+    units = [""] * shift + units + [""] * (width - shift - len(units))
+    cells = [[*row[:width], *[""] * (width - len(row))] for row in sampled]
+    yield {**_describe(skip, headings, units, cells, sorted(missing), count), "is_shifted": bool(shift)}
+
+
+def _have_nan(columns: Any) -> bool:
+    return any(np.isnan(column).any() for column in columns.values())
+
+
+def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
+    """Return the lines to skip and the heading that follows, empty without one. Raise Refused `wrong_columns`."""
+    for skip in range(MOST_SKIPPED):
+        rows = [*islice(read_rows(path, largest_mb, skip), 6)]
+        if len(rows) < 3:
+            break
+        head, *below = ([cell.strip() for cell in row] for row in rows)
+        data = [row for row in below if sum(map(is_value, row)) >= 2]
+        if len(data) < 2 or not len(data[0]) - 1 <= len([*head]) <= len(data[0]) + 1:
+            continue
+        values = sum(map(is_value, head))
+        if values >= 2:
+            return skip, []
+        if sum(map(bool, head)) >= 2:
+            return skip, head
+    raise Refused(
+        "wrong_columns",
+        f"{path} has no rows of numbers below a heading in its first {MOST_SKIPPED} lines",
+        "Give a table: a row for each reading, numbers in columns",
+    )
+
+
+def _describe(  # noqa: PLR0917
+    skip: int, headings: list[str], units: list[str], cells: list[list[str]], missing: list[str], rows: int
+) -> dict[str, Any]:
+    columns = [
+        [cell.strip() for cell in column if cell.strip() not in {"", *missing}] for column in zip(*cells, strict=True)
+    ]
+    stated = [unit or unit_in(heading) for heading, unit in zip(headings, units, strict=True)]
+    numbers = [index for index, column in enumerate(columns) if column and all(map(is_number, column))]
+    times = [index for index, column in enumerate(columns) if column and all(map(is_value, column))]
+    time = _find_time(headings, stated, columns, times)
+    time_unit = None if time is None or time not in numbers else _time_unit(headings[time], stated[time], columns[time])
+    return {
+        "skip_lines": skip,
+        "headings": headings,
+        "units": stated,
+        "numbers": [index for index in numbers if index == time or _largest(columns[index]) < LARGEST_NUMBER],
+        "texts": [index for index, column in enumerate(columns) if column and index not in numbers and index != time],
+        "time": time,
+        "time_unit": time_unit,
+        "missing": missing,
+        "rows": rows,
+    }
+
+
+def unit_in(heading: str) -> str:
+    """Return the unit that a heading states in brackets or at its end, as `UNITS` spells it, or ""."""
+    if (match := IN_BRACKETS.search(heading)) is not None:
+        text = re.sub(r"\s*(s)\^?-(\d)", lambda power: f"/s{power[2] if power[2] != '1' else ''}", match[1])
+        return next((name for name in (text, text.replace("^", "")) if name in UNITS), "")
+    if (match := AFTER_UNDERSCORE.search(heading)) is not None:
+        return UNDERSCORED.get(match[1].lower(), match[1].lower())
+    return ""
+
+
+def _largest(column: Sequence[str]) -> float:
+    return max(abs(float(cell)) for cell in column)
+
+
+def _find_time(
+    headings: Sequence[str], units: Sequence[str], columns: Sequence[Sequence[str]], times: Sequence[int]
+) -> int | None:
+    """Return the column of time: by its name or unit, or the first that increases; those whose values rise alone."""
+    rising = [index for index in times if _rises(columns[index])]
+    for index in rising:
+        name = re.sub(r"\W+", "_", IN_BRACKETS.sub("", headings[index]).strip().lower()).strip("_")
+        if TIME_NAME.fullmatch(name.rpartition(".")[2]) or (
+            units[index] in UNITS and UNITS[units[index]].quantity == TIME
+        ):
+            return index
+    unlike_counts = [index for index in rising if not _counts(columns[index])]
+    return next(iter(unlike_counts), None)
+
+
+def _rises(column: Sequence[str]) -> bool:
+    """Return whether a column never falls but where a counter begins again, and mostly rises."""
+    try:
+        steps = np.diff([float(seconds_of(cell, 1.0)) for cell in column])
+    except (ValueError, ArithmeticError):
+        return False
+    return len(steps) > 1 and bool((steps < 0).sum() <= 2 and (steps > 0).mean() > 0.1 and np.median(steps) >= 0)
+
+
+def _counts(column: Sequence[str]) -> bool:
+    """Return whether a column goes on by ones, as row numbers do."""
+    return is_number(column[0]) and bool((np.diff([float(cell) for cell in column]) == 1).all())
+
+
+def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
+    """Return the unit of time that the heading states, or that fits the numbers: a date, or a likely sample rate."""
+    if unit in ALLOWED and UNITS[unit].quantity == TIME:
+        return unit
+    name = heading.lower()
+    for word, meant in (
+        ("milli", "ms"),
+        ("micro", "us"),
+        ("nano", "ns"),
+        ("nsec", "ns"),
+        ("usec", "us"),
+        ("msec", "ms"),
+    ):
+        if word in name:
+            return meant
+    values = np.array([float(cell) for cell in column])
+    sizes = {name: UNITS[name].size for name in ("s", "ms", "us", "ns")}
+    for name, size in sizes.items():
+        if EPOCH_S[0] < values[0] * size < EPOCH_S[1]:
+            return name
+    steps = np.diff(values)
+    step = float(np.mean(steps[steps >= 0]))
+    return min(sizes, key=lambda name: abs(np.log(max(step, 1e-12) * sizes[name] * LIKELY_HZ)))

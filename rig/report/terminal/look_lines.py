@@ -1,0 +1,190 @@
+"""What a file of another program holds, and what it allows, as lines for a terminal of 80 columns."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.analysis.external.convention import Convention
+from rig.analysis.log_contents import LookedFile, Trial
+from rig.data.quantity import ACCELERATION, RATE
+from rig.errors import RigError
+from rig.errors.quoting import shorten
+from rig.observation.external.log_survey import LogSurvey
+from rig.observation.formats.table_layout import TableLayout
+from rig.sensors.lines.log_columns import LogColumns
+
+WIDTH = 14
+COLUMNS = (
+    ("time", "time_s"),
+    ("gyroscope", "x_rad_s", "y_rad_s", "z_rad_s"),
+    ("accelerometer", "x_m_s2", "y_m_s2", "z_m_s2"),
+    ("magnetometer", "x_t", "y_t", "z_t"),
+    ("temperature", "temperature_c"),
+    ("quaternion", "qw", "qx", "qy", "qz"),
+)
+NAMES_SHOWN = 46  # characters
+PLACEHOLDER = "ATTITUDES.csv"
+LEAST_LAG_S = 0.004
+
+
+def describe_file(looked: LookedFile) -> Iterator[str]:
+    """Yield the file's form, its columns, and what is in it."""
+    if looked.layout is not None and looked.guess is not None:
+        yield from _describe_table(looked.path, looked.layout, looked.guess)
+    else:
+        yield f"{looked.path}:"
+    if looked.others:
+        yield _row("other rows", f"{looked.others}, with readings of other sensors alone")
+    if looked.note:
+        yield _row("note", looked.note)
+    if looked.survey is not None:
+        yield from _describe_readings(looked, looked.survey)
+    if looked.attitudes is not None:
+        yield from _describe_attitudes(looked.attitudes)
+    for refusal in looked.refusals:
+        yield _row("refused", str(refusal))
+
+
+def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Iterator[str]:
+    heading = f"heading in line {layout.skip_lines + 1}" if layout.has_heading else "no heading"
+    yield f"{path}: {layout.rows} rows, {len(layout.headings)} columns, {heading}"
+    if layout.is_shifted:
+        yield _row("note", "the rows have a cell more than the heading: columns are named by number")
+    entries = {**guess.motion, **guess.samples}
+    for name, *columns in COLUMNS:
+        if columns[0] in entries:
+            yield _row(name, _spell(*(entries[column] for column in columns)))
+    if guess.others:
+        yield _row("not read", shorten(" ".join(guess.others)))
+    for gap in guess.gaps:
+        yield _row("CANNOT TELL", gap)
+    if layout.missing:
+        yield _row("missing", f"values are written as {' '.join(layout.missing)}")
+
+
+def describe_convention(convention: Convention | None) -> Iterator[str]:
+    """Yield what the gyroscope shows of the quaternions."""
+    if convention is None:
+        yield _row("direction", "the gyroscope does not show that of the quaternions: is it one body and one clock?")
+        return
+    order = "x y z w" if convention.scalar_last else "w x y z"
+    direction = "room to body (motion_inverse)" if convention.inverse else "body to room"
+    yield _row("direction", f"{direction}, read as {order}: {100 * convention.explained:.2f} % of the motion agrees")
+    if convention.up:
+        yield _row("up", f"{convention.up} of the room, by the accelerometer")
+    if abs(convention.lag_s) >= LEAST_LAG_S:
+        later = "readings" if convention.lag_s > 0 else "attitudes"
+        yield _row("clock", f"the {later} come {1e3 * abs(convention.lag_s):.0f} ms later; the solution finds this")
+
+
+@dataclass(frozen=True, slots=True)
+class TriedSolutions:
+    """The files and what was tried: the map's file, why it is no log at rest, the axis upwards, whether clocks differ.
+
+    `turns`, `attitudes`: the solutions that were tried, None if none was.
+    """
+
+    columns: Path | None
+    at_rest: RigError | None
+    up: str
+    finds_clock: bool
+    turns: Trial | None
+    attitudes: Trial | None
+
+
+def describe_solutions(looked: LookedFile | None, reference: LookedFile | None, tried: TriedSolutions) -> Iterator[str]:
+    """Yield which solutions the files allow, with the command of each."""
+    option = "" if tried.columns is None else f" --columns {tried.columns}"
+    if looked is None or looked.survey is None:
+        if reference is not None:
+            yield "with the log of a sensor that was turned with it:"
+            yield f"  rig look LOG {reference.path}"
+        return
+    log = looked.path
+    yield "what it allows:"
+    why = None if tried.at_rest is None else tried.at_rest.what
+    yield _row("at rest", f"rig allan {log}{option}" if why is None else f"no: {why}")
+    if tried.turns is not None:
+        command = f"rig solve {log} --turns --clock-ppm 50{option}"
+        why = tried.turns.obstacle
+        yield _row("by hand", command if why is None else f"no: {why}")
+    if RATE in looked.quantities:
+        yield from _describe_sweeps(looked.survey, f"rig solve {log} --sweeps SWEEPS.csv{option}")
+    if reference is None:
+        yield _row("attitudes", f"rig solve {log} --attitudes {PLACEHOLDER}{option}")
+        yield _row("", f"{PLACEHOLDER} says when the body was how: time_s qw qx qy qz")
+    elif tried.attitudes is not None:
+        options = " --any-mounting" + (f" --up={tried.up}" if tried.up not in ("", "+z") else "")
+        options += " --estimate-clock-offset" if tried.finds_clock else ""
+        options += "".join(f" --only {sensor}" for sensor in tried.attitudes.only)
+        why = tried.attitudes.obstacle
+        command = f"rig solve {log} --attitudes {reference.path}{option}{options}"
+        yield _row("attitudes", command if why is None else f"no: {why}")
+
+
+def _describe_sweeps(survey: LogSurvey, command: str) -> Iterator[str]:
+    if turns := sum(survey.turns.values()):
+        yield _row("sweeps", command)
+        yield _row("", f"SWEEPS.csv states the {turns} turns: start_s end_s axis_x axis_y axis_z angle_rad")
+    else:
+        yield _row("sweeps", "no turn from rest to rest; steady turns need a file that states them")
+
+
+def _row(name: str, text: str) -> str:
+    return f"  {name:<{WIDTH}}{text}"
+
+
+def _spell(*entries: Mapping[str, Any]) -> str:
+    names = " ".join(str(entry["column"]) for entry in entries)
+    entry = entries[0]
+    unit = str(entry.get("unit", "date and time" if len(entries) == 1 else ""))
+    if "lsb_per_unit" in entry:
+        unit = f"{entry['lsb_per_unit']} steps a {unit}"
+    if "factor" in entry:
+        unit = f"{entry['factor']:g} {unit} a step"
+    wraps = f", begins again at {entry['wraps_at']}" if "wraps_at" in entry else ""
+    unit = "" if unit == "1" else unit
+    return f"{shorten(names)[:NAMES_SHOWN]:<24} {unit}{wraps}".rstrip()
+
+
+def _describe_readings(looked: LookedFile, survey: LogSurvey) -> Iterator[str]:
+    sampling = survey.sampling
+    rate = f"{1 / sampling.interval_s:.5g} Hz over {survey.span_s:.1f} s"
+    arrival = ", stamped on arrival, several at once" if sampling.on_arrival else ""
+    uncounted = f", about {100 * sampling.scattered:.1f} % missing at unknown times" if sampling.scattered else ""
+    yield _row("sampling", rate + arrival + uncounted)
+    if survey.gaps:
+        longest = max(survey.gaps, key=lambda gap: gap.lasts_s)
+        missing = sum(gap.missing for gap in survey.gaps)
+        yield _row("gaps", f"{len(survey.gaps)}, {missing} readings missing; the longest {longest.lasts_s:.3g} s after "
+                   f"{longest.start_s:.10g} s, row {longest.row}")  # fmt: skip
+    else:
+        yield _row("gaps", "none")
+    for quantity, largest in survey.largest.items():
+        rest = f", {survey.at_rest[quantity]:.4g} at rest" if quantity in survey.at_rest else ""
+        more = f" ({np.degrees(largest):.4g} °/s)" if quantity == RATE else ""
+        yield _row(quantity.sensor, f"up to {largest:.4g} {quantity.unit}{more}{rest}")
+    if survey.rests:
+        lengths = [rest.end_s - rest.start_s for rest in survey.rests]
+        faces = f"; gravity in {survey.faces} directions" if ACCELERATION in looked.quantities else ""
+        yield _row("rests", f"{len(lengths)}, of {min(lengths):.3g} to {max(lengths):.3g} s, "
+                   f"{sum(lengths):.4g} s in all{faces}")  # fmt: skip
+    else:
+        yield _row("rests", "none")
+    if survey.turns:
+        turns = ", ".join(f"{axis} {count}" for axis, count in survey.turns.items())
+        yield _row("turns", f"from rest to rest, by axis: {turns}")
+
+
+def _describe_attitudes(attitudes: Mapping[str, Any]) -> Iterator[str]:
+    middles_s = np.sort((attitudes["start_s"] + attitudes["end_s"]) / 2)
+    steps_s = np.diff(middles_s)
+    usual_s = float(np.median(steps_s)) if len(steps_s) else 0.0
+    rate = f"{1 / usual_s:.4g} Hz" if usual_s > 0 else "one time"
+    yield _row("attitudes", f"{len(middles_s)} rows at {rate}, from {middles_s[0]:.10g} to {middles_s[-1]:.10g} s")
+    if usual_s > 0 and (longest := float(steps_s.max())) > 3 * usual_s:
+        at_s = float(middles_s[int(steps_s.argmax())])
+        yield _row("", f"the longest step lasts {longest:.3g} s, after {at_s:.10g} s")

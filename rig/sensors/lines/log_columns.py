@@ -1,0 +1,247 @@
+"""A map of the columns of an unknown log, as `--columns` takes it: by headings, and by what the numbers can be."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.config.units import UNITS
+from rig.data.recording.motion_file import MOTIONS
+from rig.estimation.arrays import Array
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
+from rig.observation.formats.table_layout import TableLayout
+from rig.sensors.lines.guessing import guess_triads
+
+NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
+SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
+SI_UNITS = {"g": "rad/s", "a": "m/s2", "m": "T"}
+OPEN = "?"  # where a number is still to be stated
+LIKELY_HZ = 100.0  # of a log without times
+LARGEST_COUNT = 500.0  # whole numbers beyond it are steps of a converter
+BLOCK_S, QUIETEST, AS_QUIET = 0.25, 0.1, 3.0  # a block as quiet as the quietest tenth is at rest
+LARGEST_RAD_S, NOISIEST_RAD_S = 40.0, 0.02  # more than a gyroscope reads in rad/s, or scatters at rest
+NORM_TOLERANCE = 2e-3
+AXES = ("x", "y", "z")
+REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
+QUATERNION = ("qw", "qx", "qy", "qz")
+QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")
+DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
+GRAVITY = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
+ROUND_STEPS = (131.0, 65.5, 32.8, 16.4)  # steps per °/s, as data sheets state them
+
+
+@dataclass(frozen=True, slots=True)
+class LogColumns:
+    """The columns of a log: maps of `samples` and `motion` as in the file of `--columns`, and sentences on them.
+
+    `reasons` say what decided, `gaps` what nothing shows; `others` are the columns that are not read.
+    """
+
+    samples: Mapping[str, Mapping[str, Any]]
+    motion: Mapping[str, Mapping[str, Any]]
+    reasons: Sequence[str] = ()
+    gaps: Sequence[str] = ()
+    others: Sequence[str] = field(default_factory=tuple)
+
+
+def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> LogColumns:
+    """Return the map of a log with numbers (n, k) in the columns of its layout, at `time` (n,), None without times.
+
+    Times are in the layout's unit. Values may be NaN in rows that belong to other sensors.
+    """
+    unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
+    rate_hz = LIKELY_HZ if time is None else _mean_rate_hz(unit_s * time)
+    quaternion = _find_quaternion(layout, values)
+    names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
+    used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
+    free = [index for index in layout.numbers if index not in used]
+    groups = _complete_rows(values, free)
+    samples: dict[str, dict[str, Any]] = {}
+    reasons: list[str] = []
+    gaps: list[str] = []
+    for rows, indices in groups:
+        part = values[rows][:, indices]
+        still = find_still(part, rate_hz * len(part) / max(len(values), 1))
+        guessed = guess_triads(tuple(names[index] for index in indices), part, still, rate_hz)
+        is_nameless = not any(names[index] for index in indices) or not guessed.units
+        if is_nameless and len(indices) == 3 and "x_rad_s" not in samples and set(guessed.units) <= {"m"}:
+            guessed = guess_triads(("gx", "gy", "gz"), part, still, rate_hz)
+            gaps.append("whether the three columns are a gyroscope: nothing contradicts it")
+        for kind, suffix in NAMES.items():
+            if kind not in guessed.units or f"x{suffix}" in samples:
+                continue
+            positions = [guessed.columns.index(kind + axis) for axis in "xyz"]
+            stated = layout.units[indices[positions[0]]]
+            unit, reason = _unit_of(kind, dict(guessed.units[kind]), part[:, positions], still)
+            if stated in UNITS and UNITS[stated].quantity == UNITS[SI_UNITS[kind]].quantity:
+                unit, reason = _compare_stated(kind, stated, part[:, positions], still)
+            for axis, position in zip("xyz", positions, strict=True):
+                samples[axis + suffix] = {"column": layout.name(indices[position]), **unit}
+            if reason:
+                gaps.append(f"the unit of the {SENSORS[kind]}: {reason}")
+        if "temperature" in guessed.columns and "temperature_c" not in samples:
+            index = indices[guessed.columns.index("temperature")]
+            samples["temperature_c"] = {"column": layout.name(index), "unit": "C"}
+    timed = {} if layout.time is None else {"time_s": _time_entry(layout, time)}
+    if layout.time is None:
+        gaps.append("no column of time: state samples_rate_hz")
+    motion = {name: {"column": layout.name(index), "unit": "1"} for name, index in quaternion.items()}
+    read = {entry["column"] for entry in (*samples.values(), *motion.values(), *timed.values())}
+    others = [
+        layout.headings[index] or f"column {index + 1}"
+        for index in range(len(layout.headings))
+        if layout.name(index) not in read and (layout.headings[index] or index in layout.numbers)
+    ]
+    return LogColumns(
+        {**timed, **samples} if samples else {}, {**timed, **motion} if motion else {}, reasons, gaps, others
+    )
+
+
+def _name_once(names: list[str]) -> list[str]:
+    """Return names, blank where one occurs again: of two sensors the first is read."""
+    return [name if name not in names[:index] else "" for index, name in enumerate(names)]
+
+
+def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
+    """Return the rows (n,) at rest: in blocks in which no column scatters more than in the quietest."""
+    width = max(int(BLOCK_S * rate_hz), 5)
+    count = len(values) // width
+    if count < 2:
+        return np.ones(len(values), dtype=np.bool_)
+    scatter = values[: count * width].reshape(count, width, -1).std(axis=1)
+    still = (scatter <= AS_QUIET * np.maximum(np.quantile(scatter, QUIETEST, axis=0), 1e-12)).all(axis=1)
+    rows = np.repeat(still, width)
+    return np.append(rows, np.full(len(values) - len(rows), rows[-1]))
+
+
+def _mean_rate_hz(time_s: Array) -> float:
+    steps = np.diff(time_s[np.isfinite(time_s)])
+    steps = steps[steps > 0]
+    return 1 / float(np.mean(steps[steps <= np.quantile(steps, 0.99)])) if len(steps) else LIKELY_HZ
+
+
+def _plain_name(layout: TableLayout, index: int) -> str:
+    """Return a heading in the form that names of a device's columns have: `gyro_x [deg/s]`."""
+    name = layout.headings[index].rpartition(".")[2] if "(:" in layout.headings[index] else layout.headings[index]
+    if (match := re.fullmatch(r"(.*)\((?::,)?([1-3])(?:,:)?\)", name)) is not None:
+        name = f"{match[1]}_{'xyz'[int(match[2]) - 1]}"
+    name = re.sub(r"\s*[\[(].*?[\])]", "", name).strip()
+    words = [word for word in re.split(r"[\W_]+", re.sub(r"([a-z])([XYZ])\b", r"\1_\2", name).lower()) if word]
+    words = _strip_units(words)
+    if words and words[-1] not in AXES and words[0] in AXES:
+        words = [*words[1:], words[0]]
+    if len(words) > 2 and words[-1] in AXES:  # imu_angular_velocity_x, w_RS_S_x
+        kind = next((word for word in words[:-1] if word[:3] in KINDS or word in KINDS), None)
+        words = [KINDS.get(kind, KINDS.get(kind[:3], "")), words[-1]] if kind is not None else words
+    unit = layout.units[index]
+    return "_".join(words) + (f" [{unit}]" if unit else "")
+
+
+KINDS = {
+    "gyr": "gyro",
+    "ang": "gyro",
+    "omega": "gyro",
+    "w": "gyro",
+    "rot": "gyro",
+    "acc": "acc",
+    "lin": "acc",
+    "a": "acc",
+    "mag": "mag",
+}
+
+
+def _strip_units(words: list[str]) -> list[str]:
+    """Return the words of a heading up to the axis, if a unit follows: x_rad_s."""
+    axes = [position for position, word in enumerate(words) if word in AXES]
+    if axes and axes[-1] < len(words) - 1 and all(word in UNIT_WORDS for word in words[axes[-1] + 1 :]):
+        kind = {"rad": "gyro", "deg": "gyro", "dps": "gyro", "m": "acc", "t": "mag", "ut": "mag"}.get(
+            words[axes[-1] + 1]
+        )
+        before = words[: axes[-1]] or ([kind] if kind else [])
+        return [*before, words[axes[-1]]]
+    return words
+
+
+UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
+
+
+def _complete_rows(values: Array, free: Sequence[int]) -> list[tuple[NDArray[np.intp], list[int]]]:
+    """Return groups of columns whose numbers stand in the same rows, with these rows: one for each rate of a logger."""
+    groups: dict[bytes, list[int]] = {}
+    for index in free:
+        groups.setdefault(np.isfinite(values[:, index]).tobytes(), []).append(index)
+    return [(np.flatnonzero(np.isfinite(values[:, indices[0]])), indices) for indices in groups.values()]
+
+
+def _find_quaternion(layout: TableLayout, values: Array) -> dict[str, int]:
+    """Return the columns of a quaternion by qw qx qy qz: by their names, or four neighbours of length 1."""
+    named: dict[str, int] = {}
+    for index in layout.numbers:
+        name = re.sub(r"[\W_]+", "_", layout.headings[index].lower()).strip("_")
+        if (match := QUATERNION_NAME.fullmatch(name)) is not None:
+            named.setdefault(DIGITS.get(match[1], f"q{match[1]}"), index)
+    if set(named) == set(QUATERNION) and _have_length_1(values[:, [*named.values()]]):
+        return {name: named[name] for name in QUATERNION}
+    for start in layout.numbers:
+        indices = [start + offset for offset in range(4)]
+        if set(indices) <= set(layout.numbers) and layout.time not in indices and _have_length_1(values[:, indices]):
+            return dict(zip(QUATERNION, indices, strict=True))
+    return {}
+
+
+def _have_length_1(values: Array) -> bool:
+    whole = values[np.isfinite(values).all(axis=1)]
+    return len(whole) > 1 and bool(np.median(np.abs(np.linalg.norm(whole, axis=1) - 1)) < NORM_TOLERANCE)
+
+
+def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
+    """Return unit and factor of a triad as a map of columns has them, and why they are not sure."""
+    if (scale := unit.pop("scale", None)) is not None:
+        steps = 1 / float(scale)
+        near = min(ROUND_STEPS, key=lambda round_steps: abs(steps / round_steps - 1))
+        exact = near if kind == "g" and abs(steps / near - 1) < 1e-3 else round(steps)
+        is_whole = kind == "a" or exact == near
+        return {"unit": unit["unit"], **({"lsb_per_unit": exact} if is_whole else {"factor": scale})}, ""
+    if unit["unit"] != "?":
+        return {"unit": unit["unit"]}, ""
+    if kind != "g":
+        return {"unit": SI_UNITS[kind]}, "the size of its readings fits none; see that it is SI"
+    if (values == np.rint(values)).all() and np.abs(values).max() > LARGEST_COUNT:
+        return {"unit": "deg/s", "lsb_per_unit": OPEN}, "steps of a converter: state lsb_per_unit by its data sheet"
+    turned = values - np.median(values[still], axis=0)
+    if np.abs(turned).max() > LARGEST_RAD_S or values[still].std(axis=0).max() > NOISIEST_RAD_S:
+        largest = f"{np.abs(values).max():.4g}"
+        reason = f"deg/s by size alone (up to {largest}); if these are counts, give factor or lsb_per_unit"
+        return {"unit": "deg/s"}, reason
+    return {"unit": "rad/s"}, f"rad/s by size alone (up to {np.abs(values).max():.3g})"
+
+
+def _compare_stated(kind: str, stated: str, values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
+    """Return the unit that the heading states, and how an accelerometer's size at rest contradicts it."""
+    level = float(np.median(np.linalg.norm(values[still] if still.any() else values, axis=1)))
+    fitting = [unit for unit, size in GRAVITY.items() if abs(level / size - 1) < 0.15]
+    if kind == "a" and fitting and stated not in fitting:
+        return {"unit": fitting[0]}, f"the heading says {stated}, but at rest it reads {level:.4g}, as in {fitting[0]}"
+    return {"unit": stated}, ""
+
+
+def _time_entry(layout: TableLayout, time: Array | None) -> dict[str, Any]:
+    assert layout.time is not None, "it has a column of time"
+    entry: dict[str, Any] = {"column": layout.name(layout.time)}
+    if layout.time_unit is not None:
+        entry["unit"] = layout.time_unit
+    if time is not None and layout.time_unit is not None and (wrap := _find_wrap(time)) is not None:
+        entry["wraps_at"] = wrap
+    return entry
+
+
+def _find_wrap(time: Array) -> int | None:
+    """Return the power of two at which a counter of time begins again, in steps of the counter; None if it does not."""
+    time = time[np.isfinite(time)]
+    has_fall = len(time) > 1 and bool((np.diff(time) < -0.5 * np.ptp(time)).any())
+    if not has_fall or time.max() < 100 or time.min() < 0:
+        return None
+    return int(2 ** np.ceil(np.log2(time.max() + 1)))

@@ -1,0 +1,128 @@
+"""`rig look` says what a file holds, and the map that it writes solves the file as its plain form does."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from rig.analysis.external.convention import find_convention
+from rig.analysis.log_contents import look_at
+from support.external.robot_log import make_log, write_log
+from support.laboratories.commands import rig_here
+from support.paths import DOCS
+
+pytestmark = pytest.mark.slow
+
+SWEEPS = DOCS / "examples" / "sweeps.csv"
+PLAIN = DOCS / "examples" / "samples.csv"
+TABLE = np.genfromtxt(PLAIN, delimiter=",", names=True)
+TIME_S = TABLE["time_s"]
+RATES_DEG_S = np.degrees(np.column_stack([TABLE[f"{axis}_rad_s"] for axis in "xyz"]))
+
+
+def write(path: Path, heading: str, columns: list[np.ndarray], divided: str = ",") -> Path:
+    rows = [divided.join(f"{cell:.12g}" for cell in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([*([heading] if heading else []), *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def spaces(folder: Path) -> Path:
+    return write(folder / "log.txt", "", [TIME_S, *RATES_DEG_S.T], "   ")
+
+
+def two_imus(folder: Path) -> Path:
+    other = np.full_like(RATES_DEG_S, 0.5)
+    return write(folder / "log.csv", "logger 3\n\nt,gx,gy,gz,gx,gy,gz", [TIME_S, *RATES_DEG_S.T, *other.T])
+
+
+def counter(folder: Path) -> Path:
+    ticks = (np.rint(1e6 * TIME_S) + 2**32) % 2**32
+    return write(folder / "log.csv", "micros;gyroX [°/s];gyroY [°/s];gyroZ [°/s]", [ticks, *RATES_DEG_S.T], ";")
+
+
+def matlab(folder: Path) -> Path:
+    savemat(folder / "log.mat", {"imu": {"t": TIME_S, "gyro": RATES_DEG_S}, "fs": 50.0})
+    return folder / "log.mat"
+
+
+@pytest.mark.parametrize("make", [spaces, two_imus, counter, matlab])
+def test_the_map_that_it_writes_solves_the_file(make, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    log, columns = make(tmp_path), tmp_path / "columns.yaml"
+    looked = rig_here("look", log, "--write", columns)
+    assert looked.returncode == 0, looked.stderr
+    assert "50 Hz over 65.0 s" in looked.stdout and f"written: {columns}" in looked.stdout
+    solved = rig_here("solve", log, "--sweeps", SWEEPS, "--columns", columns, "--json")
+    assert solved.returncode == 0, solved.stderr
+    plain = rig_here("solve", PLAIN, "--sweeps", SWEEPS, "--json")
+    scales = [json.loads(done.stdout)["gyroscopes"]["imu"]["scale"] for done in (solved, plain)]
+    assert scales[0] == pytest.approx(scales[1], rel=1e-6)
+
+
+def test_a_file_in_the_rig_s_own_words_needs_no_map(tmp_path: Path) -> None:
+    done = rig_here("look", PLAIN, "--write", tmp_path / "columns.yaml")
+    assert "no map is needed" in done.stdout and "CANNOT TELL" not in done.stdout
+    assert not (tmp_path / "columns.yaml").exists()
+
+
+def test_steps_of_a_converter_are_left_to_the_user(tmp_path: Path) -> None:
+    log = write(tmp_path / "log.csv", "t,gx,gy,gz", [TIME_S, *np.rint(131 * RATES_DEG_S).T])
+    columns = tmp_path / "columns.yaml"
+    looked = rig_here("look", log, "--write", columns)
+    assert "CANNOT TELL   the unit of the gyroscope: steps of a converter" in looked.stdout
+    solved = rig_here("solve", log, "--sweeps", SWEEPS, "--columns", columns)
+    assert solved.returncode == 2 and "lsb_per_unit" in solved.stderr, "what is open is refused"
+    columns.write_text(columns.read_text(encoding="utf-8").replace("'?'", "131"), encoding="utf-8")
+    assert rig_here("solve", log, "--sweeps", SWEEPS, "--columns", columns).returncode == 0
+
+
+def test_an_accelerometer_shows_the_units_of_both(tmp_path: Path) -> None:
+    log = make_log()
+    rates, forces = np.rint(65.5 * log.rates_deg_s), np.rint(8192 * log.forces_g)
+    path = write(tmp_path / "log.csv", "", [1e-3 * log.time_ms, *rates.T, *forces.T])
+    guess = look_at(path).guess
+    assert guess is not None
+    assert guess.samples["x_rad_s"] == {"column": 2, "unit": "deg/s", "lsb_per_unit": 65.5}
+    assert guess.samples["x_m_s2"] == {"column": 5, "unit": "g", "lsb_per_unit": 8192}
+
+
+def test_a_unit_that_gravity_contradicts_is_told(tmp_path: Path) -> None:
+    log = make_log()
+    columns = [1e-3 * log.time_ms, *log.rates_deg_s.T, *(9.80665 * log.forces_g).T]
+    path = write(tmp_path / "log.csv", "t,gx [dps],gy [dps],gz [dps],ax [g],ay [g],az [g]", columns)
+    guess = look_at(path).guess
+    assert guess is not None and guess.samples["x_m_s2"]["unit"] == "m/s2"
+    assert any("the heading says g, but at rest it reads 9.8" in gap for gap in guess.gaps)
+
+
+@pytest.mark.parametrize("inverse", [False, True])
+@pytest.mark.parametrize("scalar_last", [False, True])
+def test_the_convention_of_quaternions_is_found(inverse: bool, scalar_last: bool, tmp_path: Path) -> None:
+    log = make_log()
+    poses = log.poses if inverse else log.poses * [1, -1, -1, -1]
+    poses = np.roll(poses, -1, axis=1) if scalar_last else poses
+    write_log(log, tmp_path)
+    samples = look_at(tmp_path / "robot_log.txt").samples
+    attitudes = look_at(write(tmp_path / "poses.csv", "time,a,b,c,d", [log.pose_s, *poses.T])).attitudes
+    assert samples is not None and attitudes is not None
+    convention = find_convention(samples, attitudes, is_order_named=False)
+    assert convention is not None
+    assert (convention.inverse, convention.scalar_last, convention.up) == (inverse, scalar_last, "+z")
+    assert convention.lag_s == pytest.approx(0.084, abs=0.005)
+
+
+def test_gaps_are_told_with_row_and_time(tmp_path: Path) -> None:
+    kept = np.r_[0:1000, 1009 : len(TIME_S)]
+    log = write(
+        tmp_path / "log.csv", "time_s,x_rad_s,y_rad_s,z_rad_s", [TIME_S[kept], *np.radians(RATES_DEG_S[kept]).T]
+    )
+    assert (
+        "gaps          1, 9 readings missing; the longest 0.2 s after 19.98 s, row 1000" in rig_here("look", log).stdout
+    )
+
+
+def test_a_file_without_numbers_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("Dear diary,\ntoday it rained.\n" * 20, encoding="utf-8")
+    done = rig_here("look", tmp_path / "notes.txt")
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and "wrong_columns" in done.stderr
