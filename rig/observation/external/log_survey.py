@@ -18,20 +18,10 @@ MOSTLY = 0.9  # of a turn's angle about one axis
 
 
 @dataclass(frozen=True, slots=True)
-class Gap:
-    """A step between two readings that others are missing from: from `start_s`, lasting `lasts_s`, and its row."""
-
-    row: int
-    start_s: float
-    lasts_s: float
-    missing: int
-
-
-@dataclass(frozen=True, slots=True)
 class LogSurvey:
     """A log's sampling, rests and turns.
 
-    - gaps: where readings are missing. rests: windows in which the body lay still.
+    - rests: windows in which the body lay still.
     - turns: by axis ("+x"), "other" without one, the number of turns from rest to rest.
     - at_rest: by quantity, the mean norm of the readings at rest less the bias of rates; largest: by quantity.
     - faces: number of directions of gravity at rest that differ by more than 45°.
@@ -39,7 +29,6 @@ class LogSurvey:
 
     span_s: float
     sampling: Sampling
-    gaps: tuple[Gap, ...]
     rests: tuple[Window, ...]
     turns: dict[str, int]
     at_rest: dict[Quantity, float]
@@ -51,11 +40,6 @@ def survey_log(samples: Samples) -> LogSurvey:
     """Return the survey of a log's readings."""
     time_s, readings = samples.time_s, samples.readings
     sampling = samples.sampling or find_sampling(time_s)
-    steps = np.flatnonzero(sampling.gaps(time_s))
-    gaps = [
-        Gap(int(step) + 1, float(time_s[step]), float(time_s[step + 1] - time_s[step]), int(sampling.missing[step]))
-        for step in steps
-    ]
     rests = find_rests(time_s, {quantity: readings[quantity] for quantity in readings})
     cuts = [inside(time_s, rest) for rest in rests]
     at_rest = {
@@ -66,7 +50,6 @@ def survey_log(samples: Samples) -> LogSurvey:
     return LogSurvey(
         span_s=float(time_s[-1] - time_s[0]),
         sampling=sampling,
-        gaps=tuple(gaps),
         rests=rests,
         turns=_count_turns(time_s, readings[RATE], rests) if RATE in readings else {},
         at_rest=at_rest,

@@ -153,16 +153,11 @@ def _spell(*entries: Mapping[str, Any]) -> str:
 def _describe_readings(looked: LookedFile, survey: LogSurvey) -> Iterator[str]:
     sampling = survey.sampling
     rate = f"{1 / sampling.interval_s:.5g} Hz over {survey.span_s:.1f} s"
-    arrival = ", stamped on arrival, several at once" if sampling.on_arrival else ""
     uncounted = f", about {100 * sampling.scattered:.1f} % missing at unknown times" if sampling.scattered else ""
-    yield _row("sampling", rate + arrival + uncounted)
-    if survey.gaps:
-        longest = max(survey.gaps, key=lambda gap: gap.lasts_s)
-        missing = sum(gap.missing for gap in survey.gaps)
-        yield _row("gaps", f"{len(survey.gaps)}, {missing} readings missing; the longest {longest.lasts_s:.3g} s after "
-                   f"{longest.start_s:.10g} s, row {longest.row}")  # fmt: skip
-    else:
-        yield _row("gaps", "none")
+    yield _row("sampling", rate + uncounted)
+    assert looked.samples is not None, "there is a survey of them"
+    yield from (_row("", note) for note in looked.samples.notes)
+    yield from (_row("left out", str(omitted)) for omitted in looked.samples.omitted)
     for quantity, largest in survey.largest.items():
         rest = f", {survey.at_rest[quantity]:.4g} at rest" if quantity in survey.at_rest else ""
         more = f" ({np.degrees(largest):.4g} °/s)" if quantity == RATE else ""

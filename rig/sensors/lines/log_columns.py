@@ -212,7 +212,8 @@ def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.b
     if (values == np.rint(values)).all() and np.abs(values).max() > LARGEST_COUNT:
         return {"unit": "deg/s", "lsb_per_unit": OPEN}, "steps of a converter: state lsb_per_unit by its data sheet"
     turned = values - np.median(values[still], axis=0)
-    if np.abs(turned).max() > LARGEST_RAD_S or values[still].std(axis=0).max() > NOISIEST_RAD_S:
+    noise = np.median(np.abs(np.diff(values, axis=0)), axis=0).max()  # a steady turn is as quiet as a rest
+    if np.abs(turned).max() > LARGEST_RAD_S or noise > NOISIEST_RAD_S:
         largest = f"{np.abs(values).max():.4g}"
         reason = f"deg/s by size alone (up to {largest}); if these are counts, give factor or lsb_per_unit"
         return {"unit": "deg/s"}, reason

@@ -117,9 +117,15 @@ def test_gaps_are_told_with_row_and_time(tmp_path: Path) -> None:
     log = write(
         tmp_path / "log.csv", "time_s,x_rad_s,y_rad_s,z_rad_s", [TIME_S[kept], *np.radians(RATES_DEG_S[kept]).T]
     )
-    assert (
-        "gaps          1, 9 readings missing; the longest 0.2 s after 19.98 s, row 1000" in rig_here("look", log).stdout
-    )
+    looked = rig_here("look", log).stdout
+    assert "9 samples are missing in 1 gaps, the longest 0.2 s, after sample 1000, at 19.98 s" in looked
+
+
+def test_a_unit_by_size_is_marked(tmp_path: Path) -> None:
+    for unit, rates in (("rad/s", np.radians(RATES_DEG_S)), ("deg/s", RATES_DEG_S)):
+        guess = look_at(write(tmp_path / "log.csv", "t,gx,gy,gz", [TIME_S, *rates.T])).guess
+        assert guess is not None and guess.samples["x_rad_s"]["unit"] == unit
+        assert any(f"{unit} by size alone" in gap for gap in guess.gaps)
 
 
 def test_a_file_without_numbers_is_refused_in_one_line(tmp_path: Path) -> None:
