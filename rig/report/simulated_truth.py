@@ -8,10 +8,10 @@ from typing import Literal
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.section import SensorName
-from rig.data.checked import Finite, parse_json, validate
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import TRUTH
+from rig.data.validation import Finite, parse_json, validate
 from rig.report.findings.result_kind import AxisValues, DisplayRow
 from rig.report.kinds.kind_registry import shown
 from rig.report.words.printed_values import in_print

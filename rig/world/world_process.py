@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from firmware_host.errors import BoardError
-from rig.config.files.written_file import write_new
+from rig.config.files.safe_writing import write_new
 from rig.config.load import Loaded
 from rig.config.models import ArmSection, RigConfig, TurnerSection
 from rig.config.world.laboratory import SimulatedArmSection, WorldSection

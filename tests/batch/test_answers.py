@@ -6,11 +6,11 @@ from types import SimpleNamespace
 from typing import cast
 
 import pytest
-from rig.batch.journal import open_journal
-from rig.batch.parts_in_turn import Bench, Desk, Work
 
+from rig.batch.batch_journal import open_journal
 from rig.batch.batch_state import BatchPart, Begun, Doubt, Entry, PartBegun, PartEnded, state_of
 from rig.batch.operators import CHOICES, Kind, Operator, Question
+from rig.batch.part_sequence import Bench, Desk, Work
 from rig.batch.status import Now, after, update_by_batch
 from rig.config.judging.station_section import StationSection
 from rig.errors import Fault

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.commands.laboratory.laboratory_process import send_request
 from rig.data.run_folder import TRUTH
 from rig.station.events import DocumentWritten
-from rig.turners.registry import kind_of
+from rig.turners.turner_registry import kind_of
 
 if TYPE_CHECKING:
     from rig.analysis.outcome import Outcome
