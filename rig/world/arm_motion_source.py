@@ -10,7 +10,9 @@ from rig.world.magnetic_field import Frames
 from rig.world.site import build_site
 from rig.world.ur10e.faults import AtProgramStart
 from rig.world.ur10e.motion.arm_models import select_model
+from rig.world.ur10e.motion.encoders import Encoders
 from rig.world.ur10e.motion.flange_motion import BodyMotion, Components
+from rig.world.ur10e.motion.joint_drive import build_drive
 from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.ripple import draw_ripple
 from rig.world.ur10e.motion.true_arm import TrueArm, build_calibrated_links
@@ -32,11 +34,15 @@ class OnArm:
         motion = JointMotion(
             [radians(angle) for angle in config.arm.home_deg or model.home_deg],
             ripples,
-            arm.encoder_step_rad,
+            Encoders(
+                model.encoder_step_rad if arm.encoder_step_rad is None else arm.encoder_step_rad,
+                arm.encoder_noise_rad,
+                arm.encoder_speed_noise_rad_s,
+                partial(Random(f"jitter {world.seed}").gauss, 0.0, arm.state_jitter_s) if arm.state_jitter_s else None,
+                world.seed,
+            ),
             memory_s=1e-3 * max(max(s.delay_ms, s.accelerometer.delay_ms) for s in world.sensors.values()),
-            lateness_s=partial(Random(f"jitter {world.seed}").gauss, 0.0, arm.state_jitter_s)
-            if arm.state_jitter_s
-            else None,
+            drive=build_drive(arm.drive, world.seed),
             vibration=_build_vibration(arm, world.seed),
             speed_limit_rad_s=model.speed_rad_s,
         )

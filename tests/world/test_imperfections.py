@@ -40,7 +40,7 @@ ALPHA = (math.pi / 2, 0.0, 0.0, math.pi / 2, -math.pi / 2, 0.0)
 
 def laboratory(gyro: Mapping[str, object] | None = None, **world: object) -> Host:
     """demo.yaml's board, streaming, with an ideal arm and gyroscope but for what is asked for."""
-    arm = {"vibration_fraction": 0, "encoder_step_rad": 0, **(world.pop("arm", None) or {})}  # type: ignore[dict-item]
+    arm = {"joints": "ideal", **(world.pop("arm", None) or {})}  # type: ignore[dict-item]
     ideal = {"scale": [1, 1, 1], "bias_rad_s": [0, 0, 0], "noise_rad_s": 0}
     section = {"arm": arm, "sensors": {"gyro": {**ideal, **(gyro or {})}}, **world}
     return host(load(DEMO, [f"world={json.dumps(section)}"]))

@@ -33,7 +33,7 @@ pytestmark = pytest.mark.slow
 
 COUNT_RAD_S = math.radians(8.75e-3)
 PAIR = DEMO.with_name("mpu9250_adis16465.yaml")
-STILL = "world.arm.vibration_fraction=0"
+STILL = "world.arm.joints=ideal"
 
 
 def demo(*overrides: str) -> Loaded:
@@ -64,7 +64,7 @@ def test_the_same_seed_and_inputs_give_the_same_bytes_and_states() -> None:
 def test_the_sensor_reads_the_flanges_rate_through_its_mounting_and_its_errors() -> None:
     """A wrist 2 turn: counts must be (axis rate / k − b) in the sensor's axes, g = K (m + b)."""
     loaded = demo(
-        "world.arm.vibration_fraction=0",
+        "world.arm.joints=ideal",
         "world.sensors.gyro.mounting_error_deg=[0, 0, 90]",
         "world.sensors.gyro.noise_rad_s=0",
         "sensors.gyro.mounting={x: +z, y: -y, z: +x}",

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from rig.motion import geometry as rig_kinematics
 from rig.world.clock import TICK_S, WorldClock
 from rig.world.ur10e.motion import forward_kinematics
+from rig.world.ur10e.motion.encoders import Encoders
 from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.ripple import Ripple, draw_ripple
 from rig.world.ur10e.motion.trajectory import Joints
@@ -180,7 +181,7 @@ def test_a_speed_command_holds_its_speed() -> None:
 
 
 def test_encoders_report_whole_steps() -> None:
-    motion = JointMotion(HOME, [Ripple()] * 6, encoder_step_rad=1e-3)
+    motion = JointMotion(HOME, [Ripple()] * 6, Encoders(step_rad=1e-3))
     motion.move(turned(HOME, 5, 1.0), 1.0, 1.4)
     for tick in range(1, 300):
         motion.step(tick * TICK_S)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rig.world.clock import TICK_S
+from rig.world.ur10e.motion.encoders import Encoders
 from rig.world.ur10e.motion.joint_errors import Errors, JointErrors
 from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.ripple import draw_ripple
@@ -30,7 +31,7 @@ class Player:
         for _ in range(count):
             self.time_s += TICK_S
             self.motion.step(self.time_s)
-            self.errors.step(self.time_s, self.motion.q_rad, self.motion.qd_rad_s)
+            self.errors.step(self.time_s, self.motion.smooth_qd_rad_s, lambda: self.motion.q_rad)
 
     def turn(self, angle_rad: float, wait_s: float = 0.0) -> None:
         """Wrist 3 to an angle."""
@@ -136,7 +137,7 @@ def test_the_encoders_are_read_early_or_late_by_what_is_asked() -> None:
         late_s.append(rng.gauss(0.0, 1e-4))
         return late_s[-1]
 
-    motion = JointMotion(STILL, [draw_ripple(0.0, (), rng)] * 6, lateness_s=lateness_s)
+    motion = JointMotion(STILL, [draw_ripple(0.0, (), rng)] * 6, Encoders(lateness_s=lateness_s))
     motion.speed((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), 100.0)
     for tick in range(1, 200):
         motion.step(tick * TICK_S)

@@ -27,7 +27,8 @@ class ArmModel:
     """One arm model.
 
     `limit_rad` and `speed_rad_s`: greatest joint angles, to either side, and speeds. `home_deg` and `polyscope`:
-    initial pose and software version, if the configuration has none. `name` is the dashboard's.
+    initial pose and software version, if the configuration has none. `name` is the dashboard's. `encoder_step_rad`: of
+    a UR3 of the CB3 series, by its logs; that of the e-Series is only known to be finer.
     """
 
     robot_type: int
@@ -39,6 +40,7 @@ class ArmModel:
     bodies: Bodies
     home_deg: Joints = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
     polyscope: Version = POLYSCOPE_5
+    encoder_step_rad: float = 2 * pi / 2**20
 
 
 def _model(
@@ -106,7 +108,9 @@ MODELS: Mapping[ModelName, ArmModel] = MappingProxyType(
         "ur20": _model(7, "UR20", _DRAWN_20, _UR20, payload_kg=20.0, speed_deg_s=_HEAVY),
         "ur30": _model(8, "UR30", _DRAWN_30, _UR30, payload_kg=30.0, speed_deg_s=_HEAVY),
         "ur10_cb3": replace(
-            _model(2, "UR10", _DRAWN_10, _UR10, payload_kg=10.0, speed_deg_s=_BASE_SLOWER), polyscope=CB3
+            _model(2, "UR10", _DRAWN_10, _UR10, payload_kg=10.0, speed_deg_s=_BASE_SLOWER),
+            polyscope=CB3,
+            encoder_step_rad=2 * pi / 2**19,
         ),
     }
 )

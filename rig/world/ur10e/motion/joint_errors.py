@@ -6,7 +6,7 @@ form (A solid friction model, 1968): after a reversal it tends exponentially to 
 vibration that the encoder shows is no part of this: it is added to e and to the true angle alike.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import cos, exp, inf, pi, sin
 from random import Random
@@ -59,6 +59,7 @@ class JointErrors:
         self._errors = errors
         self._phases = [[random.uniform(0.0, 2.0 * pi) for _ in range(3)] for _ in range(6)]
         self._direction = [0.0] * 6
+        self._speed: Joints = ZERO
         self._reversal = [(0.0, 0.0)] * 6  # encoder's angle and hysteresis at the last reversal
         self._moving = [False] * 6
         self._stops = [(-inf, 0.0)] * 6  # time of the last stop, and the direction before
@@ -72,13 +73,20 @@ class JointErrors:
         self._is_current = [False] * 6
         self._rest: tuple[Joints, Joints] = ((), ())  # encoder and true angles at the last rest
 
-    def step(self, time_s: float, q_rad: Joints, qd_rad_s: Joints) -> None:
-        """Take the joints at the end of a tick, as the encoders read them."""
-        for joint, (angle, speed) in enumerate(zip(q_rad, qd_rad_s, strict=True)):
+    def step(self, time_s: float, smooth_qd_rad_s: Joints, q_rad: Callable[[], Joints]) -> None:
+        """Take the joints' smooth speeds at the end of a tick, and their angles, which are only asked for at reversals.
+
+        A joint's own speed changes its sign where the joint settles or is shaken.
+        """
+        if smooth_qd_rad_s is self._speed:
+            return
+        self._speed = smooth_qd_rad_s
+        for joint, speed in enumerate(smooth_qd_rad_s):
             moving = abs(speed) > STANDING_RAD_S
             if moving:
                 direction = 1.0 if speed > 0.0 else -1.0
                 if direction != self._direction[joint]:
+                    angle = q_rad()[joint]
                     self._reversal[joint] = (angle, self._hysteresis(joint, angle)[0])
                     self._direction[joint] = direction
                     self._is_current[joint] = False

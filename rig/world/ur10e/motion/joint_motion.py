@@ -1,12 +1,14 @@
 """The simulated joints: a trajectory played with a time scaling (speed slider, pause), known at any instant."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, nan
 from typing import NamedTuple
 
 from rig.world.clock import TICK_S
+from rig.world.ur10e.motion.encoders import Encoders
+from rig.world.ur10e.motion.joint_drive import JointDrive, Yielding
 from rig.world.ur10e.motion.ripple import Ripple
 from rig.world.ur10e.motion.trajectory import ZERO, Joints, Trajectory, build_rest, plan_joint_move, plan_speed_change
 from rig.world.ur10e.motion.vibration import Vibration
@@ -37,13 +39,15 @@ class _Tick(NamedTuple):
     trajectory: Trajectory
     offset: Joints
     gain: Joints
+    yielding: tuple[Yielding, ...] = ()
 
 
 class JointMotion:
     """Angles and speeds of the six joints. `step` plays a tick; `joints_at` returns any time within the last one.
 
+    - `drive`: how the joints follow the trajectory.
+    - `encoders`: what clients are told of the joints.
     - `memory_s`: the time before the last tick's end that `joints_at` covers too.
-    - `lateness_s`: draws the delay of the encoders' reading, once a tick.
     - `vibration`: a vibration that the encoders show; it is added to their angles and to the true ones.
 
     Three angles are in use: `target` (commanded), `smooth` (the same without the servo's static error, so that the
@@ -54,18 +58,18 @@ class JointMotion:
         self,
         start_rad: Sequence[float],
         ripples: Sequence[Ripple],
-        encoder_step_rad: float = 0.0,
+        encoders: Encoders | None = None,
         memory_s: float = 0.0,
-        lateness_s: Callable[[], float] | None = None,
         *,
+        drive: JointDrive | None = None,
         vibration: Vibration | None = None,
         speed_limit_rad_s: Joints = JOINT_SPEED_LIMIT_RAD_S,
     ) -> None:
         self.speed_limit_rad_s = speed_limit_rad_s
         self.vibration = vibration
         self._ripples = tuple(ripples)
-        self._encoder_step_rad = encoder_step_rad
-        self._lateness_s, self._late_s = lateness_s, 0.0
+        self._has_ripples = any(ripple.components for ripple in ripples)
+        self._encoders, self._drive = encoders or Encoders(), drive or JointDrive()
         self._trajectory = build_rest(tuple(start_rad))
         self._offset, self._gain = self._map(tuple(start_rad), tuple(start_rad))
         self._smooth, self._angles = [nan] * 6, [0.0] * 6  # last results, joint by joint
@@ -73,9 +77,9 @@ class JointMotion:
         self._trajectory_s = 0.0
         self._fraction = 1.0
         self.fraction_wanted = 1.0
-        self._ticks = deque(
-            [_Tick(0.0, 0.0, 1.0, 0.0, self._trajectory, self._offset, self._gain)], 1 + ceil(memory_s / TICK_S)
-        )
+        first = _Tick(-TICK_S, 0.0, 1.0, 0.0, self._trajectory, self._offset, self._gain)
+        self._ticks = deque([first], 1 + ceil((memory_s + self._drive.lag_s) / TICK_S))
+        self.smooth_qd_rad_s: Joints = ZERO  # of the smooth angles, at the last tick's end
         self._moving_ticks = 0  # upper bound of the ticks in memory with motion
         self._now: Instant | None = None  # computed on demand: most ticks need none
 
@@ -96,7 +100,7 @@ class JointMotion:
         if self._now is None:
             target, velocity, acceleration = self._trajectory.state_at(self._trajectory_s)
             fraction = self._fraction if self._scales else 1.0
-            q, qd = self._joints(self._offset, self._gain, target, velocity, fraction)
+            q, qd, _ = self._follow(self._end_s)
             self._now = Instant(target, tuple(v * fraction for v in velocity), acceleration, q, qd)
         return self._now
 
@@ -125,24 +129,29 @@ class JointMotion:
 
     @property
     def moving(self) -> bool:
-        return any(self.now.target_qd_rad_s)
+        return any(self.smooth_qd_rad_s)
 
     @property
     def actual_q_rad(self) -> Joints:
         """The joints' angles as the encoders read them at the end of the last tick."""
-        step, (q_rad, qd_rad_s, _) = self._encoder_step_rad, self._vibrating(ZERO)
-        if self._late_s:
-            q_rad = tuple(q + v * self._late_s for q, v in zip(q_rad, qd_rad_s, strict=True))
-        return tuple(round(q / step) * step for q in q_rad) if step else q_rad
+        q_rad, qd_rad_s, _ = self._vibrating(ZERO)
+        return self._encoders.read_angles(self._end_s, q_rad, qd_rad_s)
 
     @property
     def actual_qd_rad_s(self) -> Joints:
         """The joints' speeds as the encoders show them."""
-        return self._vibrating(ZERO)[1]
+        return self._encoders.read_speeds(self._end_s, self._vibrating(ZERO)[1])
+
+    @property
+    def settled_q_rad(self) -> Joints:
+        """The angles at which the joints are, or will be, when they have followed their targets."""
+        target = self.now.target_q_rad
+        smooth = [offset + gain * q for offset, gain, q in zip(self._offset, self._gain, target, strict=True)]
+        return tuple(ripple.angle(u) for ripple, u in zip(self._ripples, smooth, strict=True))
 
     @property
     def actual(self) -> tuple[Joints, Joints, Joints]:
-        """Angles, speeds and accelerations by encoders without steps."""
+        """Angles, speeds and accelerations by encoders without steps and noise."""
         return self._vibrating(self.qdd_rad_s2)
 
     def _vibrating(self, qdd_rad_s2: Joints) -> tuple[Joints, Joints, Joints]:
@@ -151,46 +160,62 @@ class JointMotion:
 
     def joints_at(self, time_s: float) -> tuple[Joints, Joints]:
         """Return angles and speeds of the joints at a virtual time within the last tick, or `memory_s` before it."""
-        tick, fraction, target, velocity, _ = self._find_tick(time_s)
-        return self._joints(tick.offset, tick.gain, target, velocity, fraction)
+        return self.state_at(time_s)[:2]
 
     def state_at(self, time_s: float) -> tuple[Joints, Joints, Joints]:
         """Return the joints' angles, speeds and accelerations, including the ripple's."""
-        if self.still:
-            return self.now.q_rad, ZERO, ZERO
-        tick, fraction, target, velocity, acceleration = self._find_tick(time_s)
-        q, qd = self._joints(tick.offset, tick.gain, target, velocity, fraction)
-        qdd = [0.0] * 6
-        for joint in range(6):
-            v, a = velocity[joint], acceleration[joint]
-            if v or a:
-                gain, u = tick.gain[joint], self._smooth[joint]
-                ripple = self._ripples[joint]
-                speed = gain * v * fraction
-                change = gain * (a * fraction * fraction + v * tick.slope_per_s)
-                qdd[joint] = ripple.gain(u) * change + ripple.bend(u) * speed * speed
-        return q, qd, tuple(qdd)
+        return (self.now.q_rad, ZERO, ZERO) if self.still else self._follow(time_s)
 
-    def _find_tick(self, time_s: float) -> tuple[_Tick, float, Joints, Joints, Joints]:
-        """Return the tick with a time, the time scaling then, and the trajectory's state."""
+    def _follow(self, time_s: float) -> tuple[Joints, Joints, Joints]:
+        """Return angles, speeds and accelerations of the joints that follow the trajectory by their drives."""
+        drive = self._drive
+        time_s -= drive.lag_s
         tick = self._ticks[-1]
         if time_s < tick.start_s:
             tick = next((it for it in reversed(self._ticks) if it.start_s <= time_s), self._ticks[0])
         elapsed = min(max(time_s - tick.start_s, 0.0), TICK_S)
+        fraction = tick.fraction + tick.slope_per_s * elapsed
         trajectory_s = tick.trajectory_s + (tick.fraction + 0.5 * tick.slope_per_s * elapsed) * elapsed
-        return tick, tick.fraction + tick.slope_per_s * elapsed, *tick.trajectory.state_at(trajectory_s)
+        target, velocity, acceleration = tick.trajectory.state_at(trajectory_s)
+        smooth, speed, change = list(target), [0.0] * 6, [0.0] * 6
+        squared, slope_per_s = fraction * fraction, tick.slope_per_s
+        moving = [joint for joint, (v, a) in enumerate(zip(velocity, acceleration, strict=True)) if v or a]
+        for joint in moving:
+            v = velocity[joint]
+            speed[joint], change[joint] = v * fraction, acceleration[joint] * squared + v * slope_per_s
+        joints = self._apply_ripples(tick, smooth, speed, change) if self._has_ripples else (smooth, speed, change)
+        q, qd, qdd = joints
+        shaken = []  # joint, angle and its derivatives that come on top
+        for joint in moving:
+            if drive.orders[joint]:
+                shaken += drive.shake(joint, smooth[joint], speed[joint], change[joint])
+        for motion in tick.yielding:
+            shaken += [(motion.joint, *drive.yield_at(motion, elapsed))]
+        for joint, angle, rate, bend in shaken:
+            q[joint] += angle
+            qd[joint] += rate
+            qdd[joint] += bend
+        return tuple(q), tuple(qd), tuple(qdd)
 
-    def _joints(
-        self, offset: Joints, gain: Joints, target: Joints, velocity: Joints, fraction: float
-    ) -> tuple[Joints, Joints]:
-        speeds = [0.0] * 6
-        for joint in range(6):
-            u = offset[joint] + gain[joint] * target[joint]
+    def _apply_ripples(
+        self, tick: _Tick, target: list[float], speed: list[float], change: list[float]
+    ) -> tuple[list[float], list[float], list[float]]:
+        """Return angles, speeds and accelerations with the ripples that are in proportion to the speed.
+
+        Replace the targets by the smooth angles, their speeds and accelerations.
+        """
+        qd, qdd = [0.0] * 6, [0.0] * 6
+        for joint, (offset, gain) in enumerate(zip(tick.offset, tick.gain, strict=True)):
+            u = target[joint] = offset + gain * target[joint]
+            ripple = self._ripples[joint]
             if self._smooth[joint] != u:  # most moves turn few joints
-                self._smooth[joint], self._angles[joint] = u, self._ripples[joint].angle(u)
-            if velocity[joint]:
-                speeds[joint] = self._ripples[joint].gain(u) * gain[joint] * velocity[joint] * fraction
-        return tuple(self._angles), tuple(speeds)
+                self._smooth[joint], self._angles[joint] = u, ripple.angle(u)
+            v, a = speed[joint], change[joint]
+            if v or a:
+                v, a = speed[joint], change[joint] = gain * v, gain * a
+                slope = ripple.gain(u)
+                qd[joint], qdd[joint] = slope * v, slope * a + ripple.bend(u) * v * v
+        return self._angles.copy(), qd, qdd
 
     # -- one tick ------------------------------------------------------------------------------------------------
     def step(self, end_s: float) -> None:
@@ -200,26 +225,47 @@ class JointMotion:
         limit = SCALING_RATE_PER_S * TICK_S
         self._fraction += max(-limit, min(limit, change))
         fraction, slope = (begin_fraction, (self._fraction - begin_fraction) / TICK_S) if self._scales else (1.0, 0.0)
-        self._ticks.append(_Tick(end_s - TICK_S, begin_s, fraction, slope, self._trajectory, self._offset, self._gain))
-        if self.standing:
-            self._moving_ticks = max(0, self._moving_ticks - 1)
-        else:
+        standing = self.standing
+        if not standing:
             mean = 0.5 * (begin_fraction + self._fraction) if self._scales else 1.0
             self._trajectory_s += mean * TICK_S
             self._now = None
+        yielding = self._yield(standing)
+        self._ticks.append(
+            _Tick(end_s - TICK_S, begin_s, fraction, slope, self._trajectory, self._offset, self._gain, yielding)
+        )
+        if not standing or yielding:
             self._moving_ticks = self._ticks.maxlen or 1
-        if self._lateness_s is not None:
-            self._late_s = self._lateness_s()
+            self._now = None
+        elif self._moving_ticks:
+            self._moving_ticks -= 1
+            self._now = None
+        self._encoders.step()
+
+    def _yield(self, standing: bool) -> tuple[Yielding, ...]:
+        """Return what the joints yield in the tick that has just been played."""
+        before, last = self.smooth_qd_rad_s, self._ticks[-1].yielding
+        if standing and before is ZERO:
+            return self._drive.advance(last, ZERO) if last else ()
+        velocity = self._trajectory.state_at(self._trajectory_s)[1]
+        fraction = self._fraction if self._scales else 1.0
+        speed = tuple([g * v * fraction for g, v in zip(self._gain, velocity, strict=True)]) if any(velocity) else ZERO
+        self.smooth_qd_rad_s = speed
+        if not last and speed == before:
+            return ()
+        return self._drive.advance(last, [after - b for after, b in zip(speed, before, strict=True)])
 
     # -- commands ------------------------------------------------------------------------------------------------
     def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         """Play a moveJ from rest."""
         # From the joints' actual angles, which after a stop need not be the program's.
-        self.follow(plan_joint_move(self.q_rad, target_rad, speed_rad_s, acceleration_rad_s2, self.speed_limit_rad_s))
+        self.follow(
+            plan_joint_move(self.settled_q_rad, target_rad, speed_rad_s, acceleration_rad_s2, self.speed_limit_rad_s)
+        )
 
     def follow(self, trajectory: Trajectory) -> None:
         """Play any trajectory from rest that begins at the joints' angles."""
-        self._offset, self._gain = self._map(self.q_rad, trajectory.end_rad)
+        self._offset, self._gain = self._map(self.settled_q_rad, trajectory.end_rad)
         self._play(trajectory, scaled=True)
 
     def speed(self, qd_rad_s: Joints, acceleration_rad_s2: float) -> None:

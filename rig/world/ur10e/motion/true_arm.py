@@ -69,7 +69,7 @@ class TrueArm:
         if not self._motion.still:
             self._at_rest = None
             if self._errors is not None:
-                self._errors.step(controller_s, self._motion.q_rad, self._motion.qd_rad_s)
+                self._errors.step(controller_s, self._motion.smooth_qd_rad_s, lambda: self._motion.q_rad)
 
     def rate_at(self, time_s: float) -> Vector:
         """Return the angular rate of an ideal arm's flange in its own frame, rad/s, at a time within the last tick."""

@@ -86,12 +86,13 @@ class Threads:
         motion, links = self.robot.motion, self.robot.links
         if move.straight:
             pose = self.robot.flange_pose_for(move.target) if move.is_pose else flange_pose(move.target, links)
-            trajectory = yield from plan_straight_line(motion.q_rad, pose, move.speed, move.acceleration, links)
+            trajectory = yield from plan_straight_line(motion.settled_q_rad, pose, move.speed, move.acceleration, links)
         else:
             target = move.target
             if move.is_pose:
-                target = solve_inverse_kinematics(self.robot.flange_pose_for(target), motion.q_rad, links)
-            trajectory = plan_joint_move(motion.q_rad, target, move.speed, move.acceleration, motion.speed_limit_rad_s)
+                target = solve_inverse_kinematics(self.robot.flange_pose_for(target), motion.settled_q_rad, links)
+            start, limits = motion.settled_q_rad, motion.speed_limit_rad_s
+            trajectory = plan_joint_move(start, target, move.speed, move.acceleration, limits)
         if not self.robot.is_within_limits(trajectory.end_rad):
             raise ProgramError("joint position out of limits: a target lies beyond a joint's limit")
         motion.follow(trajectory)

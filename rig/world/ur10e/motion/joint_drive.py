@@ -1,0 +1,109 @@
+"""How a joint follows its target: late, yielding to acceleration, and with the ripple of its harmonic drive.
+
+The joint's angle is u(t − lag) + y + p, with u the target. y is what it yields: a critically damped system of second
+order follows −k times the target's acceleration. p is the ripple, locked to the angle, of an amplitude that makes its
+rate the same at every speed v: p = v/(v² + v₀²) Σ Rₙ/n sin(n u + φₙ), so its rate is Rₙ cos(n u + φₙ) for v ≫ v₀, and a
+joint at rest is exactly on its target. Over a whole turn at constant speed p adds nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, exp, pi, sin, sqrt
+from random import Random
+from typing import NamedTuple
+
+from rig.config.world.arm_joints import SimulatedDriveSection
+from rig.world.clock import TICK_S
+
+SLOW_RAD_S = 0.1  # v₀
+SLOW_SQUARED = SLOW_RAD_S**2
+PARALLEL = {1: (2,), 2: (1, 3), 3: (2,)}  # shoulder, elbow and wrist 1 have parallel axes
+NEGLIGIBLE_RAD, NEGLIGIBLE_RAD_S = 1e-9, 1e-7  # less is no yielding any more
+RippleOrders = tuple[tuple[int, float, float], ...]  # cycles a turn, Rₙ/n in rad/s, phase in rad
+Derivatives = tuple[float, float, float]  # an angle in rad and its first two derivatives
+Shaken = tuple[int, float, float, float]  # a joint, and the same of what comes on top of its smooth angle
+
+
+class Yielding(NamedTuple):
+    """What one joint yields during a tick: end + (start + slope s) exp(−s/τ), s after the tick's begin; rad, s."""
+
+    joint: int
+    end_rad: float
+    start_rad: float
+    slope_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class JointDrive:
+    """The drives of all six joints. `orders`: the ripple of each; other fields as in `world.arm.drive`."""
+
+    orders: tuple[RippleOrders, ...] = ((),) * 6
+    lag_s: float = 0.0
+    yield_s2: float = 0.0
+    yield_time_s: float = 0.01
+    crosstalk: float = 0.0
+
+    def shake(self, joint: int, u: float, v: float, a: float) -> list[Shaken]:
+        """Return the ripple of a joint whose smooth angle is `u` (rad), with rate `v` and acceleration `a`.
+
+        It comes with what the joint's neighbours have of it.
+        """
+        sines = cosines = bends = 0.0
+        for n, amplitude, phase in self.orders[joint]:
+            angle = n * u + phase
+            sine, cosine = amplitude * sin(angle), amplitude * n * cos(angle)
+            sines += sine
+            cosines += cosine
+            bends += n * n * sine
+        square = v * v + SLOW_SQUARED
+        size = v / square
+        if a:
+            growth = (SLOW_SQUARED - v * v) / (square * square) * a  # of the size with time
+            bend = 2.0 * v * (v * v - 3.0 * SLOW_SQUARED) / (square * square * square) * a * a
+            angle, rate = size * sines, growth * sines + size * v * cosines
+            change = bend * sines + 2.0 * growth * v * cosines + size * (a * cosines - v * v * bends)
+        else:
+            angle, rate, change = size * sines, size * v * cosines, -size * v * v * bends
+        shaken = [(joint, angle, rate, change)]
+        c = self.crosstalk
+        if c and joint in PARALLEL:
+            shaken += [(other, c * angle, c * rate, c * change) for other in PARALLEL[joint]]
+        return shaken
+
+    def advance(self, yielding: Sequence[Yielding], change_rad_s: Sequence[float]) -> tuple[Yielding, ...]:
+        """Return what the joints yield in the next tick, in which their targets' rates change by `change_rad_s`.
+
+        `yielding` is that of the last tick.
+        """
+        if not self.yield_s2 or not (yielding or any(change_rad_s)):
+            return ()
+        before = {motion.joint: self.yield_at(motion, TICK_S) for motion in yielding}
+        joints = []
+        for joint, change in enumerate(change_rad_s):
+            angle, rate, _ = before.get(joint, (0.0, 0.0, 0.0))
+            if change or abs(angle) > NEGLIGIBLE_RAD or abs(rate) > NEGLIGIBLE_RAD_S:
+                end = -self.yield_s2 * change / TICK_S
+                joints.append(Yielding(joint, end, angle - end, rate + (angle - end) / self.yield_time_s))
+        return tuple(joints)
+
+    def yield_at(self, yielding: Yielding, elapsed_s: float) -> Derivatives:
+        """Return what a joint yields `elapsed_s` after the begin of the tick, and its derivatives."""
+        per_s = 1.0 / self.yield_time_s
+        decay = exp(-elapsed_s * per_s)
+        remainder = (yielding.start_rad + yielding.slope_rad_s * elapsed_s) * decay
+        slope = yielding.slope_rad_s * decay
+        return yielding.end_rad + remainder, slope - remainder * per_s, (remainder * per_s - 2.0 * slope) * per_s
+
+
+def build_drive(section: SimulatedDriveSection, seed: int) -> JointDrive:
+    """Return the drives of a simulated arm. The phases of the ripple are drawn by the laboratory's seed."""
+    random = Random(f"drive {seed}")
+    orders = tuple(
+        tuple(
+            (part.cycles_per_turn, sqrt(2.0) * rms / part.cycles_per_turn, random.uniform(0.0, 2.0 * pi))
+            for part in section.ripple
+            if (rms := part.rms_rad_s[joint])
+        )
+        for joint in range(6)
+    )
+    return JointDrive(orders, section.lag_s, section.yield_s2, section.yield_time_s, section.crosstalk)
