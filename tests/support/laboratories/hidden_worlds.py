@@ -23,7 +23,7 @@ from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from support.laboratories.drawn_laboratory import PART_ERRORS, SQUARE_DEG, WAVE_RAD, leaning, seen_vibration
 from support.laboratories.worlds import merge
 from support.paths import CONFIGS
-from support.recordings.drawn_ripple import drawn_ripple, in_the_world
+from support.recordings.drawn_ripple import MOST_ORDER, drawn_ripple, in_the_world
 
 JOINTS = 6
 WRISTS = np.array([0, 0, 0, 1, 1, 1])
@@ -196,7 +196,10 @@ def with_digits(decimals: int, noise_rad_s: float, *, vibrates: bool, seed: int)
 
 
 def _shaking(document: dict[str, Any], *, vibrates: bool) -> dict[str, Any]:
-    still = dict.fromkeys(("vibration_fraction", "vibration_rms_rad_s", "vibration_measured_rms_rad_s"), 0.0)
+    still: dict[str, Any] = dict.fromkeys(
+        ("vibration_fraction", "vibration_rms_rad_s", "vibration_measured_rms_rad_s"), 0.0
+    )
+    still["drive"] = {"ripple": []}
     shaken: dict[str, Any] = document if vibrates else merge(document, {"world": {"arm": still}})
     return shaken
 
@@ -295,13 +298,37 @@ def _laboratory(seed: int, rng: np.random.Generator, *, speed_deg_s: float) -> d
     }
 
 
+def _drive(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw how the joints follow: about as the logs of real arms have it, with gears of another ratio now and then."""
+    ratio = int(rng.choice([50, 80, 100, 100, 100, 101, 120, 160]))
+    orders = [order for order in (ratio, 2 * ratio, 4 * ratio) if order <= MOST_ORDER]
+    sizes = [(0.3e-3, 3e-3), (1e-3, 4e-3), (0.1e-3, 0.8e-3)]
+    ripple = [
+        {"cycles_per_turn": order, "rms_rad_s": np.exp(rng.uniform(*np.log(size), JOINTS)).tolist()}
+        for order, size in zip(orders, sizes, strict=False)
+    ]
+    return {
+        "ripple": ripple,
+        "lag_s": float(rng.uniform(2e-4, 8e-4)),
+        "yield_s2": float(rng.uniform(0.5e-4, 4e-4)),
+        "yield_time_s": float(rng.uniform(4e-3, 10e-3)),
+        "crosstalk": float(rng.uniform(0, 0.2)),
+    }
+
+
 def _arm(rng: np.random.Generator) -> dict[str, Any]:
+    seen = seen_vibration(rng)
+    separate = rng.spawn(1)[0]  # what is drawn after it is what it was without
+    drive, has_rough_ripple = _drive(separate), bool(separate.random() < 0.3)
+    rough = float(rng.uniform(0, 0.05))
     axis_rad, again_rad = np.radians([STATED.axis_deg, STATED.repeatability_deg])
     return {
-        "vibration_fraction": float(rng.uniform(0, 0.05)),
+        "drive": drive,
+        "encoder_noise_rad": float(separate.uniform(1.5e-5, 4e-5)),
+        "vibration_fraction": rough if has_rough_ripple else 0.0,
         "vibration_rms_rad_s": float(rng.uniform(0, 0.004)),
         "vibration_hz": float(rng.uniform(8, 30)),
-        **seen_vibration(rng),
+        **seen,
         "settling_rad": 5.0e-5,
         "settling_hz": 12,
         "settling_decay_s": 0.15,
