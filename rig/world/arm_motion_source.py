@@ -32,7 +32,7 @@ class OnArm:
         model = select_model(arm, config.arm.model)
         ripples = [draw_ripple(arm.vibration_fraction, arm.vibration_cycles_per_turn, random) for _ in range(JOINTS)]
         motion = JointMotion(
-            [radians(angle) for angle in config.arm.home_deg or model.home_deg],
+            [radians(angle) for angle in arm.start_deg or config.arm.home_deg or model.home_deg],
             ripples,
             Encoders(
                 model.encoder_step_rad if arm.encoder_step_rad is None else arm.encoder_step_rad,

@@ -30,6 +30,7 @@ from rig.world.laboratory import Laboratory
 from rig.world.network import UNPACED, ClientSession, Network, PortListener
 from rig.world.servo.servo_bench import BEHIND_S, ServoBench
 from rig.world.ur10e.interfaces import dashboard_server, primary_server, robot_api_server, rtde, script_socket
+from rig.world.ur10e.interfaces.stored_programs import StoredPrograms
 from rig.world.ur10e.robot import Robot
 from rig.world.world_section import read_world_section
 
@@ -128,7 +129,7 @@ class World:
             if port not in _find_closed_ports(section.arm, robot)
         ]
         if robot_api_server.has_robot_api(robot):
-            new_session = partial(robot_api_server.RobotApiSession, robot)
+            new_session = partial(robot_api_server.RobotApiSession, robot, programs=StoredPrograms())
             listeners.append(self.network.listen(turner.host, turner.robot_api_port, new_session))
         return listeners
 

@@ -11,7 +11,7 @@ from rig.config.procedures.hand_sections import HandSection
 from rig.config.procedures.servo_section import ServoSection
 from rig.config.procedures.stage_section import StageMountSection
 from rig.config.ranges import ModelName
-from rig.config.section import RATIO, Section, SensorName, Vector3
+from rig.config.section import RATIO, JointAngle, Section, SensorName, Vector3
 from rig.config.world.arm_clients import SimulatedFieldbusSection, SimulatedPoseLogSection
 from rig.config.world.arm_joints import Cycles, JointsKind, SimulatedDriveSection, fill_in_joints
 from rig.config.world.autopilot import SimulatedAutopilotSection
@@ -40,6 +40,7 @@ JointRanges = tuple[JointRange, JointRange, JointRange, JointRange, JointRange, 
 JointSpeed = Annotated[float, Field(gt=0, le=360)]
 JointSpeeds = tuple[JointSpeed, JointSpeed, JointSpeed, JointSpeed, JointSpeed, JointSpeed]
 VibrationFrequency = Annotated[float, Field(ge=0.1, le=200)]
+StartAngles = tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle]
 PartNumber = Annotated[str, Field(pattern=r"^[ -~]+$", max_length=40)]
 Gradient = Annotated[float, Field(ge=-1000, le=1000)]
 
@@ -172,6 +173,11 @@ class SimulatedArmSection(Section):
     joint_speed_limits_deg_s: JointSpeeds | None = Field(
         default=None,
         description="how fast its safety settings let each joint turn; if left out, as fast as the joint can",
+    )
+    start_deg: StartAngles | None = Field(
+        default=None,
+        description="the joint angles at which it stands when the world begins",
+        json_schema_extra={"usual": "as `arm.home_deg`"},
     )
     remote_control: bool = Field(default=True, description="whether the pendant is switched to remote control")
     speed_slider: float = Field(

@@ -31,6 +31,7 @@ PROTECTIVE_STOP_RAD_S2 = 15.0
 BRAKE_RAD_S2 = 40.0
 START_DELAY_S = 0.02  # between the last byte of a program and its first line
 POWER_STEP_S = 0.5  # powering on, releasing the brakes
+UNLOCK_S = 0.5  # the maker's clients expect more than a millisecond and less than a second
 E_SERIES, POLYSCOPE_X = (5,), (10,)  # their first versions
 
 
@@ -108,6 +109,7 @@ class Robot:
         self._started_tick = 0
         self._mode_changes: list[tuple[int, RobotMode]] = []
         self._stopped_tick = 0
+        self._unlocked_tick: int | None = None  # when a protective stop that is being unlocked will be over
         self._still_since_tick = 0
         self._moved_tick = 0
         self.speed_slider = speed_slider
@@ -149,6 +151,9 @@ class Robot:
         self.tick += 1
         if self._mode_changes and self._mode_changes[0][0] <= self.tick:
             self.robot_mode = self._mode_changes.pop(0)[1]
+        if self._unlocked_tick is not None and self._unlocked_tick <= self.tick:
+            self._unlocked_tick = None
+            self.safety_mode = SafetyMode.NORMAL
         if self._start is not None and self._start[0] <= self.tick:
             self._program, self._start = self._start[1], None
             self.messages.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STARTED")
@@ -168,7 +173,8 @@ class Robot:
     @property
     def waiting(self) -> bool:
         """Whether the joints are at rest, and only a client can make them move in the next ticks."""
-        if self._start is not None or self._mode_changes or self.watchdog_s or not self.motion.still:
+        is_changing = self._start is not None or self._mode_changes or self._unlocked_tick is not None
+        if is_changing or self.watchdog_s or not self.motion.still:
             return False
         program = self._program
         return self.runtime_state == RuntimeState.STOPPED or (
@@ -287,6 +293,7 @@ class Robot:
 
     def _safety_stop(self, mode: SafetyMode) -> None:
         self.safety_mode = mode
+        self._unlocked_tick = None
         self._stopped_tick = self.tick
         self.stop_program(f"safety mode {mode.name}")
         self.motion.stop(PROTECTIVE_STOP_RAD_S2)
@@ -297,7 +304,15 @@ class Robot:
         return (self.tick - self._stopped_tick) * TICK_S
 
     def unlock_protective_stop(self) -> None:
+        """Begin to unlock a protective stop, which takes its time."""
+        if self.safety_mode == SafetyMode.PROTECTIVE_STOP and self._unlocked_tick is None:
+            self._unlocked_tick = self.tick + round(UNLOCK_S * TICKS_PER_SECOND)
+
+    def restart_safety(self) -> None:
+        """Restart the safety system, which clears a protective stop and leaves the arm without power."""
+        self.power_off()
         if self.safety_mode == SafetyMode.PROTECTIVE_STOP:
+            self._unlocked_tick = None
             self.safety_mode = SafetyMode.NORMAL
 
     def release(self) -> None:
@@ -392,7 +407,12 @@ class Robot:
     # -- outputs of RTDE ---------------------------------------------------------------------------------------------
     @property
     def speed_scaling(self) -> float:
-        """The joints' speed per speed that the slider permits; clients multiply both."""
+        """The joints' speed per speed that the slider permits; clients multiply both. It is 0 while no program runs.
+
+        In logs of an UR3 of the CB3 series and of a UR10e.
+        """
+        if self.runtime_state == RuntimeState.STOPPED:
+            return 0.0
         return min(1.0, self.motion.fraction / self.speed_slider) if self.speed_slider else 1.0
 
     @property

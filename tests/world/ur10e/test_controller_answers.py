@@ -136,6 +136,7 @@ def test_the_pendant_waits_with_an_unlock_and_the_primary_interface_does_not(rob
     robot.protective_stop()
     assert DashboardSession(robot).answer("unlock protective stop").startswith("Cannot unlock")
     PrimarySession(robot).receive(b"set unlock protective stop\n")
+    ticks(robot, 1.0)
     assert robot.safety_mode == SafetyMode.NORMAL
     robot.protective_stop()
     ticks(robot, 5.0)

@@ -2,37 +2,36 @@
 
 Source: the maker's Dashboard Server manual, e-Series. In local control it answers questions and refuses every order,
 including `stop`; so does a connection that was opened in local control, until it is reopened (Universal Robots ROS
-Driver, issues 125 and 262). The CB3 series has no local control, nor questions about it.
+Driver, issues 125 and 262). A CB3 has neither local control nor operational modes, nor the commands about them; it has
+user roles, which the e-Series has not (the maker's client library, `dashboard_client_implementation_g5.cpp`).
 """
 
 from collections.abc import Callable
 from pathlib import PurePosixPath
 
+from rig.world.ur10e.interfaces.stored_programs import WAIT_PROGRAM, WaitProgram
 from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.robot import E_SERIES, Robot
 
 PORT = 29999
 LINE_BYTES = 1 << 16  # longer than any command
 UNLOCK_AFTER_S = 5.0
-PROGRAMS = ("wait_program.urp",)
+PROGRAMS = (f"{WAIT_PROGRAM}.urp",)
 OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
+SINCE = {  # the first versions of the e-Series with these commands, which no CB3 has
+    "version": E_SERIES,
+    "safetystatus": (5, 4),
+    "is in remote control": (5, 6),
+    "get operational mode": (5, 6),
+    "set operational mode": E_SERIES,
+    "clear operational mode": E_SERIES,
+}
+OF_CB3 = ("setuserrole", "getuserrole")
 SAFETY = "Command is not allowed due to safety reasons"
 NOT_ALLOWED = f"{SAFETY}, please switch robot to Remote Control mode and reconnect to port {PORT}"
 TOO_EARLY = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
 )
-
-
-class WaitProgram:
-    """The one program on the simulated controller's disk, which waits for ever."""
-
-    waiting = True
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-    def step(self) -> bool:
-        return True
 
 
 class DashboardSession:
@@ -121,15 +120,20 @@ class DashboardSession:
         if key == "quit":
             self.closing = True
             return "Disconnected"
-        if key in self._questions and not (key == "is in remote control" and self._robot.identity.polyscope < E_SERIES):
+        if key in self._questions and self._has(key):
             return self._questions[key]()
         if key in self._orders:
             return self._orders[key]() if self._may_order else NOT_ALLOWED
         for words, handler in {**self._orders_with_text, **self._questions_with_text}.items():
-            if key == words or key.startswith(words + " "):
+            if (key == words or key.startswith(words + " ")) and self._has(words):
                 allowed = self._may_order or words not in self._orders_with_text
                 return handler(line[len(words) :].strip()) if allowed else NOT_ALLOWED
         return f"could not understand: '{line}'"
+
+    def _has(self, command: str) -> bool:
+        """Return whether the controller's software has a command."""
+        version = self._robot.identity.polyscope
+        return version < E_SERIES if command in OF_CB3 else version >= SINCE.get(command, (0,))
 
     @property
     def _may_order(self) -> bool:
@@ -198,9 +202,7 @@ class DashboardSession:
         return "Protective stop releasing"
 
     def _restart_safety(self) -> str:
-        self._robot.power_off()
-        if self._robot.safety_mode == SafetyMode.PROTECTIVE_STOP:
-            self._robot.safety_mode = SafetyMode.NORMAL
+        self._robot.restart_safety()
         return "Restarting safety"
 
     def _shutdown(self) -> str:

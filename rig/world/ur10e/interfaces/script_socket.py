@@ -86,7 +86,7 @@ ORDERS: dict[str, Callable[[Robot], object]] = {
     "power on": Robot.power_on,
     "power off": Robot.power_off,
     "set robotmode run": Robot.brake_release,
-    "set unlock protective stop": Robot.unlock_protective_stop,  # at once: the maker's test_primary_client.cpp
+    "set unlock protective stop": Robot.unlock_protective_stop,  # also before 5 s: the maker's test_primary_client.cpp
     "stop program": lambda robot: robot.stop_program("stopped by a client"),
     "pause program": Robot.pause,
     "resume program": Robot.resume,

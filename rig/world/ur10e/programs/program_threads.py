@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.motion.cartesian import plan_straight_line, solve_inverse_kinematics
 from rig.world.ur10e.motion.forward_kinematics import flange_pose
-from rig.world.ur10e.motion.trajectory import plan_joint_move
+from rig.world.ur10e.motion.trajectory import plan_joint_move, plan_soft_joint_move
 from rig.world.ur10e.robot import Robot
 
 Steps = Iterator[None]
@@ -20,7 +20,7 @@ HAND_OVER_RAD_S2 = 4.0  # deceleration before a move that follows a killed one
 class ScriptMove:
     """A movej or (`straight`) movel to joint angles or (`is_pose`) a pose of the tool's frame.
 
-    Speed and acceleration in rad/s and rad/s²; of a straight move in m/s and m/s².
+    Speed and acceleration in rad/s and rad/s²; of a straight move in m/s and m/s². `is_soft`: it starts gently.
     """
 
     target: tuple[float, ...]
@@ -28,6 +28,7 @@ class ScriptMove:
     acceleration: float
     straight: bool = False
     is_pose: bool = False
+    is_soft: bool = False
 
 
 def check_finite(values: Sequence[float]) -> None:
@@ -92,7 +93,8 @@ class Threads:
             if move.is_pose:
                 target = solve_inverse_kinematics(self.robot.flange_pose_for(target), motion.settled_q_rad, links)
             start, limits = motion.settled_q_rad, motion.speed_limit_rad_s
-            trajectory = plan_joint_move(start, target, move.speed, move.acceleration, limits)
+            plan = plan_soft_joint_move if move.is_soft else plan_joint_move
+            trajectory = plan(start, target, move.speed, move.acceleration, limits)
         if not self.robot.is_within_limits(trajectory.end_rad):
             raise ProgramError("joint position out of limits: a target lies beyond a joint's limit")
         motion.follow(trajectory)

@@ -4,8 +4,8 @@ import ast
 import operator
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeGuard
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.ur10e.controller_messages import OutOfReach, ProgramError
@@ -129,6 +129,11 @@ def parse_program(lines: Sequence[str]) -> tuple[str, Block]:
     return name, tuple(stack[0])
 
 
+def is_lone_move(body: Block) -> TypeGuard[tuple[Call]]:
+    """Return whether a program is one movej and nothing else."""
+    return len(body) == 1 and isinstance(body[0], Call) and body[0].text.startswith("movej(")
+
+
 class ScriptProgram:
     """A program of the statements below and endless loops: no variables, no conditions."""
 
@@ -138,10 +143,19 @@ class ScriptProgram:
         self._robot = robot
         self._threads = Threads(robot)
         self.name, body = parse_program(lines)
-        self._main = self._play(body)
+        self._main = self._play_move(body[0]) if is_lone_move(body) else self._play(body)
 
     def step(self) -> bool:
         return next(self._main, StopIteration) is not StopIteration
+
+    def _play_move(self, call: Call) -> Steps:
+        """Play the one movej of a program, which starts gently."""
+        try:
+            yield from self._threads.move("main", replace(read_move("movej", Arguments(call.text)), is_soft=True))
+        except OutOfReach:
+            raise
+        except (ProgramError, TypeError, ValueError, IndexError, ArithmeticError) as error:
+            raise ProgramError(str(error), call.position) from None
 
     def _play(self, block: Block) -> Steps:
         for item in block:
