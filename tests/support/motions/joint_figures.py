@@ -112,3 +112,23 @@ def settling(time_s: Array, target_qd_rad_s: Array, qd_rad_s: Array, rest_rad_s:
     restless = np.flatnonzero(np.abs(along) > rest_rad_s)
     duration_s = float(time_s[after][restless[-1]] - time_s[last + 1]) if len(restless) else 0.0
     return Settling(float(along.min()), duration_s)
+
+
+@dataclass(frozen=True)
+class GentleStart:
+    """How long the acceleration grows from zero, and its greatest value over the one that follows."""
+
+    duration_s: float
+    overshoot: float
+
+
+def gentle_start(time_s: Array, target_qd_rad_s: Array) -> GentleStart | None:
+    """Return how a move starts whose target speeds (n,) begin with it; None if it starts at its full acceleration."""
+    acceleration = np.abs(np.diff(target_qd_rad_s) / np.diff(time_s))
+    if len(acceleration) < 10:
+        return None
+    peak = int(np.argmax(acceleration[: len(acceleration) // 2]))
+    following = float(np.median(acceleration[peak + 2 : peak + 12]))
+    if acceleration[1] > 0.5 * following or not following:
+        return None
+    return GentleStart(float(time_s[peak + 1] - time_s[0]), float(acceleration[peak] / following))
