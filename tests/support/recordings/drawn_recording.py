@@ -22,10 +22,20 @@ from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
 from rig.motion.steps import Sweep, Transfer
 from support.recordings.drawn_ripple import Ripple
-from support.recordings.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sample_times, sizes_of
+from support.recordings.synthetic_run import (
+    SENSOR,
+    Motion,
+    Setup,
+    encoder_angles,
+    rotation,
+    run_data,
+    sample_times,
+    sizes_of,
+)
 
 WRISTS = (3, 4, 5)
 WAVE_SHARE = 0.3  # as the solver has it
+ROUGH_ORDERS, MEASURED_TO_ROUGH = (18, 31, 50), 0.16  # of a ripple of at most 5 %, and of one of at most 0.8 %
 OUTWARDS_S = 0.1  # in which a joint that begins to move comes to where its friction holds it
 ARC_WAVES = np.arange(1, 5)  # of encoders: at ends 90°, 180° and 270° apart they err independently of each other
 OCTAVES_S = (0.5, 2.0, 8.0, 32.0, 128.0)
@@ -105,11 +115,14 @@ def drawn(
     """Draw a recording. The movement is that of `setup`; its unevenness is `ripple`, or usual, or none."""
     rng = np.random.default_rng(seed)
     seen = rng.spawn(1)[0]
+    is_rough = seed % 4 == 0  # as no arm was seen to be; the others ripple as logged ones
+    setup = Setup() if setup is None else setup
     setup = replace(
-        Setup() if setup is None else setup,
+        setup,
         seed=seed,
         sample_rate_hz=kind.sensor.rate_hz,
-        vibration=vibrates * float(rng.uniform(0.0, 0.05)),
+        vibration=vibrates * float(rng.uniform(0.0, 0.05)) * (1.0 if is_rough else MEASURED_TO_ROUGH),
+        orders=ROUGH_ORDERS if is_rough else setup.orders,
         seen_vibration_rad_s=vibrates * float(seen.uniform(0.0, 0.002)),
         seen_vibration_hz=float(seen.uniform(8.0, 30.0)),
         boot_s=float(rng.uniform(-1e4, 0.0)),
@@ -248,5 +261,5 @@ def _looked_at_late(run: RunData, motion: Motion, setup: Setup, rng: np.random.G
     arm = run.states.copy()
     late_s = rng.uniform(0, 1e-4) * rng.standard_normal(len(arm))
     q_rad, _ = motion.joints(arm["time_s"] + late_s)
-    arm["q_rad"] = np.round(q_rad / setup.encoder_step_rad) * setup.encoder_step_rad
+    arm["q_rad"] = encoder_angles(setup, q_rad)
     return replace(run, states=arm)

@@ -72,14 +72,15 @@ class Setup:
     noise_rad_s: float = 0.035
     noise_correlation: float = 0.0  # from sample to sample
     mounting_error_rad: tuple[float, ...] = (0.05, -0.035, 0.06)
-    vibration: float = 0.05  # RMS of the rate ripple over the rate
-    orders: tuple[int, ...] = (18, 31, 50)  # how many times each part of it comes in a turn
+    vibration: float = 0.003  # RMS of the rate ripple over the rate, as of the simulated arm
+    orders: tuple[int, ...] = (100, 200, 400)  # how many times each part of it comes in a turn
     seen_vibration_rad_s: float = 0.0  # RMS, of each wrist, that is not locked to its turning
     seen_vibration_hz: float = 10.0
     unseen_vibration_rad_s: float = 0.0  # that no encoder sees, of `drawn_recording`: another is drawn if it has
     unseen_vibration_hz: tuple[float, ...] = ()  # no frequencies
     state_rate_hz: float = 125.0
     encoder_step_rad: float = 6e-6
+    encoder_noise_rad: float = 2.4e-5
     sample_rate_hz: float = 238.0
     boot_s: float = -4321.0  # controller time at which the board's clock stood at zero
     drift: float = -35e-6  # of the controller against the board
@@ -230,7 +231,7 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm = np.zeros(len(times), ARM_STATE_DTYPE)
     q, qd = motion.joints(times)
     arm["time_s"], arm["host_time_s"] = times, times + 1e4
-    arm["q_rad"], arm["qd_rad_s"] = np.round(q / setup.encoder_step_rad) * setup.encoder_step_rad, qd
+    arm["q_rad"], arm["qd_rad_s"] = encoder_angles(setup, q), qd
     arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
     provenance = replace(PROVENANCE, arm_kinematics=setup.told, board_follows_crystal=setup.follows_crystal)
@@ -244,6 +245,12 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
         arm,
         motion.events(),
     )
+
+
+def encoder_angles(setup: Setup, q_rad: Array) -> Array:
+    """Return what the encoders say of the angles (n, 6): their noise, and steps."""
+    noise = np.random.default_rng([setup.seed, 24]).standard_normal(q_rad.shape)
+    return np.round((q_rad + setup.encoder_noise_rad * noise) / setup.encoder_step_rad) * setup.encoder_step_rad
 
 
 SENSOR = RecordedSensor(
