@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
@@ -50,7 +51,7 @@ def read(path: Path) -> Log:
     return {**columns, **joints}
 
 
-def intervals(mask: Array) -> Iterator[slice]:
+def intervals(mask: NDArray[np.bool_]) -> Iterator[slice]:
     """Yield the stretches in which `mask` (n,) holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     for begin, end in zip(edges[::2], edges[1::2], strict=True):

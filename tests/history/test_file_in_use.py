@@ -242,7 +242,7 @@ def test_what_is_not_there_when_it_is_read_back_is_not_told_as_entered(file: Pat
 IMPORTS = """
 import sys
 from pathlib import Path
-from rig.commands.history import answer as history_answer, recall, remember
+from rig.commands.history import history_answer, run_serials, remember
 from rig.config.judging.judging_sections import HistorySection
 from rig.config.load import load
 
@@ -257,10 +257,10 @@ def timed(work, within_s):
 
 history_answer.answer_of = timed
 config = load(Path(sys.argv[1])).config
-recall.remembered(config, frozenset())
+run_serials.remembered(config, frozenset())
 for _ in range(2):
     event, _ = remember.remember(Path(sys.argv[2]), HistorySection())
-    recall.remembered(config, frozenset())
+    run_serials.remembered(config, frozenset())
 print(type(event).__name__, late)
 """
 

@@ -304,8 +304,8 @@ def _drive(rng: np.random.Generator) -> dict[str, Any]:
     orders = [order for order in (ratio, 2 * ratio, 4 * ratio) if order <= MOST_ORDER]
     sizes = [(0.3e-3, 3e-3), (1e-3, 4e-3), (0.1e-3, 0.8e-3)]
     ripple = [
-        {"cycles_per_turn": order, "rms_rad_s": np.exp(rng.uniform(*np.log(size), JOINTS)).tolist()}
-        for order, size in zip(orders, sizes, strict=False)
+        {"cycles_per_turn": order, "rms_rad_s": np.exp(rng.uniform(low, high, JOINTS)).tolist()}
+        for order, (low, high) in zip(orders, np.log(sizes), strict=False)
     ]
     return {
         "ripple": ripple,

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.load import load
-from rig.world.on_arm import OnArm
-from rig.world.section import read_world_section
-from rig.world.ur10e.interfaces.primary import PrimarySession
+from rig.world.arm_motion_source import OnArm
+from rig.world.ur10e.interfaces.primary_server import PrimarySession
 from rig.world.ur10e.interfaces.rtde import OutputRecipe
+from rig.world.world_section import read_world_section
 from support.paths import DEMO
 
 Array = NDArray[np.float64]

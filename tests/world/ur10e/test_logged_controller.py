@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rig.world.ur10e.interfaces.dashboard_server import DashboardSession
-from rig.world.ur10e.interfaces.robot_api import RobotApiSession
+from rig.world.ur10e.interfaces.robot_api_server import RobotApiSession
 from rig.world.ur10e.interfaces.stored_programs import StoredPrograms
 from rig.world.ur10e.modes import RobotMode, SafetyMode
 from support.motions.arm_states import LoggedArm
@@ -81,10 +81,10 @@ def test_unlocking_a_protective_stop_takes_its_time() -> None:
     arm.log(2600)
     assert DashboardSession(arm.robot).answer("unlock protective stop") == "Protective stop releasing"
     arm.log(100)
-    assert arm.robot.safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert arm.robot.safety_mode.name == "PROTECTIVE_STOP"
     assert not arm.robot.waiting
     arm.log(400)
-    assert arm.robot.safety_mode == SafetyMode.NORMAL
+    assert arm.robot.safety_mode.name == "NORMAL"
 
 
 def test_a_stop_during_the_unlocking_is_another_one() -> None:
