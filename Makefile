@@ -96,7 +96,7 @@ figures: $(VENV)/dev.installed
 	  cp build/kvh1775_$${run%%:*}/$${run##*:}_kvh.png docs/figures/instruments/kvh1775-$${run%%:*}.png; done
 
 docs: $(VENV)/docs.installed
-	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet -d build/doctrees -c docs . build/docs
+	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet -d build/doctrees -c docs/site . build/docs
 	@echo "build/docs/index.html"
 
 drawings: $(VENV)/demo.installed

@@ -1,5 +1,7 @@
-"""The truth of a simulated laboratory beside the result: (result − truth)/U. Only for people; nothing that estimates
-imports this module."""
+"""The truth of a simulated laboratory next to the result: (result − truth)/U.
+
+It is for people only: nothing that estimates imports this module.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

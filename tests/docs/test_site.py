@@ -47,7 +47,7 @@ def test_the_drawings_are_those_the_script_makes(monkeypatch: pytest.MonkeyPatch
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site as `make docs` builds it, but for the notebook, which tests/notebook/test_first_look.py executes."""
     folder = tmp_path_factory.mktemp("docs")
-    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", "-c", str(DOCS)]
+    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", "-c", str(DOCS / "site")]
     command += ["-D", "nb_execution_mode=off", "-d", str(folder / "doctrees"), str(ROOT), str(folder / "site")]
     made = subprocess.run(
         command, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False

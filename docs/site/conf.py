@@ -12,7 +12,7 @@ from docutils import nodes
 from sphinx import addnodes
 from sphinx.application import Sphinx
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))  # the procedures and the rig as they are here, installed or not
 
 import rig  # noqa: E402
@@ -23,7 +23,7 @@ html_title = f"{project} {release}"
 
 root_doc = "docs/README"
 include_patterns = ["*.md", "docs/**", "firmware_host/**/README.md"]
-exclude_patterns = [".venv", "build", "runs", "docs/site", "docs/site_style"]
+exclude_patterns = [".venv", "build", "runs", "docs/site"]
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton"]
 myst_heading_anchors = 4
@@ -35,10 +35,10 @@ autodoc_member_order = "bysource"
 default_role = "code"
 
 html_theme = "furo"
-html_static_path = ["site_style"]
+html_static_path = ["static"]
 html_css_files = ["cards.css"]
-html_search_scorer = str(ROOT / "docs" / "site_style" / "scorer.js")
-html_extra_path = ["site", "config.schema.json"]  # site/index.html leads to the first page; editors fetch the schema
+html_search_scorer = str(ROOT / "docs" / "site" / "static" / "scorer.js")
+html_extra_path = ["index.html", "../config.schema.json"]  # index.html leads to the first page; editors fetch the schema
 html_show_sourcelink = False
 
 SECTION = re.compile(r"^## (.+)$", re.MULTILINE)
