@@ -35,6 +35,7 @@ class LookedFile:
     - layout, guess: of a table; None for a bag or a log of an autopilot.
     - columns: the map of its columns, as `--columns` takes it, to be completed if it has "?".
     - samples, survey: its readings, if it has any that can be read; others: rows without any; note: what they lack.
+    - origin_s: of the readings' times; the attitudes count from 0 of their clock.
     - attitudes: the rows of its reference, if it has one.
     - refusals: why readings or attitudes could not be read.
     """
@@ -47,6 +48,7 @@ class LookedFile:
     survey: LogSurvey | None = None
     others: int = 0
     note: str = ""
+    origin_s: int = 0
     attitudes: Columns | None = None
     refusals: tuple[RigError, ...] = ()
 
@@ -75,6 +77,14 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
         return looked
     column_map = ColumnMap.model_validate(columns)
     return _read_contents(looked, column_map, has_readings=len(guess.samples) > 1, has_attitudes=len(guess.motion) > 1)
+
+
+def count_from(looked: LookedFile, origin_s: int) -> LookedFile:
+    """Return a reference's file whose attitudes count from the origin of a log's times."""
+    if looked.attitudes is None or not origin_s:
+        return looked
+    times = {name: looked.attitudes[name] - origin_s for name in ("start_s", "end_s")}
+    return replace(looked, attitudes={**looked.attitudes, **times})
 
 
 def is_incomplete(columns: Mapping[str, Any]) -> bool:
@@ -151,7 +161,14 @@ def _read_samples(looked: LookedFile, column_map: ColumnMap) -> LookedFile:
             raise
         table = read_sample_table(looked.path, (), mapped, [RATE.sensor])
     samples = samples_in(table.columns, str(looked.path))
-    return replace(looked, samples=samples, survey=survey_log(samples), others=table.others, note=table.note)
+    return replace(
+        looked,
+        samples=samples,
+        survey=survey_log(samples),
+        others=table.others,
+        note=table.note,
+        origin_s=table.origin_s,
+    )
 
 
 def find_allan_obstacle(samples: Samples) -> RigError | None:

@@ -62,6 +62,7 @@ def _print(
     looks: "Sequence[LookedFile]", columns: dict[str, Any], stated: "ColumnMap | None", named: Path | None
 ) -> None:
     """Print the files and what they allow; change `columns` to the convention that the gyroscope shows."""
+    from rig.analysis.log_contents import count_from
     from rig.report.terminal.look_lines import describe_convention, describe_file, describe_solutions
 
     for looked in looks:
@@ -71,6 +72,7 @@ def _print(
     reference = next((looked for looked in looks if looked.attitudes is not None), None)
     convention = None
     if log is not None and reference is not None:
+        reference = count_from(reference, log.origin_s)
         convention = _find_convention(log, reference)
         for line in describe_convention(convention):
             say(line)

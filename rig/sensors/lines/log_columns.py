@@ -57,7 +57,7 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
     quaternion = _find_quaternion(layout, values)
     names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
     used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
-    free = [index for index in layout.numbers if index not in used]
+    free = [index for index in layout.numbers if index not in used and np.nanstd(values[:, index]) > 0]
     groups = _complete_rows(values, free)
     samples: dict[str, dict[str, Any]] = {}
     reasons: list[str] = []
@@ -66,6 +66,8 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
         part = values[rows][:, indices]
         still = find_still(part, rate_hz * len(part) / max(len(values), 1))
         guessed = guess_triads(tuple(names[index] for index in indices), part, still, rate_hz)
+        if quaternion and not any(names[index] for index in indices):
+            continue  # a reference's positions look like readings
         is_nameless = not any(names[index] for index in indices) or not guessed.units
         if is_nameless and len(indices) == 3 and "x_rad_s" not in samples and set(guessed.units) <= {"m"}:
             guessed = guess_triads(("gx", "gy", "gz"), part, still, rate_hz)

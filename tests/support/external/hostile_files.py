@@ -11,6 +11,7 @@ import socket
 import sqlite3
 import struct
 import sys
+import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -260,6 +261,32 @@ def asked(make: Callable[[], Makes]) -> Makes:
 
 
 NASTY = "\x1b]0;owned\x07\x1b[2J\n\r\u202e"
+# -- MATLAB, version 5 ("MAT-File Format", MathWorks) --------------------------------------------------------------------
+MAT_HEAD = b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM"
+
+
+def element(kind: int, body: bytes) -> bytes:
+    return struct.pack("<II", kind, len(body)) + body + bytes(-len(body) % 8)
+
+
+def matrix(shape: tuple[int, int]) -> bytes:
+    """Return the beginning of a matrix of this shape, without its numbers."""
+    head = element(6, struct.pack("<II", 6, 0)) + element(5, struct.pack("<ii", *shape)) + element(1, b"time_s")
+    content = head + struct.pack("<II", 9, 8 * shape[0] * shape[1] & 0xFFFFFFFF)
+    return struct.pack("<II", 14, len(content)) + content
+
+
+def packed_matrix(size: int) -> bytes:
+    """Return a file with one matrix of zeros, packed by zlib to a thousandth."""
+    packer = zlib.compressobj()
+    head = matrix((size // 8, 1))
+    head = struct.pack("<II", 14, len(head) - 8 + size) + head[8:]
+    packed = (
+        packer.compress(head) + b"".join(packer.compress(bytes(1 << 20)) for _ in range(size >> 20)) + packer.flush()
+    )
+    return MAT_HEAD + struct.pack("<II", 15, len(packed)) + packed
+
+
 FILES: dict[str, Makes] = {
     # bags
     "a packed file of 2 GB of zeros": packed_db3,
@@ -337,6 +364,16 @@ FILES: dict[str, Makes] = {
     "a log that is a pipe": alone("log.ulg", pipe),
     "a log that is a device": alone("log.ulg", zeros),
     "a log of one byte": alone("log.ulg", lambda path: path.write_bytes(b"U")),
+    # bags of ROS 1
+    "a ROS 1 bag of noise": alone("log.bag", lambda path: path.write_bytes(b"#ROSBAG V2.0\n" + os.urandom(100_000))),
+    "a ROS 1 bag that is a pipe": alone("log.bag", pipe),
+    # MATLAB's files
+    "a packed matrix of 1 GB": alone("log.mat", lambda path: path.write_bytes(packed_matrix(GIGABYTE))),
+    "a matrix that claims 4 GB": alone("log.mat", lambda path: path.write_bytes(MAT_HEAD + matrix((1 << 29, 1)))),
+    "matrices without end": alone("log.mat", lambda path: path.write_bytes(MAT_HEAD + b"\x0e" + bytes(400_000))),
+    "a MATLAB file of noise": alone("log.mat", lambda path: path.write_bytes(MAT_HEAD + os.urandom(100_000))),
+    "HDF5 of noise": alone("log.mat", lambda path: path.write_bytes(b"MATLAB 7.3 " + os.urandom(100_000))),
+    "a MATLAB file that is a device": alone("log.mat", zeros),
     # tables
     "a packed line of 1 GB": gzipped(TIMES.encode(), b"1", GIGABYTE),
     "packed rows of 1 GB": gzipped(TIMES.encode(), b"0,0,0,0\n", GIGABYTE),
