@@ -7,8 +7,8 @@ WAYS = (  # question in two lines, answer if yes, the page
     (
         "What do you have? Readings in a file:",
         "a log, a CSV, a bag, of something that was turned?",
-        "solve the file",
-        "data-recorded-elsewhere.md, known-attitudes.md",
+        "rig look FILE",
+        "from-a-robots-log.md, data-recorded-elsewhere.md",
     ),
     (
         "A Universal Robots arm?",

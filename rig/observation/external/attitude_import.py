@@ -44,7 +44,7 @@ from rig.observation.external.placement_account import AttitudeRows
 from rig.observation.external.placements import MOSTLY, Placements, find_placements
 from rig.observation.external.table_motion import TableMotion
 from rig.observation.formats.column_selection import Mapped
-from rig.observation.formats.csv_table import read_columns
+from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import attitudes_in, rows_around
 from rig.observation.sampling import find_sampling
 from rig.observation.timebase import TimeBase, estimate_time_base
@@ -107,7 +107,7 @@ def read_attitudes(
     """
     in_format = attitudes_in(path)
     if in_format is None:
-        columns = read_columns(path, MOMENTS, ATTITUDES_MB, mapped, origin_s)
+        columns = _drop_other_rows(path, read_table(path, MOMENTS, ATTITUDES_MB, mapped, origin_s))
         if TIME in columns:
             columns |= rows_around(columns.pop(TIME), path)
     else:
@@ -115,6 +115,18 @@ def read_attitudes(
     if inverse:
         columns |= {name: -columns[name] for name in ("qx", "qy", "qz")}
     return columns
+
+
+def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
+    """Return the rows that hold a quaternion: loggers of several rates leave it blank in others.
+
+    Raise Refused `not_a_number` for another blank cell.
+    """
+    kept = ~np.isnan([table.columns[name] for name in ("qw", "qx", "qy", "qz")]).all(axis=0)
+    for name, column in table.columns.items():
+        if len(blank := np.flatnonzero(np.isnan(column) & kept)):
+            raise blank_cell(path, name, int(table.lines[blank[0]]))
+    return {name: column[kept] for name, column in table.columns.items()}
 
 
 def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:

@@ -160,3 +160,16 @@ def test_quaternions_of_the_other_direction_are_inverted(tmp_path: Path) -> None
 def test_a_map_that_contradicts_itself_is_refused(columns: dict[str, object], says: str) -> None:
     with pytest.raises(ValueError, match=says):
         ColumnMap.model_validate(columns)
+
+
+def test_readings_and_poses_of_two_rates_may_share_a_file(tmp_path: Path) -> None:
+    rows = [f"{t:.3f},0.1,0.2,0.3,,,," for t in TIME_S] + [f"{t + 0.001:.3f},,,,1,0,0,0" for t in TIME_S[::4]]
+    rows.sort(key=lambda row: float(row.partition(",")[0]))
+    path = tmp_path / "both.csv"
+    path.write_text("\n".join(["time_s,x_rad_s,y_rad_s,z_rad_s,qw,qx,qy,qz", *rows]) + "\n", encoding="utf-8")
+    columns = ColumnMap.model_validate(
+        {"samples": {"time_s": {"column": "time_s"}}, "motion": {"time_s": {"column": 1}}}
+    )
+    table = read_sample_table(path, [RATE], map_samples(columns))
+    assert len(table.columns["x_rad_s"]) == 40 and table.others == 10
+    assert len(read_attitudes(path, map_motion(columns))["qw"]) == 10

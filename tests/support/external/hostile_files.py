@@ -261,7 +261,9 @@ def asked(make: Callable[[], Makes]) -> Makes:
 
 
 NASTY = "\x1b]0;owned\x07\x1b[2J\n\r\u202e"
-# -- MATLAB, version 5 ("MAT-File Format", MathWorks) --------------------------------------------------------------------
+
+
+# -- MATLAB, version 5 ("MAT-File Format", MathWorks) ------------------------------------------------------------------
 MAT_HEAD = b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM"
 
 
