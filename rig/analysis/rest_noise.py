@@ -19,7 +19,7 @@ from rig.observation.by_hand.steadiness import check_at_rest, contiguous_slices,
 from rig.observation.external.csv_samples import Samples
 from rig.observation.motion.arm_motion import motion_of
 from rig.observation.reference.dwell_acceleration import accelerations
-from rig.observation.sampling import find_sampling
+from rig.observation.time_stamps.sampling import find_sampling
 
 FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
-from rig.observation.gaps import find_hiding_gaps, hidden_angles_rad
+from rig.observation.time_stamps.gaps import find_hiding_gaps, hidden_angles_rad
 
 RATE_HZ, NOISE_RAD_S = 100, 5e-4
 TIME_S = np.arange(6000) / RATE_HZ

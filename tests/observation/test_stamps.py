@@ -7,7 +7,7 @@ import pytest
 
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.observation.stamps import OrderedStamps, order_stamps
+from rig.observation.time_stamps.stamp_order import OrderedStamps, order_stamps
 from support.external.loggers import Stamps, polled, stale_at_first, stalled
 
 COUNT, RATE_HZ = 3000, 104.0

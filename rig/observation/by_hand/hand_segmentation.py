@@ -15,8 +15,8 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move
 from rig.observation.by_hand.rests import ROUNDING, find_rests
-from rig.observation.gaps import find_hiding_gaps
-from rig.observation.sampling import find_sampling
+from rig.observation.time_stamps.gaps import find_hiding_gaps
+from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window
 
 MARGIN_S = 0.1  # of a rest at either end that belongs to the adjacent moves

@@ -20,7 +20,7 @@ from rig.data.quantity import RATE, Quantity
 from rig.estimation.arrays import Array
 from rig.observation.by_hand.knocks import KNOCK, smallest_steps
 from rig.observation.by_hand.steadiness import BEYOND
-from rig.observation.sampling import find_sampling
+from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window
 
 BLOCK_S, FEWEST = 0.25, 5  # samples of a block

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.sampling import Sampling
+from rig.observation.time_stamps.sampling import Sampling
 
 BLOCK_S = 1.0
 BEYOND = 6.0  # standard deviations of the noise of a difference

@@ -46,7 +46,7 @@ from rig.observation.external.table_motion import TableMotion
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import attitudes_in, rows_around
-from rig.observation.sampling import find_sampling
+from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window, inside
 

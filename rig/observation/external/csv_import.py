@@ -43,8 +43,8 @@ from rig.observation.external.turns import DeclaredTurns, TurnedData, find_turns
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import read_columns
 from rig.observation.observe import Observation, nearest_axis
-from rig.observation.sampling import find_sampling
 from rig.observation.stuck_check import check_reads
+from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window, inside
 
 AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
@@ -98,10 +98,10 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
     if by_angle is None:
         return replace(data, by_mean=tuple(sweep.sweep for sweep in data.sweeps))
     by_mean = tuple(sweep.sweep for sweep in data.sweeps if sweep.sweep not in (*by_angle.rows, *by_angle.hiding))
-    return replace(data, turned=by_angle, by_mean=by_mean, omitted=(*_hiding(by_angle, data), *data.omitted))
+    return replace(data, turned=by_angle, by_mean=by_mean, omitted=(*_list_hiding(by_angle, data), *data.omitted))
 
 
-def _hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
+def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
     """Yield the turns that are left out for missing readings, if there are any."""
     if by_angle.hiding:
         first = next(sweep for sweep in data.sweeps if sweep.sweep in by_angle.hiding)
@@ -150,10 +150,10 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
         else:
             turns.append(_observation(row, mean, speed, axes[row - 1]))
     _check_unit(turns)
-    return ExternalData(tuple(turns), tuple(rests), omitted=tuple(_omitted(rows, windows)))
+    return ExternalData(tuple(turns), tuple(rests), omitted=tuple(_list_omitted(rows, windows)))
 
 
-def _omitted(rows: Sequence[RowGaps], windows: Sequence[Window]) -> Iterator[Omitted]:
+def _list_omitted(rows: Sequence[RowGaps], windows: Sequence[Window]) -> Iterator[Omitted]:
     """Yield the rows that are left out, and the number of readings that are missing in the others."""
     lost = [(number, row) for number, row in enumerate(rows, start=1) if not row.is_usable]
     if lost:

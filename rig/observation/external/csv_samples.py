@@ -26,8 +26,8 @@ from rig.observation.external.omission import Omitted
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import readings_in
-from rig.observation.sampling import Sampling
-from rig.observation.stamps import OrderedStamps, order_stamps
+from rig.observation.time_stamps.sampling import Sampling
+from rig.observation.time_stamps.stamp_order import OrderedStamps, order_stamps
 
 SAMPLES_MB = 256  # an hour at 1 kHz
 

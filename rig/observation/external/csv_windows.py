@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average
-from rig.observation.gaps import hidden_angles_rad
-from rig.observation.sampling import Sampling
 from rig.observation.statistics.coloured_noise import correlation_inflation, fit_autoregression
+from rig.observation.time_stamps.gaps import hidden_angles_rad
+from rig.observation.time_stamps.sampling import Sampling
 from rig.observation.windows import Window, inside
 
 MIN_SAMPLES = 20

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.external.attitude_drift import Fixes
-from rig.observation.gaps import find_hiding_gaps
-from rig.observation.sampling import find_sampling
+from rig.observation.time_stamps.gaps import find_hiding_gaps
+from rig.observation.time_stamps.sampling import find_sampling
 
 WINDOW_S, SHORTEST_S = (
     1.0,

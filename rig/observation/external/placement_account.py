@@ -10,7 +10,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.by_hand.rests import BLOCK_S
 from rig.observation.external.omission import Omitted
-from rig.observation.sampling import find_sampling
+from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window, inside
 
 

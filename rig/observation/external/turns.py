@@ -15,9 +15,9 @@ from rig.observation.arm_rests import estimate_bias_drift
 from rig.observation.average import Average
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.csv_windows import average_of
-from rig.observation.gaps import hidden_angles_rad
 from rig.observation.observe import Observation
-from rig.observation.sampling import find_sampling
+from rig.observation.time_stamps.gaps import hidden_angles_rad
+from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window, inside
 
 REACH_S = 0.5  # between the marked end of a turn and the rest that it belongs to

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
+from rig.observation.time_stamps.moving_values import find_least_ahead, find_least_around, find_least_behind
 
 WIDTHS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)  # readings
 MEDIAN, UNDISTURBED = 0.5, 0.1  # quantiles of the interval to begin with: for few losses, and for many
@@ -34,7 +35,6 @@ SHORT, SOME_SHORT = 0.6, 0.05  # of the interval; if this fraction of steps is s
 LATE = 0.1  # of the long steps: if as many are short, readings were late and not lost
 MORE = 1.5  # times the resolution: stamps that are later than this are not only rounded
 SMALLER, OF_NORMAL = 0.85, 0.5204  # quantile of squared normal deviates; mean of those below it over the mean of all
-AVERAGED = 32  # readings whose stamps err either way
 PASSES, SETTLED = 6, 1e-9
 DECIMALS, BITS = 7, 16  # of a second, to which stamps may be rounded
 COUNTED = 50  # missing readings: the number in a longer gap is too inexact to refine the interval
@@ -96,9 +96,9 @@ class Sampling:
 def find_sampling(time_s: Array) -> Sampling:
     """Return the sampling of readings at rising times (n ≥ 2,)."""
     steps_s = np.diff(time_s)
-    mean_s = typical_interval_s(time_s)
+    mean_s = find_typical_interval_s(time_s)
     # Equal steps are as coarse as their resolution, and good.
-    rounded_s = resolution_s(time_s)
+    rounded_s = find_resolution_s(time_s)
     coarse = rounded_s > COARSE * mean_s and float(np.ptp(steps_s)) > SETTLED * mean_s
     uneven = float(np.quantile(steps_s, SOME_SHORT)) < SHORT * mean_s
     single = _count_missing(time_s, 1, MEDIAN)
@@ -125,62 +125,13 @@ def find_sampling(time_s: Array) -> Sampling:
     sampling = Sampling(best.interval_s, best.missing, 0.0, best.width, on_arrival=False)
     late_s = time_s - best.interval_s * sampling.numbers
     allowed_s = max(rounded_s, NEAR * best.interval_s)
-    too_late = float(np.max(late_s - _least(late_s, best.width))) > MORE * allowed_s
+    too_late = float(np.max(late_s - find_least_around(late_s, best.width))) > MORE * allowed_s
     return replace(sampling, on_arrival=uneven and too_late)
 
 
-def typical_interval_s(time_s: Array) -> float:
+def find_typical_interval_s(time_s: Array) -> float:
     """Return the interval over many readings at rising times (n ≥ 2,), of which some may be missing or late."""
     return min(_slope(time_s, apart) for apart in LONG)
-
-
-def even_times(time_s: Array, sampling: Sampling) -> Array:
-    """Return the strictly rising times (n,) at which readings were taken; good and different stamps unchanged.
-
-    Stamps of arrival are never early, so the least lateness counts; coarse ones err either way, so the mean does. The
-    latency that all readings have in common stays in: no stamp shows it.
-    """
-    if sampling.late is not None:
-        return _separate(time_s)
-    if not sampling.on_arrival and sampling.width == 1 and (np.diff(time_s) > 0).all():
-        return time_s
-    numbers = sampling.interval_s * sampling.numbers
-    late_s = time_s - numbers
-    width = 2 * sampling.width
-    if sampling.on_arrival:
-        # Moving averages of a moving maximum: the least lateness, without steps.
-        smooth_s = _moving_mean(_least(late_s, width), width)
-    else:
-        smooth_s = _moving_mean(late_s, max(width, AVERAGED))
-    return _separate(np.asarray(numbers + smooth_s, dtype=np.float64))
-
-
-def _moving_mean(values: Array, width: int) -> Array:
-    """Return the mean (n,) of the values around each, of fewer at either end."""
-    total = np.concatenate([[0.0], np.cumsum(values - values[0])])
-    index = np.arange(len(values))
-    first, last = np.maximum(index - width // 2, 0), np.minimum(index + width - width // 2, len(values))
-    return np.asarray(values[0] + (total[last] - total[first]) / (last - first), dtype=np.float64)
-
-
-def _separate(time_s: Array) -> Array:
-    """Return times (n,) that rise strictly: equal ones, and any after a later one, are spread until the next later."""
-    latest_s = np.maximum.accumulate(time_s)
-    new = np.concatenate([[True], np.diff(latest_s) > 0])
-    if new.all():
-        return time_s
-    starts = np.flatnonzero(new)
-    index = np.arange(len(time_s))
-    end_s = (
-        latest_s[-1] + max(float(np.median(np.diff(latest_s[starts]))), np.finfo(np.float64).tiny)
-        if len(starts) > 1
-        else latest_s[-1] + 1.0
-    )
-    apart = np.diff(np.append(starts, len(time_s)))
-    typical_s = (end_s - latest_s[0]) / len(time_s)
-    span_s = np.minimum(np.diff(np.append(latest_s[starts], end_s)), typical_s * apart)
-    group = np.cumsum(new) - 1
-    return np.asarray(latest_s + (index - starts[group]) * (span_s / apart)[group], dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +163,7 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
         late_s = time_s - interval_s * numbers
         if interval_s <= 0:  # most stamps are equal
             break
-        later_s = _least_ahead(late_s, width)[1:] - _least_behind(late_s, width)[:-1]
+        later_s = find_least_ahead(late_s, width)[1:] - find_least_behind(late_s, width)[:-1]
         whole = np.rint(later_s / interval_s) * (later_s > LOST * interval_s)
         fit = float(np.mean(np.abs(later_s - interval_s * whole) < NEAR * interval_s))
         missing = whole.astype(np.intp)
@@ -263,14 +214,14 @@ def _estimate_unlocated_losses(time_s: Array) -> Sampling:
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
     apart = min(len(time_s) // SEGMENTS, FARTHEST)
     width = max((width for width in WIDTHS if 4 * width <= apart), default=1)
-    least_s = _least_ahead(time_s - mean_s * np.arange(len(time_s)), width)[: len(time_s) - width]
+    least_s = find_least_ahead(time_s - mean_s * np.arange(len(time_s)), width)[: len(time_s) - width]
     near, far = (_walk_variance(least_s, steps) for steps in (max(apart // 4, 1), max(apart, 1)))
     lost = width >= WIDEST_BURST and GROWN[0] * near < far < GROWN[1] * near
     nowhere = np.zeros(len(time_s) - 1, dtype=np.intp)
     scattered = far / (apart * mean_s**2) if lost else 0.0
-    usual_s = typical_interval_s(time_s)
+    usual_s = find_typical_interval_s(time_s)
     late_s = time_s - usual_s * np.arange(len(time_s))
-    late = late_s - _least_ahead(late_s, LONG[0]) > LONG_STEP * usual_s
+    late = late_s - find_least_ahead(late_s, LONG[0]) > LONG_STEP * usual_s
     return Sampling(_interval_s(time_s, nowhere, width), nowhere, scattered, width, on_arrival=False, late=late)
 
 
@@ -304,7 +255,7 @@ def _slope(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
     return float(np.quantile(time_s[apart:] - time_s[:-apart], quantile) / apart)
 
 
-def resolution_s(time_s: Array) -> float:
+def find_resolution_s(time_s: Array) -> float:
     """Return the time that all stamps are multiples of: a power of ten of a second, or of two (float32); 0 if none."""
     units = sorted((*(10.0**-decimals for decimals in range(DECIMALS)), *(2.0**-bits for bits in range(BITS))))
     since_s = time_s - time_s[0]
@@ -313,26 +264,3 @@ def resolution_s(time_s: Array) -> float:
         if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
             return unit_s
     return 0.0
-
-
-def _least(values: Array, width: int) -> Array:
-    """Return the least (n,) of the values around each: the larger of the minima ahead and behind, if both exist."""
-    ahead, behind = _least_ahead(values, width), _least_behind(values, width)
-    least = np.maximum(ahead, behind)
-    least[:width], least[-width:] = ahead[:width], behind[-width:]
-    return least
-
-
-def _least_ahead(values: Array, width: int) -> Array:
-    """Return the least (n,) of each value and those after it, `width` in all."""
-    least, covered = values.copy(), 1
-    while covered < min(width, len(values)):
-        more = min(covered, width - covered)
-        least[:-more] = np.minimum(least[:-more], least[more:])
-        covered += more
-    return least
-
-
-def _least_behind(values: Array, width: int) -> Array:
-    """Return the least (n,) of each value and those before it, `width` in all."""
-    return _least_ahead(values[::-1], width)[::-1]

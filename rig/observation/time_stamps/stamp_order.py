@@ -7,7 +7,7 @@ no gap: after it all readings are there. So a long step between two stamps is he
 follow until a reading is on time again.
 
 Each of these is counted, with the first of them by number and time. What remains has the times of
-`rig.observation.sampling`. All functions are pure.
+`rig.observation.time_stamps.sampling`. All functions are pure.
 """
 
 from dataclasses import dataclass, replace
@@ -17,16 +17,17 @@ from numpy.typing import NDArray
 
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.observation.sampling import (
+from rig.observation.time_stamps.even_times import find_taken_times
+from rig.observation.time_stamps.moving_values import find_least_ahead
+from rig.observation.time_stamps.sampling import (
     COARSE,
     LONG,
     LONG_STEP,
     NEAR,
     Sampling,
-    even_times,
+    find_resolution_s,
     find_sampling,
-    resolution_s,
-    typical_interval_s,
+    find_typical_interval_s,
 )
 
 # Seconds after which counters begin anew: 16, 24 and 32 bits of ms and µs; midnight and the GPS week.
@@ -76,7 +77,7 @@ class OrderedStamps:
 
 
 @dataclass(frozen=True, slots=True)
-class _Log:
+class _UnorderedLog:
     """The rows (m,) that remain of a log, with `stamps_s` (m,) and `readings` (m, c)."""
 
     rows: NDArray[np.intp]
@@ -84,14 +85,14 @@ class _Log:
     readings: Array
     findings: tuple[StampFinding, ...] = ()
 
-    def select(self, kept: NDArray[np.bool_], reason: str) -> "_Log":
+    def select(self, kept: NDArray[np.bool_], reason: str) -> "_UnorderedLog":
         """Return the log without some rows, for a reason in words; the log itself if all are kept."""
         if kept.all():
             return self
         finding = self._describe(~kept, reason, left_out=True)
-        return _Log(self.rows[kept], self.stamps_s[kept], self.readings[kept], (*self.findings, finding))
+        return _UnorderedLog(self.rows[kept], self.stamps_s[kept], self.readings[kept], (*self.findings, finding))
 
-    def restamp(self, stamps_s: Array, changed: NDArray[np.bool_], reason: str) -> "_Log":
+    def restamp(self, stamps_s: Array, changed: NDArray[np.bool_], reason: str) -> "_UnorderedLog":
         """Return the log with other stamps of some rows."""
         finding = self._describe(changed, reason, left_out=False)
         return replace(self, stamps_s=stamps_s, findings=(*self.findings, finding))
@@ -107,7 +108,7 @@ def order_stamps(stamps_s: Array, readings: Array, where: str = "the samples") -
 
     Raise Refused `time_not_increasing`, which names `where`, if a clock was set back.
     """
-    log = _Log(np.arange(len(stamps_s)), stamps_s, readings)
+    log = _UnorderedLog(np.arange(len(stamps_s)), stamps_s, readings)
     for step in (_drop_empty, _drop_zeros, _unwrap, _drop_repeated, _sort):
         log = step(log)
     _check_rising(log, where)
@@ -117,14 +118,14 @@ def order_stamps(stamps_s: Array, readings: Array, where: str = "the samples") -
     if len(log.rows) < 2:
         return OrderedStamps(log.rows, log.stamps_s, Sampling.even(len(log.rows)), log.findings)
     sampling = find_sampling(log.stamps_s)
-    return OrderedStamps(log.rows, even_times(log.stamps_s, sampling), sampling, log.findings)
+    return OrderedStamps(log.rows, find_taken_times(log.stamps_s, sampling), sampling, log.findings)
 
 
-def _drop_empty(log: _Log) -> _Log:
+def _drop_empty(log: _UnorderedLog) -> _UnorderedLog:
     return log.select(np.asarray(~np.isnan(log.readings).all(axis=1), dtype=np.bool_), "they hold no reading")
 
 
-def _drop_zeros(log: _Log) -> _Log:
+def _drop_zeros(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log without rows of zeros at its start: a register before the first conversion."""
     zero = (log.readings == 0).all(axis=1)
     first = int(np.argmin(zero)) if not zero.all() else 0
@@ -134,7 +135,7 @@ def _drop_zeros(log: _Log) -> _Log:
     return log.select(kept, "they are zeros before the first reading")
 
 
-def _unwrap(log: _Log) -> _Log:
+def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log with a counter that began anew continued."""
     steps_s = np.diff(log.stamps_s)
     back = np.flatnonzero(steps_s < 0)
@@ -152,12 +153,12 @@ def _unwrap(log: _Log) -> _Log:
     return log
 
 
-def _drop_repeated(log: _Log) -> _Log:
+def _drop_repeated(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log without rows that repeat stamp and readings of another one.
 
     Of a sensor whose readings often repeat, neighbours with equal stamps may be two readings.
     """
-    shared = np.flatnonzero(np.isin(log.stamps_s, _repeated_values(log.stamps_s)))
+    shared = np.flatnonzero(np.isin(log.stamps_s, _find_repeated_values(log.stamps_s)))
     if not len(shared):
         return log
     rows = np.column_stack([log.stamps_s, log.readings])[shared]
@@ -173,12 +174,12 @@ def _drop_repeated(log: _Log) -> _Log:
     return log.select(kept, "they repeat another one, stamp and readings")
 
 
-def _repeated_values(values: Array) -> Array:
+def _find_repeated_values(values: Array) -> Array:
     unique, counts = np.unique(values, return_counts=True)
     return np.asarray(unique[counts > 1], dtype=np.float64)
 
 
-def _sort(log: _Log) -> _Log:
+def _sort(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log in the order of time if rows were written in another; one whose clock was set back as it is."""
     latest_s = np.maximum.accumulate(log.stamps_s)
     early = log.stamps_s < latest_s
@@ -186,17 +187,17 @@ def _sort(log: _Log) -> _Log:
         return log
     order = np.argsort(log.stamps_s, kind="stable")
     stamps_s = log.stamps_s[order]
-    interval_s = typical_interval_s(stamps_s)
+    interval_s = find_typical_interval_s(stamps_s)
     for row in np.flatnonzero(np.diff(log.stamps_s) < 0):
         first, last = np.searchsorted(stamps_s, (log.stamps_s[row + 1], log.stamps_s[row]))
         overlap_s = log.stamps_s[row] - log.stamps_s[row + 1]
         if overlap_s > FARTHEST_S or last - first > DENSER * overlap_s / interval_s + 2:
             return log
-    ordered = _Log(log.rows[order], stamps_s, log.readings[order], log.findings)
+    ordered = _UnorderedLog(log.rows[order], stamps_s, log.readings[order], log.findings)
     return ordered.restamp(stamps_s, early[order], "they stand after later ones, and are put in order")
 
 
-def _check_rising(log: _Log, where: str) -> None:
+def _check_rising(log: _UnorderedLog, where: str) -> None:
     back = np.flatnonzero(np.diff(log.stamps_s) < 0)
     if not len(back):
         return
@@ -212,12 +213,12 @@ def _check_rising(log: _Log, where: str) -> None:
     )
 
 
-def _drop_stale(log: _Log) -> _Log:
+def _drop_stale(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log without the readings at its start that had waited: they come faster than they were taken."""
-    interval_s = typical_interval_s(log.stamps_s)
+    interval_s = find_typical_interval_s(log.stamps_s)
     late_s = log.stamps_s - interval_s * np.arange(len(log.stamps_s))
-    delays_s = late_s - _least_soon(late_s)
-    usual_s = _usual_delay_s(late_s, interval_s)
+    delays_s = late_s - find_least_ahead(late_s, LONG[-1])
+    usual_s = _estimate_usual_delay_s(late_s, interval_s)
     first = int(np.argmax(delays_s <= np.median(delays_s) + NEAR * interval_s))
     delay_s = float(late_s[0] - late_s[first])
     kept = np.ones(len(late_s), dtype=np.bool_)
@@ -228,14 +229,14 @@ def _drop_stale(log: _Log) -> _Log:
     return log
 
 
-def _spread_stalled(log: _Log) -> _Log:
+def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log with readings that waited while a link stalled at the times at which they were taken.
 
     If some were lost meanwhile, nothing shows which: then all that waited are left out.
     """
-    stamps_s, interval_s = log.stamps_s.copy(), typical_interval_s(log.stamps_s)
+    stamps_s, interval_s = log.stamps_s.copy(), find_typical_interval_s(log.stamps_s)
     steps_s = np.diff(stamps_s)
-    usual_s = _usual_delay_s(stamps_s - interval_s * np.arange(len(stamps_s)), interval_s)
+    usual_s = _estimate_usual_delay_s(stamps_s - interval_s * np.arange(len(stamps_s)), interval_s)
     waited, lost = np.zeros(len(stamps_s), dtype=np.bool_), np.zeros(len(stamps_s), dtype=np.bool_)
     for last in np.flatnonzero(steps_s > LONG_STEP * interval_s + usual_s).tolist():
         reach = int(REACH * steps_s[last] / interval_s)
@@ -258,7 +259,7 @@ def _spread_stalled(log: _Log) -> _Log:
     return log.select(~lost, "they waited while the link stalled, and others of them are lost")
 
 
-def _separate_equal(log: _Log) -> _Log:
+def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log without second readings of one stamp that have no time of their own.
 
     Stamps that are coarse or those of arrival are often equal, and an even series has a time for each reading. Of good
@@ -269,7 +270,7 @@ def _separate_equal(log: _Log) -> _Log:
     if not len(equal):
         return log
     sampling = find_sampling(log.stamps_s)
-    interval_s, rounded_s = typical_interval_s(log.stamps_s), resolution_s(log.stamps_s)
+    interval_s, rounded_s = find_typical_interval_s(log.stamps_s), find_resolution_s(log.stamps_s)
     uneven_s = abs(interval_s - rounded_s * round(interval_s / rounded_s)) if rounded_s else 0.0
     slips = rounded_s > COARSE * interval_s and (uneven_s > EXACT * rounded_s or len(equal) > FEW_EQUAL)
     if sampling.width > 1 or sampling.on_arrival or slips:
@@ -286,15 +287,6 @@ def _separate_equal(log: _Log) -> _Log:
     return log.select(kept, "they are second readings with one stamp")
 
 
-def _usual_delay_s(late_s: Array, interval_s: float) -> float:
+def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
     """Return a delay, over the least soon after it, that hardly any reading exceeds unless it waited."""
-    return USUAL * float(np.median(late_s - _least_soon(late_s))) + ON_TIME * interval_s
-
-
-def _least_soon(late_s: Array) -> Array:
-    """Return the least (n,) of each lateness and those of the readings soon after it."""
-    least_s, covered = late_s.copy(), 1
-    while covered < min(LONG[-1], len(late_s)):
-        least_s[:-covered] = np.minimum(least_s[:-covered], least_s[covered:])
-        covered *= 2
-    return least_s
+    return USUAL * float(np.median(late_s - find_least_ahead(late_s, LONG[-1]))) + ON_TIME * interval_s

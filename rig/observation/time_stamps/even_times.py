@@ -1,0 +1,50 @@
+"""The times at which readings were taken, by stamps that are too coarse, or those of arrival."""
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.observation.time_stamps.moving_values import average_around, find_least_around
+from rig.observation.time_stamps.sampling import Sampling
+
+AVERAGED = 32  # readings whose stamps err either way
+
+
+def find_taken_times(time_s: Array, sampling: Sampling) -> Array:
+    """Return the strictly rising times (n,) at which readings were taken; good and different stamps unchanged.
+
+    Stamps of arrival are never early, so the least lateness counts; coarse ones err either way, so the mean does. The
+    latency that all readings have in common stays in: no stamp shows it.
+    """
+    if sampling.late is not None:
+        return _separate(time_s)
+    if not sampling.on_arrival and sampling.width == 1 and (np.diff(time_s) > 0).all():
+        return time_s
+    numbers = sampling.interval_s * sampling.numbers
+    late_s = time_s - numbers
+    width = 2 * sampling.width
+    if sampling.on_arrival:
+        # Moving averages of a moving maximum: the least lateness, without steps.
+        smooth_s = average_around(find_least_around(late_s, width), width)
+    else:
+        smooth_s = average_around(late_s, max(width, AVERAGED))
+    return _separate(np.asarray(numbers + smooth_s, dtype=np.float64))
+
+
+def _separate(time_s: Array) -> Array:
+    """Return times (n,) that rise strictly: equal ones, and any after a later one, are spread until the next later."""
+    latest_s = np.maximum.accumulate(time_s)
+    new = np.concatenate([[True], np.diff(latest_s) > 0])
+    if new.all():
+        return time_s
+    starts = np.flatnonzero(new)
+    index = np.arange(len(time_s))
+    end_s = (
+        latest_s[-1] + max(float(np.median(np.diff(latest_s[starts]))), np.finfo(np.float64).tiny)
+        if len(starts) > 1
+        else latest_s[-1] + 1.0
+    )
+    apart = np.diff(np.append(starts, len(time_s)))
+    typical_s = (end_s - latest_s[0]) / len(time_s)
+    span_s = np.minimum(np.diff(np.append(latest_s[starts], end_s)), typical_s * apart)
+    group = np.cumsum(new) - 1
+    return np.asarray(latest_s + (index - starts[group]) * (span_s / apart)[group], dtype=np.float64)
