@@ -38,7 +38,10 @@ html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["cards.css"]
 html_search_scorer = str(ROOT / "docs" / "site" / "static" / "scorer.js")
-html_extra_path = ["index.html", "../config.schema.json"]  # index.html leads to the first page; editors fetch the schema
+html_extra_path = [
+    "index.html",
+    "../config.schema.json",
+]  # a way to the first page; editors fetch the schema
 html_show_sourcelink = False
 
 SECTION = re.compile(r"^## (.+)$", re.MULTILINE)

@@ -10,7 +10,7 @@ from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.estimation.arrays import Array
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.csv_samples import Samples
-from rig.observation.sampling import Sampling, find_sampling
+from rig.observation.time_stamps.sampling import Sampling, find_sampling
 from rig.observation.windows import Window, inside
 
 LEAST_TURN_RAD = 0.3  # between two rests: less is no turn
