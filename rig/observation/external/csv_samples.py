@@ -219,10 +219,10 @@ def _describe_stamps(ordered: OrderedStamps, total: int) -> Iterator[str]:
             f"{sampling.missing.sum()} samples are missing in {len(gaps)} gaps, the longest {lasts_s:.3g} s, after "
             f"sample {ordered.rows[longest] + 1}, at {ordered.time_s[longest]:.10g} s"
         )
-    taken = f"they count as taken every {1e3 * sampling.interval_s:.4g} ms"
+    even_words = f"they count as taken every {1e3 * sampling.interval_s:.4g} ms"
     if sampling.late is not None:
         return
     if sampling.on_arrival:
-        yield f"the readings are stamped on arrival, several at once: {taken}"
+        yield f"the readings are stamped on arrival, several at once: {even_words}"
     elif sampling.width > 1:
-        yield f"the stamps are coarse: {taken}"
+        yield f"the stamps are coarse: {even_words}"

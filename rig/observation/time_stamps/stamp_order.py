@@ -138,11 +138,11 @@ def _drop_zeros(log: _UnorderedLog) -> _UnorderedLog:
 def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
     """Return the log with a counter that began anew continued."""
     steps_s = np.diff(log.stamps_s)
-    back = np.flatnonzero(steps_s < 0)
-    if not len(back):
+    backward_steps = np.flatnonzero(steps_s < 0)
+    if not len(backward_steps):
         return log
     for period_s in WRAPS_S:
-        over_s = steps_s[back] + period_s
+        over_s = steps_s[backward_steps] + period_s
         if ((over_s >= 0) & (over_s <= LONGEST_STEP * period_s)).all() and np.ptp(log.stamps_s) <= period_s:
             turns = np.concatenate([[0], np.cumsum(steps_s < 0)])
             return log.restamp(
@@ -198,13 +198,13 @@ def _sort(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _check_rising(log: _UnorderedLog, where: str) -> None:
-    back = np.flatnonzero(np.diff(log.stamps_s) < 0)
-    if not len(back):
+    backward_steps = np.flatnonzero(np.diff(log.stamps_s) < 0)
+    if not len(backward_steps):
         return
-    first = int(back[0])
+    first = int(backward_steps[0])
     before_s, after_s = log.stamps_s[first : first + 2].tolist()
     back_s = before_s - after_s + float(np.median(np.diff(log.stamps_s)))
-    more = "" if len(back) == 1 else f", the first of {len(back)} such steps"
+    more = "" if len(backward_steps) == 1 else f", the first of {len(backward_steps)} such steps"
     raise Refused(
         "time_not_increasing",
         f"{where} has time_s {after_s:.9g} after {before_s:.9g}, in sample {log.rows[first + 1] + 1}{more}: the clock "

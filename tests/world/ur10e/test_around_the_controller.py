@@ -45,6 +45,8 @@ def test_a_fieldbus_without_its_connection_stops_every_program_soon_after_its_st
         assert sum(played) == round(0.1 * TICKS_PER_SECOND) and not played[-1]
         assert robot.safety_mode == safety_mode
         robot.unlock_protective_stop()
+        while robot.safety_mode != SafetyMode.NORMAL:
+            robot.step()
 
 
 @pytest.mark.slow

@@ -132,6 +132,9 @@ def test_values_that_no_package_has_room_for_are_refused() -> None:
 
 def test_slider_and_scaling_multiply_to_what_the_joints_do() -> None:
     one = laboratory("world.arm.speed_slider=0.4")
+    assert value(one, "speed_scaling")[0] == 0.0  # no program runs
+    PrimarySession(one.robot).receive(b"def wait():\n  sleep(60)\nend\n")
+    ticks(one, 1)
     one.robot.motion.move((*HOME[:5], 2.0), 1.0, 4.0)
     ticks(one, 500)
     assert value(one, "target_speed_fraction")[0] == 0.4 and value(one, "speed_scaling")[0] == 1.0
