@@ -11,7 +11,7 @@ from rig.analysis.analyses import calibrate
 from rig.config.column_map import AS_NAMED, TIMES, ColumnMap
 from rig.config.units import UNITS
 from rig.data.quantity import RATE, Quantity
-from rig.data.recording.motion_file import TIME, Columns, Header, Item
+from rig.data.recording.motion_file import MOTIONS, TIME, Columns, Header, Item
 from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Refused, RigError
 from rig.estimation.arrays import Array
@@ -61,7 +61,7 @@ class LookedFile:
 def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
     """Return what a file holds, by its own headings and numbers, or by a `stated` map of its columns.
 
-    Raise Refused as `find_layout` does for a file that is no table.
+    Raise Refused `bad_option` for a file of sweeps, and as `find_layout` does for a file that is no table.
     """
     if is_in_format(path):
         return _read_contents(LookedFile(path, None, None, {}), AS_NAMED, has_readings=True, has_attitudes=True)
@@ -69,6 +69,9 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
         looked = LookedFile(path, None, None, {})
         return _read_contents(looked, stated, has_readings=True, has_attitudes=bool(stated.motion))
     layout = find_layout(path, SAMPLES_MB)
+    if set(layout.headings).issuperset(MOTIONS["sweeps"].needed):
+        remedy = f"Give it with its log: rig solve LOG --sweeps {path}"
+        raise Refused("bad_option", f"{path} is no log: it states sweeps, in the rig's own columns", remedy)
     values, time = _read_numbers(path, layout)
     guess = guess_columns(layout, values, time)
     columns = _map_of(layout, guess)

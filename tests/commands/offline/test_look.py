@@ -132,3 +132,8 @@ def test_a_file_without_numbers_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("Dear diary,\ntoday it rained.\n" * 20, encoding="utf-8")
     done = rig_here("look", tmp_path / "notes.txt")
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and "wrong_columns" in done.stderr
+
+
+def test_a_file_of_sweeps_is_no_log() -> None:
+    done = rig_here("look", SWEEPS)
+    assert done.returncode == 2 and f"rig solve LOG --sweeps {SWEEPS}" in done.stderr
