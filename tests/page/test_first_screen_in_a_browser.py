@@ -37,6 +37,12 @@ return [...document.body.querySelectorAll("*")]
   .filter((e) => beyond(e) && !within(e) && !e.closest(".skip, .unseen"))
   .map((e) => `${e.tagName} ${e.id} ${e.className}`);
 """
+# Panels and tables whose content is wider than they are.
+SCROLLING = """
+return [...document.querySelectorAll(".panel, #found .wide")]
+  .filter((e) => e.checkVisibility() && e.scrollWidth > e.clientWidth + 1)
+  .map((e) => e.className + e.textContent.slice(0, 40));
+"""
 AFTER = "#state-word, #state-text, #found summary, #certificate, #next-command, #tags .tag, #parts"
 DURING = "#state-word, #state-text, #left, #step-number, #bar, #halt, #tags .tag, .plot, .plot .now"
 
@@ -165,6 +171,23 @@ def test_nothing_is_wider_than_a_telephone(driver: Chrome, tmp_path: Path, six: 
             each.send_keys(Keys.ENTER)
         picture(driver, "six-passed-telephone")
         assert wide(driver) == []
+        assert driver.execute_script(SCROLLING) == []  # no table hides a column
+
+
+def test_after_the_end_no_reading_stands_beside_the_result_and_no_panel_promises_more(
+    driver: Chrome, tmp_path: Path, six: Telling
+) -> None:
+    def shown(what: str) -> list[str]:
+        return [each.text for each in driver.find_elements(By.CSS_SELECTOR, what) if each.is_displayed()]
+
+    assert len(shown(".plot .now")) == 6 and shown("#arm-facts") and "speed °/s" in shown(".joints thead th")
+    assert shown("#observations-title")  # the first appears after the first sweep
+    six(*six_judged(tmp_path))
+    wait_for(lambda: kind(driver) == "passed" and not shown(".plot .now"), "the end")
+    assert not shown("#arm-facts dd") and "speed °/s" not in shown(".joints thead th")
+    assert not shown("#observations-title") and not shown(".none")
+    label = driver.find_element(By.CSS_SELECTOR, ".plot canvas").get_attribute("aria-label")
+    assert label == "lsm9ds1, rate over the last minute of the run"
 
 
 @pytest.mark.thorough
