@@ -111,12 +111,12 @@ def driver() -> Iterator["Chrome"]:
 @pytest.fixture
 def nothing_severe_and_nothing_from_elsewhere(driver: "Chrome") -> Iterator[None]:
     """What is asked of every page, whatever it shows."""
-    from support.page.browser import TABLET, asked_hosts, set_theme, severe
+    from support.page.browser import TABLET, list_requested_hosts, set_theme, severe
 
     driver.get("about:blank")  # a page of before may still ask for a server that is gone
     severe(driver)
-    asked_hosts(driver)
+    list_requested_hosts(driver)
     set_theme(driver, dark=True)
     driver.set_window_size(*TABLET)
     yield
-    assert severe(driver) == [] and asked_hosts(driver) <= {"127.0.0.1"}
+    assert severe(driver) == [] and list_requested_hosts(driver) <= {"127.0.0.1"}

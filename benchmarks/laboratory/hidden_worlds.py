@@ -16,15 +16,15 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
 
-from support.laboratories.hidden_results import Judged, held, solved
-from support.laboratories.hidden_worlds import FAMILIES, WORLDS, first_seed, recorded
+from support.laboratories.hidden_results import Judged, compare_with_truth, solve
+from support.laboratories.hidden_worlds import FAMILIES, WORLDS, first_seed, record
 
 
 def table(family: str, runs: list[Judged]) -> None:
     """Printed."""
     refused = {run.folder.name: run.refused for run in runs if run.refused}
     print(f"{family}: {len(runs)} runs, {len(refused)} refused")
-    for (part, parameter), line in held(runs).items():
+    for (part, parameter), line in compare_with_truth(runs).items():
         print(f"  {part:10} {parameter:20} {line}")
     for seed, names in refused.items():
         print(f"  refused: {seed}: {', '.join(names)}")
@@ -43,10 +43,10 @@ def main() -> None:
         folders = [arguments.folder / family / str(seed) for seed in range(first, first + count)]
         for folder in folders:
             if not arguments.solve_only and not folder.exists():
-                recorded(family, int(folder.name), folder)
+                record(family, int(folder.name), folder)
         finished = [folder for folder in folders if (folder / "status").exists()]
         if finished:
-            table(family, [solved(folder) for folder in finished])
+            table(family, [solve(folder) for folder in finished])
 
 
 if __name__ == "__main__":

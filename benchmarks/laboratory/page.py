@@ -26,7 +26,7 @@ from rig.station.events import RunEvent
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
-from support.page.told_runs import ABOUT, before_it_moves, moving, planned
+from support.page.told_runs import ABOUT, before_it_moves, moving, plan_demo
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from goals import record
@@ -66,7 +66,7 @@ def told(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], secon
 
 def run_of(seconds: float) -> Iterator[RunEvent]:
     """The events of a run that lasts longer than `seconds`, made before they are told."""
-    return iter([*islice(moving(planned(), 1e9, step_s=PERIOD_S), int(2 * EVENTS * seconds / PERIOD_S))])
+    return iter([*islice(moving(plan_demo(), 1e9, step_s=PERIOD_S), int(2 * EVENTS * seconds / PERIOD_S))])
 
 
 def measured(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> tuple[float, float]:
@@ -80,7 +80,7 @@ def with_page(seconds: float, reading: int, stalled: int) -> tuple[float, float,
     """The share of a core, %, the longest wait, s, and the frames a second that one browser has read."""
     spawning, feed, events = multiprocessing.get_context("spawn"), Feed(PageState(ABOUT)), run_of(seconds)
     frames = spawning.Value("l", 0)
-    for event in before_it_moves(planned()):
+    for event in before_it_moves(plan_demo()):
         feed.event(event)
     with (
         tempfile.TemporaryDirectory() as folder,

@@ -23,7 +23,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
-from support.board.damaged_frames import Sent, build, to_firmware, to_host, write_sound
+from support.board.damaged_frames import Sent, build, damage_answers, damage_requests, write_sound
 from support.wires.damaged_messages import carry_to_rig, carry_to_world, readers
 
 ROOT = Path(__file__).parents[2]
@@ -48,11 +48,11 @@ def frames(number: int, seed: int) -> list[str]:
         folder = Path(name)
         program = build(folder)
         began_s = time.perf_counter()
-        sent = to_firmware(program, number, seed, write_sound(folder / "host", "host", seed))
+        sent = damage_requests(program, number, seed, write_sound(folder / "host", "host", seed))
         found = tell("the firmware's receiver", sent, time.perf_counter() - began_s)
         print(f"  the board answered {sent.answers} of the accepted, {sent.errors} of them by a refusal", flush=True)
         began_s = time.perf_counter()
-        sent, heard, of_whole = to_host(program, number, seed, write_sound(folder / "board", "board", seed))
+        sent, heard, of_whole = damage_answers(program, number, seed, write_sound(folder / "board", "board", seed))
         found += tell("the host's receiver", sent, time.perf_counter() - began_s)
     print(f"  it accepted {heard.accepted}, of them {heard.repeated} as repeated, and refused {heard.damaged}")
     if (heard.frames, heard.digest, heard.repeated) != (of_whole.frames, of_whole.digest, of_whole.repeated):

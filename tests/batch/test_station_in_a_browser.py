@@ -19,7 +19,7 @@ from rig.motion.steps import Rest
 from rig.page.server.control import STOPPED
 from rig.page.server.serving import PageAddress
 from rig.station.events import Interrupted, Progress, SamplesTaken, SensorSamples
-from support.page.browser import legible, needs_browser, picture, screen, text, typed
+from support.page.browser import legible, needs_browser, picture, screen, text, type_line
 from support.processes.waiting import PATIENCE_S, wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
@@ -63,18 +63,18 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
         assert [each.text for each in driver.find_elements(By.CSS_SELECTOR, "#tray li strong")] == ["✓", "✗", "◉"]
         legible(driver)
         picture(driver, "station-number")
-        typed(driver, "G-004")
+        type_line(driver, "G-004")
         assert answers.get(timeout=PATIENCE_S) == "G-004"
         wait_for(lambda: "Type go" in text(driver, "text"), "the question whether to go")
         assert all(each in text(driver, "lines") for each in WORDS)
-        typed(driver, "G-005")  # scanned too early: no answer
+        type_line(driver, "G-005")  # scanned too early: no answer
         wait_for(lambda: "does not answer" in text(driver, "hint"), "that a number is no answer")
         assert answers.empty()
         picture(driver, "station-go")
         with screen(driver, 390, 800):
             assert driver.execute_script("return document.documentElement.scrollWidth") <= 390
         answered_go = driver.find_element(By.CSS_SELECTOR, "#buttons .go")
-        typed(driver, "go")
+        type_line(driver, "go")
         assert answers.get(timeout=PATIENCE_S) is True
         wait_for(lambda: replaced(answered_go), "the next question")
         assert not driver.find_element(By.CSS_SELECTOR, "#buttons .go").is_enabled()

@@ -8,10 +8,10 @@ import pytest
 from support.laboratories.commands import configuration
 from support.laboratories.scanner import Scanner, station
 from support.laboratories.station_laboratory import Laboratory
-from support.processes.stopwatch import timed, told
+from support.processes.stopwatch import time_block, times_in_words
 from support.processes.system import descendant, grown, resident_kb
 from support.processes.waiting import PATIENCE_S, alive, wait_for
-from support.processes.warm import of_system
+from support.processes.warm import start_by_system
 
 PARTS = 20
 GROWTH = 0.02
@@ -34,7 +34,7 @@ def test_twenty_parts_in_a_row_each_get_the_right_verdict(tmp_path: Path) -> Non
     laboratory, out = Laboratory(config), tmp_path / "batch"
     next_s, motion_s = list[float](), list[float]()
     memory_kb, laboratory_kb = list[int](), list[int]()
-    with station(config, "--out", out, "--operator", "A. Person", start=of_system) as at:
+    with station(config, "--out", out, "--operator", "A. Person", start=start_by_system) as at:
         for number in numbers:
             at.waits_for(NUMBER)
             at.types(number)
@@ -47,14 +47,14 @@ def test_twenty_parts_in_a_row_each_get_the_right_verdict(tmp_path: Path) -> Non
                 at.waits_for("then Enter")
                 at.types("")
             at.waits_for("Type go to start: ")
-            with timed(motion_s):
+            with time_block(motion_s):
                 moves(at, laboratory)
             if number == disturbed:
                 at.waits_for("done: transfer to the start of sweep wrist_3 cw")
                 laboratory.disturb()
                 at.waits_for("recorded: ")  # and once more, when the sweeps were repeated
             at.waits_for("recorded: ")
-            with timed(next_s):
+            with time_block(next_s):
                 at.sees(NUMBER)
             memory_kb.append(resident_kb(at.process.pid))
             laboratory_kb.append(resident_kb(descendant(at.process.pid, "rig.world")))
@@ -69,7 +69,7 @@ def test_twenty_parts_in_a_row_each_get_the_right_verdict(tmp_path: Path) -> Non
         at.types("")
         at.process.wait(PATIENCE_S)
         assert at.process.returncode == 0
-    print("to next:", told(next_s), "\nto the first motion:", told(motion_s))
+    print("to next:", times_in_words(next_s), "\nto the first motion:", times_in_words(motion_s))
     with (out / "batch.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [(row["serial_number"], row["verdict"]) for row in rows] == [(number, "pass") for number in numbers]

@@ -7,11 +7,11 @@ import pytest
 from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
-from support.laboratories.command_with_a_page import with_a_page
+from support.laboratories.command_with_a_page import start_with_page
 from support.laboratories.commands import configuration, wait_for_log
 from support.laboratories.station_laboratory import Laboratory
-from support.page.browser import needs_browser, picture, text, typed
-from support.processes.stopwatch import timed, told
+from support.page.browser import needs_browser, picture, text, type_line
+from support.processes.stopwatch import time_block, times_in_words
 from support.processes.system import grown, resident_kb
 from support.processes.waiting import PATIENCE_S, wait_for
 
@@ -26,7 +26,7 @@ pytestmark = [
 
 def answers(driver: Chrome, question: str, words: str) -> None:
     asks(driver, question)
-    typed(driver, words)
+    type_line(driver, words)
 
 
 def asks(driver: Chrome, question: str) -> None:
@@ -45,7 +45,7 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
     laboratory, out = Laboratory(config), tmp_path / "batch"
     next_s, motion_s = list[float](), list[float]()
     memory_kb = list[int]()
-    with with_a_page(tmp_path / "told.txt", "station", config, "--page", "--out", out) as (process, url):
+    with start_with_page(tmp_path / "told.txt", "station", config, "--page", "--out", out) as (process, url):
         driver.get(url)
         for at, number in enumerate(numbers, 1):
             folder = out / f"{at:02d}-{number}"
@@ -55,13 +55,13 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
                 answers(driver, AGAIN, "yes")
                 answers(driver, MOUNT, "")
             answers(driver, GO, "go")
-            with timed(motion_s):
+            with time_block(motion_s):
                 wait_for(lambda: laboratory("state")["moving"], "the first motion")
             if number == disturbed:
                 wait_for_log(folder, "done: transfer to the start of sweep wrist_3 cw")
                 laboratory.disturb()
             wait_for_log(folder, "recorded: ", times=2 if number == disturbed else 1)
-            with timed(next_s):
+            with time_block(next_s):
                 asks(driver, NUMBER)
             memory_kb.append(resident_kb(process.pid))
             print(f"{number}: {memory_kb[-1]} kB", flush=True)
@@ -77,7 +77,7 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
         assert process.wait(PATIENCE_S) == 0
         wait_for(lambda: text(driver, "link-words") == "the page has ended", "that the line is closed")
         assert not driver.find_element(By.ID, "stale").is_displayed()
-    print("to next:", told(next_s), "\nto the first motion:", told(motion_s))
+    print("to next:", times_in_words(next_s), "\nto the first motion:", times_in_words(motion_s))
     with (out / "batch.csv").open(encoding="utf-8", newline="") as csv_file:
         rows = list(csv.DictReader(csv_file))
     assert [(row["serial_number"], row["verdict"]) for row in rows] == [(number, "pass") for number in numbers]

@@ -22,7 +22,7 @@ from rig.errors import Refused
 from support.laboratories.commands import rig
 from support.laboratories.worlds import World, fresh_host, hardware
 from support.paths import DEMO, ROOT
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="claims are names of Linux' kernel")
 
@@ -112,7 +112,7 @@ def test_a_second_rig_has_neither_the_arm_nor_the_board_until_the_first_has_ende
 
     operator, terminal = pty.openpty()
     command = ("run", config, "--out", tmp_path / "first")
-    with started(*command, stdin=terminal, stderr=terminal) as first, ExitStack() as ended:
+    with start_module(*command, stdin=terminal, stderr=terminal) as first, ExitStack() as ended:
         ended.callback(first.kill)
         os.close(terminal)
         said = b""

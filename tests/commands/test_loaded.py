@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rig.history.store import open_history
-from support.history.past_runs import finished
+from support.history.past_runs import finish_run
 from support.paths import DEMO, RECORDINGS
 
 # What takes long to load: the recordings' library, the solver's, the arm's client, plots, the page's server.
@@ -53,7 +53,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("RIG_HISTORY", str(tmp_path / "history.sqlite"))
     with open_history(str(tmp_path / "history.sqlite")) as history:
         for day in range(3):
-            history.enter(finished(day, serial_number=f"G-{day % 2}"))
+            history.enter(finish_run(day, serial_number=f"G-{day % 2}"))
     return tmp_path
 
 

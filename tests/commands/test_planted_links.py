@@ -12,7 +12,7 @@ from rig.world.board.flash_file import open_flash
 from support.laboratories.commands import configuration, rig_here
 from support.paths import RECORDINGS
 from support.processes.waiting import PATIENCE_S, alive, wait_for
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 WRITTEN = ("certificate.html", "calibration.h", "result.json")
 
@@ -29,7 +29,7 @@ def run_with(links: Sequence[str], tmp_path: Path) -> tuple[int, str, list[Path]
     """A run in whose folder the links lie as soon as it is there: exit status, stderr, and where they led."""
     out = tmp_path / "run"
     command = ("run", configuration(tmp_path), "--out", out, "--yes")
-    with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+    with start_module(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         wait_for((out / "config.yaml").exists, "the run's folder", meanwhile=alive(process))
         targets = [linked(out / name) for name in links]
         errors = process.communicate(timeout=PATIENCE_S)[1]

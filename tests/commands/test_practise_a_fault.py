@@ -14,9 +14,9 @@ from rig.config.load import load
 from rig.errors import Fault
 from support.laboratories.worlds import fresh_host
 from support.paths import CONFIGS, ROOT
-from support.practice_page import LABORATORY, RIG, Step, exercises, masked
+from support.practice_page import LABORATORY, RIG, Step, exercises, mask
 from support.processes.waiting import PATIENCE_S, alive, wait_for
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 QUICK = (  # sweeps that are over soon, by a laboratory that hurries
     "procedure.speed_deg_s=150", "procedure.acceleration_deg_s2=400", "procedure.rest_s=0.5",
@@ -50,7 +50,7 @@ class Terminals:
         name, *words = [str(ROOT / word) if word.startswith("configs/") else word for word in command.split()]
         assert name == "rig"
         pipe = subprocess.PIPE
-        return started(*words, *more, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
+        return start_module(*words, *more, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
 
     def _read(self) -> None:
         assert self._laboratory.stdout is not None
@@ -114,7 +114,7 @@ def terminals(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Terminals]:
 
 def check_shown(step: Step, actual: str) -> None:
     """Assert that all that the page shows was shown, in that order."""
-    rest = masked(actual)
+    rest = mask(actual)
     for text in step.shown:
         if text != "Type yes to start:":  # a question for a terminal
             assert text in rest, f"{step.typed}: {text!r} is not in {rest!r}"

@@ -21,7 +21,7 @@ from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import fresh_host, hardware, merge
 from support.paths import CONFIGS
 from support.processes.waiting import PATIENCE_S
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 KVH = CONFIGS / "own_port" / "kvh1775.yaml"
 DURATION_S = 28.0
@@ -59,7 +59,7 @@ def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pyt
     with simulated_laboratory(config.read_text(encoding="utf-8")), Arm(host, states.append) as table:
         out = tmp_path / "recorded"
         command = ("record", hardware(config, tmp_path), "--out", out, "--duration-s", f"{DURATION_S}")
-        with started(*command, stdout=subprocess.PIPE, text=True) as recording:
+        with start_module(*command, stdout=subprocess.PIPE, text=True) as recording:
             while not (out / "kvh.csv").exists():
                 table.check()
                 assert recording.poll() is None

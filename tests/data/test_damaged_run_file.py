@@ -22,7 +22,7 @@ from rig.data.recording.layout_keys import SCHEMA, TEXTS
 from rig.data.recording.run_file import read_run
 from rig.errors import Fault, Refused
 from support.paths import RECORDINGS
-from support.processes.as_nobody import as_nobody
+from support.processes.as_nobody import drop_root
 from support.processes.full_disk import full_disk
 from support.processes.waiting import PATIENCE_S, alive, wait_for
 
@@ -302,5 +302,5 @@ def test_of_provenance_more_may_be_said_than_this_version_knows(recording: Path)
 
 def test_a_file_that_may_not_be_read_is_not_said_to_be_damaged(recording: Path) -> None:
     recording.chmod(0)
-    with as_nobody(), pytest.raises(Refused, match=r"no_run_file: .*run\.h5 cannot be read: Permission denied"):
+    with drop_root(), pytest.raises(Refused, match=r"no_run_file: .*run\.h5 cannot be read: Permission denied"):
         read_run(recording)

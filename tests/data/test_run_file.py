@@ -40,7 +40,7 @@ from rig.motion.steps import Sweep
 from rig.motion.turner_state import ARM_STATE_DTYPE, ArmState
 from support.documents.results import VERIFIED
 from support.paths import CONFIGS, ROOT
-from support.processes.forked import forked
+from support.processes.forked import find_fork_server
 from support.processes.waiting import PATIENCE_S, wait_for
 from support.recordings.synthetic_run import PROVENANCE as SYNTHETIC
 from support.recordings.synthetic_run import UR
@@ -232,7 +232,7 @@ def reports(pipe: Connection) -> list[tuple[float, int]]:
 @pytest.mark.slow
 @pytest.mark.proof
 def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path, thorough: bool) -> None:
-    processes = forked()
+    processes = find_fork_server()
     lives = np.random.default_rng(50).uniform(0.0, 2.5, 48 if thorough else 6)
     for batch, batch_lives in enumerate(np.array_split(lives, len(lives) // 6)):
         writers = []

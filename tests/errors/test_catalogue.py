@@ -8,7 +8,7 @@ import pytest
 from firmware_host import protocol
 from rig.errors.catalogue import TABLE, catalogue
 from rig.errors.errors_page import page
-from support.error_names import Raised, kind_of, raised_in, raised_in_source
+from support.error_names import Raised, find_errors, find_errors_in, kind_of
 from support.paths import DOCS, ROOT
 
 PLACE = TABLE.relative_to(ROOT)
@@ -17,7 +17,7 @@ PLACE = TABLE.relative_to(ROOT)
 def raised() -> dict[str, list[Raised]]:
     """Name → where it is made: in the source, or on the board."""
     found: dict[str, list[Raised]] = defaultdict(list)
-    for each in raised_in_source():
+    for each in find_errors():
         if each.name is not None:
             found[each.name].append(each)
     for code, problem in protocol.ERRORS.items():
@@ -27,7 +27,7 @@ def raised() -> dict[str, list[Raised]]:
 
 @pytest.mark.slow
 def test_an_error_s_name_is_written_out_where_it_is_made() -> None:
-    hidden = [each.place for each in raised_in_source() if each.name is None]
+    hidden = [each.place for each in find_errors() if each.name is None]
     assert not hidden, f"write the names out, or nobody finds them: {', '.join(hidden)}"
 
 
@@ -87,4 +87,4 @@ def test_the_committed_page_is_what_the_table_generates() -> None:
     ],
 )
 def test_names_are_found_in_the_source(source: str, found: set[tuple[str | None, str]]) -> None:
-    assert {(each.name, each.kind) for each in raised_in(source, Path("some.py"))} == found
+    assert {(each.name, each.kind) for each in find_errors_in(source, Path("some.py"))} == found

@@ -55,7 +55,7 @@ def test_sensors_within_their_data_sheets_leave_what_the_solve_expects_of_them(p
     within = []
     for seed in range(8):
         session = drawn_accelerations.drawn(part, seed)
-        solution, _, _ = drawn_accelerations.solved(session)
+        solution, _, _ = drawn_accelerations.solve_session(session)
         expected = dwell_residual_std_m_s2(solution, session.movement)
         within.append(np.abs(solution.dwell_residuals_m_s2) <= 2 * expected)
     assert 0.9 < np.mean(within) < 0.99

@@ -29,7 +29,7 @@ from rig.errors import Refused
 from rig.plans.motions.temperature_course import TemperatureCourse
 from rig.runner.acquisition import Acquisition
 from rig.runner.warming import Warming
-from support.board.host_board import HostBoard, configured, convert, settle
+from support.board.host_board import HostBoard, configure, convert, settle
 from support.laboratories.worlds import fresh_host
 from support.processes.waiting import PATIENCE_S, wait_for, wait_for_error
 
@@ -365,7 +365,7 @@ def test_reboot_returns_when_the_board_answers_again(wire: tuple[BoardOnAWire, s
 @pytest.mark.parametrize("rate_hz", [59.5, 238, 952])
 def test_a_stream_takes_as_much_of_the_link_as_the_configuration_reckons_with(rate_hz: float, calibrated: bool) -> None:
     board, conversions = HostBoard(), 400
-    configured(board, 0, rate_hz, 245)
+    configure(board, 0, rate_hz, 245)
     board.ask("write_calibration", sensor=0, **CALIBRATION.values())
     board.ask("start", sensors=int(calibrated))
     settle(board)

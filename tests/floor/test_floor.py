@@ -28,7 +28,7 @@ from rig.page.server.feed import frame_of
 from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving
 from rig.station.events import ArmConnected, Failed, Prompt, SamplingStarted
-from support.history.past_runs import FIRST, finished
+from support.history.past_runs import FIRST, finish_run
 from support.processes.waiting import PATIENCE_S, wait_for
 
 AT = "2026-11-25T08:00:00+00:00"
@@ -101,11 +101,11 @@ def test_todays_parts_standards_and_recalls_are_those_of_the_history(tmp_path: P
     with open_history(str(tmp_path / "history.sqlite")) as history:
         for day in range(12):
             drifting = tuple(np.array((1.01, 0.99, 1.0)) + 0.002 * day)
-            history.enter(finished(10 * day, drifting, serial_number="G-9"))
-            history.enter(finished(10 * day + 0.1, rig="bench B", serial_number="CHECK", check_standard=True))
+            history.enter(finish_run(10 * day, drifting, serial_number="G-9"))
+            history.enter(finish_run(10 * day + 0.1, rig="bench B", serial_number="CHECK", check_standard=True))
         for day in range(12, 20):
             jumped = (1.02, 1.0, 1.01)
-            history.enter(finished(10 * day + 0.1, jumped, rig="bench B", serial_number="CHECK", check_standard=True))
+            history.enter(finish_run(10 * day + 0.1, jumped, rig="bench B", serial_number="CHECK", check_standard=True))
         pasts = history.calibrations()
     last = (FIRST + timedelta(days=110)).date()
     assert [(row["serial"], row["rig"]) for row in floor_content.todays(pasts, last)] == [

@@ -15,7 +15,7 @@ from rig.history.store import open_history
 from rig.page.server.control import Control
 from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving
-from support.history.past_runs import FIRST, finished
+from support.history.past_runs import FIRST, finish_run
 from support.page.browser import legible, needs_browser, picture, screen, text
 from support.processes.waiting import wait_for
 
@@ -36,7 +36,7 @@ def feed(tmp_path: Path) -> Iterator[Sections]:
     with open_history(where) as history:
         stations.make_table(history.engine)
         for ago in range(6):
-            history.enter(finished(days - ago, serial_number="CHECK", rig="bench 1", check_standard=True))
+            history.enter(finish_run(days - ago, serial_number="CHECK", rig="bench 1", check_standard=True))
         for rig, now in SAID.items():
             stations.tell(history.engine, rig, "lab-1", now.json())
         with looking(where) as found:

@@ -11,12 +11,12 @@ import pytest
 from selenium.webdriver import Chrome
 
 from support.history.postgres import postgresql
-from support.laboratories.command_with_a_page import with_a_page
+from support.laboratories.command_with_a_page import start_with_page
 from support.laboratories.commands import configuration
 from support.laboratories.scanner import Scanner, station
 from support.laboratories.station_laboratory import Laboratory
 from support.page.browser import needs_browser, picture, text
-from support.processes.stopwatch import timed, told
+from support.processes.stopwatch import time_block, times_in_words
 from support.processes.waiting import wait_for
 
 UNPLUGGED, KILLED, WAITS, MOUNTS, AGREES = RIGS = ("unplugged", "killed", "waits", "mounts", "agrees")
@@ -55,7 +55,7 @@ def test_five_rigs_at_once_of_which_one_is_killed_and_one_unplugged_are_shown_as
         for rig in RIGS:
             (tmp_path / rig).mkdir()
             configs[rig] = configuration(tmp_path / rig, {"history": {"rig": rig}, "world": {"time_scale": 1}})
-        _, page = stack.enter_context(with_a_page(tmp_path / "told.txt", "floor", "--history", url))
+        _, page = stack.enter_context(start_with_page(tmp_path / "told.txt", "floor", "--history", url))
         at = {rig: stack.enter_context(station(configs[rig], "--out", tmp_path / rig / "batch")) for rig in RIGS}
         driver.get(page)
         for rig in RIGS:
@@ -69,11 +69,11 @@ def test_five_rigs_at_once_of_which_one_is_killed_and_one_unplugged_are_shown_as
         wait_for(lambda: states(driver) == AT_WORK, "all at work")
 
         shown = list[float]()
-        with timed(shown):
+        with time_block(shown):
             at[KILLED].process.kill()
             Laboratory(configs[UNPLUGGED])("unplug_board")
             wait_for(lambda: states(driver)[UNPLUGGED] == "fault" and states(driver)[KILLED] == "dead", "both")
-        print("both are shown after", told(shown))
+        print("both are shown after", times_in_words(shown))
         wait_for(lambda: states(driver) == {**AT_WORK, UNPLUGGED: "fault", KILLED: "dead"}, "the others as before")
         assert "board_link_lost" in card(driver, UNPLUGGED) and f"{UNPLUGGED}-1" in card(driver, UNPLUGGED)
         assert "no sign of life" in card(driver, KILLED)

@@ -17,8 +17,8 @@ from rig.history.recompute.result_comparison import Answer, Compared, Recomputed
 from rig.history.recompute.selection import list_stated_results
 from rig.history.store import History, Selection, open_history
 from rig.report.kinds.kind_registry import followed
-from support.history.kept_recordings import certified
-from support.history.past_runs import BIAS_RAD_S, SCALE, STD, finished
+from support.history.kept_recordings import certify
+from support.history.past_runs import BIAS_RAD_S, SCALE, STD, finish_run
 
 QUESTION = RecomputeQuestion("1", ("reckoning=2",), None)
 U = 2 * STD[0]  # of a scale factor
@@ -44,9 +44,9 @@ def scaled(by: float) -> Sequence[float]:
 
 
 def test_what_the_recordings_give_as_it_was_stated_is_not_looked_at(history: History) -> None:
-    run = finished(0)
+    run = finish_run(0)
     history.enter(run)
-    certified(history, run, "RIG-1")
+    certify(history, run, "RIG-1")
     (found,) = again(history, [(run, given(run))])
     assert found.same and not found.withdrawn and not found.unconfirmed
     assert all(move.size == 0 for move in found.moves[1])
@@ -56,17 +56,17 @@ def test_what_the_recordings_give_as_it_was_stated_is_not_looked_at(history: His
 def test_a_value_moves_by_its_part_of_the_stated_u(
     by: float, of_u: float, moved: tuple[int, ...], history: History
 ) -> None:
-    run = finished(0)
+    run = finish_run(0)
     history.enter(run)
-    certified(history, run, "RIG-1")
-    (found,) = again(history, [(run, given(finished(0, scaled(by))))], of_u)
+    certify(history, run, "RIG-1")
+    (found,) = again(history, [(run, given(finish_run(0, scaled(by))))], of_u)
     assert found.moved == moved and [each.number for each in found.withdrawn] == ["RIG-1"] * len(moved)
     largest = found.moves[1][0]
     assert largest.before.name == "kx" and largest.shift == pytest.approx(abs(by) / U)
 
 
 def test_a_u_that_was_too_small_and_a_value_that_is_gone_are_moves_too(history: History) -> None:
-    run = finished(0)
+    run = finish_run(0)
     history.enter(run)
     (calibration,) = followed(run.document)
     wider = tuple(replace(each, std_statistical=1.5 * each.std_statistical) for each in calibration.parameters)
@@ -92,29 +92,29 @@ def test_a_u_that_was_too_small_and_a_value_that_is_gone_are_moves_too(history: 
 def test_a_certificate_falls_with_what_the_method_refuses_and_is_unconfirmed_by_what_nobody_solved(
     answer: Answer | None, withdrawn: int, unconfirmed: int, history: History
 ) -> None:
-    run = finished(0)
+    run = finish_run(0)
     history.enter(run)
-    certified(history, run, "RIG-1")
+    certify(history, run, "RIG-1")
     (found,) = again(history, [] if answer is None else [(run, answer)])
     assert (len(found.withdrawn), len(found.unconfirmed)) == (withdrawn, unconfirmed) and not found.same
 
 
 def test_certificates_that_are_marked_or_replaced_are_not_withdrawn_once_more(history: History) -> None:
-    run = finished(0)
+    run = finish_run(0)
     history.enter(run)
-    certified(history, run, "RIG-1")
-    certified(history, run, "RIG-2", replaces="RIG-1")
-    certified(history, run, "RIG-3", marks="Simulated laboratory: no real item was calibrated")
+    certify(history, run, "RIG-1")
+    certify(history, run, "RIG-2", replaces="RIG-1")
+    certify(history, run, "RIG-3", marks="Simulated laboratory: no real item was calibrated")
     (found,) = again(history, [(run, given(run, "fail"))])
     assert found.verdict_changed and [each.number for each in found.withdrawn] == ["RIG-2"]
 
 
 def test_a_replaced_result_is_solved_again_only_where_a_certificate_relies_on_it(history: History) -> None:
-    first, later = finished(0, solved_after_s=60), finished(0, scaled(U), solved_after_s=3600)
+    first, later = finish_run(0, solved_after_s=60), finish_run(0, scaled(U), solved_after_s=3600)
     history.enter(first)
     history.enter(later)
     assert [each.run_id for each in list_stated_results(history, Selection())] == [2]
-    certified(history, first, "RIG-1")
+    certify(history, first, "RIG-1")
     assert [(each.run_id, len(each.calibrations)) for each in list_stated_results(history, Selection())] == [
         (1, 1),
         (2, 1),
@@ -123,7 +123,7 @@ def test_a_replaced_result_is_solved_again_only_where_a_certificate_relies_on_it
 
 def test_what_was_voided_does_not_count_and_a_selection_is_heeded(history: History) -> None:
     for day in range(3):
-        history.enter(finished(day, serial_number=f"G-{day}"))
+        history.enter(finish_run(day, serial_number=f"G-{day}"))
     history.void(2, "it was dropped")
     assert [each.run_id for each in list_stated_results(history, Selection())] == [1, 3]
     assert [each.run_id for each in list_stated_results(history, Selection(serial_number="G-2"))] == [3]
@@ -131,7 +131,7 @@ def test_what_was_voided_does_not_count_and_a_selection_is_heeded(history: Histo
 
 
 def test_the_journal_gives_the_same_numbers_back_and_forgets_what_a_kill_left_half_written(tmp_path: Path) -> None:
-    answer = given(finished(0, (1 / 3, 0.1, 1e-7), BIAS_RAD_S))
+    answer = given(finish_run(0, (1 / 3, 0.1, 1e-7), BIAS_RAD_S))
     with RecomputeJournal(tmp_path, QUESTION) as journal:
         journal.note("one", answer)
         journal.note("two", Unsolved("missing", "the folder is gone"))
@@ -151,7 +151,7 @@ def test_answers_to_another_question_are_not_mixed(tmp_path: Path) -> None:
 
 
 def test_what_is_solved_is_not_solved_again_and_what_is_not_is_tried_again(history: History) -> None:
-    runs = [finished(day) for day in range(3)]
+    runs = [finish_run(day) for day in range(3)]
     for run in runs:
         history.enter(run)
     stated = list_stated_results(history, Selection())
@@ -164,14 +164,14 @@ def test_what_is_solved_is_not_solved_again_and_what_is_not_is_tried_again(histo
 
 @pytest.mark.slow
 def test_the_report_says_all_in_csv_and_what_is_to_be_looked_at_on_the_page(history: History) -> None:
-    run, hostile = finished(0), finished(1, serial_number="=<b>G-2</b>")
+    run, hostile = finish_run(0), finish_run(1, serial_number="=<b>G-2</b>")
     for each in (run, hostile):
         history.enter(each)
-    certified(history, hostile, "RIG-1")
+    certify(history, hostile, "RIG-1")
     answers: dict[str, Answer] = {
         run.content_sha256: given(run),
         hostile.content_sha256: RecomputedResult(
-            "fail", ("gyro.scale_std",), followed(finished(1, scaled(U)).document)
+            "fail", ("gyro.scale_std",), followed(finish_run(1, scaled(U)).document)
         ),
     }
     outcome = compared(list_stated_results(history, Selection()), answers, 0.1)
@@ -214,11 +214,11 @@ def replicated(history: History, run: FinishedRun, count: int) -> None:
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_ten_thousand_results_are_planned_in_a_handful_of_questions(history: History, tmp_path: Path) -> None:
-    replicated(history, finished(0), 10_000)
+    replicated(history, finish_run(0), 10_000)
     stated = list_stated_results(history, Selection())
     assert len(stated) == 10_000 and len({each.content_sha256 for each in stated}) == 10_000
     assert all(len(each.calibrations) == len(each.recordings) == len(each.places) == 1 for each in stated)
-    answer = given(finished(0))
+    answer = given(finish_run(0))
     with RecomputeJournal(tmp_path, QUESTION) as journal:
         for each in stated[:4000]:
             journal.note(each.content_sha256, answer)

@@ -21,8 +21,8 @@ from rig.floor.floor_feed import looking
 from rig.history.store import open_history
 from rig.notebook.notebook_history import calibrations
 from rig.station.events import NotRemembered, Remembered
-from support.history.kept_rows import as_of_another_process, forge
-from support.history.past_runs import finished
+from support.history.kept_rows import forge, forget_histories
+from support.history.past_runs import finish_run
 from support.history.postgres import postgresql
 from support.laboratories.commands import rig, rig_here
 from support.paths import CONFIGS, RECORDINGS, ROOT
@@ -71,10 +71,10 @@ def test_what_a_process_does_beside_its_own_connection_loses_nothing(
 ) -> None:
     """A process that looks at the history meanwhile is not alone: if it thinks so, it takes the log away."""
     with open_history(str(file)) as history:
-        history.enter(finished(0))
+        history.enter(finish_run(0))
         beside(file)
         assert rig("history").returncode == 0
-        history.enter(finished(1))
+        history.enter(finish_run(1))
         history.void(2, "to see that it can be")
         with closing(sqlite3.connect(file)) as another:
             assert another.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
@@ -88,7 +88,7 @@ def test_all_who_work_on_a_file_in_a_process_share_its_engine(file: Path) -> Non
     link.symlink_to(file.parent)
     with open_history(str(file)) as one, open_history(str(link / file.name)) as other:
         assert one.engine is other.engine
-        one.enter(finished(0))
+        one.enter(finish_run(0))
     assert {*file.parent.iterdir()} == {link, file}
 
 
@@ -132,7 +132,7 @@ def put_a_new_one_there(file: Path) -> None:
     remove(file)
     other = file.with_name("other.sqlite")
     with open_history(str(other)) as history:
-        history.enter(finished(7, serial_number="G-7"))
+        history.enter(finish_run(7, serial_number="G-7"))
     other.rename(file)
 
 
@@ -167,7 +167,7 @@ def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered
     exchange: Callable[[Path], None], name: str, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with open_history(str(file)) as history:
-        history.enter(finished(0))
+        history.enter(finish_run(0))
     config = load(CONFIGS / "ci.yaml").config
     assert recall_sensors(config, frozenset()).silent is None  # the run begins
     with monkeypatch.context() as forging:
@@ -178,7 +178,7 @@ def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered
     assert isinstance(event, NotRemembered) and name in event.why
     assert name in (recall_sensors(config, frozenset()).silent or "")
     assert {each.name: each.read_bytes() for each in file.parent.iterdir()} == before
-    as_of_another_process()
+    forget_histories()
     event, _ = remember(RECORDINGS / "verified", config.history)
     assert isinstance(event, Remembered)
 
@@ -190,9 +190,9 @@ def test_nobody_works_on_in_a_file_that_is_not_the_history_any_more(
 ) -> None:
     """Though their connections still can."""
     with open_history(str(file)) as history:
-        history.enter(finished(0))
+        history.enter(finish_run(0))
         exchange(file)
-        for work in (lambda: history.enter(finished(1)), history.calibrations):
+        for work in (lambda: history.enter(finish_run(1)), history.calibrations):
             with pytest.raises(Refused, match=name):
                 work()
 
@@ -200,7 +200,7 @@ def test_nobody_works_on_in_a_file_that_is_not_the_history_any_more(
 @pytest.mark.slow
 def test_the_floor_says_that_its_history_is_gone_and_begins_none(file: Path) -> None:
     with open_history(str(file)) as history:
-        history.enter(finished(0))
+        history.enter(finish_run(0))
         place = history.address
     with looking(place) as feed:
         wait_for(lambda: b'"today"' in feed.whole(), "what the history has")
@@ -213,13 +213,13 @@ def test_the_floor_says_that_its_history_is_gone_and_begins_none(file: Path) -> 
 def test_a_database_that_was_emptied_meanwhile_is_not_begun_anew() -> None:
     with postgresql() as url:
         with open_history(url) as history:
-            history.enter(finished(0))
+            history.enter(finish_run(0))
             with history.engine.begin() as connection:
                 connection.execute(text("DROP SCHEMA public CASCADE"))
                 connection.execute(text("CREATE SCHEMA public"))
         with pytest.raises(Refused, match="history_gone"), open_history(url):
             pass
-        as_of_another_process()
+        forget_histories()
         with open_history(url) as history:
             assert history.calibrations() == []
 
@@ -227,16 +227,16 @@ def test_a_database_that_was_emptied_meanwhile_is_not_begun_anew() -> None:
 @pytest.mark.slow
 def test_what_is_not_there_when_it_is_read_back_is_not_told_as_entered(file: Path) -> None:
     with open_history(str(file)) as history:
-        history.enter(finished(0))
+        history.enter(finish_run(0))
 
         @event.listens_for(history.engine, "checkin", once=True)
         def lose(*_: object) -> None:
             forge(str(file), "DELETE FROM parameter WHERE calibration_id = 2 AND name = 'kx'")
 
         with pytest.raises(Refused, match=r"entry_not_kept: .*run \[2\]: its rows have changed since their entry"):
-            history.enter(finished(1))
+            history.enter(finish_run(1))
         with pytest.raises(Refused, match="entry_not_kept"):
-            history.enter(finished(1))
+            history.enter(finish_run(1))
 
 
 IMPORTS = """

@@ -24,7 +24,7 @@ from rig.report.certificate.certificate_page import certificate_page
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.statements import stated_in
 from support.history.kept_rows import drop_triggers, forge
-from support.history.past_runs import finished
+from support.history.past_runs import finish_run
 from support.history.postgres import postgresql
 from support.paths import CONFIGS, RECORDINGS
 
@@ -34,7 +34,7 @@ TABLES = [table.name for table in schema.metadata.sorted_tables]
 
 
 def fill(history: History) -> None:
-    history.enter(replace(finished(0), certificate=ISSUED, documents=(("config.yaml", "cd" * 32),)))
+    history.enter(replace(finish_run(0), certificate=ISSUED, documents=(("config.yaml", "cd" * 32),)))
     history.void(1, "another sensor was mounted")
 
 
@@ -164,7 +164,7 @@ def test_a_journal_that_was_written_anew_or_cut_short_is_told_by_who_knows_its_e
         assert history.head() == Head(0, "")
         fill(history)
         known = history.head()
-        history.enter(finished(7))
+        history.enter(finish_run(7))
         assert history.holds(known) and history.holds(history.head()) and known.number < history.head().number
         with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
             drop_triggers(connection)
@@ -184,7 +184,7 @@ def test_a_journal_that_was_written_anew_or_cut_short_is_told_by_who_knows_its_e
 
 def test_a_result_that_was_changed_with_its_own_hash_is_named(tmp_path: Path) -> None:
     file = str(tmp_path / "history.sqlite")
-    run = finished(0)
+    run = finish_run(0)
     with open_history(file) as history:
         history.enter(run)
     other = run.text.replace("1.01", "1.02")
@@ -202,7 +202,7 @@ def test_a_run_that_was_deleted_with_all_its_rows_is_named(tmp_path: Path) -> No
     file = str(tmp_path / "history.sqlite")
     with open_history(file) as history:
         for day in range(3):
-            history.enter(finished(day))
+            history.enter(finish_run(day))
     without = (
         "parameter WHERE calibration_id = 2",
         *(f"{each} WHERE run_id = 2" for each in ("calibration", "location")),
@@ -266,7 +266,7 @@ def test_a_trigger_of_a_server_that_does_not_say_no_any_more_is_named(place: str
 def test_a_run_that_was_taken_away_leaves_its_numbers_though_the_journal_was_written_anew(place: str) -> None:
     with open_history(place) as history:
         for day in range(4):
-            history.enter(finished(day))
+            history.enter(finish_run(day))
         assert wrong(history) == []
         with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
             drop_triggers(connection)

@@ -10,10 +10,10 @@ from rig.errors import Refused
 from rig.history.storage import migrations, schema
 from rig.history.storage.engine import WRITES
 from rig.history.store import open_history
-from support.history.kept_rows import as_of_another_process, drop_triggers
-from support.history.past_runs import enter_many, finished
+from support.history.kept_rows import drop_triggers, forget_histories
+from support.history.past_runs import enter_many, finish_run
 from support.history.postgres import postgresql
-from support.processes.forked import forked
+from support.processes.forked import find_fork_server
 
 PROCESSES, ENTRIES, FEW = 8, 250, 5
 pytestmark = pytest.mark.slow
@@ -32,7 +32,7 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
 def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(url: str, thorough: bool) -> None:
     """The tables are made by whoever comes first."""
     entries = ENTRIES if thorough else FEW
-    with forked().Pool(PROCESSES) as pool:
+    with find_fork_server().Pool(PROCESSES) as pool:
         new = pool.starmap(enter_many, [(url, worker, entries) for worker in range(PROCESSES)])
         assert new == [entries] * PROCESSES
         again = pool.starmap(enter_many, [(url, worker % 2, FEW) for worker in range(PROCESSES)])
@@ -55,10 +55,10 @@ def test_a_later_version_has_one_place_for_its_migration(url: str, monkeypatch: 
         connection.execute(text("ALTER TABLE voided ADD COLUMN voided_by VARCHAR(400)"))
 
     with open_history(url) as history:
-        history.enter(finished(0))
+        history.enter(finish_run(0))
         history.void(1, "another sensor was mounted")
         before = history.calibrations()
-    as_of_another_process()
+    forget_histories()
     with monkeypatch.context() as newer:
         newer.setattr(schema, "VERSION", schema.VERSION + 1)
         newer.setattr(migrations, "MIGRATIONS", {schema.VERSION - 1: add_a_column})
@@ -67,7 +67,7 @@ def test_a_later_version_has_one_place_for_its_migration(url: str, monkeypatch: 
             assert list(history.broken()) == []
             with history.engine.connect() as connection:
                 assert connection.execute(text("SELECT voided_by FROM voided")).all() == [(None,)]
-    as_of_another_process()
+    forget_histories()
     with pytest.raises(Refused, match=rf"history_too_new: .*version {schema.VERSION + 1}"), open_history(url):
         pass
 
@@ -80,7 +80,7 @@ def test_a_server_s_history_from_before_version_1_is_refused(url: str) -> None:
     ):
         drop_triggers(connection)
         connection.execute(text("UPDATE meta SET key = 'version', value = '6' WHERE key = 'schema_version'"))
-    as_of_another_process()
+    forget_histories()
     with pytest.raises(Refused, match="history_too_old"), open_history(url):
         pass
 

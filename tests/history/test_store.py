@@ -27,7 +27,7 @@ from rig.history.storage.engine import engine_of
 from rig.history.store import History, Selection, open_history
 from rig.report.entries.budget import budget_entry
 from rig.report.kinds.kind_registry import followed
-from support.history.past_runs import FIRST, finished
+from support.history.past_runs import FIRST, finish_run
 from support.paths import DEMO, RECORDINGS
 
 ISSUED = Issued(
@@ -65,8 +65,8 @@ def test_the_mean_scale_factor_has_the_uncertainty_of_all_three() -> None:
 
 
 def test_the_same_run_again_adds_nothing_but_the_place_it_lies_in_now(history: History) -> None:
-    first = history.enter(finished(0))
-    moved = finished(0, solved_after_s=3600)  # solved again, with the same numbers
+    first = history.enter(finish_run(0))
+    moved = finish_run(0, solved_after_s=3600)  # solved again, with the same numbers
     again = history.enter(moved)
     assert (again.run_id, again.new) == (first.run_id, False)
     assert len(history.calibrations()) == 1
@@ -76,8 +76,8 @@ def test_the_same_run_again_adds_nothing_but_the_place_it_lies_in_now(history: H
 
 def test_a_result_of_the_same_recordings_replaces_the_one_before(history: History) -> None:
     """In series; it stays in the history."""
-    history.enter(finished(0, (1.02, 1.02, 1.02), solved_after_s=3600))
-    history.enter(finished(0, (1.01, 1.01, 1.01), solved_after_s=60))  # entered later, solved earlier
+    history.enter(finish_run(0, (1.02, 1.02, 1.02), solved_after_s=3600))
+    history.enter(finish_run(0, (1.01, 1.01, 1.01), solved_after_s=60))  # entered later, solved earlier
     (counted,) = history.calibrations()
     assert counted.value("kx") == 1.02
     assert [history.calibration(number).value("kx") for number in (1, 2)] == [1.02, 1.01]
@@ -85,7 +85,7 @@ def test_a_result_of_the_same_recordings_replaces_the_one_before(history: Histor
 
 def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(history: History) -> None:
     def scarce(day: float, bias_rad_s: float, dof: float) -> FinishedRun:
-        run = finished(day, bias_rad_s=(bias_rad_s, 0.0, 0.0))
+        run = finish_run(day, bias_rad_s=(bias_rad_s, 0.0, 0.0))
         sensor = run.document.gyroscopes["gyro"]
         line = Contributor("noise", "A", "normal", None, "", "", dof, np.array(sensor.covariance))
         found = {"budget": budget_entry(Budget((line,))), "covariance_combined": sensor.covariance}
@@ -106,8 +106,8 @@ def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(his
 
 
 def test_a_voided_calibration_stands_there_with_its_reason_and_counts_no_more(history: History) -> None:
-    history.enter(finished(0))
-    history.enter(finished(1))
+    history.enter(finish_run(0))
+    history.enter(finish_run(1))
     history.void(1, "wrong serial number")
     found = history.calibrations()
     assert [each.voided for each in found] == ["wrong serial number", None]
@@ -119,16 +119,16 @@ def test_a_voided_calibration_stands_there_with_its_reason_and_counts_no_more(hi
 
 
 def test_a_measurement_that_failed_its_own_checks_is_no_part_of_a_series(history: History) -> None:
-    history.enter(finished(0, passed=False))
+    history.enter(finish_run(0, passed=False))
     (found,) = history.calibrations()
     assert not found.fit
     assert subjects([found]) == {}
 
 
 def test_calibrations_are_found_by_sensor_day_and_rig(history: History) -> None:
-    history.enter(finished(9, serial_number="G-1", rig="bench A"))
-    history.enter(finished(3, serial_number="G-2", rig="bench B"))
-    history.enter(finished(5, serial_number="G-1", rig="bench B"))
+    history.enter(finish_run(9, serial_number="G-1", rig="bench A"))
+    history.enter(finish_run(3, serial_number="G-2", rig="bench B"))
+    history.enter(finish_run(5, serial_number="G-1", rig="bench B"))
 
     def days(selection: Selection) -> list[int]:
         return [round(float((trend.times[0] - FIRST).days)) for trend in first_trends(history, selection)]
@@ -169,14 +169,14 @@ def test_a_history_from_before_version_1_is_refused_and_stays_as_it_was(marked: 
 
 
 def test_who_ran_the_rig_and_what_was_noted_is_found_again(history: History) -> None:
-    history.enter(replace(finished(0), operator="A. Person", note="after the move to room 3"))
-    history.enter(finished(1))
+    history.enter(replace(finish_run(0), operator="A. Person", note="after the move to room 3"))
+    history.enter(finish_run(1))
     found = [(each.operator, each.note) for each in history.calibrations()]
     assert found == [("A. Person", "after the move to room 3"), (None, None)]
 
 
 def test_a_certificate_is_entered_once_by_its_number_and_with_every_file_it_was_written_to(history: History) -> None:
-    run = replace(finished(0), certificate=ISSUED)
+    run = replace(finish_run(0), certificate=ISSUED)
     first = history.enter(run)
     assert not history.enter(run).new
     later = replace(ISSUED, files=(("certificate.pdf", "cd" * 32),))
@@ -192,7 +192,7 @@ def test_rows_are_only_added(history: History) -> None:
     """What a role may do that can neither change nor remove anything (docs/how-to/finished-runs/shared-history.md)."""
     said: list[str] = []
     event.listen(history.engine, "before_cursor_execute", lambda *each: said.append(each[2].split()[0].upper()))
-    run = replace(finished(0), certificate=ISSUED, operator="A. Person")
+    run = replace(finish_run(0), certificate=ISSUED, operator="A. Person")
     history.enter(run)
     history.enter(run)
     history.certify(run.content_sha256, replace(ISSUED, files=(("certificate.pdf", "cd" * 32),)))
@@ -203,7 +203,7 @@ def test_rows_are_only_added(history: History) -> None:
 def test_a_history_of_a_newer_program_is_refused_and_not_touched(tmp_path: Path) -> None:
     file = tmp_path / "history.sqlite"
     with open_history(str(file)) as history:
-        history.enter(finished(0))
+        history.enter(finish_run(0))
     other = sqlite3.connect(file)
     other.execute("UPDATE meta SET value = ? WHERE key = 'schema_version'", [str(schema.VERSION + 1)])
     other.commit()
@@ -259,8 +259,8 @@ def test_a_server_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 
 def test_what_has_changed_is_named(history: History) -> None:
-    history.enter(finished(0))
-    history.enter(finished(30, (1.01 + 4e-4, 0.99, 1.0)))
+    history.enter(finish_run(0))
+    history.enter(finish_run(30, (1.01 + 4e-4, 0.99, 1.0)))
     before, now = history.calibrations()
     assert [each.name for each in changes_between([before], [now])[now.subject] if each.has_changed] == ["k", "kx"]
 
@@ -268,7 +268,7 @@ def test_what_has_changed_is_named(history: History) -> None:
 @pytest.mark.slow
 def test_a_sensor_s_drift_and_recall_come_out_of_its_history(history: History) -> None:
     for i in range(10):
-        history.enter(finished(30 * i, (1.01 + 1e-5 * 30 * i, 0.99, 1.0)))
+        history.enter(finish_run(30 * i, (1.01 + 1e-5 * 30 * i, 0.99, 1.0)))
     (series,) = subjects(history.calibrations(Selection(serial_number="G-1"))).values()
     found = trends(series)
     assert found["kx"].line is not None and found["kx"].drifts and not found["kz"].drifts
@@ -281,7 +281,7 @@ def test_a_sensor_s_drift_and_recall_come_out_of_its_history(history: History) -
 
 
 def test_a_limit_stands_beside_its_parameter_whatever_its_check_is_called(history: History) -> None:
-    entered = finished(0)
+    entered = finish_run(0)
     (scale,) = (check for check in entered.document.checks if check.means.parameter == "scale")
     said = {"name": "gyro.k_minus_1", "kind": "conformity", "sensor": "gyro", "quantity": "rate", "parameter": "scale"}
     beyond = scale.model_copy(update={**said, "limit": 0.005, "passed": False})
@@ -300,7 +300,9 @@ def test_check_standards_chart_their_rig_and_shared_sensors_tell_rigs_apart(hist
         for serial_number, later in (("G-1", 0.0), ("G-2", 0.2)):
             for rig, factor in (("bench A", 1 + 3e-4 * (i >= 20)), ("bench B", 1 + 4e-5)):
                 scale = tuple(factor * k + each for k in (1.01, 0.99, 1.0))
-                run = finished(i + later, scale, serial_number=serial_number, rig=rig, check_standard=rig == "bench A")
+                run = finish_run(
+                    i + later, scale, serial_number=serial_number, rig=rig, check_standard=rig == "bench A"
+                )
                 history.enter(run)
     states = {state.rig: state for state in rig_states(history.calibrations())}
     assert states["bench A"].charts["k"].out_of_control

@@ -20,7 +20,7 @@ from rig.history.terminal.history_tables import (
     trend_lines,
     trends_table,
 )
-from support.history.past_runs import FIRST, SCALE, STD, finished
+from support.history.past_runs import FIRST, SCALE, STD, finish_run
 
 ANGLE = "nonorth_yz rad"
 
@@ -46,7 +46,7 @@ def headings(text: str) -> list[str]:
 def a_year(history: History, runs: int = 12, step_days: float = 30.0) -> list[Past]:
     for i in range(runs):
         scatter = ((5 * i) % 7 - 3) * 1e-5
-        history.enter(finished(step_days * i, (1.01 + 1e-4 * i + scatter, 0.99 - scatter, 1 + 2 * scatter)))
+        history.enter(finish_run(step_days * i, (1.01 + 1e-4 * i + scatter, 0.99 - scatter, 1 + 2 * scatter)))
     return history.calibrations()
 
 
@@ -99,7 +99,7 @@ def test_what_fits_nowhere_is_folded_and_not_cut() -> None:
 @pytest.mark.slow
 def test_a_picture_shows_what_has_changed_beyond_its_u(history: History) -> None:
     for day in range(4):
-        history.enter(finished(day, (SCALE[0] + day * 40 * float(STD[0]), *SCALE[1:])))
+        history.enter(finish_run(day, (SCALE[0] + day * 40 * float(STD[0]), *SCALE[1:])))
     table = trends_of(history.calibrations())[0]
     pictures = dict(zip(table.columns[0].cells, table.columns[1].cells, strict=True))
     assert pictures["kx"] == "▁▃▆█" and len(set(pictures["ky"])) == 1
@@ -130,7 +130,7 @@ def test_the_mean_scale_factor_is_explained_where_it_is_printed(history: History
 @pytest.mark.slow
 def test_readings_from_files_are_of_no_rig_that_is_called_none(history: History) -> None:
     for day in range(6):
-        run = finished(day, check_standard=True)
+        run = finish_run(day, check_standard=True)
         provenance = run.document.provenance.model_copy(update={"arm_serial_number": NO_ARM})
         document = run.document.model_copy(update={"provenance": provenance})
         history.enter(replace(run, rig=NO_ARM, document=document))
@@ -145,7 +145,7 @@ def test_readings_from_files_are_of_no_rig_that_is_called_none(history: History)
 @pytest.mark.slow
 def test_one_alarm_is_one(history: History) -> None:
     for day in range(40):
-        history.enter(finished(day * 10, (SCALE[0] + (3e-4 if day == 20 else day % 3 * 1e-5), *SCALE[1:])))
+        history.enter(finish_run(day * 10, (SCALE[0] + (3e-4 if day == 20 else day % 3 * 1e-5), *SCALE[1:])))
     table, found = trends_of(history.calibrations())
     chart = found["kx"].chart
     assert chart is not None and chart.alarm.sum() == 1

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from support.dependencies import licence, needed
+from support.dependencies import licence, list_needed
 
 # Whose terms are kept by naming them: MIT, BSD, Apache and their like, as packages spell them.
 PERMISSIVE = {
@@ -33,7 +33,7 @@ LOOKED_AT = {
 
 @pytest.mark.slow
 def test_every_dependency_has_a_licence_that_somebody_has_looked_at() -> None:
-    packages = needed(["dev"])
+    packages = list_needed(["dev"])
     assert len(packages) > 50, "the program is not installed with its extras"
     unknown = []
     for name, package in sorted(packages.items()):
@@ -48,4 +48,4 @@ def test_every_dependency_has_a_licence_that_somebody_has_looked_at() -> None:
 
 
 def test_what_every_installation_brings_is_permissive() -> None:
-    assert not needed([]).keys() & LOOKED_AT.keys()
+    assert not list_needed([]).keys() & LOOKED_AT.keys()

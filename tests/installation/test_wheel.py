@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from support.laboratories.demo_runs import normalised_errors
+from support.laboratories.demo_runs import compute_normalised_errors
 from support.paths import ROOT
 from support.processes.waiting import PATIENCE_S
 
@@ -58,7 +58,7 @@ def test_the_demonstration_runs_from_the_wheel_and_finds_the_truth(installed: Pa
     subprocess.run([rig, "demo", "--files", tmp_path], check=True, timeout=PATIENCE_S, capture_output=True)
     assert (tmp_path / "examples" / "solve_and_apply.py").exists()
     config = tmp_path / "configs" / "demo.yaml"
-    errors = normalised_errors([rig], config, 1, tmp_path / "run")
+    errors = compute_normalised_errors([rig], config, 1, tmp_path / "run")
     print(f"errors of {np.round(errors, 2)} σ")
     assert np.abs(errors).max() < 4
     assert {file.name for file in (tmp_path / "run").iterdir()} >= {"certificate.html", "calibration.h", "result.json"}

@@ -10,7 +10,7 @@ import rig
 from rig.cli import main
 from rig.errors import Refused
 from rig.history.store import open_history
-from support.history.past_runs import FIRST, finished
+from support.history.past_runs import FIRST, finish_run
 from support.paths import RECORDINGS, ROOT
 
 MOVED = (1.0103, 0.99, 1.0)
@@ -22,7 +22,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     where = str(tmp_path / "history.sqlite")
     monkeypatch.setenv("RIG_HISTORY", where)
     with open_history(where) as history:
-        for run in (finished(0), finished(30, MOVED), finished(40, serial_number="G-2")):
+        for run in (finish_run(0), finish_run(30, MOVED), finish_run(40, serial_number="G-2")):
             history.enter(run)
     return where
 
@@ -49,7 +49,7 @@ def test_a_serial_number_that_was_never_entered_is_refused(place: str) -> None:
 def test_changes_between_two_results_are_those_of_the_command_line(
     place: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before, now = (rig.Result(run.document) for run in (finished(0), finished(30, MOVED)))
+    before, now = (rig.Result(run.document) for run in (finish_run(0), finish_run(30, MOVED)))
     found = rig.changes(before, now)["gyro"]
     assert main(["history", "compare", "1", "2", "--json"]) == 0
     assert found.to_dict() == json.loads(capsys.readouterr().out)["parameters"]

@@ -22,7 +22,7 @@ from rig.observation.statistics.coloured_noise import correlation_inflation, fit
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import swept
 from rig.report.entries.gyroscope import sensor_entry
-from support.recordings.recorded import with_channel
+from support.recordings.recorded import change_channel
 from support.recordings.solving import solve_runs
 from support.recordings.synthetic_run import (
     BIAS_RAD_S,
@@ -417,7 +417,7 @@ def still(run: RunData) -> RunData:
 
 def scaled(run: RunData, factor: float) -> RunData:
     sensor = run.sensors["gyro"]
-    changed = with_channel(sensor, unit_per_count=sensor.channel(RATE).unit_per_count * factor)
+    changed = change_channel(sensor, unit_per_count=sensor.channel(RATE).unit_per_count * factor)
     return replace(run, sensors={"gyro": changed})
 
 

@@ -8,14 +8,14 @@ import pytest
 from rig.data.quantity import RATE
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.csv_samples import read_samples
-from support.external.real import unpacked
+from support.external.real import unpack
 from support.external.turned_body import Hand, turn
 from support.paths import DOCS
 
 
 def test_a_hands_rests_are_found_as_they_are_known_of_a_real_recording(tmp_path: Path) -> None:
     """Thirteen, say those who looked at it."""
-    samples = read_samples(unpacked("imucal", "samples.csv", tmp_path))
+    samples = read_samples(unpack("imucal", "samples.csv", tmp_path))
     rests = find_rests(samples.time_s, samples.readings)
     assert len(rests) == 13
     assert (rests[1].start_s, rests[1].end_s) == pytest.approx((3.8, 13.4), abs=0.3)

@@ -17,9 +17,9 @@ from rig.page.about import About
 from rig.page.arm import built
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, PhaseStarted, RunEvent, SamplesTaken, SensorSamples
 from rig.turners.turner_registry import installed, kind_of, sections
-from support.laboratories.command_with_a_page import with_a_page
+from support.laboratories.command_with_a_page import start_with_page
 from support.laboratories.commands import configuration
-from support.laboratories.servo_runs import configured
+from support.laboratories.servo_runs import configure
 from support.laboratories.worlds import fresh_host, merge
 from support.page.browser import needs_browser, picture
 from support.page.told_page import showing
@@ -111,7 +111,7 @@ def written(folder: Path, name: str, changes: dict[str, Any], time_scale: float)
 RUNS: dict[str, Callable[[Path], Path]] = {
     "hand": by_hand,
     "lines": of_lines,
-    "servo": configured,
+    "servo": configure,
     "arm": lambda folder: configuration(folder, {"world": {"time_scale": 2}}),
 }
 
@@ -120,7 +120,7 @@ RUNS: dict[str, Callable[[Path], Path]] = {
 @pytest.mark.parametrize("what", RUNS)
 def test_while_a_run_goes_on_its_readings_are_of_now(driver: Chrome, tmp_path: Path, what: str) -> None:
     command = ("run", RUNS[what](tmp_path), "--out", tmp_path / "run", "--yes", "--page")
-    with with_a_page(tmp_path / "told.txt", *command, "--page-address", "127.0.0.1:0") as (process, url):
+    with start_with_page(tmp_path / "told.txt", *command, "--page-address", "127.0.0.1:0") as (process, url):
         driver.get(url)
         wait_for(lambda: driver.find_elements(By.CSS_SELECTOR, ".plot canvas"), "readings", meanwhile=alive(process))
         began_ms = driver.execute_script(WATCH)

@@ -17,7 +17,7 @@ import pytest
 from rig.motion.turner_state import REST_SPEED_RAD_S
 from support.laboratories.commands import configuration, wait_for_log
 from support.laboratories.worlds import World, WorldHandle, hardware
-from support.page.flood import flooded
+from support.page.flood import flood
 from support.processes.waiting import PATIENCE_S, wait_for
 
 pytestmark = pytest.mark.slow
@@ -90,7 +90,7 @@ def moving(laboratory: WorldHandle) -> bool:
 @pytest.mark.thorough
 def test_half_requests_end_no_run(start: Start, tmp_path: Path) -> None:
     running = start(configuration(tmp_path))
-    with flooded(running.url, MANY):
+    with flood(running.url, MANY):
         stdout, _ = running.process.communicate(timeout=PATIENCE_S)
     assert running.process.returncode == 0, running.told()
     assert "verdict: PASS" in stdout and "[Errno" not in running.told()
@@ -101,7 +101,7 @@ def test_the_stop_button_works_while_half_requests_are_held(
     start: Start, laboratory: WorldHandle, tmp_path: Path
 ) -> None:
     running = start(hardware(laboratory.config_path, tmp_path))
-    with flooded(running.url, MANY):
+    with flood(running.url, MANY):
         wait_for(lambda: moving(laboratory), "motion")
         place = urlsplit(running.url)
         asking = HTTPConnection(place.hostname or "", place.port, timeout=PATIENCE_S)
@@ -117,7 +117,7 @@ def test_a_frozen_driver_is_answered_by_a_stop_while_half_requests_are_held(
     start: Start, laboratory: WorldHandle, tmp_path: Path
 ) -> None:
     running = start(hardware(laboratory.config_path, tmp_path))
-    with flooded(running.url, MANY):
+    with flood(running.url, MANY):
         wait_for(lambda: moving(laboratory), "motion")
         os.kill(running.child(b"multiprocessing.spawn"), signal.SIGSTOP)
         wait_for(lambda: not moving(laboratory), "rest")

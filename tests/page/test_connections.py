@@ -16,7 +16,7 @@ from rig.page.server.connections import STRANGERS, TRUSTED, Connections
 from rig.page.server.control import Control
 from rig.page.server.feed import Feed
 from rig.page.server.serving import PageAddress, serving
-from support.page.flood import alive, half_a_request, opened
+from support.page.flood import alive, half_a_request, open_request
 from support.processes.waiting import PATIENCE_S, wait_for
 
 
@@ -61,7 +61,7 @@ def test_a_stream_with_the_token_outlives_any_number_of_strangers(tmp_path: Path
     with ExitStack() as held:
         url = held.enter_context(page(tmp_path))
         token = f"Authorization: Bearer {urlsplit(url).fragment}\r\n"
-        operator = held.enter_context(opened(url, "/events", token))
+        operator = held.enter_context(open_request(url, "/events", token))
         operator.settimeout(PATIENCE_S)
         assert b" 200 " in operator.recv(4096)
         many = [held.enter_context(half_a_request(url)) for _ in range(2 * STRANGERS + TRUSTED)]
@@ -74,7 +74,7 @@ def test_browsers_without_the_token_leave_places_for_those_with_it(tmp_path: Pat
     with ExitStack() as held:
         url = held.enter_context(page(tmp_path))
         for _ in range(40):
-            stranger = held.enter_context(opened(url, "/events"))
+            stranger = held.enter_context(open_request(url, "/events"))
             stranger.settimeout(PATIENCE_S)
             assert stranger.recv(4096)
         assert status(url, "GET", "/events") == 503

@@ -18,10 +18,10 @@ from rig.turners.turner_registry import installed
 from support.page.told_runs import (
     ABOUT,
     before_it_moves,
-    judged,
+    judge,
     look,
     moving,
-    planned,
+    plan_demo,
     report,
     servo_report,
     servo_state,
@@ -40,7 +40,7 @@ def read(frame: bytes | None) -> tuple[str, dict[str, Any]]:
 
 
 def test_news_hold_what_has_changed_and_each_point_once() -> None:
-    feed, plan = fed(), planned()
+    feed, plan = fed(), plan_demo()
     for event in before_it_moves(plan):
         feed.event(event)
     assert read(feed.news())[0] == "some" and feed.news() is None
@@ -58,7 +58,7 @@ def test_news_hold_what_has_changed_and_each_point_once() -> None:
 
 def test_the_arm_is_named_as_it_was_found() -> None:
     feed = fed()
-    for event in before_it_moves(planned()):
+    for event in before_it_moves(plan_demo()):
         feed.event(event)
     arm = read(feed.whole())[1]["arm"]
     assert arm["model"] == "UR10e or UR12e" and arm["serial_number"] == "20225500001"
@@ -144,7 +144,7 @@ def test_the_last_news_reach_who_reads_and_nobody_else_is_waited_for_long() -> N
 
         reading = asyncio.create_task(reads())
         await asyncio.sleep(0.3)
-        for event in judged(Path("nowhere"), passed=True):
+        for event in judge(Path("nowhere"), passed=True):
             feed.event(event)
         await broadcast.close(0.3)
         assert (await reading)[-1] == "some"
@@ -155,7 +155,7 @@ def test_the_last_news_reach_who_reads_and_nobody_else_is_waited_for_long() -> N
 
 
 def test_the_hosts_observation_takes_the_place_of_the_boards_and_a_result_that_of_what_was_so_far() -> None:
-    shown, plan = PageState(ABOUT), planned()
+    shown, plan = PageState(ABOUT), plan_demo()
     for event in [*before_it_moves(plan), *moving(plan, 100.0)]:
         shown.take(event)
     assert [(row["sweep"], row["by"]) for row in shown.sections["observations"]] == [(n, "board") for n in range(6)]

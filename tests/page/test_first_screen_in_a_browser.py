@@ -13,7 +13,7 @@ from rig.errors import Fault
 from rig.station.events import DocumentWritten, Failed, Prompt
 from support.page.browser import TABLET, kind, legible, needs_browser, picture, screen, set_theme, text
 from support.page.told_page import Telling, showing
-from support.page.told_runs import before_it_moves, judged, look, moving, planned
+from support.page.told_runs import before_it_moves, judge, look, moving, plan_demo
 from support.page.told_six import IMU, PARTS, SIX, six_found, six_judged, six_moving
 from support.processes.waiting import wait_for
 
@@ -62,7 +62,7 @@ def wide(driver: Chrome) -> list[str]:
 @pytest.fixture
 def six(driver: Chrome, tmp_path: Path) -> Iterator[Telling]:
     with showing(driver, tmp_path, about=SIX) as tell:
-        tell(*before_it_moves(planned()), *six_moving(7.0))
+        tell(*before_it_moves(plan_demo()), *six_moving(7.0))
         tell.word("Measuring")
         yield tell
         driver.get("about:blank")  # so that it asks no longer
@@ -92,8 +92,8 @@ def test_one_sensor_has_each_value_with_its_u_in_the_first_screen(
     driver: Chrome, tmp_path: Path, size: tuple[int, int]
 ) -> None:
     with screen(driver, *size), showing(driver, tmp_path) as tell:
-        tell(*before_it_moves(planned()), *moving(planned(), 7.0), DocumentWritten(IMU / RESULT))
-        tell(*judged(tmp_path, passed=True))
+        tell(*before_it_moves(plan_demo()), *moving(plan_demo(), 7.0), DocumentWritten(IMU / RESULT))
+        tell(*judge(tmp_path, passed=True))
         tell.word("PASS")
         picture(driver, f"one-passed-{size[0]}x{size[1]}")
         assert below(driver, f"{AFTER}, #found tbody tr", 10) == []
@@ -193,10 +193,10 @@ def test_after_the_end_no_reading_stands_beside_the_result_and_no_panel_promises
 @pytest.mark.thorough
 def test_an_oblique_turn_is_held_against_the_part_of_it_that_an_axis_feels(driver: Chrome, tmp_path: Path) -> None:
     """0.727 rad/s of 1.047 is what an axis reads that lies 46° off; their ratio of 0.69 looked like a fault."""
-    seen = look(planned(), 1)
+    seen = look(plan_demo(), 1)
     row = {**seen.observations[0], "mean_rad_s": [0.6303, 0.63, 0.0], "axis": "x", "sign": 1, "along": 0.694}
     with showing(driver, tmp_path) as tell:
-        tell(*before_it_moves(planned()), *moving(planned(), 1.0))
+        tell(*before_it_moves(plan_demo()), *moving(plan_demo(), 1.0))
         tell.observed([row])
         wait_for(lambda: "0.72676" in text(driver, "observations"), "what is expected")
         assert "0.86728" in text(driver, "observations")

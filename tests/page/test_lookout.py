@@ -13,7 +13,7 @@ from rig.page.analysis_process import looking_out
 from rig.page.page_state import PageState
 from rig.page.server.feed import Feed
 from rig.station.events import StepFinished
-from support.page.told_runs import moving, planned
+from support.page.told_runs import moving, plan_demo
 from support.processes.waiting import wait_for
 
 
@@ -30,7 +30,7 @@ def helper() -> int:
 
 
 def swept() -> StepFinished:
-    finished = (event for event in moving(planned(), 100.0) if isinstance(event, StepFinished))
+    finished = (event for event in moving(plan_demo(), 100.0) if isinstance(event, StepFinished))
     return next(event for event in finished if isinstance(event.step, Sweep))
 
 

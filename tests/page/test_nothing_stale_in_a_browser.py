@@ -17,7 +17,7 @@ from rig.motion.turner_state import ArmState, RuntimeState
 from rig.station.events import ArmSeen, Failed, Interrupted, PhaseRecorded, RunEvent, SensorSamples
 from support.page.browser import kind, legible, needs_browser, picture, severe, text
 from support.page.told_page import showing
-from support.page.told_runs import before_it_moves, judged, moving, planned
+from support.page.told_runs import before_it_moves, judge, moving, plan_demo
 from support.paths import ROOT
 from support.processes.waiting import wait_for
 
@@ -69,7 +69,7 @@ def let_go(events: list[RunEvent]) -> ArmSeen:
 
 
 def sweeping() -> list[RunEvent]:
-    return [*before_it_moves(planned()), *moving(planned(), 7.0)]
+    return [*before_it_moves(plan_demo()), *moving(plan_demo(), 7.0)]
 
 
 def test_a_run_that_goes_on_is_alive_by_the_same_reading(driver: Chrome, tmp_path: Path) -> None:
@@ -91,8 +91,8 @@ def test_after_the_end_no_text_says_that_it_goes_on(driver: Chrome, tmp_path: Pa
     recorded = PhaseRecorded((SensorSamples("gyro", 14280, 0, {"rate": (0.0, 0.0, 0.0)}),), 0)
     ends: dict[str, list[RunEvent]] = {
         "stopped": [let_go(moved), Interrupted(STOPPED)],
-        "passed": [recorded, let_go(moved), *judged(tmp_path, passed=True)],
-        "failed": [recorded, let_go(moved), *judged(tmp_path, passed=False)],
+        "passed": [recorded, let_go(moved), *judge(tmp_path, passed=True)],
+        "failed": [recorded, let_go(moved), *judge(tmp_path, passed=False)],
         "arm lost": [Failed(GONE)],
     }
     with showing(driver, tmp_path) as tell:

@@ -21,7 +21,7 @@ from support.laboratories.commands import configuration, rig
 from support.laboratories.worlds import World, hardware
 from support.page.browser import kind, needs_browser, picture, text
 from support.processes.waiting import PATIENCE_S, wait_for
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
@@ -35,7 +35,7 @@ def page(tmp_path: Path) -> Iterator[Callable[..., tuple["subprocess.Popen[str]"
         words = (*arguments, "--page-address", "127.0.0.1:0")
         told = tmp_path / f"stderr-{len(running)}"
         with told.open("w", encoding="utf-8") as errors:
-            process = started(*words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, text=True)
+            process = start_module(*words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, text=True)
         running.append(process)
         found = wait_for(lambda: re.search(r"^page: (\S+)$", told.read_text(encoding="utf-8"), re.M), "the address")
         return process, found[1]

@@ -18,9 +18,19 @@ from rig.page.server.feed import Feed
 from rig.page.server.serving import PageAddress, serving
 from rig.station.events import Answered, Crashed, Failed, Interrupted, PhaseRecorded, Prompt, RunEvent, SensorSamples
 from support.page import told_runs
-from support.page.browser import TABLET, asked_hosts, kind, legible, needs_browser, picture, set_theme, severe, text
+from support.page.browser import (
+    TABLET,
+    kind,
+    legible,
+    list_requested_hosts,
+    needs_browser,
+    picture,
+    set_theme,
+    severe,
+    text,
+)
 from support.page.told_page import showing
-from support.page.told_runs import ABOUT, before_it_moves, judged, moving, planned
+from support.page.told_runs import ABOUT, before_it_moves, judge, moving, plan_demo
 from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
@@ -41,7 +51,7 @@ REFUSED = Refused("speed_slider", "the speed slider stands at 50 %", "Set it to 
 GONE = Fault("board_link_lost", "the board on /dev/ttyACM0 has gone", "Check its cable")
 TRACEBACK = "Traceback (most recent call last):\n  …\nZeroDivisionError: division by zero\n"
 ENDINGS: dict[str, tuple[str, str, Callable[[Path], Iterable[RunEvent]]]] = {
-    "failed": ("FAIL", "4 of 5 checks passed", lambda folder: judged(folder, passed=False)),
+    "failed": ("FAIL", "4 of 5 checks passed", lambda folder: judge(folder, passed=False)),
     "refused": ("Refused", str(REFUSED), lambda _: [Failed(REFUSED)]),
     "fault": ("Fault", str(GONE), lambda _: [Failed(GONE)]),
     "defect": ("Fault", "A defect of the program: ZeroDivisionError: division by zero", lambda _: [Crashed(TRACEBACK)]),
@@ -57,7 +67,7 @@ def test_no_state_is_without_a_picture() -> None:
 
 
 def test_every_state_of_a_run_has_its_word_and_its_sign(driver: Chrome, tmp_path: Path) -> None:
-    plan, recorded = planned(), PhaseRecorded((SensorSamples("gyro", 14280, 0, {"rate": (0.0, 0.0, 0.0)}),), 0)
+    plan, recorded = plan_demo(), PhaseRecorded((SensorSamples("gyro", 14280, 0, {"rate": (0.0, 0.0, 0.0)}),), 0)
     connected, *until_asked = before_it_moves(plan)
     before: dict[str, list[RunEvent]] = {
         "connecting": [],
@@ -74,7 +84,7 @@ def test_every_state_of_a_run_has_its_word_and_its_sign(driver: Chrome, tmp_path
 
 
 def test_a_run_is_shown_from_the_question_to_the_verdict(driver: Chrome, tmp_path: Path) -> None:
-    plan = planned()
+    plan = plan_demo()
     (tmp_path / "certificate.html").write_text("<title>Certificate</title>", encoding="utf-8")
 
     with showing(driver, tmp_path) as tell:
@@ -114,7 +124,7 @@ def test_a_run_is_shown_from_the_question_to_the_verdict(driver: Chrome, tmp_pat
         driver.set_window_size(*TABLET)
         set_theme(driver, dark=True)
         tell.look(6)
-        tell(*judged(tmp_path, passed=True))
+        tell(*judge(tmp_path, passed=True))
         tell.word("PASS")
         assert text(driver, "state-text") == "5 of 5 checks passed" and "✓ passed" in text(driver, "checks")
         assert not driver.find_element(By.ID, "halt").is_displayed()
@@ -132,7 +142,7 @@ def test_a_run_is_shown_from_the_question_to_the_verdict(driver: Chrome, tmp_pat
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_other_endings_say_why(driver: Chrome, tmp_path: Path, ending: str) -> None:
-    plan = planned()
+    plan = plan_demo()
     word, why, last = ENDINGS[ending]
     set_theme(driver, dark=ending != "failed")
     with showing(driver, tmp_path) as tell:
@@ -149,7 +159,7 @@ ELSEWHERE = {True: "Answer it at the terminal, not here.", False: "This address 
 @pytest.mark.parametrize("token", ELSEWHERE)
 def test_a_question_for_somebody_else_has_no_buttons(driver: Chrome, tmp_path: Path, token: bool) -> None:
     with showing(driver, tmp_path, token=token, may_answer=not token) as tell:
-        tell(*before_it_moves(planned()), Prompt(ANNOUNCED))
+        tell(*before_it_moves(plan_demo()), Prompt(ANNOUNCED))
         tell.word("Your answer is needed")
         assert text(driver, "prompt-elsewhere").startswith(ELSEWHERE[token])
         assert not driver.find_element(By.ID, "yes").is_displayed()
@@ -158,7 +168,7 @@ def test_a_question_for_somebody_else_has_no_buttons(driver: Chrome, tmp_path: P
 
 
 def test_a_line_that_is_lost_makes_all_of_it_old(driver: Chrome, tmp_path: Path) -> None:
-    plan = planned()
+    plan = plan_demo()
     with showing(driver, tmp_path) as tell:
         tell(*before_it_moves(plan), *moving(plan, 52.0))
         tell.word("Resting")
@@ -174,7 +184,7 @@ def test_an_address_of_this_computer_without_its_token_shows_nothing_and_says_so
     driver: Chrome, tmp_path: Path
 ) -> None:
     host = own_address()
-    severe(driver), asked_hosts(driver)  # of before
+    severe(driver), list_requested_hosts(driver)  # of before
     feed = Feed(PageState(ABOUT))
     feed.event(Prompt(ANNOUNCED))
     address = PageAddress(host, 0, "a-token-of-forty-characters-and-no-other")
@@ -187,7 +197,7 @@ def test_an_address_of_this_computer_without_its_token_shows_nothing_and_says_so
         driver.get(url)
         wait_for(lambda: text(driver, "state-word") == "Your answer is needed", "the question")
         assert text(driver, "prompt-tick") == Prompt(ANNOUNCED).to_tick
-        assert asked_hosts(driver) == {host}
+        assert list_requested_hosts(driver) == {host}
 
 
 def own_address() -> str:

@@ -10,11 +10,11 @@ from rig.config.procedures.servo_section import ServoSection
 from rig.motion.steps import Plan, Rest, Transfer
 from rig.plans.motions.servo_sweeps import plan_servo_six_observation
 from rig.turners.servo.servo_kind import SERVO
-from support.motions.drawn_servo import loaded
+from support.motions.drawn_servo import load_servo
 
 
 def planned(*overrides: str, start_rad: float | None = None, done: tuple[int, ...] = ()) -> Plan:
-    config = loaded(overrides).config
+    config = load_servo(overrides).config
     assert isinstance(config.turner, ServoSection) and isinstance(config.procedure, ServoSixObservationSection)
     start = None if start_rad is None else (start_rad,)
     return plan_servo_six_observation(config.turner, config.procedure, start, done)
@@ -79,13 +79,13 @@ def test_the_pace_leaves_little_beside_turning_and_resting() -> None:
 )
 def test_what_cannot_be_is_refused_before_anything_is_connected(override: str, what: str) -> None:
     with pytest.raises(ConfigurationRefused) as refused:
-        loaded((override,))
+        load_servo((override,))
     assert any(what in problem for problem in refused.value.problems), refused.value.problems
 
 
 def test_a_plan_that_no_such_servo_can_drive_is_refused_by_name() -> None:
     plan = planned("procedure.speed_deg_s=10", "procedure.overtravel_deg=360")
-    servo = loaded().config.turner
+    servo = load_servo().config.turner
     assert isinstance(servo, ServoSection)
     assert {problem.name for problem in SERVO.problems([plan], servo, None)} == {"servo_move_too_long"}
     assert SERVO.problems([planned()], servo, None) == []

@@ -38,9 +38,9 @@ from rig.world.hand.habits import Action, FlipAction, TurnAction
 from support.external.handled_body import Part, handle
 from support.motions.drawn_servo import KNOWN as OF_DRAWN
 from support.motions.drawn_servo import drawn_servo
-from support.motions.drawn_servo import loaded as servo_loaded
+from support.motions.drawn_servo import load_servo as servo_loaded
 from support.paths import CONFIGS
-from support.recordings.drawn_accelerations import drawn, solved
+from support.recordings.drawn_accelerations import drawn, solve_session
 from support.recordings.synthetic_run import CONFIG, Setup, synthetic_run
 
 SET_TO = {"lsm9ds1": (238, 500), "adis16465": (200, 500), "icm42688p": (200, 500)}  # Hz, °/s
@@ -322,7 +322,7 @@ def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches(part: st
     budgets = predict_accelerometer_budgets(config, plan_of(config, config.procedure), made.kinematics)
     foretold = ReachedUncertainty.of_budgets({}, budgets)
     for seed in range(5 if thorough else 1):
-        found = ReachedUncertainty.of_budgets({}, {"drawn": solved(drawn(part, seed, ARM_RAD, warmer_k=0.0))[1]})
+        found = ReachedUncertainty.of_budgets({}, {"drawn": solve_session(drawn(part, seed, ARM_RAD, warmer_k=0.0))[1]})
         assert RATIO[0] <= found.acceleration_scale / foretold.acceleration_scale <= RATIO[1], seed
         bias = found.acceleration_bias_m_s2 / foretold.acceleration_bias_m_s2
         assert BIAS_RATIO[0] <= bias <= BIAS_RATIO[1], seed

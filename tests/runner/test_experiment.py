@@ -20,7 +20,7 @@ from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import QUICK_EXPERIMENT, fresh_host, merge
 from support.paths import CONFIGS
 from support.processes.waiting import PATIENCE_S, alive, wait_for
-from support.recordings.stated import solved_otherwise
+from support.recordings.stated import find_differences
 
 EXPERIMENTS = [
     "lsm9ds1_adis16465",
@@ -139,7 +139,7 @@ def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) ->
     assert np.allclose(kept["scale"], result["gyroscopes"]["gyro"]["scale"], rtol=1e-6)
     again = rig_here("solve", out, "--json")
     assert again.returncode == 0, again.stderr
-    assert solved_otherwise(out, again.stdout) == []
+    assert find_differences(out, again.stdout) == []
 
 
 @pytest.mark.thorough

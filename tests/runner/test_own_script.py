@@ -16,7 +16,7 @@ from support.laboratories.commands import configuration, python, rig, rig_here, 
 from support.laboratories.worlds import merge
 from support.paths import ROOT
 from support.processes.waiting import PATIENCE_S
-from support.recordings.stated import solved_otherwise
+from support.recordings.stated import find_differences
 
 OWN = ROOT / "tests" / "support" / "motions" / "unequal_sweeps.py"
 SECTION = {"procedure": {"name": "unequal_sweeps", "wrist_2_deg_s": 100}}
@@ -81,7 +81,7 @@ def test_an_interrupted_script_of_ones_own_is_resumed_by_itself(interrupted: Pat
     assert result["provenance"]["script"] == "mine.py"
     assert result["provenance"]["script_sha256"] == hashlib.sha256(OWN.read_bytes()).hexdigest()
     solved = rig_here("solve", interrupted, "--json")
-    assert solved_otherwise(interrupted, solved.stdout) == [], solved.stderr
+    assert find_differences(interrupted, solved.stdout) == [], solved.stderr
     (interrupted / "script.py").write_text("PROCEDURE = None", encoding="utf-8")
     assert "rig: another_script: " in rig_here("solve", interrupted).stderr, "it is judged as it was, or not at all"
 

@@ -18,7 +18,7 @@ from rig.plans.script_file import ScriptFile, installed_script
 from rig.runner.resumption import resumption
 from support.laboratories.commands import configuration, rig
 from support.recordings import damaged_accelerations
-from support.recordings.damaged_readings import offset, readings_of, replaced
+from support.recordings.damaged_readings import offset, readings_of, replace_readings
 from support.recordings.synthetic_run import Setup
 
 SCRIPT = installed_script("six_observation")
@@ -103,7 +103,7 @@ def test_what_was_repeated_counts_in_its_place() -> None:
 def test_what_was_read_at_rest_beside_a_repeated_sweep_does_not_count() -> None:
     """A bad contact in the rest before sweep 4: the run ended there, and went on with sweep 4 when it was mended."""
     seen = readings_of(SETUP)
-    bad = replaced(lambda seen: seen.rest(3) & seen.some(0.1), 20_000)(seen).recording()
+    bad = replace_readings(lambda seen: seen.rest(3) & seen.some(0.1), 20_000)(seen).recording()
     assert "gyro.spikes" in failed([bad])
     begun_s = next(each.window.start_s for each in swept(seen.run) if each.sweep.index == 4)
     other = readings_of(replace(SETUP, seed=2)).recording()

@@ -15,8 +15,8 @@ import yaml
 from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 from support.laboratories.worlds import merge
 from support.processes.waiting import PATIENCE_S
-from support.processes.warm import started
-from support.recordings.stated import solved_otherwise
+from support.processes.warm import start_module
+from support.recordings.stated import find_differences
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +30,7 @@ def start() -> Iterator[Start]:
     running: list[subprocess.Popen[str]] = []
 
     def popen(*arguments: str | Path) -> subprocess.Popen[str]:
-        process = started(*arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = start_module(*arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         running.append(process)
         return process
 
@@ -94,7 +94,7 @@ def test_a_passed_run_stays_passed_where_stdout_takes_no_more(tmp_path: Path) ->
     out = tmp_path / "run"
     with (
         FULL.open("w") as full,
-        started(
+        start_module(
             "run", configuration(tmp_path), "--out", out, stdout=full, stderr=subprocess.PIPE, text=True
         ) as process,
     ):
@@ -108,7 +108,7 @@ def test_solve_gives_the_numbers_of_the_run(finished: tuple[Path, dict[str, Any]
     out, *_ = finished
     again = rig("solve", out / "run.h5", "--json")
     assert again.returncode == 0, again.stderr
-    assert solved_otherwise(out, again.stdout) == []
+    assert find_differences(out, again.stdout) == []
 
 
 def test_the_papers_algorithm_agrees(finished: tuple[Path, dict[str, Any], Any]) -> None:
@@ -164,7 +164,7 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     assert [o["sweep"] for o in result["gyroscopes"]["gyro"]["observations"]] == [0, 1, 2, 3, 4, 5]
     assert len(result["gyroscopes"]["gyro"]["time_bases"]) == 2
     assert swept < 6 and resumed.stderr.count("done: sweep") == 6 - swept
-    assert solved_otherwise(out, rig_here("solve", out, "--json").stdout) == []
+    assert find_differences(out, rig_here("solve", out, "--json").stdout) == []
 
 
 @pytest.mark.proof

@@ -11,7 +11,7 @@ import pytest
 
 from rig.analysis.gyroscope.calibration import solve_vector
 from support.laboratories.drawn_laboratory import SPEED_RAD_S, drawn
-from support.laboratories.single_effects import Effect, bound, with_effect
+from support.laboratories.single_effects import Effect, bound, world_with_effect
 from support.laboratories.whole_runs import WholeRun, whole_run
 
 SEEDS = range(1, 61)  # a third of them put the share beyond U off by two in a hundred, which is what is asked
@@ -53,7 +53,7 @@ def test_the_stated_uncertainty_holds_in_imperfect_laboratories(tmp_path: Path) 
 
 @pytest.mark.parametrize("effect", Effect)
 def test_of_a_single_effect_no_more_is_stated_than_it_leaves_undeterminable(tmp_path: Path, effect: Effect) -> None:
-    finished = runs(partial(with_effect, effect), range(1, 9), tmp_path)
+    finished = runs(partial(world_with_effect, effect), range(1, 9), tmp_path)
     speed_rad_s = 1e-3 if effect is Effect.NONLINEARITY else SPEED_RAD_S  # several speeds tell the scale at none
     stated = np.array([run.stated_std("gyro") for run in finished])
     errors = np.array([run.stated("gyro") - run.truth("gyro", speed_rad_s) for run in finished]) / stated

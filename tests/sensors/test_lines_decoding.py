@@ -7,7 +7,7 @@ import pytest
 
 from rig.config.sensors.lines_section import LinesSection
 from rig.sensors.lines.decoding import LineBatch, LineReader
-from support.wires.printed_lines import lines_section, summed
+from support.wires.printed_lines import add_checksum, lines_section
 
 THREE: dict[str, Any] = {"columns": ("gx", "gy", "gz"), "time": None, "acceleration": None, "clock": "arrival"}
 
@@ -38,7 +38,7 @@ def test_numbers_are_exactly_what_was_printed_in_pieces_of_any_size(piece: int) 
         ({"separator": "tab"}, b"1.5\t-2\t3E-05"),
         ({"separator": "space"}, b"  1.5   -2 0.00003"),
         ({"prefix": "$IMU,"}, b"$IMU,1.5,-2,0.00003"),
-        ({"prefix": "$IMU,", "checksum": "nmea"}, summed("$IMU,1.5,-2,0.00003").strip()),
+        ({"prefix": "$IMU,", "checksum": "nmea"}, add_checksum("$IMU,1.5,-2,0.00003").strip()),
         ({"keys": ("gx:", "gy:", "gz:")}, b"gx:1.5,gy:-2,gz:0.00003"),
         ({"keys": ("x=", "yx=", "zyx=")}, b"x=1.5 yx=-2 zyx=0.00003"),
         ({"keys": ('"gx":', '"gy":', '"gz":')}, b'{"gx":1.5, "gy": -2, "gz":3e-05}'),
@@ -96,7 +96,7 @@ def test_what_is_no_sample_is_counted_and_costs_no_other(section: dict[str, Any]
     keys = section.get("keys", ("",) * 3)
     body = section.get("prefix", "") + ",".join(key + value for key, value in zip(keys, "789", strict=True))
     body = body if section.get("separator") != "space" else "7 8 9"
-    good = summed(body) if told.checksum == "nmea" else body.encode() + b"\n"
+    good = add_checksum(body) if told.checksum == "nmea" else body.encode() + b"\n"
     values, (found,) = read(told, good + line + b"\n# 1,2,3\n\n" + good)
     assert values.tolist() == [[7, 8, 9]] * 2
     assert (found.samples_before.tolist(), found.comments, found.first_rejected) == ([1], 1, line)
@@ -120,7 +120,7 @@ def damaged(count: int, seed: int) -> tuple[bytes, np.ndarray, list[int]]:
     readings = rng.normal(0, 50, (count, 6))
     lines, sizes = [], []
     for number, row in enumerate(readings):
-        line = bytearray(summed(f"$IMU,{number * 1000}," + ",".join(f"{each:.2f}" for each in row))[:-2])
+        line = bytearray(add_checksum(f"$IMU,{number * 1000}," + ",".join(f"{each:.2f}" for each in row))[:-2])
         size = int(rng.integers(1, 6))
         for place in rng.choice(np.arange(1, len(line)), size, replace=False):
             line[place] ^= int(rng.integers(1, 256))
@@ -147,7 +147,7 @@ def test_damaged_lines_pass_a_sum_no_oftener_than_one_in_256(count: int) -> None
     assert passed <= count / 256
     one_byte = b"".join(
         bytes([*line[:place], line[place] ^ 1 << bit, *line[place + 1 :]])
-        for line in [summed("$IMU,1000,1.25,-2.50,3.75,0.01,-0.02,0.98")]
+        for line in [add_checksum("$IMU,1000,1.25,-2.50,3.75,0.01,-0.02,0.98")]
         for place in range(1, len(line) - 2)
         for bit in range(8)
     )

@@ -13,7 +13,7 @@ from rig.config.sensors.lines_section import LinesSection
 from rig.sensors.lines.guessed_section import section
 from rig.sensors.lines.guessing import Guess, guess
 from rig.sensors.lines.shape import NoShape, Shape, TimedLine, find_shape
-from support.wires.printed_lines import summed
+from support.wires.printed_lines import add_checksum
 
 G = 9.80665
 STILL_S, LASTS_S = 4.0, 10.0
@@ -132,7 +132,7 @@ FORMATS = {
         lambda r: text("%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", *deg(r), *g(r)), IMU,
         {"clock": "arrival"} | DEG | G_UNIT, ("when it took a sample",)),
     "NMEA": Format(
-        lambda r: summed(
+        lambda r: add_checksum(
             text("$IMU,%d,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", 1e6 * r["t"], *deg(r), *g(r)).decode().strip()
         ), f"time {IMU}",
         US | {"prefix": "$IMU,", "checksum": "nmea"} | DEG | G_UNIT),

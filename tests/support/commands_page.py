@@ -60,7 +60,7 @@ def _section(parser: argparse.ArgumentParser) -> Iterator[str]:
     below = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
     if not below:
         shown = [action for action in parser._actions if not isinstance(action, argparse._HelpAction)]
-        rows = [f"| `{_called(action)}` | {_cell(action.help or '')} |" for action in shown]
+        rows = [f"| `{_name_action(action)}` | {_cell(action.help or '')} |" for action in shown]
         yield from ("", "| argument | meaning |", "| --- | --- |", *rows) if rows else ()
     for action in below:
         meanings = {choice.dest: choice.help or "" for choice in action._choices_actions}
@@ -69,7 +69,7 @@ def _section(parser: argparse.ArgumentParser) -> Iterator[str]:
             yield from _section(command)
 
 
-def _called(action: argparse.Action) -> str:
+def _name_action(action: argparse.Action) -> str:
     name = action.option_strings[-1] if action.option_strings else ""
     if action.nargs == 0:
         return name

@@ -9,7 +9,7 @@ from packaging.utils import canonicalize_name
 ITSELF = "calibration-rig"
 
 
-def needed(extras: Iterable[str]) -> dict[str, Distribution]:
+def list_needed(extras: Iterable[str]) -> dict[str, Distribution]:
     """Every package that an installation with these extras brings, by its name, without the program itself."""
     found: dict[str, Distribution] = {}
     asked: set[tuple[str, str]] = set()
@@ -23,12 +23,12 @@ def needed(extras: Iterable[str]) -> dict[str, Distribution]:
             found[name] = distribution(name)
         except PackageNotFoundError:
             continue  # of another system's, or of an extra that is not installed
-        to_ask += _required(found[name], extra)
+        to_ask += _list_required(found[name], extra)
     del found[ITSELF]
     return found
 
 
-def _required(package: Distribution, extra: str) -> Iterator[tuple[str, str]]:
+def _list_required(package: Distribution, extra: str) -> Iterator[tuple[str, str]]:
     for line in package.requires or ():
         requirement = Requirement(line)
         if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):

@@ -35,13 +35,15 @@ class Raised:
 
 
 @functools.cache
-def raised_in_source() -> list[Raised]:
+def find_errors() -> list[Raised]:
     """Every error that is made anywhere in the packages, by file and line."""
     files = sorted({file for package in PACKAGES for file in (ROOT / package).rglob("*.py")} - {THE_FORM_ITSELF})
-    return [found for file in files for found in raised_in(file.read_text(encoding="utf-8"), file.relative_to(ROOT))]
+    return [
+        found for file in files for found in find_errors_in(file.read_text(encoding="utf-8"), file.relative_to(ROOT))
+    ]
 
 
-def raised_in(source: str, file: Path) -> list[Raised]:
+def find_errors_in(source: str, file: Path) -> list[Raised]:
     """The same of one file's text."""
     module = _Module(ast.parse(source))
     return [
@@ -57,15 +59,15 @@ def kind_of(raised: Sequence[Raised]) -> str:
     return kinds.pop() if len(kinds) == 1 else "either"
 
 
-def _dotted(called: ast.expr) -> str:
+def _spell_dotted(called: ast.expr) -> str:
     """Return what is called as it is written: `ast.unparse` takes a hundred times as long."""
     match called:
         case ast.Name(id=name):
             return name
         case ast.Attribute(value=of, attr=name):
-            return f"{_dotted(of)}.{name}"
+            return f"{_spell_dotted(of)}.{name}"
         case ast.Call(func=function):
-            return f"{_dotted(function)}()"
+            return f"{_spell_dotted(function)}()"
     return ""
 
 
@@ -83,7 +85,7 @@ class _Module:
                 maker = next((ast.unparse(base) for base in node.bases if ast.unparse(base) in MAKERS), None)
                 self._bases |= dict.fromkeys(ast.walk(node), maker) if maker else {}
             elif isinstance(node, ast.Call):
-                self._calls[_dotted(node.func).removeprefix("self.")].append(node)
+                self._calls[_spell_dotted(node.func).removeprefix("self.")].append(node)
 
     def errors(self) -> Iterator[tuple[ast.Call, str]]:
         for name, calls in self._calls.items():

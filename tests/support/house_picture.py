@@ -24,7 +24,7 @@ def picture() -> str:
     """Return the drawing of the rooms: scripts above them in the contract's order, the board's half below."""
     rooms = [[(name, f"rig/{name}") for name in layer] for layer in _contracts()["rig"]]
     layers = [[("procedures", "procedures")], *rooms, [("firmware_host", "firmware_host")]]
-    rows = ["".join(_row(name, _said(path)) for name, path in layer) for layer in layers]
+    rows = ["".join(_row(name, _read_summary(path)) for name, path in layer) for layer in layers]
     return _rule("┌", "┬", "┐") + _rule("├", "┼", "┤").join(rows) + _rule("└", "┴", "┘")
 
 
@@ -56,7 +56,7 @@ def _contracts() -> dict[str, list[list[str]]]:
     }
 
 
-def _said(path: str) -> str:
+def _read_summary(path: str) -> str:
     """Return the first line of a room's docstring."""
     package = ROOT / path / "__init__.py"
     source = package if package.exists() else ROOT / f"{path}.py"
@@ -73,10 +73,10 @@ def _row(name: str, said: str) -> str:
 
 def drawn(page: str) -> str:
     """Return the page with both drawings made anew."""
-    return _between(_between(page, BEGIN, picture()), BEGIN_INSIDE, inside())
+    return _replace_drawing(_replace_drawing(page, BEGIN, picture()), BEGIN_INSIDE, inside())
 
 
-def _between(page: str, begin: str, drawing: str) -> str:
+def _replace_drawing(page: str, begin: str, drawing: str) -> str:
     before, rest = page.split(begin)
     _, after = rest.split(END, maxsplit=1)
     return before + begin + drawing + END + after

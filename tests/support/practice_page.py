@@ -27,7 +27,7 @@ class Step:
     shown: tuple[str, ...]
 
 
-def masked(text: str) -> str:
+def mask(text: str) -> str:
     """Return a text without numbers, addresses, folders and line breaks."""
     for pattern, name in MASKS:
         text = pattern.sub(name, text)
@@ -54,4 +54,4 @@ def _steps(block: str) -> Iterator[Step]:
 def _texts(shown: str) -> tuple[str, ...]:
     """Return the texts that a block shows: a line each, but one that goes on over lines, or has a gap `…`."""
     lines = re.split(r"\n(?=[a-z]+: |the data are|done: |not ready|Type yes|PASS|An empty| )", shown)
-    return tuple(masked(text) for line in lines for text in line.split(" … ") if text.strip())
+    return tuple(mask(text) for line in lines for text in line.split(" … ") if text.strip())

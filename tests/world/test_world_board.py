@@ -24,7 +24,7 @@ from rig.world.board.serial_line import misread
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal
-from support.laboratories.laboratory_host import Host, booted, host
+from support.laboratories.laboratory_host import Host, boot, host
 from support.laboratories.worlds import World, WorldHandle
 from support.paths import DEMO
 from support.processes.waiting import wait_for, wait_for_error
@@ -146,7 +146,7 @@ def stored_scale(one: Host) -> tuple[float, ...] | None:
 
 
 def test_without_power_the_board_keeps_its_calibration_but_without_a_file_not_for_the_next_world() -> None:
-    one = booted(pair())
+    one = boot(pair())
     assert stored_scale(one) is None
     give_calibration(one)
     one.laboratory.unplug()
@@ -154,36 +154,36 @@ def test_without_power_the_board_keeps_its_calibration_but_without_a_file_not_fo
     one.laboratory.plug_in()
     one.ticks(200)
     assert stored_scale(one) == (1.25, 1.0, 0.75)
-    assert stored_scale(booted(pair())) is None
+    assert stored_scale(boot(pair())) is None
 
 
 def test_a_flash_file_keeps_the_calibration_for_the_next_world_but_never_the_program(tmp_path: Path) -> None:
     file = tmp_path / "board.bin"
     kept = pair(f"world.board.flash_file={file}")
-    give_calibration(booted(kept))
-    assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
+    give_calibration(boot(kept))
+    assert stored_scale(boot(kept)) == (1.25, 1.0, 0.75)
     data = file.read_bytes()
     assert data.startswith(read_firmware("bin"))
     file.write_bytes(data[:8] + bytes(STORE_OFFSET - 8) + data[STORE_OFFSET:])  # another program, long ago
-    assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
+    assert stored_scale(boot(kept)) == (1.25, 1.0, 0.75)
 
 
 def test_a_flash_file_keeps_what_a_power_cut_tore(tmp_path: Path) -> None:
     kept = pair(f"world.board.flash_file={tmp_path / 'board.bin'}")
-    one = booted(kept)
+    one = boot(kept)
     one.answer("configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0, "range_g": 0, "range_gauss": 0})
     one.ask("write_calibration", 9, CALIBRATION)
     one.ticks(5)  # the erasing takes eleven
     again = open_flash(tmp_path / "board.bin")
     assert len(again.torn) == PAGE_BYTES // DOUBLEWORD_BYTES
-    assert stored_scale(booted(kept)) is None
+    assert stored_scale(boot(kept)) is None
 
 
 @pytest.mark.parametrize("name", ["short.bin", "nowhere/board.bin"])
 def test_a_flash_file_that_cannot_be_is_refused(name: str, tmp_path: Path) -> None:
     (tmp_path / "short.bin").write_bytes(b"short")
     with pytest.raises(Refused, match="flash_file"):
-        booted(pair(f"world.board.flash_file={tmp_path / name}"))
+        boot(pair(f"world.board.flash_file={tmp_path / name}"))
 
 
 @pytest.mark.thorough

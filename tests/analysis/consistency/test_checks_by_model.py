@@ -10,8 +10,8 @@ from rig.analysis.consistency.contradictions import CHECKS
 from rig.estimation.arrays import Array
 from rig.motion.geometry import NOMINAL
 from rig.observation.windows import swept
-from support.recordings.checked_runs import checked, failed, kind_of
-from support.recordings.drawn_recording import KINDS, Drawn, damaged, drawn
+from support.recordings.checked_runs import check_run, kind_of, list_failed
+from support.recordings.drawn_recording import KINDS, Drawn, add_readings, drawn
 from support.recordings.synthetic_run import Setup, synthetic_run
 
 DIRECTION = np.array([1.0, -0.7, 0.5])
@@ -63,15 +63,15 @@ def test_the_least_damage_that_matters_is_told(name: str, thorough: bool) -> Non
         passed = []
         for seed in seeds:
             seen = drawn(500 + seed, KINDS[kind])
-            run = damaged(seen, KINDS[kind], damage(seen, float(sizes[place])))
-            passed += [] if failed(checked(run)) else [seed]
+            run = add_readings(seen, KINDS[kind], damage(seen, float(sizes[place])))
+            passed += [] if list_failed(check_run(run)) else [seed]
         print(f"{kind}: {len(passed)} of {len(seeds)} passed {passed}")
         assert len(passed) <= 0.05 * len(seeds), (kind, passed)
 
 
 @pytest.mark.slow
 def test_every_check_that_is_made_has_its_share_of_the_false_alarms() -> None:
-    made = sorted({kind_of(check) for check in checked(drawn(3, KINDS["ADIS16465"]).run)})
+    made = sorted({kind_of(check) for check in check_run(drawn(3, KINDS["ADIS16465"]).run)})
     assert made == sorted(CHECKS)
 
 
@@ -80,9 +80,9 @@ def test_what_changes_on_one_axis_alone_is_told_by_the_ways_between_the_sweeps()
     """The axis is swept in one stretch of time, and its gain changes after it: no sweep shows that."""
     kind = KINDS["ADIS16465"]
     seen = drawn(3, kind)
-    checks = checked(damaged(seen, kind, 2e-3 * later(seen) * seen.felt_rad_s * [0, 0, 1]))
+    checks = check_run(add_readings(seen, kind, 2e-3 * later(seen) * seen.felt_rad_s * [0, 0, 1]))
     assert max(checks, key=lambda check: (check.value or 0.0) / (check.limit or np.inf)).name == "gyro.axis_changed"
-    assert failed(checks) <= {"axis_changed", "scale_changed", "loose_mounting"}
+    assert list_failed(checks) <= {"axis_changed", "scale_changed", "loose_mounting"}
 
 
 @pytest.mark.slow
@@ -91,9 +91,9 @@ def test_a_recording_without_rests_or_with_several_speeds_is_held_to_the_model_t
     without = Setup(rest_s=0.0)
     several = Setup(procedure=(("speeds_deg_s", "[40, 90]"),))
     for setup in (without, several):
-        checks = checked(drawn(11, kind, setup).run)
+        checks = check_run(drawn(11, kind, setup).run)
         assert {check.name.split(".")[1] for check in checks} >= {"axis_changed", "scale_changed", "residuals"}
-        assert not failed(checks)
+        assert not list_failed(checks)
 
 
 @pytest.mark.slow
@@ -101,7 +101,7 @@ def test_a_wrist_whose_zero_is_off_makes_axes_lean_farther_than_the_sensors_do()
     """No sweep contradicts another, and the scale factors of a sensor that is mounted askew are off by it."""
     leaning = replace(NOMINAL, theta_rad=(0, 0, 0, 0, float(np.radians(5)), 0))
     off = synthetic_run(Setup(noise_rad_s=0.002, kinematics=leaning))
-    checks = checked(off)
-    assert "non_orthogonality" in failed(checks) and "residuals" not in failed(checks)
+    checks = check_run(off)
+    assert "non_orthogonality" in list_failed(checks) and "residuals" not in list_failed(checks)
     told = next(check for check in checks if check.name == "gyro.non_orthogonality")
     assert told.value == pytest.approx(5, abs=0.3) and told.unit == "°"

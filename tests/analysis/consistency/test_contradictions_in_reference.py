@@ -15,15 +15,15 @@ from support.recordings.damaged_accelerations import (
     Mask,
     Readings,
     bent,
-    converted,
+    convert,
+    find_contradictions,
+    load_recording,
     offset,
     readings_of,
-    recorded,
-    scaled,
+    rotate,
+    scale,
     spike,
     stuck,
-    told_of,
-    turned,
 )
 
 IMU, COMPASS, KVH = "imu", "magnetometer", "earth_rate"
@@ -59,18 +59,18 @@ DAMAGES: dict[str, tuple[tuple[str, ...], Damage]] = {
     "asymmetry of 0.2 %": (("asymmetry",), bent(lambda felt: 2e-3 * np.abs(felt))),
     "odd nonlinearity of 1.5 % of v³/g²": (("odd_term",), bent(lambda felt: 1.5e-2 * felt**3 / GRAVITY_M_S2**2)),
     "0.008 m/s² in sweeps only": (("sweeps_against_dwells",), offset(0.008, turning)),
-    "turned by 0.06° half-way": (("loose_mounting",), turned(0.06, late)),
+    "turned by 0.06° half-way": (("loose_mounting",), rotate(0.06, late)),
     "bias changes by 0.01 m/s² half-way": (("bias_changed", "sweeps_against_dwells"), offset(0.01, late)),
-    "scale changes by 0.04 % half-way": (("scale_changed",), scaled(1.0004, late)),
-    "one axis' scale changes by 0.1 % half-way": (("scale_changed",), scaled(1.001, late, (0,))),
+    "scale changes by 0.04 % half-way": (("scale_changed",), scale(1.0004, late)),
+    "one axis' scale changes by 0.1 % half-way": (("scale_changed",), scale(1.001, late, (0,))),
     "0.02 m/s² in one dwell": (("disturbed_dwell",), offset(0.02, dwell_3)),
-    "turned by 0.2° in one dwell": (("disturbed_dwell",), turned(0.2, dwell_3)),
+    "turned by 0.2° in one dwell": (("disturbed_dwell",), rotate(0.2, dwell_3)),
     "a step of 0.02 m/s² in a dwell": (("knocked_dwell",), offset(0.02, half_of_dwell_3)),
     "0.02 m/s² in one sweep": (("disturbed_sweep", "disturbed_dwell"), offset(0.02, sweep_4)),
     "a reading off by 0.5 m/s² in a dwell": (("spikes",), spike(0.5, dwell_3)),
-    "low byte always 0": (("stuck_bit", "attitude_untrustworthy"), converted(lambda counts: counts & ~0xFF)),
-    "bit 3 always high": (("stuck_bit",), converted(lambda counts: counts | 8)),
-    "bit 0 always low": (("stuck_bit",), converted(lambda counts: counts & ~1)),
+    "low byte always 0": (("stuck_bit", "attitude_untrustworthy"), convert(lambda counts: counts & ~0xFF)),
+    "bit 3 always high": (("stuck_bit",), convert(lambda counts: counts | 8)),
+    "bit 0 always low": (("stuck_bit",), convert(lambda counts: counts & ~1)),
     "an axis stuck in a dwell": (("stuck_axis",), stuck(0, dwell_3)),
     "an axis stuck in a sweep": (("stuck_sensor",), stuck(1, sweep_4)),
     "an axis stuck at 3 m/s² in a dwell": (("attitude_untrustworthy",), stuck(2, dwell_3, 3.0)),
@@ -91,7 +91,7 @@ FIELD_DAMAGES: dict[str, tuple[tuple[str, ...], Damage]] = {
     "0.3 µT in one dwell": (("disturbed_dwell", NOT_UNIFORM), offset(0.3 * MICROTESLA, dwell_3)),
     "a step of 0.6 µT in a dwell": (("knocked_dwell",), offset(0.6 * MICROTESLA, half_of_dwell_3)),
     "a reading off by 10 µT in a dwell": (("spikes",), spike(10 * MICROTESLA, dwell_3)),
-    "bit 0 always low": (("stuck_bit",), converted(lambda counts: counts & ~1)),
+    "bit 0 always low": (("stuck_bit",), convert(lambda counts: counts & ~1)),
     "an axis stuck in a dwell": (("stuck_axis",), stuck(1, dwell_3)),
 }
 
@@ -114,7 +114,7 @@ def all_or_first(damages: dict[str, tuple[tuple[str, ...], Damage]]) -> list[obj
 def named(folder: str, sensor: str, damage: Damage, prefix: str) -> set[str]:
     """What is told of a damaged recording: names of checks that failed, or of the refusal."""
     try:
-        told = told_of(damage(readings_of(folder, sensor)).recording())
+        told = find_contradictions(damage(readings_of(folder, sensor)).recording())
     except Fault as fault:
         return {fault.name}
     return {*told.refused, *(name.removeprefix(prefix) for name in told.failed if name.startswith(prefix))}
@@ -137,18 +137,18 @@ def test_what_is_damaged_of_a_magnetometer_is_named(name: str) -> None:
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("folder", UNDAMAGED)
 def test_a_recording_as_it_was_made_contradicts_nothing(folder: str) -> None:
-    assert told_of(recorded(folder)).failed == set()
+    assert find_contradictions(load_recording(folder)).failed == set()
 
 
 @pytest.mark.thorough
 def test_a_sensor_that_is_no_more_bent_than_its_data_sheet_says_is_within_its_uncertainty() -> None:
     """The simulated KVH 1775 has 0.09 % of v²/g on one axis, and the run did not look for it."""
-    run = recorded(KVH)
+    run = load_recording(KVH)
     found = calibrate_accelerometers(observe_recordings([run]), run.settings)["kvh"]
     truth = yaml.safe_load((RECORDINGS / KVH / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["kvh"][
         "accelerometer"
     ]
-    assert told_of(run).failed == set()
+    assert find_contradictions(run).failed == set()
     off = np.concatenate([found.triad.scale - truth["scale"], found.bias_m_s2 - truth["bias_m_s2"]])
     assert np.all(np.abs(off) < found.budget.expanded)
 
@@ -168,9 +168,9 @@ def test_a_sweep_that_only_the_accelerometer_feels_to_be_disturbed_is_repeated_a
 
 
 def test_a_bias_that_drifts_contradicts_nothing_where_it_is_watched() -> None:
-    drifting = told_of(recorded("bias_drift"))
+    drifting = find_contradictions(load_recording("bias_drift"))
     assert "gyro.acceleration_bias_changed" in {check.name for check in drifting.checks}
-    outcome = calibrate([recorded("bias_drift")], drifting=True)
+    outcome = calibrate([load_recording("bias_drift")], drifting=True)
     names = {check.name for check in outcome.checks}
     assert "gyro.acceleration_bias_changed" not in names and "gyro.acceleration_scale_changed" in names
 

@@ -8,13 +8,13 @@ from support.recordings.drawn_accelerations import (
     Damage,
     Session,
     bent,
-    disturbed,
+    disturb,
     drawn,
-    scaled,
-    solved,
-    stepped,
+    find_detected,
+    scale_half,
+    solve_session,
+    step_bias,
     swept,
-    told_of,
 )
 
 pytestmark = pytest.mark.slow
@@ -28,20 +28,20 @@ DAMAGES: dict[str, tuple[Damage, float]] = {
     "odd": (bent(lambda along: along**3, scale=1.0), 1.5),
     "asymmetry": (bent(np.abs), 1.5),
     "sweeps only": (swept, 1.5),
-    "bias step": (stepped, 1.5),
-    "scale step": (scaled(np.ones(3)), 1.5),
-    "scale step of one axis": (scaled(np.array([1.0, 0.0, 0.0])), 1.5),
-    "one dwell": (disturbed, 1.5),
+    "bias step": (step_bias, 1.5),
+    "scale step": (scale_half(np.ones(3)), 1.5),
+    "scale step of one axis": (scale_half(np.array([1.0, 0.0, 0.0])), 1.5),
+    "one dwell": (disturb, 1.5),
 }
 
 
 def passes(session: Session) -> float | None:
     """By how many U the parameter farthest off is, or None where something is told."""
     try:
-        solution, budget, off = solved(session)
+        solution, budget, off = solve_session(session)
     except Fault:
         return None
-    return None if told_of(session, solution, RATE) else float(np.max(np.abs(off) / budget.expanded))
+    return None if find_detected(session, solution, RATE) else float(np.max(np.abs(off) / budget.expanded))
 
 
 def just_below(damage: Damage, session: Session) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from itertools import cycle
 import pytest
 
 from rig.analysis.check import fitness
-from support.recordings.checked_runs import checks_of, failed, kind_of, probability, solved
+from support.recordings.checked_runs import checks_of, kind_of, list_failed, probability, solve_inputs
 from support.recordings.drawn_recording import KINDS, Kind, drawn
 from support.recordings.synthetic_run import Setup
 
@@ -37,14 +37,14 @@ def seen(seeds: Iterable[int], kinds: Iterable[Kind], setup: Setup | None = None
     """One recording for every seed, of one kind after the other: two of a seed would have their arm in common."""
     found = Seen()
     for seed, kind in zip(seeds, cycle(kinds), strict=False):
-        look = solved(drawn(seed, kind, setup).run)
+        look = solve_inputs(drawn(seed, kind, setup).run)
         checks = checks_of(look, LARGER)
         found.recordings += 1
-        found.beyond.update(failed(checks))
+        found.beyond.update(list_failed(checks))
         for check in checks:
             if kind_of(check) in CHI_SQUARE:
                 found.p_values.setdefault(kind_of(check), []).append(probability(check, LARGER))
-        if alarms := failed(checks) and failed(checks_of(look)):  # limits of a smaller rate are farther out
+        if alarms := list_failed(checks) and list_failed(checks_of(look)):  # limits of a smaller rate are farther out
             found.alarms.append((seed, alarms))
     return found
 

@@ -16,8 +16,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import DELAY, LEVER, NO_SWEEPS, Movement
 from rig.estimation.reference.imu import solve_imu
 from rig.motion.geometry import NOMINAL, flange_pose
-from support.motions.arm_attitudes import crooked_arm, joints_rad
-from support.motions.arm_sweeps import Truth, joints_at, planned, recorded_dwells, recorded_sweeps
+from support.motions.arm_attitudes import draw_true_arm, joints_rad
+from support.motions.arm_sweeps import Truth, joints_at, plan_sweeps, record_dwells, record_sweeps
 from support.recordings import drawn_accelerations
 from support.recordings.reference_p_values import p_values
 
@@ -43,12 +43,12 @@ def drawn(rng: np.random.Generator, delay_s: float = 0.004) -> Truth:
 
 def moved(truth: Truth, arm: Poses, density_ug: float, rng: np.random.Generator, axes: int = 6) -> Movement:
     """Sweeps about so many axes, and eighteen dwells."""
-    swept = recorded_sweeps(truth, arm, planned(axes), density_ug, rng) if axes else NO_SWEEPS
-    return Movement(recorded_dwells(truth, arm, JOINTS, density_ug, rng), swept)
+    swept = record_sweeps(truth, arm, plan_sweeps(axes), density_ug, rng) if axes else NO_SWEEPS
+    return Movement(record_dwells(truth, arm, JOINTS, density_ug, rng), swept)
 
 
 def stood(axes: int) -> list[Posture]:
-    turned = planned(axes) if axes else ()
+    turned = plan_sweeps(axes) if axes else ()
     return [
         *map(Posture, JOINTS),
         *(Posture(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned),
@@ -83,7 +83,7 @@ def test_sound_readings_are_beyond_a_limit_as_often_as_it_says(
     beyond, judged = 0, 0
     for seed in range(runs):
         rng = np.random.default_rng(seed)
-        movement = moved(drawn(rng), crooked_arm(arm_rad, rng), density_ug, rng, axes)
+        movement = moved(drawn(rng), draw_true_arm(arm_rad, rng), density_ug, rng, axes)
         found = check_reference(read_of(movement, axes, arm_rad), rate)
         judged += len(found.statistics) + 1
         beyond += sum(value > limit for value, limit in found.statistics.values()) + bool(found.disturbed)
@@ -116,7 +116,7 @@ def test_p_values_of_sensors_as_their_data_sheets_let_them_be_are_uniform(
     found: dict[str, list[float]] = {}
     for seed in range(50):
         session = drawn_accelerations.drawn(part, seed, evenly=evenly)
-        solution, _, _ = drawn_accelerations.solved(session)
+        solution, _, _ = drawn_accelerations.solve_session(session)
         held = drawn_accelerations.read_of(session, solution)
         for name, rate in p_values(held).items():
             found.setdefault(name, []).append(rate)
@@ -167,7 +167,7 @@ def _off(error: int, size_rad: float) -> Poses:
 @pytest.mark.slow
 def test_a_turn_of_one_dwell_is_named_however_far_off_the_arm_is() -> None:
     rng = np.random.default_rng(3)
-    movement = moved(drawn(rng), crooked_arm(5e-4, rng), 150.0, rng)
+    movement = moved(drawn(rng), draw_true_arm(5e-4, rng), 150.0, rng)
     turned = movement.dwells.attitudes.copy()
     turned[7] = turned[7] @ Rotation.from_rotvec([2e-3, -3e-3, 1e-3]).as_matrix()
     damaged = replace(movement, dwells=replace(movement.dwells, attitudes=turned))

@@ -15,7 +15,7 @@ from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.motion.geometry import NOMINAL
 from rig.observation.windows import swept
-from support.recordings.drawn_recording import KINDS, Drawn, damaged, drawn
+from support.recordings.drawn_recording import KINDS, Drawn, add_readings, drawn
 from support.recordings.synthetic_run import Motion, Setup
 
 SURE = 1.3  # times the size from which on it is told in 95 of 100
@@ -56,7 +56,7 @@ def planted(seen: Drawn, kind: str, times: float, way: int) -> Iterator[tuple[De
     """Each damage of so many times the size from which on it is told, and whether it was."""
     for each in held(seen.run).detection_limits["gyro"]:
         by = times * each.size * PLANTED[each.what](seen, way)
-        checks = held(damaged(seen, KINDS[kind], by)).checks
+        checks = held(add_readings(seen, KINDS[kind], by)).checks
         yield each, not all(check.passed for check in checks)
 
 

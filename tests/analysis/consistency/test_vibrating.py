@@ -9,7 +9,7 @@ from rig.data.quantity import RATE
 from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.observation.statistics.spectral_lines import LineSearch, find_lines, line_swing, waves
-from support.recordings.checked_runs import checked, failed
+from support.recordings.checked_runs import check_run, list_failed
 from support.recordings.drawn_recording import ADIS16465, KINDS, drawn
 
 
@@ -34,7 +34,7 @@ def test_a_vibration_and_another_of_twice_its_frequency_or_nearly_the_same_fail_
     """Together two of them lean to one side, as noise with a wrong bit does; and what is left of one is none."""
     for seed in (3, 4):
         run = shaken(drawn(seed, KINDS["ADIS16465"]).run, hertz, 0.003)
-        assert not failed(checked(run)), seed
+        assert not list_failed(check_run(run)), seed
 
 
 SEARCH = LineSearch(stands_out=30.0)

@@ -14,8 +14,8 @@ from rig.cli import main
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.estimate import Estimate
-from support.external.real import recording, unpacked
-from support.external.sweeps_as_files import averaged_files
+from support.external.real import recording, unpack
+from support.external.sweeps_as_files import average_files
 from support.external.turned_body import Hand, Session, turn, write
 
 THREE = np.eye(3)
@@ -30,7 +30,7 @@ HANDS = {
 
 
 def solved(folder: Path, session: Session) -> Estimate:
-    return solve_swept(averaged_files(*write(folder, session)), None)
+    return solve_swept(average_files(*write(folder, session)), None)
 
 
 def off(found: Estimate, session: Session) -> Array:
@@ -74,7 +74,7 @@ def test_real_turns_by_hand_tell_as_much_as_they_can(
 ) -> None:
     """A foot-sized IMU against a box: its turns and its flips disagree by 2e-3, says its README."""
     monkeypatch.setenv("COLUMNS", "200")
-    files = unpacked("imucal", "samples.csv", tmp_path), "--sweeps", recording("imucal") / "sweeps.csv"
+    files = unpack("imucal", "samples.csv", tmp_path), "--sweeps", recording("imucal") / "sweeps.csv"
     found = document(capsys, *files)
     expanded = 2 * np.sqrt(np.diag(found["covariance"]))[:3]
     assert (np.abs(np.array(found["scale"]) - [0.9728, 1.0179, 1.0017]) < 0.5 * expanded).all()

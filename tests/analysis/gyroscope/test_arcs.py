@@ -6,7 +6,7 @@ import pytest
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import ENCODERS, Budget
 from rig.observation.observe import Observation
-from support.recordings.checked_runs import checked, failed, solved
+from support.recordings.checked_runs import check_run, list_failed, solve_inputs
 from support.recordings.drawn_recording import KINDS, Drawn, drawn
 from support.recordings.synthetic_run import Setup, synthetic_run, truth
 
@@ -20,7 +20,7 @@ def arcs(arc_deg: float, *, std_deg: float = STD_DEG, **more: object) -> Setup:
 
 def errors(seen: Drawn) -> tuple[Array, Budget, tuple[Observation, ...]]:
     """(6,) scale and bias less the truth, and what is known of them."""
-    found = solved(seen.run)[1]["gyro"]
+    found = solve_inputs(seen.run)[1]["gyro"]
     averages = [*(each.average for each in found.observations), *found.rests]
     inside = np.zeros(len(seen.time_s), dtype=np.bool_)
     for each in averages:
@@ -54,7 +54,7 @@ def test_gravity_s_share_is_that_of_the_arc_s_attitudes(arc_deg: float) -> None:
     """Over an arc it does not average out: as of a whole turn, scale and bias would be off by a part in a hundred."""
     sensitive = tuple(tuple(row) for row in (0.01 * np.array([[1, 2, -1], [-2, 1, 1], [1, -1, 2]])).tolist())
     setup = arcs(arc_deg, noise_rad_s=1e-4, g_sensitivity_rad_s_per_g=sensitive, vibration=0.0)
-    found = solved(synthetic_run(setup))[1]["gyro"]
+    found = solve_inputs(synthetic_run(setup))[1]["gyro"]
     off = np.concatenate([found.scale, found.bias_rad_s]) - truth(setup)
     assert np.abs(off[:3]).max() < 1e-4
     assert np.abs(off[3:]).max() < 1e-4
@@ -64,7 +64,7 @@ def test_gravity_s_share_is_that_of_the_arc_s_attitudes(arc_deg: float) -> None:
 def test_a_ripple_is_motion_and_no_noise() -> None:
     """What the readings add up to between the ends is held against what the encoders say of the same ends."""
     still, shaken = (
-        solved(synthetic_run(arcs(180, noise_rad_s=1e-3, vibration=each)))[1]["gyro"] for each in (0, 0.05)
+        solve_inputs(synthetic_run(arcs(180, noise_rad_s=1e-3, vibration=each)))[1]["gyro"] for each in (0, 0.05)
     )
     for found in (still, shaken):
         assert np.abs(found.scale - truth(Setup())[:3]).max() < 4e-4
@@ -78,7 +78,9 @@ def test_a_ripple_is_motion_and_no_noise() -> None:
 def test_the_encoders_are_in_the_budget_as_they_are_stated() -> None:
     """√2 of a standard deviation over the arc, the same one way and back, so nothing of the bias."""
     for arc_deg in (90.0, 180.0):
-        found = solved(synthetic_run(arcs(arc_deg, noise_rad_s=1e-3, mounting_error_rad=(0.0, 0.0, 0.0))))[1]["gyro"]
+        found = solve_inputs(synthetic_run(arcs(arc_deg, noise_rad_s=1e-3, mounting_error_rad=(0.0, 0.0, 0.0))))[1][
+            "gyro"
+        ]
         assert found.uncertainty is not None
         (line,) = (each for each in found.uncertainty.contributors if each.name == ENCODERS)
         assert line.std[:3] / found.scale == pytest.approx([np.sqrt(2) * STD_DEG / arc_deg] * 3, rel=0.02)
@@ -91,7 +93,7 @@ def test_the_encoders_are_in_the_budget_as_they_are_stated() -> None:
 def test_of_whole_turns_the_encoders_err_by_nothing() -> None:
     """What is stated of them changes no number."""
     stated, unstated = (
-        solved(synthetic_run(Setup(noise_rad_s=1e-3, angle_std_deg=each)))[1]["gyro"] for each in (STD_DEG, None)
+        solve_inputs(synthetic_run(Setup(noise_rad_s=1e-3, angle_std_deg=each)))[1]["gyro"] for each in (STD_DEG, None)
     )
     assert stated.uncertainty is not None and unstated.uncertainty is not None
     assert ENCODERS not in [each.name for each in stated.uncertainty.contributors]
@@ -106,6 +108,6 @@ def test_encoders_that_err_as_stated_fail_nothing_and_ten_times_that_is_told(tho
     """By what cw says of ccw, and the parts of a sweep of each other."""
     kind, passed = KINDS["quiet LSM9DS1"], 0
     for seed in range(700, 720 if thorough else 701):
-        assert failed(checked(drawn(seed, kind, arcs(180)).run)) == set()
-        passed += not failed(checked(drawn(seed, kind, arcs(180, encoders_err=10.0)).run))
+        assert list_failed(check_run(drawn(seed, kind, arcs(180)).run)) == set()
+        passed += not list_failed(check_run(drawn(seed, kind, arcs(180, encoders_err=10.0)).run))
     assert passed <= (MISSED if thorough else 0)

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from support.recordings.coarse_sources import SOURCES, recorded, stated
+from support.recordings.coarse_sources import SOURCES, record, state_solution
 
 NOISE_RAD_S = (0.0003, 0.0015, 0.005)
 FIRST_SEED, SEEDS = 900, 5
@@ -24,7 +24,8 @@ def test_what_is_stated_by_a_coarse_source_holds_and_passes(source: str, thoroug
     draws = product(NOISE_RAD_S, (False, True), range(FIRST_SEED, FIRST_SEED + SEEDS))
     some = [*draws] if thorough else [(NOISE_RAD_S[0], False, FIRST_SEED)]
     found = [
-        stated(recorded(SOURCES[source], seed, noise_rad_s, vibrates=vibrates)) for noise_rad_s, vibrates, seed in some
+        state_solution(record(SOURCES[source], seed, noise_rad_s, vibrates=vibrates))
+        for noise_rad_s, vibrates, seed in some
     ]
     off = np.abs([each.error / each.expanded for each in found])
     print(f"{source}: {100 * np.mean(off <= 1):.1f} % of {off.size} errors within U, the largest {off.max():.2f} U")

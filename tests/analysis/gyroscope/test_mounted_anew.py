@@ -12,7 +12,7 @@ from rig.data.recording.settings import settings_from_json
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget
 from support.recordings.drawn_recording import KINDS
-from support.recordings.drawn_stages import drawn_stages, staged
+from support.recordings.drawn_stages import drawn_stages, stage_setup
 from support.recordings.synthetic_run import Setup, synthetic_run
 
 SEEDS, FEW = range(20), range(2)
@@ -43,7 +43,7 @@ def solved(setup: Setup, seed: int, off_deg: Array) -> tuple[Array, Budget, tupl
 def test_three_mountings_tell_the_scale_as_well_as_their_budget_says(thorough: bool) -> None:
     ratios = []
     for seed in SEEDS if thorough else FEW:
-        error, budget, _ = solved(staged(Setup()), seed, np.random.default_rng(seed).uniform(-1, 1, (3, 3)))
+        error, budget, _ = solved(stage_setup(Setup()), seed, np.random.default_rng(seed).uniform(-1, 1, (3, 3)))
         ratios.append(error / budget.std[:3])
     rms = float(np.sqrt(np.mean(np.square(ratios))))
     assert (0.8 if thorough else 0.3) < rms < (1.2 if thorough else 2.0), rms
@@ -52,7 +52,7 @@ def test_three_mountings_tell_the_scale_as_well_as_their_budget_says(thorough: b
 @pytest.mark.slow
 def test_how_the_item_was_mounted_off_is_found() -> None:
     off_deg = np.array([[0.0, 0.0, 0.0], [1.0, -0.5, 0.8]])
-    _, budget, (mount,) = solved(staged(Setup(), TWO), 3, off_deg)
+    _, budget, (mount,) = solved(stage_setup(Setup(), TWO), 3, off_deg)
     assert mount.stage == 1
     assert mount.rotation_rad == pytest.approx(-np.radians(off_deg[1]), abs=4 * float(mount.std_rad.max()))
     assert mount.std_rad.max() < np.radians(OFF_DEG) / 10
@@ -62,7 +62,7 @@ def test_how_the_item_was_mounted_off_is_found() -> None:
 
 @pytest.mark.slow
 def test_what_one_axis_a_stage_does_not_tell_of_the_mounts_is_in_the_budget() -> None:
-    setup = staged(replace(Setup(), repeats=2), BY_ONE_JOINT)
+    setup = stage_setup(replace(Setup(), repeats=2), BY_ONE_JOINT)
     off_deg = np.random.default_rng(5).uniform(-OFF_DEG, OFF_DEG, (3, 3))
     error, budget, mounts = solved(setup, 5, off_deg)
     assert min(mount.std_rad.max() for mount in mounts) > np.radians(OFF_DEG) / 3
@@ -80,7 +80,7 @@ def test_an_item_that_is_not_mounted_anew_is_recorded_as_before() -> None:
 
 @pytest.mark.slow
 def test_the_mounts_are_recorded() -> None:
-    runs, _ = drawn_stages(1, KIND, staged(Setup(), TWO), np.zeros((2, 3)))
+    runs, _ = drawn_stages(1, KIND, stage_setup(Setup(), TWO), np.zeros((2, 3)))
     assert [run.settings.stage for run in runs] == [0, 1]
     again = settings_from_json(runs[1].settings.to_json())
     assert again == runs[1].settings

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from support.recordings.checked_runs import solved
+from support.recordings.checked_runs import solve_inputs
 from support.recordings.drawn_recording import KINDS, drawn
 from support.recordings.drawn_ripple import drawn_ripple
 from support.recordings.synthetic_run import Setup
@@ -23,7 +23,7 @@ def errors(kind: str, arc_deg: float | None, seed: int) -> tuple[np.ndarray, np.
     setup = Setup(speed_deg_s=speed_deg_s, state_rate_hz=500.0, **arc)  # type: ignore[arg-type]
     ripple = drawn_ripple(rng, speed_deg_s / 360, [KINDS[kind].sensor.rate_hz])
     case = drawn(seed, KINDS[kind], setup, ripple)
-    found = solved(case.run)[1]["gyro"]
+    found = solve_inputs(case.run)[1]["gyro"]
     averages = [*(each.average for each in found.observations), *found.rests]
     inside = (case.time_s > min(each.start_s for each in averages)) & (
         case.time_s < max(each.end_s for each in averages)

@@ -6,9 +6,9 @@ import pytest
 from rig.analysis.analyses import calibrate
 from rig.estimation.arrays import Array
 from support.motions.drawn_servo import Source, drawn_servo
-from support.motions.servo_other_sources import by_autopilot, by_lines
+from support.motions.servo_other_sources import sample_autopilot, sample_lines
 
-SOURCES = {"lines": by_lines, "autopilot": by_autopilot}
+SOURCES = {"lines": sample_lines, "autopilot": sample_autopilot}
 NOISE_RAD_S = 0.01
 QUICK = ("turner.state_rate_hz=100", "procedure.speed_deg_s=150", "procedure.rest_s=1.5")
 

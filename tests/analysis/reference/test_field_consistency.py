@@ -12,7 +12,7 @@ from rig.estimation.reference.accelerometer_model import LEVER, NO_SWEEPS, PARAM
 from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import solve_triaxial
 from rig.motion.geometry import NOMINAL, flange_pose
-from support.motions.arm_attitudes import crooked_arm, joints_rad
+from support.motions.arm_attitudes import draw_true_arm, joints_rad
 from support.recordings.reference_p_values import p_values
 
 JOINTS = joints_rad(MAGNETIC)
@@ -24,7 +24,7 @@ ARM_RAD = 1e-4
 def read_of(seed: int) -> ReferenceModel:
     """Of a field that drifts as it may where it is not tested, on an arm that is good to so much."""
     rng = np.random.default_rng([seed, 11])
-    arm, told = crooked_arm(ARM_RAD, rng), flange_pose(JOINTS)[:, :3, :3]
+    arm, told = draw_true_arm(ARM_RAD, rng), flange_pose(JOINTS)[:, :3, :3]
     change_t = UNTESTED_DRIFT_T * rng.uniform(-1, 1, 3)
     fields_t = FIELD_T + np.linspace(-0.5, 0.5, len(JOINTS))[:, None] * change_t
     matrix = np.diag(1 + 0.03 * rng.normal(size=3)) @ (np.eye(3) + 0.01 * rng.normal(size=(3, 3)))

@@ -10,7 +10,7 @@ import pytest
 from rig.cli import main
 from rig.estimation.arrays import Array
 from support.external.laid_down import GRAVITY_M_S2, Box, Laid, lay_down, write
-from support.external.real import recording, unpacked
+from support.external.real import recording, unpack
 
 pytestmark = pytest.mark.slow
 
@@ -60,7 +60,7 @@ def test_real_faces_laid_down_again_are_within_what_was_stated(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Its README: the first six placements give k x 1.00326, the same faces laid down again 4.4e-4 more."""
-    files = unpacked("imucal", "samples.csv", tmp_path), recording("imucal") / "still.csv"
+    files = unpack("imucal", "samples.csv", tmp_path), recording("imucal") / "still.csv"
     found = solved(capsys, *files, "--only", "accelerometer")
     scale, known = np.array(found["scale"]), expanded(found)[:3]
     for again in ([1.00326, 0.99757, 0.97713], [1.00373, 0.99757, 0.97713], [1.00370, 0.99757, 0.97713]):
@@ -107,7 +107,7 @@ def test_a_body_that_never_rests_tells_no_gravity(tmp_path: Path, capsys: pytest
 
 def test_too_few_rests_among_many_rows_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A hand before cameras that rested twice: fast rows are not taken for gravity."""
-    files = unpacked("broad", "samples.csv", tmp_path), unpacked("broad", "attitudes.csv", tmp_path)
+    files = unpack("broad", "samples.csv", tmp_path), unpack("broad", "attitudes.csv", tmp_path)
     assert main(["solve", *map(str, (files[0], "--attitudes", files[1], "--json"))]) == 1
     error = json.loads(capsys.readouterr().out)["unsolved"]["imu"]["acceleration"]["error"]
     assert error.startswith("too_few_observations") and "rows in which the body moves are left out" in error

@@ -21,8 +21,8 @@ from rig.estimation.reference.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import solve_triaxial
 from rig.plans.recorded_run import open_run
-from support.motions.arm_attitudes import attitudes_of, crooked, crooked_arm, joints_rad
-from support.motions.arm_sweeps import Truth, planned, recorded_dwells, recorded_sweeps
+from support.motions.arm_attitudes import attitudes_of, draw_true_arm, draw_true_attitudes, joints_rad
+from support.motions.arm_sweeps import Truth, plan_sweeps, record_dwells, record_sweeps
 from support.paths import RECORDINGS
 from support.recordings import drawn_accelerations
 
@@ -55,11 +55,11 @@ def accelerometer(seed: int, site: Site = SITE, lag_s: float = LAG_S) -> Session
         lever_arm_m=np.array([0.02, 0.01, 0.03]),
         delay_s=0.0,
     )
-    arm = crooked_arm(ARM_RAD, rng)
-    sweeps = recorded_sweeps(truth, arm, planned(6), DENSITY_UG, rng)
+    arm = draw_true_arm(ARM_RAD, rng)
+    sweeps = record_sweeps(truth, arm, plan_sweeps(6), DENSITY_UG, rng)
     smaller = 1 - rng.uniform() * np.square(sweeps.speeds_rad_s * lag_s) / 2
     sweeps.harmonics_m_s2[:, 1:] *= smaller[:, None, None]
-    dwells = recorded_dwells(truth, arm, JOINTS, DENSITY_UG, rng)
+    dwells = record_dwells(truth, arm, JOINTS, DENSITY_UG, rng)
     solution = solve_imu(dwells, sweeps, gravity_m_s2=GRAVITY)
     readings = dwells.readings_m_s2.size + sweeps.harmonics_m_s2.size
     many = np.full(readings, np.inf)  # degrees of freedom
@@ -73,7 +73,7 @@ def magnetometer(seed: int, site: Site = SITE) -> Session:
     """A session in a field that is not quite of the stated size, and that drifts less than its tests at home show."""
     rng = np.random.default_rng([72, seed])
     told = attitudes_of(JOINTS)
-    true = crooked(JOINTS, ARM_RAD, rng)
+    true = draw_true_attitudes(JOINTS, ARM_RAD, rng)
     direction = np.array([0.4, 0.1, -0.9])
     field = (FIELD_T + FIELD_U / 2 * rng.normal()) * direction / np.linalg.norm(direction)
     matrix = np.eye(3) + 0.03 * rng.normal(size=(3, 3))
@@ -140,7 +140,7 @@ def test_the_stated_uncertainty_covers_what_a_data_sheet_lets_a_sensor_do(part: 
     seeds, within = (200, (0.85, 1.15)) if thorough else (10, (0.6, 1.4))
     off = []
     for seed in range(seeds):
-        _, budget, error = drawn_accelerations.solved(drawn_accelerations.drawn(part, seed))
+        _, budget, error = drawn_accelerations.solve_session(drawn_accelerations.drawn(part, seed))
         off.append((error / budget.std, error / budget.expanded))
     over_u, over_expanded = np.swapaxes(off, 0, 1)
     rms = [float(np.sqrt(np.mean(each**2))) for each in (over_u[:, :3], over_u[:, 3:])]
@@ -161,7 +161,7 @@ def test_the_readings_tell_how_much_of_what_an_arm_is_off_by_is_new_in_each_dwel
         session = drawn_accelerations.drawn("adis16465", seed, arm_rad=3e-4)
         turns = turned(session.truth.theta(), session.movement)[:, : OWN_ERRORS * len(JOINTS)]
         elsewhere = new_rad * np.random.default_rng([9, seed]).standard_normal(turns.shape[1])
-        solution, budget, error = drawn_accelerations.solved(session.reading(turns @ elsewhere))
+        solution, budget, error = drawn_accelerations.solve_session(session.reading(turns @ elsewhere))
         shares.append(solution.own_share)
         off.append(error[3:] / budget.std[3:])
     assert least <= np.median(shares) <= most
@@ -171,7 +171,7 @@ def test_the_readings_tell_how_much_of_what_an_arm_is_off_by_is_new_in_each_dwel
 def test_how_far_a_sensor_bends_is_in_its_budget_where_attitudes_do_not_tell() -> None:
     """Named lines make up the whole; what a data sheet bounds is of type B, and known by more than its half-width."""
     session = drawn_accelerations.drawn("adis16465", 0)
-    solution, budget, _ = drawn_accelerations.solved(session)
+    solution, budget, _ = drawn_accelerations.solve_session(session)
     stated = {line.name: f"{line.half_width:g} {line.unit}" for line in budget.contributors if line.name in BY_SHEET}
     assert stated == BY_SHEET
     for line in budget.contributors:
@@ -188,7 +188,7 @@ def test_how_far_a_sensor_bends_is_in_its_budget_where_attitudes_do_not_tell() -
 
 def test_a_quiet_sensor_s_flicker_and_what_its_thermometer_hides_are_in_its_budget() -> None:
     """By the least Allan deviation, and by half a step over the run: no more than that makes of a mean."""
-    _, budget, _ = drawn_accelerations.solved(drawn_accelerations.drawn("adis16465", 0))
+    _, budget, _ = drawn_accelerations.solve_session(drawn_accelerations.drawn("adis16465", 0))
     (line,) = (line for line in budget.contributors if line.name == "flicker of the bias")
     assert (line.kind, line.distribution, line.source) == ("B", "normal", "least Allan deviation: 3.6 µg")
     assert np.all((line.std[3:] > 0.2 * 3.6e-6 * GRAVITY) & (line.std[3:] < 3.6e-6 * GRAVITY))

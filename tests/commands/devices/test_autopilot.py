@@ -21,7 +21,7 @@ from rig.sensors.mavlink.writing import find_unfinished_change
 from support.laboratories.commands import rig_here
 from support.paths import CONFIGS, ROOT
 from support.processes.waiting import PATIENCE_S
-from support.processes.warm import started
+from support.processes.warm import start_module
 from support.wires.autopilot_on_a_wire import AutopilotOnAWire, autopilot_on_a_wire, section
 
 LEFT = {"INS_GYROFFS_X": 0.1, "INS_ACCSCAL_Y": 1.01}  # of which no single-precision number is just that
@@ -145,7 +145,7 @@ def killed_after(wire: AutopilotOnAWire, arguments: list[Any], place: int, *, ap
             os.kill(process[0].pid, signal.SIGKILL)
 
     wire.parameters.set_field = setting  # type: ignore[method-assign]
-    process.append(started("autopilot", "store", *arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+    process.append(start_module("autopilot", "store", *arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
     assert process[0].wait(PATIENCE_S) == -signal.SIGKILL
     wire.parameters.set_field = set_field  # type: ignore[method-assign]
 

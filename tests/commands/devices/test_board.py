@@ -28,7 +28,7 @@ from support.documents.results import SENSOR, VERIFIED, result_document
 from support.laboratories import commands
 from support.laboratories.worlds import World, WorldHandle, worlds
 from support.processes.waiting import PATIENCE_S
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 pytestmark = pytest.mark.slow
 
@@ -49,7 +49,7 @@ def rig(*arguments: str | Path, stdin: int = subprocess.DEVNULL) -> subprocess.C
 def answered(keyboard: int, terminal: int, answer: bytes, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """The command at that terminal, whose question is answered when it is asked: earlier is no answer."""
     command = ("board", *arguments)
-    with started(*command, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    with start_module(*command, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None and process.stderr is not None
         said = b""
         while b"Type yes to" not in said and (more := os.read(process.stderr.fileno(), 4096)):

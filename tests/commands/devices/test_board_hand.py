@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from rig.analysis.by_hand.on_board import SCALE_LIMIT
-from support.board.hand_on_board import alone, handled_alone, served
+from support.board.hand_on_board import alone, run_button_session, serve
 from support.board.host_board import HostBoard
 from support.external.handled_body import TWELVE, Recorded, handle
 from support.laboratories.commands import rig, rig_here
@@ -88,7 +88,7 @@ def handled() -> Recorded:
 @pytest.fixture
 def kept(handled: Recorded) -> HostBoard:
     """A board that was calibrated by its button, without a computer."""
-    return handled_alone(handled)
+    return run_button_session(handled)
 
 
 def real_board(folder: Path, port: str, **changes: Any) -> Path:
@@ -103,7 +103,7 @@ def real_board(folder: Path, port: str, **changes: Any) -> Path:
 def test_what_the_button_began_is_fetched_said_to_be_unchecked_and_stored(
     tmp_path: Path, kept: HostBoard, handled: Recorded
 ) -> None:
-    with served(kept) as port:
+    with serve(kept) as port:
         path = real_board(tmp_path, port)
         said = rig_here("board", "hand", path, "--fetch")
         assert said.returncode == 0, said.stderr
@@ -120,7 +120,7 @@ def test_what_the_button_began_is_fetched_said_to_be_unchecked_and_stored(
 
 @pytest.mark.slow
 def test_an_answer_of_another_range_or_sensor_is_refused(tmp_path: Path, kept: HostBoard) -> None:
-    with served(kept) as port:
+    with serve(kept) as port:
         wide = rig_here(
             "board", "hand", real_board(tmp_path, port), "--set", "sensors.gyro.range_deg_s=2000", "--fetch"
         )
@@ -141,7 +141,7 @@ def test_an_answer_of_another_range_or_sensor_is_refused(tmp_path: Path, kept: H
 def test_a_board_without_an_answer_says_why(
     tmp_path: Path, handled: Recorded, turned: Callable[[Recorded], Recorded], why: str
 ) -> None:
-    with served(handled_alone(turned(handled))) as port:
+    with serve(run_button_session(turned(handled))) as port:
         ended = rig_here("board", "hand", real_board(tmp_path, port), "--fetch")
     assert ended.returncode == 2
     assert "no_answer_by_hand" in ended.stderr and why in " ".join(ended.stderr.split())
@@ -149,7 +149,7 @@ def test_a_board_without_an_answer_says_why(
 
 @pytest.mark.slow
 def test_a_board_that_was_just_switched_on_has_no_answer(tmp_path: Path) -> None:
-    with served(alone()) as port:
+    with serve(alone()) as port:
         ended = rig_here("board", "hand", real_board(tmp_path, port), "--fetch", "--write", "--yes")
     assert ended.returncode == 2
     assert "no_answer_by_hand" in ended.stderr and "none has been made" in " ".join(ended.stderr.split())

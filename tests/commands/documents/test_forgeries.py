@@ -18,8 +18,8 @@ from support.documents.forged_json import FORGED_JSON, IN_OTHER_BYTES
 from support.documents.forged_pdf import FORGED_PDF, UNTRUSTED_PDF
 from support.documents.forged_xml import FORGED_XML, MOVED_XML
 from support.documents.forging_xml import DCC, DS, better_results
-from support.documents.signed_laboratory import PDF, RESULT, XML, Laboratory, names_of, signed_laboratory
-from support.documents.signing import Holder, holder, issued, signing_as
+from support.documents.signed_laboratory import PDF, RESULT, XML, Laboratory, make_signed_laboratory, names_of
+from support.documents.signing import Holder, holder, issue, signing_as
 
 # WeasyPrint does not close its colour profile.
 pytestmark = pytest.mark.filterwarnings("ignore:.*sRGB2014.icc:pytest.PytestUnraisableExceptionWarning")
@@ -28,7 +28,7 @@ ALTERED, NOBODY_TRUSTED = 1, 4
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Laboratory]:
-    with signed_laboratory(tmp_path_factory.mktemp("signed")) as laboratory:
+    with make_signed_laboratory(tmp_path_factory.mktemp("signed")) as laboratory:
         yield laboratory
 
 
@@ -119,22 +119,22 @@ ServerAuth, ClientAuth = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CL
 DOCUMENTS, MAIL = ObjectIdentifier("1.3.6.1.5.5.7.3.36"), ExtendedKeyUsageOID.EMAIL_PROTECTION
 # Who is certified by the trusted authority and may not sign documents, or is not the one that is expected.
 OTHERS: dict[str, Callable[[Holder], Holder]] = {
-    "a web server": lambda of: issued("Laboratory", key(), of, purposes=[ServerAuth]),
-    "a web server and client": lambda of: issued("Laboratory", key(), of, purposes=[ServerAuth, ClientAuth]),
-    "a maker of programs": lambda of: issued("Laboratory", key(), of, purposes=[ExtendedKeyUsageOID.CODE_SIGNING]),
-    "a time server": lambda of: issued("Laboratory", key(), of, purposes=[ExtendedKeyUsageOID.TIME_STAMPING]),
-    "a key to encrypt with": lambda of: issued("Laboratory", key(), of, usage=["key_encipherment"]),
-    "a key to agree with": lambda of: issued("Laboratory", key(), of, usage=["key_agreement"], purposes=[MAIL]),
-    "a key without a usage": lambda of: issued("Laboratory", key(), of, usage=[]),
-    "a weak key": lambda of: issued("Laboratory", rsa.generate_private_key(65537, 1024), of),
-    "a short key": lambda of: issued("Laboratory", ec.generate_private_key(ec.SECP224R1()), of),
+    "a web server": lambda of: issue("Laboratory", key(), of, purposes=[ServerAuth]),
+    "a web server and client": lambda of: issue("Laboratory", key(), of, purposes=[ServerAuth, ClientAuth]),
+    "a maker of programs": lambda of: issue("Laboratory", key(), of, purposes=[ExtendedKeyUsageOID.CODE_SIGNING]),
+    "a time server": lambda of: issue("Laboratory", key(), of, purposes=[ExtendedKeyUsageOID.TIME_STAMPING]),
+    "a key to encrypt with": lambda of: issue("Laboratory", key(), of, usage=["key_encipherment"]),
+    "a key to agree with": lambda of: issue("Laboratory", key(), of, usage=["key_agreement"], purposes=[MAIL]),
+    "a key without a usage": lambda of: issue("Laboratory", key(), of, usage=[]),
+    "a weak key": lambda of: issue("Laboratory", rsa.generate_private_key(65537, 1024), of),
+    "a short key": lambda of: issue("Laboratory", ec.generate_private_key(ec.SECP224R1()), of),
     "an authority": lambda of: of,
-    "one that has expired": lambda of: issued("Laboratory", key(), of, days=(-9, -2)),
-    "one that is to come": lambda of: issued("Laboratory", key(), of, days=(2, 9)),
-    "somebody below a signer": lambda of: issued("Laboratory", key(), issued("Signer", key(), of)),
-    "another name": lambda of: issued("Laboratory 2", key(), of),
-    "a stranger of that name": lambda of: issued("Laboratory", key(), holder("Authority")),
-    "oneself": lambda of: issued("Laboratory", key(), usage=["digital_signature"]),
+    "one that has expired": lambda of: issue("Laboratory", key(), of, days=(-9, -2)),
+    "one that is to come": lambda of: issue("Laboratory", key(), of, days=(2, 9)),
+    "somebody below a signer": lambda of: issue("Laboratory", key(), issue("Signer", key(), of)),
+    "another name": lambda of: issue("Laboratory 2", key(), of),
+    "a stranger of that name": lambda of: issue("Laboratory", key(), holder("Authority")),
+    "oneself": lambda of: issue("Laboratory", key(), usage=["digital_signature"]),
 }
 
 
@@ -169,7 +169,7 @@ def test_whoever_may_not_sign_documents_or_is_another_is_not_trusted(who: str, f
 def test_a_certificate_for_documents_is_trusted_by_its_name_or_by_all_of_it(
     purposes: tuple[ObjectIdentifier, ...], lab: Laboratory
 ) -> None:
-    signed_by(lab, issued("Laboratory", key(), lab.authority, usage=["content_commitment"], purposes=purposes))
+    signed_by(lab, issue("Laboratory", key(), lab.authority, usage=["content_commitment"], purposes=purposes))
     for name in (None, "Laboratory", "CN=Laboratory"):
         status, said = lab.verified(PDF, XML, history=False, signer=name)
         assert (status, names_of(said)) == (0, []), said

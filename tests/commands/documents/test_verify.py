@@ -16,9 +16,9 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from rig.cli import main
 from rig.report.signatures.trust import Trust, why_untrusted
 from support.documents.dcc_rules import schema_faults
-from support.documents.forged_pdf import flipped
-from support.documents.signed_laboratory import PAGE, PDF, RESULT, XML, Laboratory, names_of, signed_laboratory
-from support.documents.signing import PASSPHRASE, Key, holder, issued, revocation_list, stamping, time_server
+from support.documents.forged_pdf import flip
+from support.documents.signed_laboratory import PAGE, PDF, RESULT, XML, Laboratory, make_signed_laboratory, names_of
+from support.documents.signing import PASSPHRASE, Key, holder, issue, revocation_list, stamping, time_server
 from support.history.kept_rows import forge
 from support.laboratories.commands import rig_here
 from support.processes.waiting import PATIENCE_S
@@ -32,7 +32,7 @@ ALTERED, NOBODY_TRUSTED = 1, 4
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Laboratory]:
-    with signed_laboratory(tmp_path_factory.mktemp("signed")) as laboratory:
+    with make_signed_laboratory(tmp_path_factory.mktemp("signed")) as laboratory:
         yield laboratory
 
 
@@ -85,7 +85,7 @@ def test_other_programs_find_the_signatures_valid_and_those_of_altered_files_not
     said = pdfsig(lab.folder / PDF)
     assert "Signature is Valid" in said and "Total document signed" in said
     assert "ETSI.CAdES.detached" in said
-    (lab.folder / "altered.pdf").write_bytes(flipped(b"stream\n", 40)(lab.read(PDF)))
+    (lab.folder / "altered.pdf").write_bytes(flip(b"stream\n", 40)(lab.read(PDF)))
     said = pdfsig(lab.folder / "altered.pdf")
     assert "Digest Mismatch" in said and "Signature is Valid" not in said
     content = lab.read(XML)
@@ -187,7 +187,7 @@ def test_one_of_an_unsigned_run_is_known_by_the_history_alone(lab: Laboratory) -
 def test_keys_come_from_files_under_a_passphrase_of_the_environment(
     form: str, lab: Laboratory, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    key = issued("Laboratory", rsa.generate_private_key(65537, 2048), holder("Authority"))
+    key = issue("Laboratory", rsa.generate_private_key(65537, 2048), holder("Authority"))
     file = lab.folder.parent / "key"
     _ = key.p12(file) if form == "p12" else key.pem(file, sealed=form == "pem")
     command = ["report", str(lab.folder), "--dcc", "--sign", str(file), "--history", "off"]
@@ -218,7 +218,7 @@ def test_a_key_in_a_token_signs_both(
     softhsm("--init-token", "--free", "--label", "rig", *pin, "--so-pin", "1234")
     keys: dict[str, Key] = {"ec": ec.generate_private_key(ec.SECP256R1()), "rsa": rsa.generate_private_key(65537, 2048)}
     for number, (label, private) in enumerate(keys.items(), start=1):
-        key = issued(f"Laboratory, {label}", private, holder("Authority"))
+        key = issue(f"Laboratory, {label}", private, holder("Authority"))
         file = key.pem(base / label, sealed=False)
         softhsm("--import", str(file), "--token", "rig", "--label", label, "--id", f"0{number}", *pin)
         with pkcs11.lib(str(library)).get_token(token_label="rig").open(rw=True, user_pin="1234") as session:
@@ -281,7 +281,7 @@ def test_what_cannot_be_signed_is_refused_before_anything_is_written(
     out = ["--out", str(lab.folder / "new"), "--history", "off"]
     old = holder("Laboratory", holder("Authority"), days=(-9, -2)).p12(lab.folder / "old.p12")
     server = ec.generate_private_key(ec.SECP256R1()), holder("Authority")
-    of_server = issued("Laboratory", *server, purposes=[ExtendedKeyUsageOID.SERVER_AUTH]).p12(lab.folder / "web.p12")
+    of_server = issue("Laboratory", *server, purposes=[ExtendedKeyUsageOID.SERVER_AUTH]).p12(lab.folder / "web.p12")
     for key in (old, of_server, lab.root, lab.folder / RESULT, lab.folder / "none"):
         assert main(["report", str(lab.folder), "--sign", str(key), *out]) == 2
         assert "signing_key" in capsys.readouterr().err

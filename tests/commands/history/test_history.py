@@ -17,7 +17,7 @@ from rig.history.store import open_history
 from rig.station.events import NotRemembered, Remembered
 from rig.station.words import line
 from support.history.kept_rows import forge
-from support.history.past_runs import FIRST, finished
+from support.history.past_runs import FIRST, finish_run
 from support.laboratories.commands import configuration, rig
 from support.paths import CONFIGS, RECORDINGS
 
@@ -36,7 +36,7 @@ def year(place: str) -> str:
         for i in range(12):
             scatter = ((5 * i) % 7 - 3) * 1e-5
             scale = (1.01 + 3e-4 * i + scatter, 0.99 - scatter, 1.0 + 2 * scatter)
-            history.enter(finished(30 * i, scale, check_standard=True))
+            history.enter(finish_run(30 * i, scale, check_standard=True))
     return place
 
 
@@ -127,7 +127,7 @@ def test_a_calibration_is_shown_and_compared(year: str, capsys: pytest.CaptureFi
     said = " ".join(told(capsys, "compare", "1", "12").split())
     assert "changed" in said and re.search(r"10 are compared, so a change is significant if E_n", said)
     with open_history(year) as history:
-        history.enter(finished(400, serial_number="G-2"))
+        history.enter(finish_run(400, serial_number="G-2"))
     assert main(["history", "compare", "1", "13"]) == 2
     assert "not_comparable" in capsys.readouterr().err
 

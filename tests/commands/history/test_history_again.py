@@ -16,8 +16,8 @@ from rig.data.result_file import ResultDocument
 from rig.history.recompute.result_comparison import Answer, RecomputedResult
 from rig.history.store import History, open_history
 from rig.report.kinds.kind_registry import followed
-from support.history.kept_recordings import certified, keep
-from support.history.past_runs import finished
+from support.history.kept_recordings import certify, keep
+from support.history.past_runs import finish_run
 from support.laboratories.commands import rig_here
 from support.paths import RECORDINGS
 from support.processes.clusters import killable_cluster, local_cluster
@@ -56,8 +56,8 @@ def shifted(document: ResultDocument) -> ResultDocument:
 def test_seven_verdicts_change_by_another_limit_and_no_file_does(history: History, tmp_path: Path) -> None:
     for i in range(7):
         run = keep(history, tmp_path / "runs" / f"wide {i}")
-        certified(history, run, f"RIG-{i}")
-    certified(history, keep(history, tmp_path / "runs" / "narrow", VERIFIED), "RIG-V")
+        certify(history, run, f"RIG-{i}")
+    certify(history, keep(history, tmp_path / "runs" / "narrow", VERIFIED), "RIG-V")
     before = in_file(tmp_path / "runs")
     done = rig_here("history", "recompute", "--set", "limits.scale_std=0.0005", "--jobs", "2")
     assert done.returncode == 1, done.stderr
@@ -76,8 +76,8 @@ def test_moved_missing_and_damaged_are_named_counted_and_gone_on_with(history: H
     same = keep(history, tmp_path / "same")
     moved = keep(history, tmp_path / "moved", change=shifted)
     for run, number in ((same, "RIG-1"), (moved, "RIG-2")):
-        certified(history, run, number)
-    certified(history, keep(history, tmp_path / "damaged"), "RIG-3")
+        certify(history, run, number)
+    certify(history, keep(history, tmp_path / "damaged"), "RIG-3")
     keep(history, tmp_path / "missing")
     recording = tmp_path / "damaged" / "run.h5"
     whole = recording.read_bytes()
@@ -162,7 +162,7 @@ def test_another_estimator_moves_what_it_moves_and_answers_are_not_mixed(history
     ],
 )
 def test_what_cannot_be_asked_is_refused_by_name(words: tuple[str, ...], named: str, history: History) -> None:
-    history.enter(finished(0))
+    history.enter(finish_run(0))
     done = rig_here("history", "recompute", *words)
     assert done.returncode == 2 and named in done.stderr
 
@@ -170,7 +170,7 @@ def test_what_cannot_be_asked_is_refused_by_name(words: tuple[str, ...], named: 
 @pytest.mark.slow
 def test_an_interrupted_one_is_gone_on_with(history: History) -> None:
     """With a stand-in for the solving: what is in the journal is not solved again."""
-    runs = {run.content_sha256: run for run in map(finished, range(40))}
+    runs = {run.content_sha256: run for run in map(finish_run, range(40))}
     for run in runs.values():
         history.enter(run)
     asked: list[str] = []

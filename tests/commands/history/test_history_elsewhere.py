@@ -22,7 +22,7 @@ from rig.history.documents import history_csv
 from rig.history.store import open_history
 from rig.station.events import NotRemembered
 from support.history.frozen_database import freezing_at
-from support.history.past_runs import finished
+from support.history.past_runs import finish_run
 from support.history.postgres import postgresql
 from support.laboratories.commands import rig_here
 from support.paths import CONFIGS, RECORDINGS
@@ -87,7 +87,7 @@ def test_a_spreadsheet_is_given_no_formulas(tmp_path: Path) -> None:
     texts = ('=HYPERLINK("http://192.0.2.1/")', "+1", "-1", "@SUM(A1)", "\tx", "\rx")
     with open_history(str(tmp_path / "history.sqlite")) as history:
         for day, text in enumerate(texts):
-            history.enter(replace(finished(day), operator=text, note="a - b = c"))
+            history.enter(replace(finish_run(day), operator=text, note="a - b = c"))
         rows = list(csv.DictReader(io.StringIO(history_csv(history.calibrations()), newline="")))
     assert [row["operator"] for row in rows if row["parameter"] == "bx"] == [
         f"'{text}".replace("\r", " ") for text in texts

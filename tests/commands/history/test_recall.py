@@ -7,7 +7,7 @@ import pytest
 from rig.commands.history.run_serials import recall_sensors
 from rig.config.load import load
 from rig.history.store import open_history
-from support.history.past_runs import finished
+from support.history.past_runs import finish_run
 from support.laboratories.commands import CI
 
 
@@ -21,14 +21,14 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 def test_the_calibrations_of_the_configured_serial_numbers_are_known_the_newest_first(place: str) -> None:
     with open_history(place) as history:
         for day, serial_number in ((0, "G-1"), (1, "G-2"), (2, "G-1"), (3, "G-1")):
-            history.enter(finished(day, serial_number=serial_number, passed=day != 2))
+            history.enter(finish_run(day, serial_number=serial_number, passed=day != 2))
         history.void(4, "another sensor was mounted")
     known = recall_sensors(load(CI, ["sensors.gyro.serial_number=G-1"], None).config, frozenset({"G-1"}))
     assert [(each.number, each.day, each.verdict) for each in known.calibrations] == [
         (3, "2025-01-08", "pass"),
         (1, "2025-01-06", "pass"),
     ]
-    assert {each.board_unique_id for each in known.calibrations} == {finished(0).document.provenance.board_unique_id}
+    assert {each.board_unique_id for each in known.calibrations} == {finish_run(0).document.provenance.board_unique_id}
     assert known.silent is None and known.moved == {"G-1"}
 
 

@@ -12,7 +12,7 @@ from rig.data.recording.layout import Contents, lay_out
 from rig.data.recording.layout_keys import EVENTS_DTYPE, SCHEMA
 from rig.data.recording.recorded_events import encode_event
 from rig.data.recording.run_file import RunData
-from support.external.real import unpacked
+from support.external.real import unpack
 from support.laboratories.commands import rig_here
 from support.recordings.synthetic_run import UR, Setup, synthetic_run
 
@@ -132,12 +132,12 @@ def test_a_log_in_which_the_sensor_was_turned_is_refused(
 def test_a_body_that_a_hand_moved_was_not_at_rest(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["allan", str(unpacked(name, "samples.csv", tmp_path))]) == 2
+    assert main(["allan", str(unpack(name, "samples.csv", tmp_path))]) == 2
     assert "rig: not_at_rest: " in capsys.readouterr().err
 
 
 def test_the_still_part_of_a_recording_by_hand_has_a_curve(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    lines = unpacked("imucal", "samples.csv", tmp_path).read_text(encoding="utf-8").splitlines()
+    lines = unpack("imucal", "samples.csv", tmp_path).read_text(encoding="utf-8").splitlines()
     held = [line for line in lines[1:] if 5.5 < float(line.partition(",")[0]) < 12.2]
     (tmp_path / "held.csv").write_text("\n".join([lines[0], *held]) + "\n", encoding="utf-8")
     assert main(["allan", str(tmp_path / "held.csv"), "--json"]) == 0

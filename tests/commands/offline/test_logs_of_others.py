@@ -20,7 +20,7 @@ from support.external.loggers import (
     Stamps,
     laid_down,
     swept,
-    turned_slowly,
+    turn_slowly,
     write_forces,
     write_rates,
 )
@@ -204,7 +204,7 @@ def test_files_by_two_clocks_say_from_when_to_when(tmp_path: Path, capsys: pytes
 def test_a_gentle_turn_that_cancels_the_bias_is_no_rest(
     mean_rad_s: float, bias_rad_s: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    files = write_rates(tmp_path, turned_slowly(mean_rad_s, np.array([bias_rad_s, 0.01, -0.005])), None, "angle_rad")
+    files = write_rates(tmp_path, turn_slowly(mean_rad_s, np.array([bias_rad_s, 0.01, -0.005])), None, "angle_rad")
     found = solved(capsys, *_interleave(files))
     off, expanded = off_and_u(found)
     assert (
@@ -216,7 +216,7 @@ def test_a_gentle_turn_that_cancels_the_bias_is_no_rest(
 
 @pytest.mark.slow
 def test_turns_that_count_by_their_mean_speed_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    log = turned_slowly(0.35, np.array([0.02, 0.01, -0.005]))
+    log = turn_slowly(0.35, np.array([0.02, 0.01, -0.005]))
     cut = log.rows.copy()
     cut[2, 0] += 6.0  # begins in mid-turn
     cut[2, 5] *= 0.7

@@ -11,7 +11,7 @@ import pytest
 from rig.cli import main
 from rig.observation.by_hand.hand_segmentation import segment_session
 from support.external.handled_body import TWELVE, creeping, handle, write
-from support.external.real import unpacked
+from support.external.real import unpack
 
 CLOCK = ("--turns", "--clock-ppm", "50")
 
@@ -78,7 +78,7 @@ def test_what_nothing_shows_must_be_told(tmp_path: Path, capsys: pytest.CaptureF
 @pytest.mark.slow
 def test_a_real_session_tells_its_own_accuracy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its README: turns alone and flips alone disagree by 2e-3."""
-    found = solved(capsys, unpacked("imucal", "samples.csv", tmp_path), *CLOCK)
+    found = solved(capsys, unpack("imucal", "samples.csv", tmp_path), *CLOCK)
     for one_way in ([0.9728, 1.0179, 1.0017], [0.9744, 1.0166, 1.0036]):
         assert (np.abs(np.array(found["scale"]) - one_way) < 2e-3).all()
     assert (expanded(found) > 1e-3).all() and (expanded(found) < 4e-3).all()
@@ -93,7 +93,7 @@ def test_halves_of_a_real_session_agree(tmp_path: Path, capsys: pytest.CaptureFi
 
     In the first half a hand held it that shook: where its blocks begin moves the scale factors by half of U.
     """
-    log = np.loadtxt(unpacked("mikoff", "imu0.log", tmp_path))
+    log = np.loadtxt(unpack("mikoff", "imu0.log", tmp_path))
     time_s = np.arange(len(log)) / 100.0
     names, halves = "time_s,x_rad_s,y_rad_s,z_rad_s,x_m_s2,y_m_s2,z_m_s2", []
     for number, rows in enumerate(np.array_split(np.arange(len(log)), 2)):

@@ -12,7 +12,7 @@ from rig.estimation.earth import DEG_H, EARTH_RATE_RAD_S
 from rig.estimation.gyroscope.earth_rate import EarthRate, EarthRatePrior, find_earth_rate
 from rig.estimation.gyroscope.vector_fit import explain
 from rig.study.rate_table import GYRO_MATRIX
-from support.motions.earth_seen import KVH1775, LATITUDE_RAD, LSM9DS1, MPU9250, UP, Part, Session, Truth, recorded
+from support.motions.earth_seen import KVH1775, LATITUDE_RAD, LSM9DS1, MPU9250, UP, Part, Session, Truth, record
 
 KNOWN = EarthRatePrior(UP, repeatability_rad=5e-5, state_jitter_s=2e-5)
 SENSITIVE = replace(KNOWN, g_sensitivity=True)
@@ -26,13 +26,13 @@ SEEDS = 20
 @cache
 def found(session: Session, seed: int, known: str = "known") -> tuple[EarthRate, Truth]:
     """`known`: "known" or "at latitude"."""
-    seen, truth = recorded(session, seed)
+    seen, truth = record(session, seed)
     return find_earth_rate(seen, STRAIGHT, KNOWN if known == "known" else AT_LATITUDE), truth
 
 
 def refused(session: Session, seed: int, known: EarthRatePrior = KNOWN) -> str:
     with pytest.raises(Fault) as caught:
-        find_earth_rate(recorded(session, seed)[0], STRAIGHT, known)
+        find_earth_rate(record(session, seed)[0], STRAIGHT, known)
     return caught.value.name
 
 
@@ -88,7 +88,7 @@ def test_a_sensitivity_that_is_left_out_is_noticed() -> None:
 
 
 def test_one_attitude_tells_nothing_of_it() -> None:
-    seen, _ = recorded(Session(dwell_s=0.0), 1)
+    seen, _ = record(Session(dwell_s=0.0), 1)
     sweeps = len([joint for joint in seen.joints if joint])
     still = replace(
         seen,
@@ -101,7 +101,7 @@ def test_one_attitude_tells_nothing_of_it() -> None:
 
 def test_sweeps_alone_tell_it_only_of_an_arm_whose_axes_do_not_lean() -> None:
     assert refused(Session(dwell_s=0.0), 1) == "earth_rate_not_observable"
-    seen, truth = recorded(Session(dwell_s=0.0, leaning_rad=0.0), 1)
+    seen, truth = record(Session(dwell_s=0.0, leaning_rad=0.0), 1)
     earth = find_earth_rate(seen, STRAIGHT, replace(KNOWN, repeatability_rad=0.0))
     assert np.linalg.norm(earth.rate_rad_s - truth.earth_rad_s) < 1.5 * DEG_H
     assert np.sqrt(np.linalg.eigvalsh(earth.covariance_rad2_s2)[-1]) < 0.5 * DEG_H
@@ -112,7 +112,7 @@ def test_sweeps_alone_tell_it_only_of_an_arm_whose_axes_do_not_lean() -> None:
 def test_the_papers_matrix_and_bias_come_back() -> None:
     """On an arm that is what it says: else the rows of F turn with it."""
     exact = Session(axes=6, arm_rad=0.0, hysteresis_rad=0.0, leaning_rad=0.0)
-    seen, truth = recorded(exact, 1)
+    seen, truth = record(exact, 1)
     seen = replace(seen, axis_errors_rad_s=None)
     earth = find_earth_rate(seen, STRAIGHT, replace(KNOWN, repeatability_rad=0.0))
     solution = explain(replace(seen, earth_rate_rad_s=earth.rate_rad_s), STRAIGHT).solution

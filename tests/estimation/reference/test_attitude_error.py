@@ -13,7 +13,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.study.rate_table import ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_MATRIX, MG
-from support.motions.arm_attitudes import attitudes_of, crooked, joints_rad
+from support.motions.arm_attitudes import attitudes_of, draw_true_attitudes, joints_rad
 
 NORM = 9.80665
 UP = NORM * np.array([0.02, -0.01, 1.0]) / np.linalg.norm([0.02, -0.01, 1.0])  # a base that is not quite upright
@@ -36,7 +36,7 @@ def independent(error_rad: float) -> Arm:
 
 
 def geometry(error_rad: float) -> Arm:
-    return lambda joints, rng: crooked(joints, error_rad, rng)
+    return lambda joints, rng: draw_true_attitudes(joints, error_rad, rng)
 
 
 def solve(m: Array, std: float, method: Method, r: Array, *, attitude_std_rad: Array | None = None) -> TriaxialSolution:

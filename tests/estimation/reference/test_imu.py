@@ -30,16 +30,16 @@ from rig.estimation.reference.reference_model import BIAS, KnownNorm
 from rig.estimation.reference.triaxial import solve_triaxial
 from rig.estimation.sensor_axes import non_orthogonality
 from rig.motion.geometry import flange_pose
-from support.motions.arm_attitudes import crooked_arm, joints_rad
+from support.motions.arm_attitudes import draw_true_arm, joints_rad
 from support.motions.arm_sweeps import (
     DWELL_S,
     MICRO_G,
     Truth,
     joints_at,
-    planned,
-    recorded_dwells,
-    recorded_sweeps,
-    with_readings,
+    make_sweeps,
+    plan_sweeps,
+    record_dwells,
+    record_sweeps,
 )
 
 NORM = 9.80665
@@ -68,9 +68,9 @@ def drawn(rng: np.random.Generator) -> Truth:
 
 def recorded(design: Design, rms_rad: float, density_ug: float, seed: int) -> tuple[Truth, Dwells, Sweeps]:
     rng = np.random.default_rng(seed)
-    truth, arm, (axes, rests) = drawn(rng), crooked_arm(rms_rad, rng), design
-    sweeps = recorded_sweeps(truth, arm, planned(axes), density_ug, rng) if axes else NO_SWEEPS
-    return truth, recorded_dwells(truth, arm, JOINTS, density_ug, rng) if rests else NO_DWELLS, sweeps
+    truth, arm, (axes, rests) = drawn(rng), draw_true_arm(rms_rad, rng), design
+    sweeps = record_sweeps(truth, arm, plan_sweeps(axes), density_ug, rng) if axes else NO_SWEEPS
+    return truth, record_dwells(truth, arm, JOINTS, density_ug, rng) if rests else NO_DWELLS, sweeps
 
 
 def found(solution: ImuSolution, truth: Truth) -> Array:
@@ -158,7 +158,7 @@ def test_without_noise_the_truth_comes_back(design: Design, second_order: bool) 
 @pytest.mark.parametrize("error", range(10))
 def test_the_effects_of_an_arm_s_errors_are_those_of_such_an_arm(error: int) -> None:
     """A turn of the flange, one of the base, a wave of the swept joint, made in where the flange goes."""
-    size, sweep = 1e-4, planned(6)[4]
+    size, sweep = 1e-4, plan_sweeps(6)[4]
     truth = replace(drawn(np.random.default_rng(1)), delay_s=0.0)
     turned = np.eye(4)
     turned[:3, :3] = Rotation.from_rotvec(size * np.eye(3)[error % 3]).as_matrix()
@@ -173,7 +173,7 @@ def test_the_effects_of_an_arm_s_errors_are_those_of_such_an_arm(error: int) -> 
         return flange_pose(q)
 
     right, wrong = (
-        recorded_sweeps(truth, each, (sweep,), 1e-9, np.random.default_rng(1)) for each in (flange_pose, poses)
+        record_sweeps(truth, each, (sweep,), 1e-9, np.random.default_rng(1)) for each in (flange_pose, poses)
     )
     told_change = SHARE * (wrong.harmonics_m_s2 - right.harmonics_m_s2).ravel() / size
     expected = effects(truth.theta(), Movement(NO_DWELLS, right))[:, error]
@@ -288,10 +288,10 @@ def test_points_of_a_turn_that_are_taken_for_independent_state_too_little() -> N
     ratios = []
     for seed in range(5):
         rng = np.random.default_rng(seed)
-        truth, arm = drawn(rng), crooked_arm(1e-3, rng)
-        points = np.concatenate([joints_at(sweep, np.arange(12) * np.pi / 6) for sweep in planned(6)])
+        truth, arm = drawn(rng), draw_true_arm(1e-3, rng)
+        points = np.concatenate([joints_at(sweep, np.arange(12) * np.pi / 6) for sweep in plan_sweeps(6)])
         noise = DENSITY_UG["MPU-9250"] * np.sqrt(12 * DWELL_S / 6.0)  # of six seconds in all
-        solution = solve(recorded_dwells(truth, arm, points, noise, rng))
+        solution = solve(record_dwells(truth, arm, points, noise, rng))
         off = told(found(solution, truth)) - told(truth.theta())
         ratios.append(off[6:9] / np.sqrt(told_variance(truth.theta(), solution.covariance)[6:9]))
     apart = float(np.sqrt(np.mean(np.square(ratios))))
@@ -306,16 +306,16 @@ def test_a_joint_that_stands_elsewhere_when_it_comes_from_the_other_side_is_no_d
     half_width_rad, delays = 5e-5, []
     for seed in range(5):
         rng = np.random.default_rng(seed)
-        truth, arm = drawn(rng), crooked_arm(1e-4, rng)
-        dwells, swept = recorded_dwells(truth, arm, JOINTS, DENSITY_UG["ADIS16465"], rng), []
-        for sweep in planned(6):
+        truth, arm = drawn(rng), draw_true_arm(1e-4, rng)
+        dwells, swept = record_dwells(truth, arm, JOINTS, DENSITY_UG["ADIS16465"], rng), []
+        for sweep in plan_sweeps(6):
             lag = half_width_rad / 2 * np.r_[0, 0, 0, rng.choice([-1, 1], 3)]
             lag[sweep.joint] = half_width_rad / 2 * (1 if sweep.direction == "ccw" else -1)
-            swept.append(recorded_sweeps(truth, partial(_lagging, arm, lag), (sweep,), DENSITY_UG["ADIS16465"], rng))
-        sweeps = with_readings(
+            swept.append(record_sweeps(truth, partial(_lagging, arm, lag), (sweep,), DENSITY_UG["ADIS16465"], rng))
+        sweeps = make_sweeps(
             np.concatenate([each.harmonics_m_s2 for each in swept]),
             np.concatenate([each.covariances_m2_s4 for each in swept]),
-            planned(6),
+            plan_sweeps(6),
         )
         off = []
         for repeatability_rad in (0.0, half_width_rad / np.sqrt(3)):
@@ -336,8 +336,8 @@ def _lagging(arm: Callable[[Array], Array], lag_rad: Array, joints: Array) -> Ar
 def test_the_delay_turns_both_ways_apart() -> None:
     truth, _, sweeps = recorded(TWELVE, 0.0, 23.0, 1)
     late = solve(NO_DWELLS, sweeps)
-    early = solve(NO_DWELLS, recorded_sweeps(replace(truth, delay_s=-0.002), crooked_arm(0.0, np.random.default_rng(0)),
-                                             planned(6), 23.0, np.random.default_rng(7)))  # fmt: skip
+    early = solve(NO_DWELLS, record_sweeps(replace(truth, delay_s=-0.002), draw_true_arm(0.0, np.random.default_rng(0)),
+                                             plan_sweeps(6), 23.0, np.random.default_rng(7)))  # fmt: skip
     assert late.delay_s == pytest.approx(truth.delay_s, abs=2e-5)
     assert early.delay_s == pytest.approx(-0.002, abs=2e-5)
 
@@ -349,7 +349,7 @@ def only(sweeps: Sweeps, kept: Array) -> Sweeps:
 @pytest.mark.parametrize("wrist", [3, 4, 5])
 def test_one_wrist_alone_is_refused(wrist: int) -> None:
     _, _, sweeps = recorded((3, False), 1e-3, 150.0, 2)
-    alone = only(sweeps, np.array([sweep.joint == wrist for sweep in planned(3)]))
+    alone = only(sweeps, np.array([sweep.joint == wrist for sweep in plan_sweeps(3)]))
     with pytest.raises(Fault, match="rank_deficient"):
         solve(NO_DWELLS, alone)
 

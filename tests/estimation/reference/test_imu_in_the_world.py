@@ -12,7 +12,7 @@ from rig.world.site import SiteTruth
 from rig.world.ur10e.motion.flange_motion import find_motion, transfer_force
 from rig.world.ur10e.motion.links import links
 from support.motions.arm_attitudes import joints_rad
-from support.motions.arm_sweeps import MICRO_G, joints_at, planned, signed_speed, with_readings
+from support.motions.arm_sweeps import MICRO_G, find_signed_speed, joints_at, make_sweeps, plan_sweeps
 
 NORM = 9.80665
 UP = NORM * np.array([0.02, -0.01, 1.0]) / np.linalg.norm([0.02, -0.01, 1.0])
@@ -38,12 +38,12 @@ def read(joints: Array, speeds: Array) -> Array:
 @pytest.mark.slow
 def test_what_the_world_lets_a_sensor_feel_gives_the_truth_back() -> None:
     harmonics = []
-    for sweep in planned(6):
-        speed = signed_speed(sweep)
+    for sweep in plan_sweeps(6):
+        speed = find_signed_speed(sweep)
         m = read(joints_at(sweep, ANGLES - speed * DELAY_S), speed * np.eye(6)[sweep.joint])
         harmonics.append([m.mean(axis=0), 2 * np.cos(ANGLES) @ m / len(m), 2 * np.sin(ANGLES) @ m / len(m)])
     quiet = MICRO_G**2
-    sweeps = with_readings(np.array(harmonics), np.tile(quiet * np.eye(9), (12, 1, 1)), planned(6))
+    sweeps = make_sweeps(np.array(harmonics), np.tile(quiet * np.eye(9), (12, 1, 1)), plan_sweeps(6))
     joints = joints_rad(EIGHTEEN)
     readings = read(joints, np.zeros(6))
     dwells = Dwells(readings, np.full_like(readings, quiet), flange_pose(joints)[:, :3, :3])

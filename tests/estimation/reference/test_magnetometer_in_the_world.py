@@ -6,7 +6,7 @@ import pytest
 from rig.errors import Fault, Refused
 from rig.estimation.reference.reference_model import BIAS, F
 from rig.estimation.reference.reversal import separate
-from support.motions.field_in_the_world import HOUSING, OVER, ROUND, UPRIGHT, Seen, seen
+from support.motions.field_in_the_world import HOUSING, OVER, ROUND, UPRIGHT, Seen, solve_field
 
 SEEDS, FEW = 20, 5
 GRADIENT_UT_M, MOMENT_A_M2 = 5.0, 0.2
@@ -35,7 +35,7 @@ def housings(seed: int, moment_a_m2: float) -> list[dict[str, object]]:
 
 @pytest.mark.slow
 def test_in_a_uniform_field_no_estimate_is_worse_than_its_bound() -> None:
-    found = [seen(seed) for seed in range(SEEDS)]
+    found = [solve_field(seed) for seed in range(SEEDS)]
     errors = np.array([[*(e.solution.matrix - e.matrix).ravel(), *(e.solution.bias - e.bias_t)] for e in found])
     told = np.r_[F, BIAS]
     std = np.sqrt(np.diag(found[0].solution.covariance)[told])
@@ -44,7 +44,7 @@ def test_in_a_uniform_field_no_estimate_is_worse_than_its_bound() -> None:
 
 
 def refused(**what: object) -> bool:
-    return not seen(method="maximum_likelihood", **what).uniform.uniform  # type: ignore[arg-type]
+    return not solve_field(method="maximum_likelihood", **what).uniform.uniform  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
@@ -71,7 +71,7 @@ ALONG = [{**HOUSING, "moment_a_m2": [0.0, 0.0, 0.06]}]
 @pytest.mark.proof
 def test_turning_over_recovers_the_bias_that_one_mounting_has_wrong(thorough: bool) -> None:
     for seed in range(SEEDS if thorough else FEW):
-        upright, over = (seen(seed + 100 * i, iron=ALONG, mounting=m) for i, m in enumerate((UPRIGHT, OVER)))
+        upright, over = (solve_field(seed + 100 * i, iron=ALONG, mounting=m) for i, m in enumerate((UPRIGHT, OVER)))
         assert upright.uniform.uniform, "no residual shows it"
         off = np.abs(upright.solution.bias - upright.bias_t) / np.sqrt(np.diag(upright.solution.covariance)[BIAS])
         assert off.max() >= 5
@@ -82,7 +82,7 @@ def test_turning_over_recovers_the_bias_that_one_mounting_has_wrong(thorough: bo
 
 
 def test_a_second_turn_tells_the_third_axis_too() -> None:
-    runs = [seen(seed, iron=ALONG, mounting=each) for seed, each in enumerate((UPRIGHT, OVER, ROUND))]
+    runs = [solve_field(seed, iron=ALONG, mounting=each) for seed, each in enumerate((UPRIGHT, OVER, ROUND))]
     found = separate(*biases(*runs))
     assert found.arm_field_in_bias == (False, False, False) and found.degrees_of_freedom == 3
     std = np.sqrt(np.diag(found.covariance))
@@ -92,7 +92,7 @@ def test_a_second_turn_tells_the_third_axis_too() -> None:
 
 
 def test_runs_that_do_not_belong_together_are_refused() -> None:
-    upright, over = seen(1), seen(2, mounting=OVER)
+    upright, over = solve_field(1), solve_field(2, mounting=OVER)
     with pytest.raises(Refused, match="mounting_not_turned"):
         separate(*biases(upright, upright))
     moved, *others = biases(upright, over)

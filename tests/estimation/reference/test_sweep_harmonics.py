@@ -14,16 +14,16 @@ from rig.estimation.reference.imu_fit import covariance_bound
 from rig.estimation.reference.reference_model import BIAS, REFERENCE
 from rig.estimation.reference.sweep_harmonics import FirstHarmonic, first_harmonic
 from rig.observation.statistics.vibration_noise import fit_inflation, line_columns
-from support.motions.arm_attitudes import crooked_arm
+from support.motions.arm_attitudes import draw_true_arm
 from support.motions.arm_sweeps import (
     MICRO_G,
     Samples,
     Sampling,
     Truth,
-    planned,
-    recorded_samples,
-    recorded_sweeps,
-    with_readings,
+    make_sweeps,
+    plan_sweeps,
+    record_samples,
+    record_sweeps,
 )
 
 NORM = 9.80665
@@ -34,7 +34,7 @@ TRUTH = Truth(
     lever_arm_m=np.array([0.025, 0.01, 0.03]),
     delay_s=0.004,
 )
-EXACT = crooked_arm(0.0, np.random.default_rng(0))
+EXACT = draw_true_arm(0.0, np.random.default_rng(0))
 
 
 def sampling(density_ug: float, vibration: float = 0.05) -> Sampling:
@@ -53,7 +53,7 @@ def reduced_with(samples: Samples, readings_m_s2: Array, coloured: Callable[[Arr
 
 def revolution(seed: int, density_ug: float, vibration: float = 0.05, sweep: int = 3) -> Samples:
     rng = np.random.default_rng(seed)
-    return recorded_samples(TRUTH, EXACT, planned(6)[sweep], sampling(density_ug, vibration), rng)
+    return record_samples(TRUTH, EXACT, plan_sweeps(6)[sweep], sampling(density_ug, vibration), rng)
 
 
 @pytest.mark.kernels
@@ -76,7 +76,8 @@ def test_a_speed_that_changes_slowly_takes_nothing_from_gravity(vibration: float
     slow = replace(sampling(0.0, vibration), cycles=(1,), encoder_step_rad=1e-15)
     even = replace(slow, vibration=0.0)
     found, expected = (
-        reduced(recorded_samples(TRUTH, EXACT, planned(6)[3], each, np.random.default_rng(1))) for each in (slow, even)
+        reduced(record_samples(TRUTH, EXACT, plan_sweeps(6)[3], each, np.random.default_rng(1)))
+        for each in (slow, even)
     )
     np.testing.assert_allclose(found.harmonic_m_s2, expected.harmonic_m_s2, atol=1e-9 + 0.6 * vibration)
     assert np.abs(expected.harmonic_m_s2).max() > 9
@@ -91,11 +92,11 @@ def test_what_a_slow_ripple_adds_is_what_the_model_makes_of_the_same_weights(cyc
         replace(sampling(0.0), cycles=cycles, encoder_step_rad=1e-15, clock_error_s=0.0),
         replace(sampling(0.0, 0.0), encoder_step_rad=1e-15, clock_error_s=0.0),
     )
-    sweeps = planned(6)
+    sweeps = plan_sweeps(6)
     off = []
     for each in (rippled, even):
-        turns = [reduced(recorded_samples(TRUTH, EXACT, sweep, each, np.random.default_rng(1))) for sweep in sweeps]
-        read = with_readings(
+        turns = [reduced(record_samples(TRUTH, EXACT, sweep, each, np.random.default_rng(1))) for sweep in sweeps]
+        read = make_sweeps(
             np.array([turn.harmonic_m_s2 for turn in turns]), np.tile(np.eye(9), (len(turns), 1, 1)), sweeps
         )
         read = replace(read, turning_rad2_s2=np.array([turn.turning_rad2_s2 for turn in turns]))
@@ -106,7 +107,7 @@ def test_what_a_slow_ripple_adds_is_what_the_model_makes_of_the_same_weights(cyc
 
 def test_the_model_s_derivatives_are_those_of_its_readings_in_an_uneven_turn() -> None:
     rng = np.random.default_rng(3)
-    sweeps = with_readings(np.zeros((12, 3, 3)), np.tile(np.eye(9), (12, 1, 1)), planned(6))
+    sweeps = make_sweeps(np.zeros((12, 3, 3)), np.tile(np.eye(9), (12, 1, 1)), plan_sweeps(6))
     uneven = 0.1 * sweeps.speeds_rad_s[:, None, None] ** 2 * rng.standard_normal((12, 6, 3))
     movement = Movement(NO_DWELLS, replace(sweeps, turning_rad2_s2=sweeps.turning_rad2_s2 + uneven))
     theta, step = TRUTH.theta(), 1e-6
@@ -155,18 +156,18 @@ def test_a_vibration_in_one_direction_says_nothing_of_the_noise_across_it() -> N
 @pytest.mark.parametrize(("part", "density_ug"), [("MPU-9250", 300.0), ("ADIS16465", 23.0), ("LSM9DS1", 150.0)])
 def test_a_calibration_from_samples_reaches_the_bound_of_their_noise(part: str, density_ug: float) -> None:
     """Ripple, encoder steps, a clock that is late by 0.2 ms: this is part of the delay."""
-    sweeps, theta = planned(6), TRUTH.theta()
-    ideal = recorded_sweeps(TRUTH, EXACT, sweeps, density_ug, np.random.default_rng(0))
+    sweeps, theta = plan_sweeps(6), TRUTH.theta()
+    ideal = record_sweeps(TRUTH, EXACT, sweeps, density_ug, np.random.default_rng(0))
     bound = np.diag(covariance_bound(theta, Movement(NO_DWELLS, ideal), 0.0)[0])
     theta[DELAY] += Sampling(0.0).clock_error_s
     off, stated = [], []
     for seed in range(10):
         rng = np.random.default_rng(seed)
-        turns = [reduced(recorded_samples(TRUTH, EXACT, sweep, sampling(density_ug), rng)) for sweep in sweeps]
+        turns = [reduced(record_samples(TRUTH, EXACT, sweep, sampling(density_ug), rng)) for sweep in sweeps]
         harmonics, covariances = (
             np.array([getattr(turn, name) for turn in turns]) for name in ("harmonic_m_s2", "covariance_m2_s4")
         )
-        solution = solve_imu(NO_DWELLS, with_readings(harmonics, covariances, sweeps), gravity_m_s2=NORM)
+        solution = solve_imu(NO_DWELLS, make_sweeps(harmonics, covariances, sweeps), gravity_m_s2=NORM)
         assert solution.lever_arm_m is not None and solution.delay_s is not None
         found = np.concatenate([solution.matrix.ravel(), solution.reference_m_s2, solution.bias_m_s2])
         off.append(np.concatenate([found, solution.lever_arm_m, [solution.delay_s]]) - theta[: DELAY + 1])

@@ -5,7 +5,7 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.temperature.over_temperature import fit_over_temperature, powers_at
-from support.motions.heated_course import BIAS_RAD_S, HYSTERESIS_RAD_S, REFERENCE_C, SCALE, seen, warmed
+from support.motions.heated_course import BIAS_RAD_S, HYSTERESIS_RAD_S, REFERENCE_C, SCALE, repeat_means, warm_board
 
 COLD_C, WARM_C = 26.0, 44.0
 GRADIENT_K = 0.1  # uncertainty.thermometer_gradient_k as it usually is
@@ -13,9 +13,9 @@ GRADIENT_K = 0.1  # uncertainty.thermometer_gradient_k as it usually is
 
 def errors(sensors: int) -> tuple[Array, Array]:
     """(n, 2, 6) errors over u of what k and c change by, over the range and about its middle; (n, 3) the loop's."""
-    of, slopes, loops = warmed(), [], []
+    of, slopes, loops = warm_board(), [], []
     for seed in range(sensors):
-        found = fit_over_temperature(seen(of, seed), REFERENCE_C, GRADIENT_K)
+        found = fit_over_temperature(repeat_means(of, seed), REFERENCE_C, GRADIENT_K)
         assert found.hysteresis is not None
         pairs = ((COLD_C, WARM_C), (REFERENCE_C - 1, REFERENCE_C + 1))
         slopes.append([changed(found.coefficients, found.covariance, *pair) for pair in pairs])

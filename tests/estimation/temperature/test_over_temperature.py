@@ -14,10 +14,10 @@ from support.motions.warmed_sweeps import (
     REFERENCE_C,
     TO_C,
     Drawn,
-    calibrated,
+    calibrate,
     drawn,
     readings,
-    repeated,
+    repeat_means,
     session,
 )
 
@@ -48,7 +48,7 @@ def covered(sensors: int, **planted: float) -> tuple[float, float]:
     for seed in range(sensors):
         walk = WALK * (seed % 2)
         sensor, rng = upright(seed, **{"walk": walk, **planted})
-        both.append(errors(sensor, calibrated(sensor, session(), rng)))
+        both.append(errors(sensor, calibrate(sensor, session(), rng)))
     over_u, over_expanded = (np.concatenate(each) for each in zip(*both, strict=True))
     return float(np.mean(np.abs(over_expanded) <= 1)), float(np.sqrt(np.mean(over_u**2)))
 
@@ -75,7 +75,7 @@ def test_what_is_left_of_the_bias_is_thirty_times_less_than_before() -> None:
     before, after, u = [], [], []
     for seed in range(4):
         sensor, rng = upright(seed, gradient_k=0.0)
-        found = calibrated(sensor, session(), rng)
+        found = calibrate(sensor, session(), rng)
         for warm in np.linspace(*found.range_c, 9):
             held = found.evaluate(float(warm))
             before.append(sensor.at(warm)[3:] - sensor.at(REFERENCE_C)[3:])
@@ -91,9 +91,9 @@ def test_what_leans_in_every_repeat_tells_nothing_of_temperature() -> None:
     sensor, rng = upright(1)
     of = session()
     means = readings(sensor, of, rng)
-    straight = fit_over_temperature(repeated(means, of, sensor.noise), REFERENCE_C, 0.1)
+    straight = fit_over_temperature(repeat_means(means, of, sensor.noise), REFERENCE_C, 0.1)
     leaning = np.random.default_rng(2).normal(0, 1e-2, NONE.shape)[of.places]
-    leant = fit_over_temperature(repeated(means + leaning, of, sensor.noise), REFERENCE_C, 0.1)
+    leant = fit_over_temperature(repeat_means(means + leaning, of, sensor.noise), REFERENCE_C, 0.1)
 
     assert np.allclose(leant.bias[1:], straight.bias[1:], rtol=1e-3, atol=1e-9)
     assert np.allclose(leant.scale[1] / leant.scale[0], straight.scale[1] / straight.scale[0], rtol=0.05, atol=1e-8)
@@ -103,7 +103,7 @@ def test_what_leans_in_every_repeat_tells_nothing_of_temperature() -> None:
 def test_u_grows_towards_both_ends_and_there_is_none_beyond() -> None:
     sensor, rng = upright(0, gradient_k=0.0)
     of = session()
-    found = fit_over_temperature(repeated(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C, 0.0)
+    found = fit_over_temperature(repeat_means(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C, 0.0)
     low, middle, high = (found.evaluate(each).std for each in (FROM_C + 0.1, 40.0, found.range_c[1]))
 
     assert (low > middle).all() and (high > middle).all()
@@ -119,7 +119,7 @@ def test_the_order_is_that_of_the_sensor() -> None:
     sensor = drawn(rng)
     straight = replace(sensor, scale=sensor.scale * [[1], [0], [0]], bias=sensor.bias * [[1], [1], [0]], walk=0.0)
     of = session()
-    found = fit_over_temperature(repeated(readings(straight, of, rng), of, sensor.noise), REFERENCE_C, 0.1)
+    found = fit_over_temperature(repeat_means(readings(straight, of, rng), of, sensor.noise), REFERENCE_C, 0.1)
 
     assert found.orders[0] <= 1 and 1 <= found.orders[1] <= 2
     assert np.abs(found.bias[1] - straight.bias[1]).max() < 2e-5
@@ -128,7 +128,7 @@ def test_the_order_is_that_of_the_sensor() -> None:
 @pytest.mark.slow
 def test_a_hysteresis_is_found_and_covered() -> None:
     sensor, rng = upright(3, hysteresis=2e-3)
-    found = calibrated(sensor, session(), rng)
+    found = calibrate(sensor, session(), rng)
     assert found.hysteresis is not None
     loop, std = found.hysteresis
 
@@ -142,13 +142,13 @@ def test_a_hysteresis_is_found_and_covered() -> None:
 def test_a_sensor_that_only_warmed_says_nothing_of_hysteresis() -> None:
     sensor, rng = upright(3)
 
-    assert calibrated(sensor, session(both_directions=False), rng).hysteresis is None
+    assert calibrate(sensor, session(both_directions=False), rng).hysteresis is None
 
 
 @pytest.mark.slow
 def test_the_lag_of_the_thermometer_is_found() -> None:
     sensor, rng = upright(5)
-    found = calibrated(replace(sensor, lag_s=20.0), session(), rng)
+    found = calibrate(replace(sensor, lag_s=20.0), session(), rng)
 
     assert abs(found.lag_s - 20.0) < 4 * found.lag_std_s + 2.0
 
@@ -167,7 +167,7 @@ def test_what_tells_no_polynomial_is_refused_by_name(changed: dict[str, Any], na
     of = session()
     with pytest.raises(Fault) as refused:
         fit_over_temperature(
-            replace(repeated(readings(sensor, of, rng), of, sensor.noise), **changed), REFERENCE_C, 0.1
+            replace(repeat_means(readings(sensor, of, rng), of, sensor.noise), **changed), REFERENCE_C, 0.1
         )
 
     assert refused.value.name == name

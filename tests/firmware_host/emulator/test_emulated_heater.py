@@ -8,7 +8,7 @@ import pytest
 from firmware_host.emulator.chip.flash_memory import STORE_OFFSET, FlashMemory
 from firmware_host.frames import encode
 from firmware_host.protocol import HEATER_CAUSES, HEATER_LIMIT_C, RESET_CAUSES
-from support.board.emulated_session import Session, shipped_flash
+from support.board.emulated_session import Session, make_shipped_flash
 
 POWER = 255
 OFF_WITHIN_S = 2.5
@@ -121,7 +121,7 @@ def test_the_heater_goes_off_by_itself_in_20_of_20(happens: Callable[[int], None
 
 def test_a_program_that_hangs_is_bitten_and_the_heater_goes_off() -> None:
     """The main loop kicks the watchdog by its tick: here the tick fails while the heater is on."""
-    image = bytearray(shipped_flash().data[:STORE_OFFSET])
+    image = bytearray(make_shipped_flash().data[:STORE_OFFSET])
     systick, usart2 = 4 * 15, 4 * (16 + 38)
     image[systick : systick + 4] = image[usart2 : usart2 + 4]
     session = streaming(Oven(), FlashMemory(bytes(image)))

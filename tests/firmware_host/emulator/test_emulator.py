@@ -15,7 +15,7 @@ from firmware_host.errors import BoardError
 from firmware_host.frames import encode
 from firmware_host.protocol import BAUD_RATE, RESET_CAUSES
 from support.board import tiny_firmware
-from support.board.emulated_session import CRYSTAL_PPM, UNIQUE_ID, Session, shipped_flash
+from support.board.emulated_session import CRYSTAL_PPM, UNIQUE_ID, Session, make_shipped_flash
 
 SETTLING = 8  # conversions the firmware throws away after a configure
 
@@ -162,7 +162,7 @@ def test_what_nobody_drives_is_pulled_to_rest(pin: str, level: str) -> None:
 
 
 def test_an_image_whose_tick_fails_is_restarted_by_its_watchdog() -> None:
-    image = bytearray(shipped_flash().data[:STORE_OFFSET])
+    image = bytearray(make_shipped_flash().data[:STORE_OFFSET])
     systick, usart2 = 4 * 15, 4 * (16 + 38)
     image[systick : systick + 4] = image[usart2 : usart2 + 4]  # another's handler, so that nothing ever ticks
     session = Session(flash=FlashMemory(bytes(image)))

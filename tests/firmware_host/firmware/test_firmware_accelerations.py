@@ -7,7 +7,7 @@ import pytest
 from support.board.host_board import (
     PERIOD_US,
     HostBoard,
-    configured,
+    configure,
     convert,
     error_of,
     first_samples,
@@ -41,7 +41,7 @@ def test_a_range_of_accelerations_the_part_does_not_have_is_refused(
 def test_accelerations_come_with_their_rates_only_where_they_are_wanted(
     board: HostBoard, sensor: int, range_g: float, name: str
 ) -> None:
-    setup = configured(board, sensor, range_g=range_g)
+    setup = configure(board, sensor, range_g=range_g)
     assert (setup["range_m_s2"], setup["sensitivity_m_s2"] > 0) == (pytest.approx(range_g * G_M_S2), range_g > 0)
     batch = first_samples(board, sensor, (-3, 2, 1), acceleration=(300, -200, -32768))
     assert (batch.name, batch.values["mode"]) == (name, 0)
@@ -53,7 +53,7 @@ def test_accelerations_come_with_their_rates_only_where_they_are_wanted(
 
 @pytest.mark.parametrize("sensor", range(3))
 def test_a_stream_with_accelerations_is_numbered_and_stamped_as_any_other(board: HostBoard, sensor: int) -> None:
-    configured(board, sensor, range_g=8)
+    configure(board, sensor, range_g=8)
     board.ask("start", 2, sensors=0)
     frames = []
     for k in range(60):
@@ -79,7 +79,7 @@ def test_the_lsm9ds1s_ranges_have_the_data_sheets_sensitivities(
     board: HostBoard, wanted_g: float, g: float, code: int, mg: float
 ) -> None:
     """At 16 g a count is half as much again as the full scale would have it."""
-    setup = configured(board, 0, rate_hz=238, range_g=wanted_g)
+    setup = configure(board, 0, rate_hz=238, range_g=wanted_g)
     assert setup["range_m_s2"] == pytest.approx(g * G_M_S2, rel=1e-15)
     assert setup["sensitivity_m_s2"] == pytest.approx(mg * 1e-3 * G_M_S2, rel=1e-14)
     assert board.gyro.values[0x20] == 4 << 5 | code << 3 | 0x06, "the gyroscope's rate, and 105 Hz"
@@ -94,13 +94,13 @@ def test_the_lsm9ds1s_ranges_have_the_data_sheets_sensitivities(
 def test_the_lsm9ds1s_accelerations_are_filtered_below_the_data_rate(
     board: HostBoard, rate_hz: float, filter_code: int
 ) -> None:
-    configured(board, 0, rate_hz=rate_hz, range_g=2)
+    configure(board, 0, rate_hz=rate_hz, range_g=2)
     assert board.gyro.values[0x20] & 0x07 == 0x04 | filter_code
 
 
 def test_both_triads_of_the_lsm9ds1_come_in_right_handed_axes(board: HostBoard) -> None:
     """Its own x of both points the other way than its magnetometer's (datasheet, figure 1)."""
-    configured(board, 0, range_g=2)
+    configure(board, 0, range_g=2)
     board.gyro.convert((0, 0, 0), 0)
     own = {0x18: (1000, -2000, 3000), 0x28: (-32768, 5000, 6000)}
 
@@ -125,7 +125,7 @@ def test_a_conversion_between_the_lsm9ds1s_two_bursts_costs_that_reading_and_nob
     board: HostBoard, moment: str
 ) -> None:
     """Rates of one conversion and accelerations of the next must not make a sample."""
-    configured(board, 0, rate_hz=238, range_g=2)
+    configure(board, 0, rate_hz=238, range_g=2)
     board.ask("start", 2, sensors=0)
     settle(board)
     for k in range(1, 30):
@@ -156,7 +156,7 @@ def test_the_mpu9250s_ranges_have_the_data_sheets_sensitivities(
     board: HostBoard, wanted_g: float, g: float, code: int, counts_per_g: float
 ) -> None:
     board.mpu9250.values[0x1C] = board.mpu9250.values[0x1D] = 0xFF  # self-test, around the filter
-    setup = configured(board, 1, range_g=wanted_g)
+    setup = configure(board, 1, range_g=wanted_g)
     assert setup["range_m_s2"] == pytest.approx(g * G_M_S2, rel=1e-15)
     assert setup["sensitivity_m_s2"] == pytest.approx(G_M_S2 / counts_per_g, rel=1e-15)
     assert board.mpu9250.values[0x1C] == code << 3
@@ -167,7 +167,7 @@ def test_the_factorys_trim_of_the_mpu9250s_accelerometer_is_left_alone(board: Ho
     trim = range(0x77, 0x7F)
     for address in trim:
         board.mpu9250.values[address] = address
-    configured(board, 1, range_g=2)
+    configure(board, 1, range_g=2)
     assert not {address for address, _value in board.mpu9250.writes} & set(trim)
 
 
@@ -175,7 +175,7 @@ def test_the_factorys_trim_of_the_mpu9250s_accelerometer_is_left_alone(board: Ho
 
 
 def test_the_adis16465_has_one_range_of_accelerations(board: HostBoard) -> None:
-    setup = configured(board, 2, range_g=2)
+    setup = configure(board, 2, range_g=2)
     assert setup["range_m_s2"] == pytest.approx(8 * G_M_S2, rel=1e-15)
     assert setup["sensitivity_m_s2"] == pytest.approx(G_M_S2 / 4000, rel=1e-15)
     assert (
@@ -186,7 +186,7 @@ def test_the_adis16465_has_one_range_of_accelerations(board: HostBoard) -> None:
 
 @pytest.mark.parametrize(("range_g", "name"), [(0, "samples"), (8, "imu_samples")])
 def test_the_adis16465s_outputs_are_rounded_to_the_nearest_count(board: HostBoard, range_g: float, name: str) -> None:
-    configured(board, 2, range_g=range_g)
+    configure(board, 2, range_g=range_g)
     board.ask("start", 2, sensors=0)
     for k in range(6):
         board.adis16465.convert((-1, 5, 32767), 0, (-7, 99, -32768), (0x8000, 0x7FFF, 0xFFFF, 0x8001, 0x0000, 0xFFFF))
@@ -200,7 +200,7 @@ def test_the_adis16465s_outputs_are_rounded_to_the_nearest_count(board: HostBoar
 
 
 def test_lower_words_of_the_next_conversion_cost_that_reading_and_nobody_is_blamed(board: HostBoard) -> None:
-    configured(board, 2)
+    configure(board, 2)
     board.ask("start", 2, sensors=0)
     for k in range(3):
         convert(board, 50_000 + 5000 * k, sensor=2)

@@ -11,9 +11,9 @@ from firmware_host.frames import Frame
 from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import text
 from rig.estimation.arrays import Array
-from support.board.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle, streaming_board
+from support.board.host_board import PERIOD_US, HostBoard, configure, convert, error_of, settle, streaming_board
 from support.board.host_flash import HostFlash
-from support.motions.warmed_sweeps import REFERENCE_C, calibrated, drawn, session
+from support.motions.warmed_sweeps import REFERENCE_C, calibrate, drawn, session
 
 RAD_S = np.radians(8.75e-3)  # per count of the LSM9DS1 at 245 °/s
 SCALE, BIAS_RAD_S = np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051])
@@ -36,7 +36,7 @@ WHOLE = CALIBRATION | {"model": 2, "matrix": MATRIX}
 def test_a_calibration_is_read_back_as_written_with_the_part_it_belongs_to() -> None:
     board = HostBoard()
     assert error_of(board.ask("read_calibration", sensor=0)) == "no_calibration"
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     (ack,) = board.ask("write_calibration", sensor=0, **CALIBRATION)
     assert ack.name == "ack"
     board.core.board_reset()
@@ -54,7 +54,7 @@ def test_a_calibration_is_read_back_as_written_with_the_part_it_belongs_to() -> 
 
 def test_a_write_that_comes_twice_is_stored_once() -> None:
     board, flash = HostBoard(), HostFlash()
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     board.ask("write_calibration", sensor=0, **CALIBRATION)
     done = len(flash.operations)
     (ack,) = board.ask("write_calibration", sensor=0, **CALIBRATION)
@@ -87,7 +87,7 @@ NAN, INFINITY = float("nan"), float("inf")
 )
 def test_a_calibration_that_cannot_be_right_is_refused_and_the_stored_one_stays(wrong: dict[str, Any]) -> None:
     board = HostBoard()
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     board.ask("write_calibration", sensor=0, **CALIBRATION)
     assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION | wrong)) == "bad_calibration"
     (stored,) = board.ask("read_calibration", sensor=0)
@@ -99,7 +99,7 @@ def test_requests_about_calibrations_are_refused_by_name() -> None:
     for name, values in (("read_calibration", {}), ("write_calibration", CALIBRATION), ("erase_calibration", {})):
         assert error_of(board.ask(name, sensor=len(BOARD_PARTS), **values)) == "no_such_sensor"
     assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "not_configured"
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     board.gyro.values[0x0F] = 0x00
     assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "sensor_absent"
     board.gyro.values[0x0F] = 0x69
@@ -112,7 +112,7 @@ def test_requests_about_calibrations_are_refused_by_name() -> None:
 
 def test_flash_that_fails_is_named() -> None:
     board, flash = HostBoard(), HostFlash()
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     flash.power_up(lasts=3)
     assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "flash_failed"
     assert error_of(board.ask("erase_calibration", sensor=0)) == "flash_failed"
@@ -124,7 +124,7 @@ def test_flash_that_fails_is_named() -> None:
 def calibrated_board(calibration: dict[str, Any] = CALIBRATION) -> HostBoard:
     """An LSM9DS1 that has just been started to send calibrated rates."""
     board = HostBoard()
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     board.ask("write_calibration", sensor=0, **calibration)
     (ack,) = board.ask("start", sensors=1)
     assert ack.name == "ack"
@@ -156,7 +156,7 @@ def test_calibrated_rates_are_k_times_m_plus_b_to_the_microradian() -> None:
 @pytest.mark.parametrize("range_deg_s", [245, 500, 2000])
 def test_the_whole_matrix_corrects_within_the_bound_of_single_precision(range_deg_s: float) -> None:
     board = HostBoard()
-    setup = configured(board, 0, 238, range_deg_s)
+    setup = configure(board, 0, 238, range_deg_s)
     board.ask("write_calibration", sensor=0, **WHOLE)
     board.ask("start", sensors=1)
     settle(board)
@@ -188,8 +188,8 @@ def test_calibrated_rates_are_rounded_not_cut_off() -> None:
 
 def test_one_sensor_streams_calibrated_beside_another_that_streams_raw() -> None:
     board = HostBoard()
-    configured(board, 0, 238, 245)
-    configured(board, 2)
+    configure(board, 0, 238, 245)
+    configure(board, 2)
     board.ask("write_calibration", sensor=2, **CALIBRATION)
     (ack,) = board.ask("start", sensors=4)
     assert ack.name == "ack"
@@ -222,13 +222,13 @@ def test_a_start_that_comes_twice_changes_nothing_and_another_mode_is_refused() 
 def test_a_calibrated_start_without_a_fitting_calibration_is_refused() -> None:
     board = HostBoard()
     assert error_of(board.ask("start", sensors=1 << len(BOARD_PARTS))) == "no_such_sensor"
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     assert error_of(board.ask("start", sensors=1)) == "no_calibration"
     assert error_of(board.ask("start", sensors=3)) == "not_configured"
     board.ask("write_calibration", sensor=0, **CALIBRATION)
-    configured(board, 0, 238, 500)
+    configure(board, 0, 238, 500)
     assert error_of(board.ask("start", sensors=1)) == "other_sensor"
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     board.gyro.values[0x0F] = 0xFF
     assert error_of(board.ask("start", sensors=1)) == "sensor_absent"
     board.gyro.values[0x0F] = 0x68
@@ -280,7 +280,7 @@ def test_readings_are_corrected_as_warm_as_the_part_is_and_beyond_the_range_as_a
     base: dict[str, Any],
 ) -> None:
     board = HostBoard()
-    setup = configured(board, 0, 238, 245)
+    setup = configure(board, 0, 238, 245)
     calibration = OVER_TEMPERATURE | {name: base[name] for name in ("model", "matrix")}
     (ack,) = board.ask("write_calibration", sensor=0, **calibration)
     assert ack.name == "ack"
@@ -304,7 +304,7 @@ def test_readings_are_corrected_as_warm_as_the_part_is_and_beyond_the_range_as_a
 
 def test_polynomials_come_back_as_written() -> None:
     board = HostBoard()
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     board.ask("write_calibration", sensor=0, **OVER_TEMPERATURE)
     board.core.board_reset()
     (stored,) = board.ask("read_calibration", sensor=0)
@@ -328,7 +328,7 @@ def test_polynomials_come_back_as_written() -> None:
 )
 def test_polynomials_that_cannot_be_right_are_refused(wrong: dict[str, Any]) -> None:
     board = HostBoard()
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     assert error_of(board.ask("write_calibration", sensor=0, **OVER_TEMPERATURE | wrong)) == "bad_calibration"
 
 
@@ -341,9 +341,9 @@ def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_t
     for seed in range(4):
         rng = np.random.default_rng([31, seed])
         sensor = replace(drawn(rng, gradient_k=0.0, walk=0.0), leaning=np.zeros((12, 3)))
-        found = calibrated(sensor, session(), rng)
+        found = calibrate(sensor, session(), rng)
         board = HostBoard()
-        setup = configured(board, sensor_index, 500, 15.625)
+        setup = configure(board, sensor_index, 500, 15.625)
         about: dict[str, Any] = {"model": 1, "serial_number": "1", "written_unix_s": 0, "temperature_c": REFERENCE_C}
         board.ask(
             "write_calibration", sensor=sensor_index, **about,

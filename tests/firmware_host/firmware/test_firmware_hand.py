@@ -12,8 +12,18 @@ from rig.analysis.by_hand.on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardRe
 from rig.errors import Fault
 from rig.world.hand.habits import Action, FlipAction, Mistake, MistakeKind, TurnAction
 from support.board.emulated_session import Session
-from support.board.hand_on_board import Played, alone, asked, begun, give, handled_alone, in_counts, play, pressed
-from support.board.host_board import HostBoard, configured, core, error_of
+from support.board.hand_on_board import (
+    Played,
+    alone,
+    begun,
+    convert_to_counts,
+    give,
+    play,
+    press,
+    query,
+    run_button_session,
+)
+from support.board.host_board import HostBoard, configure, core, error_of
 from support.external.handled_body import LSM9DS1, TWELVE, Recorded, handle
 
 pytestmark = pytest.mark.slow
@@ -172,29 +182,29 @@ def test_what_is_asked_of_a_board_that_cannot_is_refused() -> None:
     board = HostBoard()
     assert error_of(board.ask("by_hand", sensor=9, moves=12, scale_std=1e-3)) == "no_such_sensor"
     assert error_of(board.ask("by_hand", sensor=0, moves=12, scale_std=1e-3)) == "not_configured"
-    configured(board, 0, 119.0, 500.0)
+    configure(board, 0, 119.0, 500.0)
     assert error_of(board.ask("by_hand", sensor=0, moves=12, scale_std=1e-3)) == "bad_range"
-    assert HandReport.decode(asked(board, "hand_status")).state == "idle"
+    assert HandReport.decode(query(board, "hand_status")).state == "idle"
 
 
 def test_a_sensor_set_up_anew_ends_its_session_and_no_other() -> None:
     board, _ = begun()
-    configured(board, 1, 200.0, 250.0)
-    assert HandReport.decode(asked(board, "hand_status")).state == "starting"
-    configured(board, 0, 119.0, 500.0, 4.0)
-    assert HandReport.decode(asked(board, "hand_status")).state == "idle"
+    configure(board, 1, 200.0, 250.0)
+    assert HandReport.decode(query(board, "hand_status")).state == "starting"
+    configure(board, 0, 119.0, 500.0, 4.0)
+    assert HandReport.decode(query(board, "hand_status")).state == "idle"
 
 
 def test_the_lamp_tells_rest_taken_again_and_done() -> None:
     recorded = handle((*TWELVE[:4], TurnAction(1), *TWELVE[4:]), 3, rest_s=4.0)
     board, setup = begun()
-    times_us, counts, forces = in_counts(recorded, setup)
+    times_us, counts, forces = convert_to_counts(recorded, setup)
     lit: dict[str, list[bool]] = {}
     since_us, judged = 0, 0
     end = np.searchsorted(times_us, times_us[-1] - 3_000_000)
     for number, (time_us, rate, force) in enumerate(zip(times_us[:end].tolist(), counts, forces, strict=False)):
         give(board, time_us, number, rate, force)
-        report = HandReport.decode(asked(board, "hand_status"))
+        report = HandReport.decode(query(board, "hand_status"))
         if report.judged != judged:
             judged, since_us = report.judged, time_us
         told = "settled" if report.state == "resting" and time_us > since_us + 2_000_000 else report.state
@@ -209,29 +219,29 @@ def test_the_lamp_tells_rest_taken_again_and_done() -> None:
 
 
 def state_of(board: HostBoard) -> str:
-    return HandReport.decode(asked(board, "hand_status")).state
+    return HandReport.decode(query(board, "hand_status")).state
 
 
 def test_the_button_sets_a_gyroscope_up_starts_it_and_begins_a_session() -> None:
     board = alone()
-    pressed(board, 0, 20_000)
+    press(board, 0, 20_000)
     assert state_of(board) == "idle", "it only rattled"
-    pressed(board, 100_000)
+    press(board, 100_000)
     assert state_of(board) == "starting"
-    assert asked(board, "status").values["streaming"] == 1
+    assert query(board, "status").values["streaming"] == 1
 
 
 def test_what_was_found_alone_stays_until_the_next_session() -> None:
-    board = handled_alone(twelve())
-    kept = BoardHandSolution.decode(asked(board, "hand_solve"))
+    board = run_button_session(twelve())
+    kept = BoardHandSolution.decode(query(board, "hand_solve"))
     assert (kept.state, kept.taken, kept.sensor, kept.range_deg_s) == ("done", 12, 0, 500.0)
     assert kept.temperature_c == 25.0, "the middle of the part's scale, as was given"
     assert 1e-5 < kept.scale_std < 1e-3
     board.ask("stop", 2)
-    configured(board, 0, 119.0, 245.0)
-    configured(board, 1, 200.0, 250.0)
-    assert BoardHandSolution.decode(asked(board, "hand_solve")) == kept
-    pressed(board, 100_000_000)
+    configure(board, 0, 119.0, 245.0)
+    configure(board, 1, 200.0, 250.0)
+    assert BoardHandSolution.decode(query(board, "hand_solve")) == kept
+    press(board, 100_000_000)
     assert state_of(board) == "starting"
 
 
@@ -240,7 +250,7 @@ def test_the_button_begins_anew_with_the_sensor_that_streams_accelerations_alrea
     board.core.host_lock_clock(True)
     assert [frame.name for frame in board.ask("start", 2, sensors=0)] == ["ack"]
     recorded = twelve()
-    times_us, counts, forces = in_counts(
+    times_us, counts, forces = convert_to_counts(
         recorded, {"sensitivity_rad_s": np.radians(0.0175), "sensitivity_m_s2": 0.0012}
     )
     for number, (time_us, rate, force) in enumerate(zip(times_us[:400].tolist(), counts, forces, strict=False)):
@@ -250,18 +260,18 @@ def test_the_button_begins_anew_with_the_sensor_that_streams_accelerations_alrea
     for number in range(400, 430):  # it moves, so the lamp is dark
         give(board, 4_000_000 + 8_403 * number, number, np.array([9000, 0, 0]), forces[0])
     assert state_of(board) == "moving"
-    pressed(board, 8_000_000, 60_000)
+    press(board, 8_000_000, 60_000)
     assert state_of(board) == "starting"
 
 
 def test_no_button_changes_a_stream_without_accelerations_or_begins_by_a_clock_without_its_crystal() -> None:
     board = alone()
-    configured(board, 0, 119.0, 500.0)
+    configure(board, 0, 119.0, 500.0)
     board.ask("start", 2, sensors=0)
-    pressed(board, 0, 60_000)
+    press(board, 0, 60_000)
     assert state_of(board) == "idle"
     board = alone(locked=False)
-    pressed(board, 0, 60_000)
+    press(board, 0, 60_000)
     assert state_of(board) == "idle"
 
 

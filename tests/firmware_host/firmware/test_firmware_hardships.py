@@ -11,7 +11,7 @@ from firmware_host.emulator.parts.adis16465 import Adis16465
 from firmware_host.emulator.parts.lsm9ds1 import Lsm9ds1
 from firmware_host.frames import encode
 from support.board import emulated_session
-from support.board.emulated_session import FIRST_RECORD, Session, samples, shipped_flash
+from support.board.emulated_session import FIRST_RECORD, Session, make_shipped_flash, samples
 
 pytestmark = pytest.mark.slow
 
@@ -115,7 +115,7 @@ def registers(session: Session, part: str) -> Sequence[int] | dict[int, int]:
 
 
 def test_torn_pages_whose_flag_the_chip_has_lost_do_not_keep_the_board_from_its_work() -> None:
-    flash = shipped_flash()
+    flash = make_shipped_flash()
     flash.torn.update(range(FIRST_RECORD, FIRST_RECORD + 2 * PAGE_BYTES, 8))
     flash.flags_lost = True
     session = Session(flash=flash, boot_time_s=0.0)

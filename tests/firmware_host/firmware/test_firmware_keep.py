@@ -12,7 +12,7 @@ from firmware_host.frames import Frame
 from firmware_host.parts import BOARD_PARTS, GYROSCOPES
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Accumulator
-from support.board.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle
+from support.board.host_board import PERIOD_US, HostBoard, configure, convert, error_of, settle
 
 RAD_S = np.radians(8.75e-3)  # per count of the LSM9DS1 at 245 °/s
 SPEED_RAD_S = 1.0472
@@ -31,7 +31,7 @@ class Sweeps:
         self.board.set_time(time_us)
         self.board.run()
         self.board.frames()
-        configured(self.board, 0, 238, 245)
+        configure(self.board, 0, 238, 245)
         self.board.ask("start", sensors=0)
         settle(self.board, time_us)
         self.time_us = time_us
@@ -145,7 +145,7 @@ def test_what_was_kept_of_another_setting_and_while_the_part_settles_is_not_used
     sweeps.keep()
     span = sweeps.turn(100)
     sweeps.ask("stop")
-    configured(sweeps.board, 0, 238, 500)
+    configure(sweeps.board, 0, 238, 500)
     frames = sweeps.ask("observe", sensor=0, index=0, start_us=span[0], end_us=span[1] - PERIOD_US, speed_rad_s=1.0)
     assert error_of(frames) == "not_kept"
     sweeps.keep()
@@ -162,7 +162,7 @@ def test_what_was_kept_of_another_setting_and_while_the_part_settles_is_not_used
 @pytest.mark.parametrize("duration_s", [0.5, 3.0, 30.0])
 def test_three_sensors_share_the_room_and_each_has_its_duration(duration_s: float) -> None:
     board = HostBoard()
-    setups = [configured(board, sensor, rate_hz, 245) for sensor, rate_hz in enumerate((238, 200, 400))]
+    setups = [configure(board, sensor, rate_hz, 245) for sensor, rate_hz in enumerate((238, 200, 400))]
     (ack,) = board.ask("start", sensors=0)
     assert ack.name == "ack"
     for sensor in range(3):
@@ -193,7 +193,7 @@ def test_keep_refuses_what_it_cannot() -> None:
     board = HostBoard()
     assert error_of(board.ask("keep", sensors=1, duration_s=1.0)) == "not_configured"
     assert error_of(board.ask("keep", sensors=1 << len(BOARD_PARTS), duration_s=1.0)) == "no_such_sensor"
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     for duration_s in (0.0, -1.0, float("nan"), float("inf"), 1e6):
         assert error_of(board.ask("keep", sensors=1, duration_s=duration_s)) == "bad_observation"
 
@@ -263,9 +263,9 @@ def test_an_empty_span_is_a_bad_observation_and_an_unknown_sensor_is_named() -> 
 
 def test_setting_a_sensor_up_forgets_what_was_observed_with_another_setting() -> None:
     board = HostBoard()
-    configured(board, 0, 238, 245)
+    configure(board, 0, 238, 245)
     board.ask("recall", sensor=0, index=0, mean_rad_s=(1.0, 0.0, 0.0), speed_rad_s=1.0)
-    configured(board, 0, 238, 500)
+    configure(board, 0, 238, 500)
     (solution,) = board.ask("solve", sensor=0, method=0)
     assert solution.values["observations"] == 0
 

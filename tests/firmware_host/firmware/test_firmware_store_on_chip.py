@@ -9,7 +9,7 @@ from firmware_host.emulator.chip.flash_memory import PAGE_BYTES, STORE_OFFSET, F
 from firmware_host.emulator.chip.nvic import NMI, Nvic
 from firmware_host.frames import Frame, encode
 from firmware_host.protocol import ERRORS
-from support.board.emulated_session import FIRST_RECORD, Session, shipped_flash
+from support.board.emulated_session import FIRST_RECORD, Session, make_shipped_flash
 
 pytestmark = pytest.mark.slow
 
@@ -64,7 +64,7 @@ def write(session: Session, number: int) -> Frame:
 @pytest.fixture(scope="module")
 def written() -> FlashMemory:
     """Flash of a board that has been given calibrations 1 and 2."""
-    session = boot(shipped_flash())
+    session = boot(make_shipped_flash())
     assert stored(session) is None
     assert write(session, 1).name == "ack"
     assert write(session, 2).name == "ack"
@@ -158,7 +158,7 @@ def test_power_that_fails_at_any_moment_of_a_write_leaves_the_old_calibration_or
 
 
 def test_a_page_that_is_torn_all_over_is_no_calibration_and_no_fault() -> None:
-    flash = shipped_flash()
+    flash = make_shipped_flash()
     flash.torn.update(range(FIRST_RECORD, FIRST_RECORD + 2 * PAGE_BYTES, 8))
     session = boot(flash)
     assert stored(session) is None
@@ -168,7 +168,7 @@ def test_a_page_that_is_torn_all_over_is_no_calibration_and_no_fault() -> None:
 
 
 def test_any_other_non_maskable_interrupt_is_a_fault() -> None:
-    session = boot(shipped_flash())
+    session = boot(make_shipped_flash())
     (nvic,) = [block for block in session.board.peripherals if isinstance(block, Nvic)]
     nvic.pend(NMI)
     session.run(0.2)

@@ -11,7 +11,7 @@ import pytest
 from rig.cli import main
 from rig.errors import Fault, Refused, RigError
 from rig.observation.external.csv_import import ExternalData
-from support.external.sweeps_as_files import averaged_files
+from support.external.sweeps_as_files import average_files
 from support.paths import DOCS
 
 EXAMPLES = DOCS / "examples"
@@ -31,7 +31,7 @@ def read_with(
     samples: Callable[[list[str]], list[str]] = list,
     sweeps: Callable[[list[str]], list[str]] = list,
 ) -> ExternalData:
-    return averaged_files(edited(folder, "samples.csv", samples), edited(folder, "sweeps.csv", sweeps))
+    return average_files(edited(folder, "samples.csv", samples), edited(folder, "sweeps.csv", sweeps))
 
 
 def scaled(factor: float, columns: slice) -> Callable[[list[str]], list[str]]:
@@ -62,7 +62,7 @@ def test_the_example_is_solved_within_its_uncertainty(capsys: pytest.CaptureFixt
 
 
 def test_the_example_holds_six_turns_and_six_rests() -> None:
-    data = averaged_files(EXAMPLES / "samples.csv", EXAMPLES / "sweeps.csv")
+    data = average_files(EXAMPLES / "samples.csv", EXAMPLES / "sweeps.csv")
     assert [(turn.axis, turn.sign) for turn in data.sweeps] == [
         ("z", -1),
         ("z", 1),
@@ -135,9 +135,9 @@ def test_only_regular_files_of_a_sensible_size_are_opened(tmp_path: Path) -> Non
     sweeps = EXAMPLES / "sweeps.csv"
     for path, why in ((pipe, "no regular file"), (endless, "no regular file"), (huge, "longer than 256000000 bytes")):
         with pytest.raises(Refused, match=f"no_file: .*{why}"):
-            averaged_files(path, sweeps)
+            average_files(path, sweeps)
     with pytest.raises(Refused, match=r"no_file: .*no regular file"):
-        averaged_files(EXAMPLES / "samples.csv", pipe)
+        average_files(EXAMPLES / "samples.csv", pipe)
 
 
 def test_what_a_message_quotes_is_short_and_harmless(tmp_path: Path) -> None:

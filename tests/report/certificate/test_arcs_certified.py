@@ -5,14 +5,14 @@ import pytest
 
 from rig.data.result_file import ResultDocument
 from rig.report.certificate.dcc import digital_certificate
-from support.documents.certified import certificate, compared, read, result
+from support.documents.certified import add_comparison, certificate, read, result
 from support.documents.dcc_rules import schema_faults
 
 
 def of_arcs(angle_rad: float) -> ResultDocument:
     sensor = result().gyroscopes["gyro"]
     turned = tuple(each.model_copy(update={"angle_rad": angle_rad}) for each in sensor.observations)
-    return compared(
+    return add_comparison(
         result().model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update={"observations": turned})}})
     )
 

@@ -26,16 +26,16 @@ from rig.report.tables.coverage_statements import coverage_sentence
 from rig.report.words.printed_values import rounded
 from support.documents.certified import (
     LABORATORY,
+    add_accelerometer,
+    add_comparison,
     certificate,
-    compared,
     everything,
-    planted,
+    plant,
     read,
     result,
     reversal,
-    with_accelerometer,
 )
-from support.documents.results import without_budget
+from support.documents.results import remove_budget
 from support.paths import CONFIGS, RECORDINGS
 
 CLAUSES = [
@@ -138,7 +138,7 @@ def test_values_and_their_uncertainties_are_those_of_the_budget() -> None:
 
 def test_noise_is_not_called_uncertainty() -> None:
     """A result of an estimator without a budget makes no certificate."""
-    found = certificate(without_budget(read_result(RECORDINGS / "six_observation")))
+    found = certificate(remove_budget(read_result(RECORDINGS / "six_observation")))
     page = read(found)
     assert found.title == "Calibration record"
     assert any("uncertainty is not known" in mark for mark in found.marks)
@@ -265,12 +265,12 @@ def test_time_is_traceable_only_through_a_reference_that_is_named_and_was_compar
     unnamed = StatedFacts(SiteSection(), CertificateSection())
     simulated = StatedFacts(LABORATORY.site, simulated=True)
     alone = result().model_copy(update={"clock": result().clock.model_copy(update={"comparisons": ()})})  # type: ignore[union-attr]
-    assert certificate(compared(result())).traceable
-    assert "traceable to the second" in read(certificate(compared(result()))).under["7.8.4.1c"]
+    assert certificate(add_comparison(result())).traceable
+    assert "traceable to the second" in read(certificate(add_comparison(result()))).under["7.8.4.1c"]
     for found in (
-        certificate(compared(result()), unnamed),
+        certificate(add_comparison(result()), unnamed),
         certificate(alone),
-        certificate(compared(result()), simulated),
+        certificate(add_comparison(result()), simulated),
     ):
         assert not found.traceable
         assert "No metrological traceability" in read(found).under["7.8.4.1c"]
@@ -287,8 +287,8 @@ def test_before_and_after_of_a_verified_run_are_as_found_and_as_left() -> None:
 
 
 def test_an_accelerometer_stands_there_with_its_uncertainty_and_its_budget() -> None:
-    document = with_accelerometer()
-    page = read(certificate(compared(document)))
+    document = add_accelerometer()
+    page = read(certificate(add_comparison(document)))
     assert "1.01235 ± 0.00022" in page.text  # 1e-4 of noise, 0.5e-4 of gravity, k = 2
     assert "0.3000 ± 0.0020" in page.text  # gravity's size leaves the bias alone
     assert "gravity B normal ±0.000981 m/s² (k = 2) ∞ 49 19.6 % 0.00 < 0.1 %" in page.text  # u(k) in 10⁻⁶
@@ -305,10 +305,10 @@ def test_an_accelerometer_stands_there_with_its_uncertainty_and_its_budget() -> 
 
 def test_without_a_budget_it_is_no_certificate_and_without_an_uncertainty_of_gravity_not_traceable() -> None:
     """Of an estimator without a budget, and of a field that nobody has said the uncertainty of."""
-    page = read(certificate(without_budget(result())))
+    page = read(certificate(remove_budget(result())))
     assert "Calibration record" in page.text and "Not a certificate: the uncertainty is not known" in page.text
     assert "No expanded uncertainty is known: the estimator" in page.text
-    assumed = read(certificate(compared(everything())))  # its field's size is taken to be good to 1 %
+    assumed = read(certificate(add_comparison(everything())))  # its field's size is taken to be good to 1 %
     field = assumed.under["7.8.4.1c"].split("The size of the magnetic field")[1]
     assert "no metrological traceability is claimed" in field
 
@@ -449,9 +449,9 @@ def test_no_resource_is_loaded_from_anywhere() -> None:
 
 
 def test_every_text_from_elsewhere_shows_as_text() -> None:
-    document = compared(everything())
+    document = add_comparison(everything())
     hostile = ResultDocument.model_validate(
-        planted(document.model_dump(by_alias=True, exclude_unset=True), MARKUP, FIXED)
+        plant(document.model_dump(by_alias=True, exclude_unset=True), MARKUP, FIXED)
     )
     words = ("laboratory", "address", "place", "time_reference", "gravity_reference", "magnetic_field_reference")
     said = dict.fromkeys(words, MARKUP)

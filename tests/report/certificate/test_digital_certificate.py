@@ -18,16 +18,16 @@ from rig.report.tables.dcc_results import JOINT_FACTOR_3
 from rig.report.tables.xml_parts import product
 from support.documents.certified import (
     LABORATORY,
+    add_accelerometer,
+    add_comparison,
     certificate,
-    compared,
     everything,
     magnetometer,
     result,
     reversal,
-    with_accelerometer,
 )
 from support.documents.dcc_rules import rule_faults, schema_faults
-from support.documents.results import without_budget
+from support.documents.results import remove_budget
 from support.paths import RECORDINGS
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
@@ -76,7 +76,7 @@ def test_ptb_s_rules_find_nothing_wrong(stated: StatedFacts) -> None:
 @pytest.mark.parametrize("stated", [LABORATORY, SILENT], ids=["said", "unsaid"])
 def test_accelerometers_and_verifications_are_valid_too(stated: StatedFacts) -> None:
     verified = read_result(RECORDINGS / "verified").verification
-    xml = digital_certificate(certificate(with_accelerometer().model_copy(update={"verification": verified}), stated))
+    xml = digital_certificate(certificate(add_accelerometer().model_copy(update={"verification": verified}), stated))
     assert [len(each) for each in map(numbers, found(xml, "si:valueXMLList"))] == [3, 3, 6, 3, 9, 3, 3, 6, 3, 3, 3]
     assert rule_faults(xml) == []
     assert schema_faults(xml) == []
@@ -247,13 +247,13 @@ def test_units_multiply(first: str, second: str, both: str) -> None:
 
 
 def test_it_says_whether_it_is_traceable_and_that_a_simulated_one_is_not_valid() -> None:
-    real = digital_certificate(certificate(compared(result())))
+    real = digital_certificate(certificate(add_comparison(result())))
     assert [each.text for each in found(real, "dcc:traceable")] == ["true"]
     assert found(real, "dcc:valid") == []
-    both = digital_certificate(certificate(compared(with_accelerometer())))
+    both = digital_certificate(certificate(add_comparison(add_accelerometer())))
     assert [each.text for each in found(both, "dcc:traceable")] == ["true", "true"]  # time's, and gravity's
     assert [each.text for each in found(of_everything(), "dcc:traceable")] == ["true", "true", "false"]
-    simulated = digital_certificate(certificate(compared(result()), SIMULATED))
+    simulated = digital_certificate(certificate(add_comparison(result()), SIMULATED))
     assert [each.text for each in found(simulated, "dcc:traceable")] == ["false"]
     assert [each.text for each in found(simulated, "dcc:valid")] == ["false"]
     assert "Simulated laboratory" in simulated.decode()
@@ -271,7 +271,7 @@ def half_known() -> ResultDocument:
     ("refused", "why"),
     [
         (
-            lambda: certificate(without_budget(read_result(RECORDINGS / "six_observation"))),
+            lambda: certificate(remove_budget(read_result(RECORDINGS / "six_observation"))),
             "only the noise part of the uncertainty",
         ),
         (lambda: certificate(result().model_copy(update={"gyroscopes": {}})), "calibrated nothing"),

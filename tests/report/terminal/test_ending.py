@@ -14,7 +14,7 @@ from rig.report.terminal.run_summary import ending
 from rig.report.words.check_words import check_words, what_failed, words_of
 from rig.report.words.checks_page import page_text
 from rig.report.words.glossary_page import page_text as glossary_text
-from support.documents.ended_runs import ONE, failed, of_three_parts
+from support.documents.ended_runs import ONE, fail_checks, make_three_parts
 from support.paths import DOCS, RECORDINGS
 
 FROZEN = sorted(path.parent for path in RECORDINGS.glob("*/result.json"))
@@ -35,15 +35,15 @@ def entry_of(check: Check) -> CheckEntry:
     return entry(CheckEntry, check, coverage_factor=None, **means)
 
 
-ALL = [check.name for check in of_three_parts().checks]
+ALL = [check.name for check in make_three_parts().checks]
 
 
 @pytest.mark.parametrize(
     "result",
     [
         ONE,
-        failed(ONE, "gyro.verification_rms"),
-        failed(ONE.model_copy(update={"verification": {}}), "gyro.scale_deviation"),  # what failed is not verified
+        fail_checks(ONE, "gyro.verification_rms"),
+        fail_checks(ONE.model_copy(update={"verification": {}}), "gyro.scale_deviation"),  # what failed is not verified
     ],
     ids=["passed", "verification failed", "calibration failed"],
 )
@@ -61,7 +61,7 @@ def test_whatever_fails_the_end_fits_its_lines(folder: Path, width: int) -> None
     most = 12 if one else 25
     names = [each.name for each in result.checks]
     for broken in ([], *([name] for name in names), names[:2], names):
-        lines = ended(failed(result, *broken), width)
+        lines = ended(fail_checks(result, *broken), width)
         assert len(lines) <= most, lines
         said = "\n".join(lines)
         told = [int(more) for more in re.findall(r"\((\d+)\s+more\s+failed\)", said)]
@@ -69,13 +69,13 @@ def test_whatever_fails_the_end_fits_its_lines(folder: Path, width: int) -> None
 
 
 def test_a_narrow_screen_says_what_a_wide_one_says() -> None:
-    result = failed(ONE, *(each.name for each in ONE.checks))
+    result = fail_checks(ONE, *(each.name for each in ONE.checks))
     assert sorted(" ".join(ended(result, 60)).split()) == sorted(" ".join(ended(result, 80)).split())
 
 
 @pytest.mark.parametrize("names", [[], ALL[:1], ALL[:40]], ids=["passed", "one failed", "forty failed"])
 def test_six_sensors_end_in_a_screen(names: list[str]) -> None:
-    lines = ended(failed(of_three_parts(), *names))
+    lines = ended(fail_checks(make_three_parts(), *names))
     assert len(lines) <= 25 and (len(names) < 2 or "more failed)" in " ".join(lines))
 
 
@@ -83,7 +83,7 @@ def test_six_sensors_end_in_a_screen(names: list[str]) -> None:
 @pytest.mark.parametrize("folder", FROZEN, ids=lambda folder: f"{folder.parent.name}-{folder.name}")
 def test_every_result_fits_the_width_and_ends_with_its_verdict(folder: Path, width: int) -> None:
     result = read_result(folder)
-    for lines in (ended(result, width), ended(failed(result, *(each.name for each in result.checks)), width)):
+    for lines in (ended(result, width), ended(fail_checks(result, *(each.name for each in result.checks)), width)):
         assert max(len(line) for line in lines if not line.startswith(COPYABLE) and "rig " not in line) <= width
         assert lines[-1] in {"verdict: PASS", "verdict: FAIL"}
         assert f"all details: rig show {RUN} --all" in lines
@@ -91,10 +91,10 @@ def test_every_result_fits_the_width_and_ends_with_its_verdict(folder: Path, wid
 
 
 def test_what_failed_is_said_in_words_with_a_command_that_can_be_copied() -> None:
-    text = " ".join(" ".join(ended(failed(ONE, "gyro.scale_deviation"))).split())
+    text = " ".join(" ".join(ended(fail_checks(ONE, "gyro.scale_deviation"))).split())
     assert "FAILED gyro.scale_deviation: 0.9, allowed 0.3" in text
     assert f"rig solve {RUN} --set limits.scale_deviation=VALUE" in text
-    text = " ".join(" ".join(ended(failed(ONE, "gyro.disturbed_sweep"))).split())
+    text = " ".join(" ".join(ended(fail_checks(ONE, "gyro.disturbed_sweep"))).split())
     assert "one sweep contradicts the others" in text and f"rig resume {RUN}" in text
 
 

@@ -13,7 +13,7 @@ from rig.report.terminal.result_table import print_values
 from rig.report.terminal.run_summary import ending
 from rig.report.words.mounting_words import farthest_off, mount_lines
 from rig.station.events import DocumentWritten
-from support.documents.certified import certificate, compared, read, result
+from support.documents.certified import add_comparison, certificate, read, result
 from support.documents.dcc_rules import schema_faults
 from support.page.told_runs import ABOUT
 
@@ -32,7 +32,7 @@ def entry(stage: int, turn_deg: tuple[float, float, float], std_deg: tuple[float
 def in_stages() -> ResultDocument:
     second = entry(2, (0.401, -0.6, 0.5), (0.006, 0.01, 0.006))
     third = entry(3, (0.0, 0.1, 0.0), (0.58, 0.006, 0.006))
-    return compared(result()).model_copy(update={"mounts": (second, third)})
+    return add_comparison(result()).model_copy(update={"mounts": (second, third)})
 
 
 def test_the_terminal_tells_every_stage_and_the_end_of_a_run_the_farthest() -> None:
@@ -68,7 +68,7 @@ def test_the_page_tells_every_stage(tmp_path: Path) -> None:
 
 
 def test_of_an_item_that_stayed_nothing_is_said(tmp_path: Path) -> None:
-    found = compared(result())
+    found = add_comparison(result())
     assert "mounted in" not in read(certificate(found)).text
     write_result(found, tmp_path)
     shown = PageState(ABOUT)

@@ -16,12 +16,12 @@ from rig.errors import Fault, Problem, refuse
 from rig.report.terminal.result_table import print_kept
 from rig.station.events import Advice
 from rig.station.words import line
-from support.documents.ended_runs import ONE, failed, of_three_parts
+from support.documents.ended_runs import ONE, fail_checks, make_three_parts
 from support.paths import ROOT
 
 PICTURES = ROOT / "build" / "terminal"
 RUN = Path("runs/2026-11-25T10-00-00Z-imu")
-SIX = of_three_parts()
+SIX = make_three_parts()
 RESULTS = {"one": ONE, "six": SIX}
 NAMES = {"one": ["gyro"], "six": [*SIX.gyroscopes]}
 MOST = {"one": {60: 17, 80: 12, 120: 12}, "six": {60: 44, 80: 25, 120: 25}}  # lines, by width
@@ -66,7 +66,7 @@ def ends(sensors: str, how: str) -> Callable[[], int]:
     broken = [each.name for each in result.checks if each.name.startswith(tuple(f"{name}.scale" for name in names))]
     return {
         "pass": verdict(result),
-        "fail": verdict(failed(result, *broken)),
+        "fail": verdict(fail_checks(result, *broken)),
         "stopped": stopped(names),
         "refused": refused(names),
     }[how]

@@ -25,7 +25,7 @@ from support.laboratories.drawn_laboratory import truth
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 from support.processes.waiting import PATIENCE_S
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 SOURCES = {"lines": ("imu", {"range_g": 8}, "oscillator_ppm"), "autopilot": ("imu1", {"range_g": 16}, "clock_ppm")}
 CLOCK_PPM, SEEDS = 50.0, 12
@@ -81,7 +81,7 @@ def ran(source: str, folder: Path, *changes: dict[str, Any]) -> Ran:
     laboratory, name = document(source, *changes), SOURCES[source][0]
     config, out = folder / "config.yaml", folder / "run"
     config.write_text(yaml.safe_dump(laboratory, sort_keys=False), encoding="utf-8")
-    with started("run", config, "--out", out, stdout=PIPE, stderr=STDOUT, text=True) as process:
+    with start_module("run", config, "--out", out, stdout=PIPE, stderr=STDOUT, text=True) as process:
         try:
             wait_for_log(out, "sampling: ")
             began_s = began(laboratory, (out / "log.txt").read_text(encoding="utf-8"))

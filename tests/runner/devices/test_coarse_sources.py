@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from support.laboratories.hidden_results import Judged, solved
-from support.laboratories.hidden_worlds import at_address, by_message, run_in, with_digits
+from support.laboratories.hidden_results import Judged, solve
+from support.laboratories.hidden_worlds import move_to_address, run_in, world_of_message, world_with_digits
 from support.laboratories.worlds import fresh_host
 
 MESSAGES = ("RAW_IMU", "SCALED_IMU", "HIGHRES_IMU")
@@ -25,9 +25,9 @@ WITHIN, BEYOND = 0.93, 2.2  # at least such a share of the errors within U, and 
 
 def judged(document: dict[str, Any], folder: Path) -> Judged:
     """A run of a laboratory, solved."""
-    run_in(at_address(document, fresh_host()), folder)
+    run_in(move_to_address(document, fresh_host()), folder)
     assert (folder / "status").read_text(encoding="utf-8") == "0\n", (folder / "said").read_text(encoding="utf-8")
-    return solved(folder)
+    return solve(folder)
 
 
 def shares(runs: list[Judged]) -> tuple[float, float]:
@@ -42,7 +42,9 @@ def shares(runs: list[Judged]) -> tuple[float, float]:
 @pytest.mark.parametrize("message", MESSAGES)
 def test_a_quiet_imu_passes_by_every_message(message: str, tmp_path: Path) -> None:
     """With and without a thermometer, on an arm that turns evenly."""
-    run = judged(by_message(message, 0.0005, vibrates=False, seed=600 + MESSAGES.index(message)), tmp_path / "run")
+    run = judged(
+        world_of_message(message, 0.0005, vibrates=False, seed=600 + MESSAGES.index(message)), tmp_path / "run"
+    )
     assert not run.refused and shares([run])[1] < BEYOND
 
 
@@ -54,7 +56,7 @@ def test_a_quiet_imu_passes_by_every_message(message: str, tmp_path: Path) -> No
 def test_what_is_stated_by_every_message_and_number_of_digits_holds(source: str | int, tmp_path: Path) -> None:
     def run(draw: tuple[float, bool, int]) -> Judged:
         noise_rad_s, vibrates, seed = draw
-        drawn = by_message if isinstance(source, str) else with_digits
+        drawn = world_of_message if isinstance(source, str) else world_with_digits
         document = drawn(source, noise_rad_s, vibrates=vibrates, seed=seed)  # type: ignore[arg-type]
         return judged(document, tmp_path / f"{noise_rad_s}-{vibrates}-{seed}")
 

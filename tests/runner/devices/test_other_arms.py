@@ -11,8 +11,8 @@ from rig.config.ranges import ModelName
 from rig.data.recording.run_file import read_run
 from rig.motion.geometry import lengths_m
 from rig.motion.model import load_turner_model
-from support.laboratories.hidden_results import Judged, solved
-from support.laboratories.hidden_worlds import MORE_ARMS, OTHER_ARMS, WORLDS, first_seed, recorded
+from support.laboratories.hidden_results import Judged, solve
+from support.laboratories.hidden_worlds import MORE_ARMS, OTHER_ARMS, WORLDS, first_seed, record
 
 NAMED = {
     "ur3e": "UR3e", "ur5e": "UR5e or UR7e", "ur20": "UR20", "ur10_cb3": "UR10",
@@ -39,7 +39,7 @@ def test_every_arm_of_the_family_calibrates_a_gyroscope(model: ModelName, tmp_pa
 
 
 def _calibrates(model: ModelName, tmp_path: Path) -> None:
-    recorded(model, first_seed(model), tmp_path / model)
+    record(model, first_seed(model), tmp_path / model)
     run, said = tmp_path / model / "run", (tmp_path / model / "said").read_text(encoding="utf-8")
     assert (tmp_path / model / "status").read_text(encoding="utf-8").strip() == "0", said
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
@@ -55,7 +55,7 @@ def _calibrates(model: ModelName, tmp_path: Path) -> None:
     assert lengths_m(measured.turner.geometry) == pytest.approx(lengths_m(row.drawing), abs=5e-3)
     rate_hz = 1 / np.median(np.diff(measured.states["time_s"]))
     assert rate_hz == pytest.approx(125, rel=1e-6)
-    judged = solved(tmp_path / model)
+    judged = solve(tmp_path / model)
     assert not judged.refused
     assert _rms([judged]) < 2
 
@@ -67,8 +67,8 @@ def _calibrates(model: ModelName, tmp_path: Path) -> None:
 def test_what_is_stated_holds_on_other_arms(tmp_path: Path) -> None:
     worlds = [(model, first_seed(model) + each) for model in OTHER_ARMS for each in range(WORLDS[model])]
     with ThreadPoolExecutor(2) as two_at_once:
-        list(two_at_once.map(lambda world: recorded(world[0], world[1], tmp_path / str(world[1])), worlds))
-    runs = {world: solved(tmp_path / str(world[1])) for world in worlds}
+        list(two_at_once.map(lambda world: record(world[0], world[1], tmp_path / str(world[1])), worlds))
+    runs = {world: solve(tmp_path / str(world[1])) for world in worlds}
     assert not [(world, run.refused) for world, run in runs.items() if run.refused]
     for model in OTHER_ARMS:
         print(model, f"RMS of error over u {_rms([run for (of, _), run in runs.items() if of == model]):.2f}")

@@ -12,7 +12,7 @@ from rig.data.processes.process_silence import crowding
 from rig.data.recording.run_file import read_run
 from rig.turners.servo.servo_link import SILENCE_S
 from support.laboratories.commands import rig, rig_here
-from support.laboratories.servo_runs import Act, Seen, carried_out, configured
+from support.laboratories.servo_runs import Act, Seen, carry_out, configure
 
 pytestmark = pytest.mark.slow
 
@@ -37,16 +37,16 @@ def frozen(seen: Seen) -> None:
 
 @pytest.mark.thorough
 def test_a_run_that_lost_its_supply_is_resumed_and_solved(tmp_path: Path) -> None:
-    config, out = configured(tmp_path), tmp_path / "run"
+    config, out = configure(tmp_path), tmp_path / "run"
     off = asked(do="servo_power", on=False)
-    seen = carried_out("run", config, "--out", out, config=config, when=TURNS, times=2, act=off, after_s=0.8)
+    seen = carry_out("run", config, "--out", out, config=config, when=TURNS, times=2, act=off, after_s=0.8)
     said = "".join(seen.said)
     assert seen.process.returncode == 3 and "servo_link_lost" in said and "rig resume" in said
     assert seen.at_rest_after_s < 1.0 and seen.stood
     begun = [read_run(out / name) for name in ("run.h5", "run-2.h5")]
     assert [len(run.samples["gyro"]) > 1000 for run in begun] == [True, True] and len(begun[1].states) > 100
 
-    rest = carried_out("resume", out, config=config)
+    rest = carry_out("resume", out, config=config)
     assert rest.process.returncode == 0, "".join(rest.said)
     assert "stage 1 of 3" not in "".join(rest.said).lower()
 
@@ -65,7 +65,7 @@ def test_a_run_that_lost_its_supply_is_resumed_and_solved(tmp_path: Path) -> Non
 
 
 def test_what_is_there_is_looked_at_and_nothing_turns(tmp_path: Path) -> None:
-    config = configured(tmp_path, {"world": {"servo": {"firmware": 37}}})
+    config = configure(tmp_path, {"world": {"servo": {"firmware": 37}}})
     done = rig("check", config)
     assert done.returncode == 2 and "servo_firmware_old" in done.stderr
     assert "ROBOTIS XM430-W210, ID 1, firmware 37" in done.stdout and "torque off" in done.stdout
@@ -115,8 +115,8 @@ def test_whatever_happens_the_shaft_stands_the_data_are_kept_and_the_run_goes_on
     what: str, moment: str, tmp_path: Path
 ) -> None:
     (act, status, name), (times, after_s) = FAULTS[what], MOMENTS[moment]
-    config, out = configured(tmp_path), tmp_path / "run"
-    seen = carried_out("run", config, "--out", out, config=config, when=TURNS, times=times, act=act, after_s=after_s)
+    config, out = configure(tmp_path), tmp_path / "run"
+    seen = carry_out("run", config, "--out", out, config=config, when=TURNS, times=times, act=act, after_s=after_s)
     said = "".join(seen.said)
     silent_s = SILENCE_S * crowding()
     print(f"at rest after {seen.at_rest_after_s:.2f} s; a silence is known after {silent_s:.2f} s here")
@@ -128,5 +128,5 @@ def test_whatever_happens_the_shaft_stands_the_data_are_kept_and_the_run_goes_on
     assert seen.stood
     last = read_run(sorted(out.glob("run*.h5"), key=lambda path: path.stat().st_mtime)[-1])
     assert len(last.samples["gyro"]) > 500 and len(last.states) > 100
-    rest = carried_out("resume", out, config=config)
+    rest = carry_out("resume", out, config=config)
     assert rest.process.returncode == 0, "".join(rest.said)

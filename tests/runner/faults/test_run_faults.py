@@ -23,7 +23,7 @@ from support.laboratories.commands import rig as command
 from support.laboratories.worlds import World, WorldHandle, fresh_host, hardware, merge
 from support.processes.system import descendant
 from support.processes.waiting import PATIENCE_S, alive, wait_for
-from support.processes.warm import started
+from support.processes.warm import start_module
 from support.wires.arm_relay import relay
 
 # The driver names each of these faults as well (tests/turners/ur/test_driver.py): a few whole runs are enough.
@@ -55,7 +55,7 @@ class RunningRig:
         config = hardware(world.config_path, folder)
         self.world = world
         self.out = folder / "run"
-        self.process = started(
+        self.process = start_module(
             "run",
             config,
             "--out",
@@ -418,7 +418,7 @@ def test_an_arm_that_was_moved_while_the_operator_thought_is_not_driven(world: W
     handle = world()
     config = hardware(handle.config_path, tmp_path)
     operator, terminal = pty.openpty()
-    with started("run", config, "--out", tmp_path / "run", stdin=terminal, stderr=terminal) as process:
+    with start_module("run", config, "--out", tmp_path / "run", stdin=terminal, stderr=terminal) as process:
         os.close(terminal)
         said = b""
         while b"Type yes to start" not in said:

@@ -11,7 +11,7 @@ import yaml
 
 from rig.data.recording.run_file import read_run
 from support.laboratories.commands import rig
-from support.laboratories.hidden_worlds import STATED, at_address, quiet
+from support.laboratories.hidden_worlds import STATED, move_to_address, quiet
 from support.laboratories.worlds import fresh_host, merge
 
 SEEDS, FEW = range(20), range(1)
@@ -43,7 +43,7 @@ def ran(document: dict[str, Any], folder: Path) -> tuple[int, str]:
     """Exit status and errors of `rig run` in `folder`/run."""
     folder.mkdir()
     config = folder / "config.yaml"
-    config.write_text(yaml.safe_dump(at_address(document, fresh_host()), sort_keys=False), encoding="utf-8")
+    config.write_text(yaml.safe_dump(move_to_address(document, fresh_host()), sort_keys=False), encoding="utf-8")
     done = rig("run", config, "--out", folder / "run")
     return done.returncode, done.stderr + done.stdout
 

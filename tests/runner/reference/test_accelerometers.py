@@ -21,7 +21,7 @@ from rig.errors import Fault
 from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 from support.laboratories.worlds import merge
 from support.processes.waiting import PATIENCE_S
-from support.recordings.stated import solved_otherwise
+from support.recordings.stated import find_differences
 
 ACCELEROMETER: dict[str, Any] = {
     "scale": [1.02, 0.985, 1.01],
@@ -135,7 +135,7 @@ def test_one_run_calibrates_gyroscope_and_accelerometer(imu: Finished) -> None:
 
 def test_solving_the_recording_equals_the_run(imu: Finished) -> None:
     out, *_ = imu
-    assert solved_otherwise(out, rig_here("solve", out, "--json").stdout) == []
+    assert find_differences(out, rig_here("solve", out, "--json").stdout) == []
 
 
 def test_the_header_corrects_readings_as_the_result_says(imu: Finished, tmp_path: Path) -> None:

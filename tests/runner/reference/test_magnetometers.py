@@ -17,7 +17,7 @@ from rig.data.quantity import FIELD, RATE
 from rig.data.recording.run_file import RunData, read_run
 from support.laboratories.commands import configuration, rig, rig_here
 from support.laboratories.worlds import merge
-from support.recordings.stated import solved_otherwise
+from support.recordings.stated import find_differences
 
 SITE: dict[str, Any] = {"magnetic_field_ut": 50.0}
 TRUTH: dict[str, Any] = {
@@ -145,7 +145,7 @@ def test_dwells_tell_scale_bias_and_angles_as_mounted(finished: tuple[Path, dict
 
 def test_solving_the_recording_equals_the_run(finished: tuple[Path, dict[str, Any], str]) -> None:
     out, *_ = finished
-    assert solved_otherwise(out, rig_here("solve", out, "--json").stdout) == []
+    assert find_differences(out, rig_here("solve", out, "--json").stdout) == []
 
 
 @pytest.mark.proof

@@ -9,7 +9,7 @@ import pytest
 
 from support.fault_matrix.bench import END_S, POLL_S, QUICK, REAL, START_S, Bench, bench
 from support.fault_matrix.catalogue import BY_NAME
-from support.fault_matrix.clock_shift import shifted_clock
+from support.fault_matrix.clock_shift import shift_clock
 from support.fault_matrix.setups import SWEEPS
 from support.laboratories.worlds import merge
 
@@ -58,7 +58,7 @@ def off_after_s(here: Bench) -> float:
 @pytest.mark.parametrize("name", [*FEW, *(pytest.param(name, marks=PROOF) for name in BY_NAME if name not in FEW)])
 def test_no_fault_leaves_the_heater_on(name: str, tmp_path: Path) -> None:
     fault, folder = BY_NAME[name], tmp_path / "cell"
-    environment = shifted_clock(tmp_path) if "CLOCK_SHIFT" in fault.environment else {}
+    environment = shift_clock(tmp_path) if "CLOCK_SHIFT" in fault.environment else {}
     with bench(folder, HEATED, environment) as here:
         here.start()
         assert here.until(lambda _state: heats(here), START_S), here.said("run")[-500:]

@@ -17,7 +17,7 @@ from rig.observation.finished_steps import finished_sweeps
 from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 from support.laboratories.worlds import World, hardware, merge, world
 from support.processes.waiting import PATIENCE_S, alive, wait_for
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 __all__ = ["world"]
 
@@ -205,7 +205,7 @@ def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> No
     laboratory = world(merge(merge(LABORATORY, slow), {"procedure": procedure}))
     config, out = hardware(laboratory.config_path, tmp_path), tmp_path / "run"
     command = ("run", config, "--out", out, "--yes")
-    with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
+    with start_module(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
         wait_for_log(out, "your turn: warm the board until it is at")
         laboratory.control({"do": "air", "temperature_c": 41})
         said = run.communicate(timeout=PATIENCE_S)[1]
@@ -217,7 +217,7 @@ def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> No
 def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
     config, out = configuration(tmp_path, LABORATORY, PROCEDURE), tmp_path / "run"
     command = ("run", config, "--out", out, "--yes")
-    with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
+    with start_module(*command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
         wait_for_log(out, "set measured")
         wait_for_log(out, "done: sweep", times=8)
         run.send_signal(signal.SIGINT)
@@ -234,7 +234,7 @@ def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tm
     laboratory = world(merge(LABORATORY, {"procedure": {"order": None, "directions": None, **PROCEDURE}}))
     config = hardware(laboratory.config_path, tmp_path)
     command = ("run", config, "--out", tmp_path / "run", "--yes")
-    with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
+    with start_module(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
         goes_on = alive(run)
         wait_for(lambda: laboratory.control({"do": "heater"})["duty"] > 0, "the heater", meanwhile=goes_on)
         laboratory.control({"do": "hold"})

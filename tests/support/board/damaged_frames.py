@@ -82,7 +82,7 @@ def _sound(random: np.random.Generator, message: protocol.Message) -> bytes:
     return encode(message.name, int(random.integers(256)), values, items)
 
 
-def to_firmware(program: Path, frames: int, seed: int, sound: Path) -> Sent:
+def damage_requests(program: Path, frames: int, seed: int, sound: Path) -> Sent:
     """Damaged requests to the firmware's receiver and board. Raises AssertionError with what the sanitizers say."""
     run = subprocess.run([program, str(frames), str(seed), sound], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
@@ -132,7 +132,7 @@ def listen(stream: IO[bytes]) -> Heard:
     return Heard(names, digest.hexdigest(), reader.damaged, reader.repeated)
 
 
-def to_host(program: Path, frames: int, seed: int, sound: Path) -> tuple[Sent, Heard, Heard]:
+def damage_answers(program: Path, frames: int, seed: int, sound: Path) -> tuple[Sent, Heard, Heard]:
     """Damaged answers and samples to the host's receiver: what was sent, heard, and heard of the whole blocks alone."""
     whole = sound.with_suffix(".whole")
     command = [str(program), str(frames), str(seed), str(sound), str(whole)]

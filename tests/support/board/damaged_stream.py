@@ -112,7 +112,7 @@ def damage(random: np.random.Generator, stream: bytes, faults: int) -> tuple[byt
     return b"".join([*pieces, stream[end:]]), spans
 
 
-def _touched(wires: list[bytes], spans: list[tuple[int, int]]) -> set[int]:
+def _find_touched(wires: list[bytes], spans: list[tuple[int, int]]) -> set[int]:
     """Numbers of the frames of which a span has a byte, or the delimiter before them."""
     begins = np.concatenate(([0], np.cumsum([len(wire) for wire in wires])))
     touched: set[int] = set()
@@ -129,7 +129,7 @@ def carry(seed: int, count: int, faults: int) -> Outcome:
     sent = transmission(random, count)
     stream = b"".join(sent.wires)
     arrived, spans = damage(random, stream, faults)
-    touched = _touched(sent.wires, spans)
+    touched = _find_touched(sent.wires, spans)
     untouched = set(range(count)) - touched
     number_of = {wire: number for number, wire in enumerate(sent.wires)}
     blocks = [block + b"\0" for block in arrived.split(b"\0")[:-1] if block]

@@ -49,7 +49,7 @@ TRUTH = GyroTruth((1.1771, 1.1554, 1.1440), (0.0077, -0.0100, -0.0051))
 ACCELERATION = AccelerometerTruth((1.02, 0.99, 1.01), (0.2, -0.1, 0.3))
 
 
-def shipped_flash() -> FlashMemory:
+def make_shipped_flash() -> FlashMemory:
     """A chip as it comes from the programmer."""
     return FlashMemory((IMAGE / "rig_l432.bin").read_bytes())
 
@@ -81,7 +81,7 @@ class Session:
             )
             for part in parts
         }
-        self.flash = flash or shipped_flash()
+        self.flash = flash or make_shipped_flash()
         self.board = EmulatedBoard(
             flash=self.flash,
             elf=(IMAGE / "rig_l432.elf").read_bytes(),

@@ -14,7 +14,7 @@ from firmware_host.frames import Frame
 from firmware_host.hand_answers import BoardHandSolution, HandReport
 from rig.analysis.by_hand.on_board import BoardReadings, HandAgreement, compare_with_board
 from rig.estimation.arrays import Array
-from support.board.host_board import HostBoard, configured
+from support.board.host_board import HostBoard, configure
 from support.external.handled_body import Recorded
 
 RANGE_DEG_S, RANGE_G = 500.0, 4.0
@@ -58,19 +58,19 @@ class Played:
 def begun(rate_hz: float = 119.0, moves: int = 12, scale_std: float = 1e-3) -> tuple[HostBoard, dict[str, Any]]:
     """A board whose LSM9DS1 is about to be turned by hand, and its setup."""
     board = HostBoard()
-    setup = configured(board, 0, rate_hz, RANGE_DEG_S, RANGE_G)
+    setup = configure(board, 0, rate_hz, RANGE_DEG_S, RANGE_G)
     (answer,) = board.ask("by_hand", sensor=0, moves=moves, scale_std=scale_std)
     assert answer.name == "ack"
     return board, setup
 
 
-def asked(board: HostBoard, name: str) -> Frame:
+def query(board: HostBoard, name: str) -> Frame:
     """The answer to a request without fields."""
     (answer,) = (frame for frame in board.ask(name, 7) if frame.values.get("reply_to") == 7)
     return answer
 
 
-def in_counts(recorded: Recorded, setup: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def convert_to_counts(recorded: Recorded, setup: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times in microseconds, rates and accelerations as the part gives them."""
     rates, forces = (
         np.clip(np.round(values / per_count), -32768, 32767).astype(np.int16)
@@ -91,7 +91,7 @@ def give(board: HostBoard, time_us: int, number: int, rate: np.ndarray, force: n
 def play(recorded: Recorded, moves: int = 12, scale_std: float = 1e-3, number: np.ndarray | None = None) -> Played:
     """Plays a whole recording, whose readings have the numbers `number`; the host asks five times a second."""
     board, setup = begun(1 / float(np.median(np.diff(recorded.time_s))), moves, scale_std)
-    times_us, counts, forces = in_counts(recorded, setup)
+    times_us, counts, forces = convert_to_counts(recorded, setup)
     numbers = np.arange(len(times_us)) if number is None else number
     reports: list[HandReport] = []
     asked_us = 0
@@ -99,15 +99,15 @@ def play(recorded: Recorded, moves: int = 12, scale_std: float = 1e-3, number: n
         give(board, time_us, each, rate, force)
         if time_us >= asked_us + POLLED_US:
             asked_us = time_us
-            report = HandReport.decode(asked(board, "hand_status"))
+            report = HandReport.decode(query(board, "hand_status"))
             if report.judged > len(reports):
                 reports.append(report)
-    solved = BoardHandSolution.decode(asked(board, "hand_solve"))
+    solved = BoardHandSolution.decode(query(board, "hand_solve"))
     return Played(times_us, counts * setup["sensitivity_rad_s"], reports, solved)
 
 
 @contextmanager
-def served(board: HostBoard) -> Iterator[str]:
+def serve(board: HostBoard) -> Iterator[str]:
     """A board's serial line as a `socket://` port; in the `with` block nobody else may talk to it."""
     ended = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -149,7 +149,7 @@ def _answer(board: HostBoard, host: socket.socket, ended: threading.Event) -> No
         host.sendall(said)
 
 
-def pressed(board: HostBoard, begin_us: int, lasts_us: int = 60_000) -> None:
+def press(board: HostBoard, begin_us: int, lasts_us: int = 60_000) -> None:
     """The button is down for so long, while the main loop runs."""
     board.core.host_press(True)
     for time_us in range(begin_us, begin_us + lasts_us, 5_000):
@@ -166,12 +166,12 @@ def alone(*, locked: bool = True) -> HostBoard:
     return board
 
 
-def handled_alone(recorded: Recorded) -> HostBoard:
+def run_button_session(recorded: Recorded) -> HostBoard:
     """A board whose button was pressed, and which was then turned as recorded, without a computer."""
     board = alone()
-    pressed(board, 100_000)
+    press(board, 100_000)
     setup = {"sensitivity_rad_s": np.radians(0.0175), "sensitivity_m_s2": 0.244e-3 * 9.80665}
-    times_us, counts, forces = in_counts(recorded, setup)
+    times_us, counts, forces = convert_to_counts(recorded, setup)
     for number, (time_us, rate, force) in enumerate(zip(times_us.tolist(), counts, forces, strict=True)):
         give(board, 200_000 + time_us, number, rate, force)
     return board

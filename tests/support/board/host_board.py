@@ -180,7 +180,7 @@ def sample_sequences(frames: list[Frame], sensor: int = 0) -> list[int]:
     return [batch.values["sequence"] + i for batch in batches for i in range(batch.values["count"])]
 
 
-def configured(
+def configure(
     board: HostBoard, sensor: int, rate_hz: float = 200, range_deg_s: float = 125, range_g: float = 0
 ) -> dict[str, Any]:
     """Sets a sensor up. Returns what the board answers."""

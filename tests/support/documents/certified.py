@@ -111,11 +111,11 @@ def accelerometer(
         "warnings": (),
     }
     return AccelerometerEntry.model_validate(
-        _budgeted(fields, KnownSize("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
+        _add_budget(fields, KnownSize("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
     )
 
 
-def _budgeted(fields: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
+def _add_budget(fields: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
     """Add a budget of noise and of the reference's uncertainty."""
     noise = np.linalg.cholesky(np.array(fields["covariance"]))
     exact = AttitudeError(0.0, 0.0)
@@ -133,7 +133,7 @@ def _budgeted(fields: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
     return {**fields, "covariance_combined": budget.covariance.tolist(), "budget": budget_entry(budget)}
 
 
-def with_accelerometer(found: AccelerometerEntry | None = None) -> ResultDocument:
+def add_accelerometer(found: AccelerometerEntry | None = None) -> ResultDocument:
     """Return the result with an accelerometer."""
     return result().model_copy(update={"accelerometers": {"gyro": found or accelerometer()}})
 
@@ -184,7 +184,7 @@ def magnetometer() -> MagnetometerEntry:
         "warnings": (),
     }
     return MagnetometerEntry.model_validate(
-        _budgeted(fields, KnownSize("size of the field", 0.01, False, 48.0, "µT", "not given"))
+        _add_budget(fields, KnownSize("size of the field", 0.01, False, 48.0, "µT", "not given"))
     )
 
 
@@ -286,7 +286,7 @@ def over_temperature() -> OverTemperatureEntry:
 def everything() -> ResultDocument:
     """A gyroscope that felt gravity and found the Earth's rate, an accelerometer of second order, a magnetometer, and
     biases by repeat: more than one run finds."""
-    document = with_accelerometer(
+    document = add_accelerometer(
         accelerometer().model_copy(
             update={"second_order_s2_m": (9.72e-6, -9.478e-5, 0.0), "second_order_std_s2_m": (4.6e-6,) * 3}
         )
@@ -322,7 +322,7 @@ def everything() -> ResultDocument:
     )
 
 
-def compared(document: ResultDocument) -> ResultDocument:
+def add_comparison(document: ResultDocument) -> ResultDocument:
     """Return the result with a comparison of the controller's clock with the computer's."""
     assert document.clock is not None
     clock = document.clock.model_copy(
@@ -388,10 +388,10 @@ def read(found: Certificate) -> Page:
     return page
 
 
-def planted(value: Any, text: str, kept: Collection[str]) -> Any:
+def plant(value: Any, text: str, kept: Collection[str]) -> Any:
     """Return a document in which every text that others could have written is `text`."""
     if isinstance(value, dict):
-        return {key: each if key in kept else planted(each, text, kept) for key, each in value.items()}
+        return {key: each if key in kept else plant(each, text, kept) for key, each in value.items()}
     if isinstance(value, list | tuple):
-        return [planted(each, text, kept) for each in value]
+        return [plant(each, text, kept) for each in value]
     return text if isinstance(value, str) else value

@@ -6,7 +6,7 @@ from support.paths import RECORDINGS
 ONE = read_result(RECORDINGS / "verified")
 
 
-def of_three_parts() -> ResultDocument:
+def make_three_parts() -> ResultDocument:
     """Three gyroscopes and three accelerometers, with every check of each."""
     one = read_result(RECORDINGS / "imu")
     names = ("lsm9ds1", "mpu9250", "adis16465")
@@ -27,7 +27,7 @@ def of_three_parts() -> ResultDocument:
     )
 
 
-def failed(result: ResultDocument, *names: str) -> ResultDocument:
+def fail_checks(result: ResultDocument, *names: str) -> ResultDocument:
     """The result with checks of these names far beyond their limits."""
     checks = [
         check.model_copy(update={"passed": False, "value": 3 * (check.limit or 1)}) if check.name in names else check

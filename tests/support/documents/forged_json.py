@@ -8,7 +8,7 @@ from typing import Any
 Forgery = Callable[[bytes], bytes]
 
 
-def replaced(old: str, new: str) -> Forgery:
+def replace(old: str, new: str) -> Forgery:
     def forge(content: bytes) -> bytes:
         forged = re.sub(old.encode(), new.encode(), content, count=1)
         assert forged != content, old
@@ -30,36 +30,36 @@ def written(found: Any, **form: Any) -> bytes:
     return (json.dumps(found, **{"indent": 2, "ensure_ascii": False, **form}) + "\n").encode()
 
 
-def reordered(found: dict[str, Any]) -> None:
+def reorder(found: dict[str, Any]) -> None:
     found["provenance"] = found.pop("provenance")
 
 
-def in_provenance(key: str, value: str) -> Forgery:
+def change_provenance(key: str, value: str) -> Forgery:
     return document(lambda found: found["provenance"].update({key: value}))
 
 
 FORGED_JSON: dict[str, Forgery] = {
-    "the verdict": replaced(r'"verdict": "pass"', '"verdict": "fail"'),
-    "the serial number": replaced(r'"serial_number": "', r'"serial_number": "X'),
-    "a scale factor": replaced(r'("scale": \[\s*)\d', r"\g<1>7"),
-    "a check": replaced(r'"passed": true', '"passed": false'),
-    "when it was solved": in_provenance("solved_utc", "2020-01-01T00:00:00Z"),
-    "when it was measured": in_provenance("started_utc", "2020-01-01T00:00:00Z"),
+    "the verdict": replace(r'"verdict": "pass"', '"verdict": "fail"'),
+    "the serial number": replace(r'"serial_number": "', r'"serial_number": "X'),
+    "a scale factor": replace(r'("scale": \[\s*)\d', r"\g<1>7"),
+    "a check": replace(r'"passed": true', '"passed": false'),
+    "when it was solved": change_provenance("solved_utc", "2020-01-01T00:00:00Z"),
+    "when it was measured": change_provenance("started_utc", "2020-01-01T00:00:00Z"),
     "a key more": document(lambda found: found.update(note="k = 1 1 1")),
-    "a key of its parts more": in_provenance("accredited_by", "PTB"),
-    "the order of its keys": document(reordered),
-    "a key twice, the forged one first": replaced(r'"verdict": "pass"', r'"verdict": "fail", "verdict": "pass"'),
-    "a key twice, the forged one last": replaced(r'"verdict": "pass"', r'"verdict": "pass", "verdict": "fail"'),
-    "a key twice, in its parts": replaced(r'"provenance": {', r'"provenance": {"started_utc": "2020-01-01T00:00:00Z",'),
-    "a part twice": replaced(r'"provenance": {', r'"provenance": {}, "provenance": {'),
-    "the same key in another spelling": replaced(r'"verdict": "pass"', r'"verdi\\u0063t": "fail", "verdict": "pass"'),
+    "a key of its parts more": change_provenance("accredited_by", "PTB"),
+    "the order of its keys": document(reorder),
+    "a key twice, the forged one first": replace(r'"verdict": "pass"', r'"verdict": "fail", "verdict": "pass"'),
+    "a key twice, the forged one last": replace(r'"verdict": "pass"', r'"verdict": "pass", "verdict": "fail"'),
+    "a key twice, in its parts": replace(r'"provenance": {', r'"provenance": {"started_utc": "2020-01-01T00:00:00Z",'),
+    "a part twice": replace(r'"provenance": {', r'"provenance": {}, "provenance": {'),
+    "the same key in another spelling": replace(r'"verdict": "pass"', r'"verdi\\u0063t": "fail", "verdict": "pass"'),
     "another document behind": lambda content: content + b'{"verdict": "pass"}\n',
     "a text behind": lambda content: content + b"// k = 1 1 1\n",
-    "a comment": replaced(r"{", r"{ /* k = 1 1 1 */"),
+    "a comment": replace(r"{", r"{ /* k = 1 1 1 */"),
     "a zero byte behind": lambda content: content + b"\0",
     "a mark of the byte order": lambda content: b"\xef\xbb\xbf" + content,
     "UTF-16": lambda content: content.decode().encode("utf-16"),
-    "no number": replaced(r'("scale": \[\s*)[\d.]+', r"\g<1>NaN"),
+    "no number": replace(r'("scale": \[\s*)[\d.]+', r"\g<1>NaN"),
     "everything": lambda content: b"{}",
     "nothing": lambda content: b"",
 }
@@ -68,5 +68,5 @@ IN_OTHER_BYTES: dict[str, Forgery] = {
     "a line at its end": lambda content: content + b"\n",
     "no blanks": lambda content: written(json.loads(content), indent=None),
     "the ends of its lines": lambda content: content.replace(b"\n", b"\r\n"),
-    "a letter as a code": replaced(r'"pass"', r'"p\\u0061ss"'),
+    "a letter as a code": replace(r'"pass"', r'"p\\u0061ss"'),
 }

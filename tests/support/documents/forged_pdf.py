@@ -20,23 +20,23 @@ from pyhanko.sign.signers import PdfSignatureMetadata, sign_pdf
 
 from support.documents.forging_cms import (
     Forgery,
+    add_unsigned,
     certificate_added,
     certificate_altered,
-    contained,
+    change_container,
+    change_stamp,
     digests_more,
-    in_stamp,
     lists_added,
     parameters_more,
-    said_unsigned,
     server_altered,
     signer_doubled,
+    stamp_by_stranger,
     stamp_doubled,
-    stamped_by_a_stranger,
 )
 from support.documents.signing import holder, signing_as
 
 
-def replaced(old: bytes, new: bytes) -> Forgery:
+def replace(old: bytes, new: bytes) -> Forgery:
     def forge(content: bytes) -> bytes:
         assert old in content
         return content.replace(old, new, 1)
@@ -44,7 +44,7 @@ def replaced(old: bytes, new: bytes) -> Forgery:
     return forge
 
 
-def flipped(pattern: bytes, further: int) -> Forgery:
+def flip(pattern: bytes, further: int) -> Forgery:
     """Flip one bit, `further` bytes behind the first `pattern`."""
 
     def forge(content: bytes) -> bytes:
@@ -71,11 +71,11 @@ def padding_changed(content: bytes) -> bytes:
     return hex_changed(content, content.index(b">", content.index(b"/Contents <")) - 2)
 
 
-def without_signature(content: bytes) -> bytes:
+def remove_signature(content: bytes) -> bytes:
     return content[: content.index(b"%%EOF") + 6]
 
 
-def updated(change: Callable[[IncrementalPdfFileWriter], object]) -> Forgery:
+def update(change: Callable[[IncrementalPdfFileWriter], object]) -> Forgery:
     """Make an incremental update, as an editor does."""
 
     def forge(content: bytes) -> bytes:
@@ -141,21 +141,21 @@ def signature_object(change: Callable[[Any], object]) -> Callable[[IncrementalPd
     return update
 
 
-def uncertified(writer: IncrementalPdfFileWriter) -> None:
+def remove_certification(writer: IncrementalPdfFileWriter) -> None:
     """Replace a page, and remove the rule that forbids it."""
     other_page(writer)
     del writer.root["/Perms"]
 
 
-def signed_again(content: bytes) -> bytes:
+def sign_again(content: bytes) -> bytes:
     """Sign a changed page a second time, by a stranger."""
     by = signing_as(holder("Laboratory", holder("Authority")))
     about = PdfSignatureMetadata(field_name="Other", md_algorithm="sha256")
-    writer = IncrementalPdfFileWriter(io.BytesIO(updated(uncertified)(content)))
+    writer = IncrementalPdfFileWriter(io.BytesIO(update(remove_certification)(content)))
     return bytes(sign_pdf(writer, about, by.signer).getbuffer())
 
 
-def ranged(change: Callable[[list[int], int], Sequence[int]]) -> Forgery:
+def change_range(change: Callable[[list[int], int], Sequence[int]]) -> Forgery:
     """Change the signed byte range."""
 
     def forge(content: bytes) -> bytes:
@@ -168,15 +168,15 @@ def ranged(change: Callable[[list[int], int], Sequence[int]]) -> Forgery:
     return forge
 
 
-def moved_end(content: bytes) -> bytes:
+def move_end(content: bytes) -> bytes:
     """Move the signed end back and insert content (signature wrapping)."""
     inserted = b"\n9 0 obj\n(k = 1 1 1)\nendobj\n"
-    forged = ranged(lambda numbers, _: [*numbers[:2], numbers[2] + len(inserted), numbers[3]])(content)
+    forged = change_range(lambda numbers, _: [*numbers[:2], numbers[2] + len(inserted), numbers[3]])(content)
     offset = content.index(b">", content.index(b"/Contents <")) + 1
     return forged[:offset] + inserted + forged[offset:]
 
 
-def mixed_case(content: bytes) -> bytes:
+def mix_case(content: bytes) -> bytes:
     offset = content.index(b"/Contents <") + 11
     return content[:offset] + content[offset : offset + 40].swapcase() + content[offset + 40 :]
 
@@ -185,7 +185,7 @@ def _none(node: Any, key: str) -> None:
     node[pdf_name(key)] = NullObject()
 
 
-def _removed(node: Any, key: str) -> None:
+def _remove(node: Any, key: str) -> None:
     del node[key]
 
 
@@ -199,53 +199,53 @@ def _form(writer: IncrementalPdfFileWriter) -> None:
 
 FORGED_PDF: dict[str, Forgery] = {
     # Bytes that are signed.
-    "a byte of a page": flipped(b"stream\n", 40),
-    "a byte of an attachment": flipped(b"/EmbeddedFile", 120),
-    "the version": replaced(b"%PDF-1.7", b"%PDF-1.6"),
-    "the reason": replaced(b"(Simulated", b"(Different"),
-    "the day": replaced(rb"/M (D\07220", rb"/M (D\07219"),
-    "which files are attached": replaced(b"/EmbeddedFiles", b"/EmbeddedFilez"),
+    "a byte of a page": flip(b"stream\n", 40),
+    "a byte of an attachment": flip(b"/EmbeddedFile", 120),
+    "the version": replace(b"%PDF-1.7", b"%PDF-1.6"),
+    "the reason": replace(b"(Simulated", b"(Different"),
+    "the day": replace(rb"/M (D\07220", rb"/M (D\07219"),
+    "which files are attached": replace(b"/EmbeddedFiles", b"/EmbeddedFilez"),
     # What is signed of it.
-    "a range that begins later": ranged(lambda numbers, _: [1, *numbers[1:]]),
-    "a range that ends earlier": ranged(lambda numbers, _: [*numbers[:3], numbers[3] - 10]),
-    "a range with a wider gap": ranged(lambda numbers, _: [numbers[0], numbers[1] - 10, *numbers[2:]]),
-    "a range of six": ranged(lambda numbers, _: [0, 9, 9, numbers[1] - 9, *numbers[2:]]),
-    "an end moved back": moved_end,
-    "letters of the signature": mixed_case,
+    "a range that begins later": change_range(lambda numbers, _: [1, *numbers[1:]]),
+    "a range that ends earlier": change_range(lambda numbers, _: [*numbers[:3], numbers[3] - 10]),
+    "a range with a wider gap": change_range(lambda numbers, _: [numbers[0], numbers[1] - 10, *numbers[2:]]),
+    "a range of six": change_range(lambda numbers, _: [0, 9, 9, numbers[1] - 9, *numbers[2:]]),
+    "an end moved back": move_end,
+    "letters of the signature": mix_case,
     "its signature": signature_changed,
     "what follows its signature": padding_changed,
     # What comes before or after.
     "bytes at its end": lambda content: content + b"\n% better\n",
     "its end": lambda content: content[:-40],
-    "an update by an editor": updated(_language),
-    "a page replaced by an update": updated(other_page),
-    "a page removed by an update": updated(no_page),
-    "a note over a page": updated(note),
-    "an attachment replaced by an update": updated(other_attachment),
-    "a script that runs at once": updated(script),
-    "a signature without contents": updated(signature_object(lambda found: _removed(found, "/Contents"))),
-    "a signature with no contents": updated(signature_object(lambda found: _none(found, "/Contents"))),
-    "a signature without a range": updated(signature_object(lambda found: _removed(found, "/ByteRange"))),
-    "a signature with no range": updated(signature_object(lambda found: _none(found, "/ByteRange"))),
-    "a second signature over another page": signed_again,
+    "an update by an editor": update(_language),
+    "a page replaced by an update": update(other_page),
+    "a page removed by an update": update(no_page),
+    "a note over a page": update(note),
+    "an attachment replaced by an update": update(other_attachment),
+    "a script that runs at once": update(script),
+    "a signature without contents": update(signature_object(lambda found: _remove(found, "/Contents"))),
+    "a signature with no contents": update(signature_object(lambda found: _none(found, "/Contents"))),
+    "a signature without a range": update(signature_object(lambda found: _remove(found, "/ByteRange"))),
+    "a signature with no range": update(signature_object(lambda found: _none(found, "/ByteRange"))),
+    "a second signature over another page": sign_again,
     # What the signature's container holds.
     "another certificate beside": certificate_added(lambda: holder("PTB")),
-    "another certificate of the time server": contained(in_stamp(server_altered)),
-    "lists of somebody": contained(lists_added),
-    "a time that is not signed": contained(said_unsigned),
-    "two time stamps": contained(stamp_doubled),
-    "two signers": contained(signer_doubled),
-    "another digest beside": contained(digests_more),
-    "a text in the method": contained(parameters_more),
-    "a text in the time stamp": contained(in_stamp(said_unsigned)),
-    "lists in the time stamp": contained(in_stamp(lists_added)),
+    "another certificate of the time server": change_container(change_stamp(server_altered)),
+    "lists of somebody": change_container(lists_added),
+    "a time that is not signed": change_container(add_unsigned),
+    "two time stamps": change_container(stamp_doubled),
+    "two signers": change_container(signer_doubled),
+    "another digest beside": change_container(digests_more),
+    "a text in the method": change_container(parameters_more),
+    "a text in the time stamp": change_container(change_stamp(add_unsigned)),
+    "lists in the time stamp": change_container(change_stamp(lists_added)),
 }
 # By whom it is: nothing is altered that is signed.
 UNTRUSTED_PDF: dict[str, tuple[Forgery, str]] = {
-    "all but the signature": (without_signature, "not_signed"),
-    "another document at its end": (lambda content: content + without_signature(content), "not_signed"),
-    "no field for a signature": (updated(_form), "not_signed"),
+    "all but the signature": (remove_signature, "not_signed"),
+    "another document at its end": (lambda content: content + remove_signature(content), "not_signed"),
+    "no field for a signature": (update(_form), "not_signed"),
     "something before it": (lambda content: b"% better\n" + content, "not_signed"),
-    "a certificate of the authority altered": (contained(certificate_altered), "signer_not_trusted"),
-    "a time stamp by a stranger": (contained(stamped_by_a_stranger), "signer_not_trusted"),
+    "a certificate of the authority altered": (change_container(certificate_altered), "signer_not_trusted"),
+    "a time stamp by a stranger": (change_container(stamp_by_stranger), "signer_not_trusted"),
 }

@@ -13,7 +13,7 @@ from support.documents.signing import Holder, holder, revocation_list
 Forgery = Callable[[bytes], bytes]
 
 
-def contained(change: Callable[[Any, Any], object]) -> Forgery:
+def change_container(change: Callable[[Any, Any], object]) -> Forgery:
     """Replace the signature's container: `change` gets its content and its one SignerInfo."""
 
     def forge(content: bytes) -> bytes:
@@ -37,7 +37,7 @@ def certificate_added(make_holder: Callable[[], Holder]) -> Forgery:
             cms.CertificateChoices("certificate", asn1.Certificate.load(der)),
         ]
 
-    return contained(change)
+    return change_container(change)
 
 
 def certificate_altered(signed: Any, _: Any) -> None:
@@ -69,12 +69,12 @@ def lists_added(signed: Any, _: Any) -> None:
     signed["crls"] = [cms.RevocationInfoChoice("crl", crl.CertificateList.load(der))]
 
 
-def said_unsigned(_: Any, info: Any) -> None:
+def add_unsigned(_: Any, info: Any) -> None:
     signing_time = cms.CMSAttribute({"type": "signing_time", "values": [cms.Time("utc_time", "200101000000Z")]})
     info["unsigned_attrs"] = [*(info["unsigned_attrs"] or ()), signing_time]
 
 
-def stamped_by_a_stranger(signed: Any, info: Any) -> None:
+def stamp_by_stranger(signed: Any, info: Any) -> None:
     """Replace the time stamp by one of another time server."""
     import asyncio
     from hashlib import sha256
@@ -104,7 +104,7 @@ def stamp_doubled(_: Any, info: Any) -> None:
     info["unsigned_attrs"] = [cms.CMSAttribute({"type": "signature_time_stamp_token", "values": twice})]
 
 
-def in_stamp(change: Callable[[Any, Any], object]) -> Callable[[Any, Any], None]:
+def change_stamp(change: Callable[[Any, Any], object]) -> Callable[[Any, Any], None]:
     def altered(_: Any, info: Any) -> None:
         content = info["unsigned_attrs"][0]["values"][0]["content"]
         change(content, content["signer_infos"][0])

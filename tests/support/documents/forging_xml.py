@@ -20,7 +20,7 @@ def written(root: Any) -> bytes:
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8"))
 
 
-def replaced(old: bytes, new: bytes) -> Forgery:
+def replace(old: bytes, new: bytes) -> Forgery:
     def forge(content: bytes) -> bytes:
         assert old in content
         return content.replace(old, new, 1)
@@ -45,7 +45,7 @@ def signature(change: Callable[[Any], object]) -> Forgery:
     return element(f"{DS}Signature", change)
 
 
-def signed_info(change: Callable[[Any], object]) -> Forgery:
+def change_signed_info(change: Callable[[Any], object]) -> Forgery:
     return element(f".//{DS}SignedInfo", change)
 
 
@@ -74,7 +74,7 @@ def within(tag: str, inside: str | Any | None = None, **attributes: str) -> Call
     return change
 
 
-def removed(node: Any) -> None:
+def remove(node: Any) -> None:
     node.getparent().remove(node)
 
 
@@ -90,7 +90,7 @@ def better_results(root: Any) -> Any:
     return results
 
 
-def of_another(node: Any) -> None:
+def use_another(node: Any) -> None:
     stranger = holder("Laboratory", holder("Authority")).certificates().decode()
     node.text = stranger.split("-----")[2]
 
@@ -119,7 +119,7 @@ def properties_elsewhere(node: Any) -> None:
     etree.SubElement(node, f"{DS}Object").append(signed)
 
 
-def wrapped(content: bytes) -> bytes:
+def wrap_content(content: bytes) -> bytes:
     """Move the signed content aside under another name, and replace it (signature wrapping)."""
     root = etree.fromstring(content)
     node = root.find(f"{DS}Signature")
@@ -133,7 +133,7 @@ def wrapped(content: bytes) -> bytes:
     return written(root)
 
 
-def wrapped_around(content: bytes) -> bytes:
+def wrap_document(content: bytes) -> bytes:
     """Wrap the signed document, with its signature, in a certificate with other content."""
     signed = etree.fromstring(content)
     outer = copy.deepcopy(signed)
@@ -166,7 +166,7 @@ def inside_itself(node: Any) -> None:
     within(f"{DS}Object", copy.deepcopy(node))(node)
 
 
-def redigested(algorithm: str, digest: Callable[[bytes], Any]) -> Forgery:
+def compute_digest_anew(algorithm: str, digest: Callable[[bytes], Any]) -> Forgery:
     """Change the value, and compute its digest again with this algorithm."""
 
     def forge(content: bytes) -> bytes:
@@ -183,7 +183,7 @@ def redigested(algorithm: str, digest: Callable[[bytes], Any]) -> Forgery:
     return forge
 
 
-def keyed_by_what_is_public(node: Any) -> None:
+def sign_by_public_key(node: Any) -> None:
     """Replace the signature by a message authentication code whose "secret" is the public certificate."""
     import hmac
 
@@ -195,26 +195,26 @@ def keyed_by_what_is_public(node: Any) -> None:
     node.find(f"{DS}SignatureValue").text = b64encode(code).decode()
 
 
-def padded(node: Any) -> None:
+def pad(node: Any) -> None:
     node.text = node.text[:20] + "\n!" + node.text[20:]
 
 
-def typed(declarations: str, outside: str = "") -> Forgery:
+def insert_document_type(declarations: str, outside: str = "") -> Forgery:
     """Insert a document type before the root."""
     document_type = f"<!DOCTYPE x {outside}[{declarations}]>"
     return lambda content: content.replace(b"?>", f"?>{document_type}".encode(), 1)
 
 
-def by_entity(content: bytes) -> bytes:
+def use_entity(content: bytes) -> bytes:
     forged = re.sub(rb"(<si:valueXMLList>)\d", rb"\1&e;", content, count=1)
-    return typed('<!ENTITY e "9">')(forged)
+    return insert_document_type('<!ENTITY e "9">')(forged)
 
 
 def before_root(added: bytes) -> Forgery:
     return lambda content: content.replace(b"?>", b"?>" + added, 1)
 
 
-def declared(declaration: str, encoding: str) -> Forgery:
+def declare(declaration: str, encoding: str) -> Forgery:
     """Return the text with another declaration and encoding."""
 
     def forge(content: bytes) -> bytes:
@@ -224,7 +224,7 @@ def declared(declaration: str, encoding: str) -> Forgery:
     return forge
 
 
-def swapped_names(content: bytes) -> bytes:
+def swap_prefixes(content: bytes) -> bytes:
     """Exchange the namespaces of two prefixes."""
     one, two = b'xmlns:dcc="https://ptb.de/dcc"', b'xmlns:si="https://ptb.de/si"'
     assert one in content and two in content
@@ -232,5 +232,5 @@ def swapped_names(content: bytes) -> bytes:
     return swapped.replace(two, b'xmlns:si="https://ptb.de/dcc"', 1)
 
 
-def on_start_tag(tag: bytes, added: bytes) -> Forgery:
+def change_start_tag(tag: bytes, added: bytes) -> Forgery:
     return lambda content: re.sub(rb"<" + tag + rb"(?=[ >])", rb"<" + tag + b" " + added, content, count=1)

@@ -61,7 +61,7 @@ def names_of(said: str) -> list[str]:
 
 
 @contextmanager
-def signed_laboratory(base: Path) -> Iterator[Laboratory]:
+def make_signed_laboratory(base: Path) -> Iterator[Laboratory]:
     """A laboratory in the folder `base`; while it is there, the passphrase of its keys is in the environment."""
     folder, history = base / "run", base / "history.sqlite"
     folder.mkdir()

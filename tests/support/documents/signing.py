@@ -57,10 +57,10 @@ class Holder:
 
 def holder(name: str, above: Holder | None = None, *, days: tuple[int, int] = (-1, 30)) -> Holder:
     """Return a holder whose certificate is valid for these days from now, issued by `above` or by itself."""
-    return issued(name, ec.generate_private_key(ec.SECP256R1()), above, days=days)
+    return issue(name, ec.generate_private_key(ec.SECP256R1()), above, days=days)
 
 
-def issued(
+def issue(
     name: str,
     key: Key,
     above: Holder | None = None,
@@ -93,7 +93,7 @@ def issued(
 def stamping(name: str, above: Holder) -> Holder:
     """Return a time server's key with a certificate of that authority."""
     purposes = [ExtendedKeyUsageOID.TIME_STAMPING]
-    return issued(name, rsa.generate_private_key(65537, 2048), above, purposes=purposes)
+    return issue(name, rsa.generate_private_key(65537, 2048), above, purposes=purposes)
 
 
 def signing_as(by: Holder) -> Signatory:

@@ -115,12 +115,12 @@ def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
     return made
 
 
-def _found(document: ResultDocument) -> Iterator[Finding[InclinometerEntry]]:
+def _find(document: ResultDocument) -> Iterator[Finding[InclinometerEntry]]:
     for name, entry in document.others.get(KEY, {}).items():
         yield Finding(name, INCLINATION, InclinometerEntry.model_validate(entry))
 
 
-def _printed(found: Finding[InclinometerEntry]) -> Iterator[Table | str]:
+def _print(found: Finding[InclinometerEntry]) -> Iterator[Table | str]:
     yield from tables(f"{found.sensor}: inclinometer, m = φ / k + b", INCLINATION, found.entry)
 
 
@@ -128,14 +128,14 @@ def _shown(found: Finding[InclinometerEntry]) -> DisplayRow:
     return replace(shown_of(found), combined=found.entry.covariance_combined is not None)
 
 
-def _followed(found: Finding[InclinometerEntry], document: ResultDocument) -> HistoryRecord:
+def _record(found: Finding[InclinometerEntry], document: ResultDocument) -> HistoryRecord:
     entry = found.entry
     rows = list(scale_and_bias(found.sensor, INCLINATION, entry, entry.bias_rad, document))
     of = entry.part, entry.serial_number, 0.0, entry.estimator, None
     return HistoryRecord(found.sensor, INCLINATION.name, *of, select_uncertain(rows))
 
 
-def _unexplained(found: Finding[InclinometerEntry]) -> Unexplained:
+def _find_residuals(found: Finding[InclinometerEntry]) -> Unexplained:
     left = np.array(found.entry.residuals_rad)
     labels = [f"attitude {number}" for number in range(1, len(left) + 1)]
     return Unexplained(INCLINATION, labels, left, np.full(left.shape, TABLE_STD_RAD), "the table's attitudes")
@@ -146,7 +146,7 @@ def _header(found: Finding[InclinometerEntry], _: Mapping[str, Array]) -> Iterat
     yield f"static const float {found.sensor}_inclination_scale[2] = {{{x}f, {y}f}};"
 
 
-def _measured(found: Finding[InclinometerEntry], _: Any) -> CertifiedItem:
+def _certify(found: Finding[InclinometerEntry], _: Any) -> CertifiedItem:
     entry, spread = found.entry, [found.entry.covariance[i][i] ** 0.5 for i in range(2)]
     listed = real_list("xy", entry.scale, [r"\one"], expanded=expanded(spread, None))
     result: Element = dcc("result", text("name", "scale factor"), dcc("data", listed))
@@ -158,16 +158,16 @@ RESULT = ResultKind(
     name="inclinometer",
     key=KEY,
     entries=_entries,
-    find=_found,
-    printed=_printed,
+    find=_find,
+    printed=_print,
     shown=_shown,
-    followed=_followed,
+    followed=_record,
     header=_header,
     figures=NoOutlet("two lines are told by their residuals, which are in the result"),
     block="inclinometer.html.j2:inclinometer",
     templates=Path(__file__).parent,
-    measured=_measured,
-    unexplained=_unexplained,
+    measured=_certify,
+    unexplained=_find_residuals,
     corrected=NoOutlet("no autopilot and no library that takes exports knows two lines"),
     standard=Standard(
         size="The rise of its axes above the horizontal",

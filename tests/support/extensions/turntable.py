@@ -183,7 +183,7 @@ class OneAxisSection(ProcedureSection):
     speed_deg_s: float = Field(default=60.0, gt=0)
 
 
-def planned(
+def plan(
     table: TurntableSection, procedure: OneAxisSection, start_q_rad: Joints | None = None, done: Collection[int] = ()
 ) -> Plan:
     """A turn either way with a rest before each."""
@@ -204,7 +204,7 @@ def planned(
     return Plan((*steps, home), start_q_rad or (0.0,), (0.0,))
 
 
-def carried_out(rig: Verbs) -> None:
+def carry_out(rig: Verbs) -> None:
     """What the plan says, step by step."""
     for step in rig.plan.steps:
         match step:
@@ -216,7 +216,7 @@ def carried_out(rig: Verbs) -> None:
                 rig.move(step)
 
 
-def analysed(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
+def analyse(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
     """Whether the gyroscope reads the table's speed along z to a tenth."""
     recordings = observe_runs(runs)
     turns = [turn for recording in recordings for turn in recording.sensors["gyro"].revolutions]
@@ -227,5 +227,5 @@ def analysed(runs: Sequence[RunData], before: Outcome | None, estimator: str) ->
 
 
 PROCEDURE = Procedure(
-    name="one_axis", section=OneAxisSection, plan=planned, script=carried_out, analyse=analysed, turner=TurntableSection
+    name="one_axis", section=OneAxisSection, plan=plan, script=carry_out, analyse=analyse, turner=TurntableSection
 )

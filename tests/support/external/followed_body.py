@@ -70,7 +70,7 @@ def follow(world: World, seed: int) -> Followed:
     walk = np.cumsum(rng.normal(size=felt.shape), axis=0) * world.bias_walk_rad_s_sqrt_s / np.sqrt(world.rate_hz)
     noise = rng.normal(size=felt.shape) * world.random_walk_rad_sqrt_s * np.sqrt(world.rate_hz)
     told, told_rates, moving = _stopping(swings, world, looks_s + world.late_s)
-    missed = _coloured(world, len(looks_s), rng) * np.where(moving, 1.0, AT_REST)[:, None]
+    missed = _draw_coloured(world, len(looks_s), rng) * np.where(moving, 1.0, AT_REST)[:, None]
     errors = Rotation.from_rotvec(missed).as_matrix()
     return Followed(time_s, felt + walk - walk.mean(axis=0) + noise, looks_s, errors @ told, told_rates, matrix, bias)
 
@@ -106,7 +106,7 @@ def _stopping(swings: _Swings, world: World, time_s: Array) -> tuple[Array, Arra
     return attitudes, rates * moving[:, None], moving
 
 
-def _coloured(world: World, count: int, rng: np.random.Generator) -> Array:
+def _draw_coloured(world: World, count: int, rng: np.random.Generator) -> Array:
     """Return correlated errors (count, 3) in rad."""
     if world.colour_s == 0:
         return world.attitude_rad * rng.normal(size=(count, 3))

@@ -18,7 +18,7 @@ from typing import Any
 
 import lz4.frame
 
-from support.external.packed import packed_zeros, zstd
+from support.external.packed import pack_zeros, zstd
 
 IMU, POSE = "sensor_msgs/msg/Imu", "geometry_msgs/msg/PoseStamped"
 MAGIC = b"\x89MCAP0\r\n"
@@ -74,7 +74,7 @@ def mcap(*records: bytes, summary: bytes = b"", ends: bytes | None = None, **sai
     return make
 
 
-def indexed(*chunks: bytes) -> Makes:
+def make_indexed(*chunks: bytes) -> Makes:
     """Make a file of these chunks with an index, all for the same time."""
     said = schema() + channel("/imu")
     head, index = len(MAGIC + record(1, text("ros2") + text("nobody"))) + len(said), b""
@@ -136,12 +136,12 @@ def db3(*statements: str, data: bytes | None = None, packed: str = "", **said: A
     return make
 
 
-def packed_db3(folder: Path) -> Path:
-    (folder / "bag_0.db3.zstd").write_bytes(packed_zeros(2 * GIGABYTE))
+def pack_db3(folder: Path) -> Path:
+    (folder / "bag_0.db3.zstd").write_bytes(pack_zeros(2 * GIGABYTE))
     return metadata(folder, "sqlite3", "bag_0.db3.zstd", packed="FILE")
 
 
-def beside_db3(lay: Callable[[Path], object], name: str = "bag_1.db3") -> Makes:
+def add_to_db3(lay: Callable[[Path], object], name: str = "bag_1.db3") -> Makes:
     """Make a bag of two files, the second of which is not a regular file."""
 
     def make(folder: Path) -> Path:
@@ -152,7 +152,7 @@ def beside_db3(lay: Callable[[Path], object], name: str = "bag_1.db3") -> Makes:
     return make
 
 
-def with_metadata(lay: Callable[[Path], object]) -> Makes:
+def replace_metadata(lay: Callable[[Path], object]) -> Makes:
     def make(folder: Path) -> Path:
         database(folder)
         lay(folder / "metadata.yaml")
@@ -238,7 +238,7 @@ def table(content: bytes, name: str = "log.csv") -> Makes:
     return alone(name, lambda path: path.write_bytes(content))
 
 
-def gzipped(start: bytes, repeated: bytes, size: int) -> Makes:
+def gzip_repetitions(start: bytes, repeated: bytes, size: int) -> Makes:
     """Make a table of `size` bytes that consists of repetitions."""
 
     def lay(path: Path) -> None:
@@ -251,7 +251,7 @@ def gzipped(start: bytes, repeated: bytes, size: int) -> Makes:
     return alone("log.csv.gz", lay)
 
 
-def asked(make: Callable[[], Makes]) -> Makes:
+def make_on_demand(make: Callable[[], Makes]) -> Makes:
     """Create on demand a file that takes long to compress."""
 
     def made(folder: Path) -> Path:
@@ -291,45 +291,49 @@ def packed_matrix(size: int) -> bytes:
 
 FILES: dict[str, Makes] = {
     # bags
-    "a packed file of 2 GB of zeros": packed_db3,
-    "a chunk of 2 GB": asked(lambda: mcap(schema(), channel("/imu"), chunk(packed_zeros(2 * GIGABYTE), 2 * GIGABYTE))),
-    "a chunk of 2 GB by lz4": asked(lambda: mcap(
+    "a packed file of 2 GB of zeros": pack_db3,
+    "a chunk of 2 GB": make_on_demand(lambda: mcap(
+        schema(), channel("/imu"), chunk(pack_zeros(2 * GIGABYTE), 2 * GIGABYTE)
+    )),
+    "a chunk of 2 GB by lz4": make_on_demand(lambda: mcap(
         schema(), channel("/imu"), chunk(lz4.frame.compress(bytes(GIGABYTE // 4)), GIGABYTE // 4, "lz4")
     )),
     "a chunk that is another size": mcap(schema(), channel("/imu"), chunk(zstd(b"\0" * 9), 1 << 62)),
-    "a thousand chunks of 8 MB at once": asked(lambda: indexed(*[chunk(packed_zeros(8 << 20), 8 << 20)] * 1000)),
+    "a thousand chunks of 8 MB at once": make_on_demand(lambda: make_indexed(
+        *[chunk(pack_zeros(8 << 20), 8 << 20)] * 1000
+    )),
     "a chunk in a chunk": mcap(schema(), channel("/imu"), chunk(zstd(chunk(zstd(b""), 0)), len(chunk(zstd(b""), 0)))),
-    "a chunk of a million records": asked(lambda: mcap(
+    "a chunk of a million records": make_on_demand(lambda: mcap(
         schema(), channel("/imu"), chunk(zstd(record(9, b"") * 20_000_000), 9 * 20_000_000)
     )),
     "a record of 2^62 bytes": mcap(schema(), struct.pack("<BQ", 5, 1 << 62)),
-    "three thousand topics": asked(lambda: topics(3000, b"float64 x\nstd_msgs/Header header\n")),
-    "topics of 1 MB": asked(lambda: mcap(offers=["/" + "t" * 1_000_000, "/" + "u" * 1_000_000])),
+    "three thousand topics": make_on_demand(lambda: topics(3000, b"float64 x\nstd_msgs/Header header\n")),
+    "topics of 1 MB": make_on_demand(lambda: mcap(offers=["/" + "t" * 1_000_000, "/" + "u" * 1_000_000])),
     "topics that write on the terminal": mcap(offers=["/a" + NASTY, "/b" + NASTY]),
     "types that write on the terminal": mcap(offers=["/a", "/b"], kind=IMU + NASTY),
-    "a definition of a million fields": asked(lambda: mcap(
+    "a definition of a million fields": make_on_demand(lambda: mcap(
         schema(definition="float64 x\n" * 1_000_000), channel("/imu"), message(reading())
     )),
-    "a definition nested without end": asked(lambda: mcap(
+    "a definition nested without end": make_on_demand(lambda: mcap(
         schema(definition="float64[<=" * 100_000), channel("/imu"), message(reading())
     )),
     "a quality of service that laughs": mcap(schema(), channel("/imu", qos=laughs()), message(reading())),
     "an index that points nowhere": mcap(schema(), channel("/imu"), summary=record(8, b"\xff" * 200)),
     "no end": mcap(schema(), channel("/imu"), ends=b""),
     "a frame with a name of 4 GB": mcap(schema(), channel("/imu"), message(reading((1 << 32) - 1))),
-    "a pipe in the bag": beside_db3(pipe),
-    "a device in the bag": beside_db3(zeros),
-    "a socket in the bag": beside_db3(listener),
-    "a link to itself in the bag": beside_db3(loop),
-    "a hole of a terabyte in the bag": beside_db3(hole),
+    "a pipe in the bag": add_to_db3(pipe),
+    "a device in the bag": add_to_db3(zeros),
+    "a socket in the bag": add_to_db3(listener),
+    "a link to itself in the bag": add_to_db3(loop),
+    "a hole of a terabyte in the bag": add_to_db3(hole),
     "twenty thousand files": crowd,
     "a bag that is a pipe": alone("bag.mcap", pipe),
     "a bag that is a device": alone("bag.db3", zeros),
-    "metadata of 50 MB": with_metadata(lambda path: path.write_text("a: b\n" * 10_000_000)),
-    "metadata that laughs": with_metadata(lambda path: path.write_text(laughs())),
-    "metadata nested without end": with_metadata(deep),
-    "metadata from a pipe": with_metadata(pipe),
-    "metadata from a device": with_metadata(zeros),
+    "metadata of 50 MB": replace_metadata(lambda path: path.write_text("a: b\n" * 10_000_000)),
+    "metadata that laughs": replace_metadata(lambda path: path.write_text(laughs())),
+    "metadata nested without end": replace_metadata(deep),
+    "metadata from a pipe": replace_metadata(pipe),
+    "metadata from a device": replace_metadata(zeros),
     "a hundred thousand files that are not there": lambda folder: metadata(
         folder, "sqlite3", *map(str, range(100_000))
     ),
@@ -342,7 +346,7 @@ FILES: dict[str, Makes] = {
         " SELECT '/t' AS topic_type, 'ros2msg' AS encoding, hex(zeroblob(1000000)) AS encoded_message_definition,"
         " '' AS type_description_hash, x AS id FROM c",
     ),
-    "a message that unpacks to 2 GB": asked(lambda: db3(data=packed_zeros(2 * GIGABYTE), packed="MESSAGE")),
+    "a message that unpacks to 2 GB": make_on_demand(lambda: db3(data=pack_zeros(2 * GIGABYTE), packed="MESSAGE")),
     "a hundred thousand topics in SQLite": db3(
         "WITH RECURSIVE c(x) AS (SELECT 2 UNION ALL SELECT x + 1 FROM c WHERE x < 100000)"
         f" INSERT INTO topics SELECT x, '/t' || x, '{IMU}', 'cdr', '' FROM c"
@@ -350,8 +354,8 @@ FILES: dict[str, Makes] = {
     "a quality of service that laughs in SQLite": db3(f"UPDATE topics SET offered_qos_profiles = '{laughs()}'"),
     "no data base": alone("bag.db3", lambda path: path.write_bytes(os.urandom(100_000))),
     # logs of PX4
-    "a log of 10 MB of nothing": asked(lambda: ulog(FLAGS, GYRO, ADDED, tail=bytes(10_000_000))),
-    "a log of 10 MB of noise": asked(lambda: ulog(FLAGS, GYRO, ADDED, tail=bytes(range(256)) * 40_000)),
+    "a log of 10 MB of nothing": make_on_demand(lambda: ulog(FLAGS, GYRO, ADDED, tail=bytes(10_000_000))),
+    "a log of 10 MB of noise": make_on_demand(lambda: ulog(FLAGS, GYRO, ADDED, tail=bytes(range(256)) * 40_000)),
     "a form in itself": ulog(FLAGS, form("sensor_gyro:sensor_gyro x;"), ADDED),
     "forms that multiply": ulog(
         FLAGS, form("a:float[65535] x;"), form("b:a[65535] x;"), form("sensor_gyro:b[65535] x;"), ADDED
@@ -377,10 +381,10 @@ FILES: dict[str, Makes] = {
     "HDF5 of noise": alone("log.mat", lambda path: path.write_bytes(b"MATLAB 7.3 " + os.urandom(100_000))),
     "a MATLAB file that is a device": alone("log.mat", zeros),
     # tables
-    "a packed line of 1 GB": gzipped(TIMES.encode(), b"1", GIGABYTE),
-    "packed rows of 1 GB": gzipped(TIMES.encode(), b"0,0,0,0\n", GIGABYTE),
-    "packed empty lines of 250 MB": gzipped(TIMES.encode(), b"\n", 250_000_000),
-    "a packed cell over 250 MB": gzipped(TIMES.encode() + b'"', b"1\n", 250_000_000),
+    "a packed line of 1 GB": gzip_repetitions(TIMES.encode(), b"1", GIGABYTE),
+    "packed rows of 1 GB": gzip_repetitions(TIMES.encode(), b"0,0,0,0\n", GIGABYTE),
+    "packed empty lines of 250 MB": gzip_repetitions(TIMES.encode(), b"\n", 250_000_000),
+    "a packed cell over 250 MB": gzip_repetitions(TIMES.encode() + b'"', b"1\n", 250_000_000),
     "numbers beyond all": table((TIMES + "0,1e400,-1e400,nan\n" * 100).encode()),
     "headings that write on the terminal": table((",".join(f"{n}{NASTY[:-3]}" for n in range(300)) + "\n").encode()),
     "a table that is a pipe": alone("log.csv", pipe),

@@ -106,7 +106,7 @@ def swept(rate_hz: float, seed: int = 1, noise_rad_s: float = 5e-4, bias_rad_s: 
     return Log(time_s, _read(rates, rng, noise_rad_s, bias_rad_s), np.array(sorted(turns + rests)))
 
 
-def turned_slowly(
+def turn_slowly(
     mean_rad_s: float, bias_rad_s: Array, seed: int = 1, rate_hz: float = 100.0, rest_s: float = 5.0
 ) -> Log:
     """Draw a servo's turns from rest to rest with a raised-cosine profile, in six directions."""

@@ -17,7 +17,7 @@ def zstd(data: bytes) -> bytes:
 
 
 @cache
-def packed_zeros(size: int) -> bytes:
+def pack_zeros(size: int) -> bytes:
     """So many zeros, packed to a thirty-thousandth, in one piece that says how many."""
     packing = ZstdCompressor()
     packing.set_pledged_input_size(size)

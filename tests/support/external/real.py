@@ -23,7 +23,7 @@ def recording(name: str) -> Path:
     pytest.skip("recordings of others are not here: set RIG_REAL_RECORDINGS to their folder")
 
 
-def unpacked(name: str, file: str, folder: Path) -> Path:
+def unpack(name: str, file: str, folder: Path) -> Path:
     """A file of one, as a user has it, in a folder of the test's."""
     packed = recording(name) / f"{file}.gz"
     path = folder / file

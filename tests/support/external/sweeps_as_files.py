@@ -7,6 +7,6 @@ from rig.observation.external.csv_import import ExternalData, average_sweeps, re
 from rig.observation.external.csv_samples import read_samples
 
 
-def averaged_files(samples: Path, sweeps: Path) -> ExternalData:
+def average_files(samples: Path, sweeps: Path) -> ExternalData:
     """What the two files tell. Raises Refused and Fault as `rig solve --sweeps` does."""
     return average_sweeps(read_samples(samples, [RATE]), read_sweeps(sweeps))

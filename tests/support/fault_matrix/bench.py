@@ -14,7 +14,7 @@ import yaml
 from support.fault_matrix.wires import ARM_PORTS, Wire, wires
 from support.laboratories.worlds import WorldHandle, hardware, worlds
 from support.paths import ROOT
-from support.processes.warm import of_system, started
+from support.processes.warm import start_by_system, start_module
 
 BOARD_PORT = 7321
 QUICK, REAL = 8.0, 1.0  # paces of the laboratory: on the way to the fault, and from it on
@@ -39,7 +39,7 @@ class Bench:
 
     def rig(self, *arguments: str) -> "subprocess.Popen[bytes]":
         """`rig …` in a session of its own, as a terminal would start it; with libraries loaded first by the system."""
-        start = of_system if self._environment else started
+        start = start_by_system if self._environment else start_module
         with (self.config.parent / f"{arguments[0]}.txt").open("wb") as errors:
             return start(
                 *arguments,

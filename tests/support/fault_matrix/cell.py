@@ -18,7 +18,7 @@ from rig.errors import RigError
 from rig.observation.windows import dwelt, swept
 from support.fault_matrix.bench import END_S, POLL_S, QUICK, REAL, START_S, Bench, alive, bench
 from support.fault_matrix.catalogue import Fault
-from support.fault_matrix.clock_shift import shifted_clock
+from support.fault_matrix.clock_shift import shift_clock
 from support.fault_matrix.setups import SETUPS, errors_in_u
 
 AT_REST_S = 1.0  # of the controller's time, after the fault can be known
@@ -59,7 +59,7 @@ def carry_out(
 ) -> Cell:
     """A run of `setup` that meets the fault (None: none) after `moment` of the `span_s` it takes, in `folder`."""
     cell, random, began_s = Cell(name, setup, moment), Random(seed), time.monotonic()
-    environment = shifted_clock(folder.parent) if fault is not None and "CLOCK_SHIFT" in fault.environment else {}
+    environment = shift_clock(folder.parent) if fault is not None and "CLOCK_SHIFT" in fault.environment else {}
     with bench(folder, SETUPS[setup], environment) as here:
         here.start()
         if not here.until(lambda state: state["program_running"], START_S):
@@ -175,13 +175,13 @@ def _files(here: Bench, fault: Fault, cell: Cell, fault_wall_s: float) -> None:
     if not len(recorded):
         return  # nothing had been received, or the arm had not begun
     to_s = max(fault_wall_s - max(fault.kept_s, BEHIND_S), recorded["host_time_s"].max() - BEHIND_S)
-    delivered = _delivered(here, recorded["host_time_s"][0], to_s)
+    delivered = _find_delivered(here, recorded["host_time_s"][0], to_s)
     cell.missing = len(delivered - set(recorded["board_time_us"].tolist()))
     if cell.missing:
         cell.deviations.append(f"{cell.missing} of {len(delivered)} samples received are not in the file")
 
 
-def _delivered(here: Bench, from_s: float, to_s: float) -> set[int]:
+def _find_delivered(here: Bench, from_s: float, to_s: float) -> set[int]:
     """The board's time stamps of the samples that were handed to the rig in that time."""
     reader, stamps = FrameReader(), set[int]()
     for wall_s, data in here.wire["board"].delivered or []:

@@ -7,7 +7,7 @@ SOURCE = Path(__file__).with_name("clock_shift.c")
 FILE = "clock_shift"  # in the folder of the run: by how many seconds
 
 
-def shifted_clock(folder: Path) -> dict[str, str]:
+def shift_clock(folder: Path) -> dict[str, str]:
     """The environment of a program whose clock is off by what `folder`/clock_shift says, in seconds; needs gcc."""
     library = folder / "clock_shift.so"
     subprocess.run(["gcc", "-shared", "-fPIC", "-O2", "-o", library, SOURCE, "-ldl"], check=True)

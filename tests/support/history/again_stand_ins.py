@@ -17,7 +17,7 @@ def task(key: str, *places: Path) -> Task:
     return Task(key, (), tuple(("bench", str(each)) for each in places), (), None)
 
 
-def told(task: Task) -> Answer:
+def answer_at_once(task: Task) -> Answer:
     """Answer at once with the worker's process and the threads of its linear algebra."""
     return RecomputedResult(task.key, (str(os.getpid()), os.environ.get("OPENBLAS_NUM_THREADS", "")), ())
 
@@ -26,14 +26,14 @@ def deadly(task: Task) -> Answer:
     """Answer as `told`; one recording kills its worker."""
     if task.key == DEADLY:
         os.kill(os.getpid(), signal.SIGKILL)
-    return told(task)
+    return answer_at_once(task)
 
 
 def failing(task: Task) -> Answer:
     """Answer as `told`; one recording meets a defect of the program."""
     if task.key == DEADLY:
         raise ZeroDivisionError("a defect")
-    return told(task)
+    return answer_at_once(task)
 
 
 def waiting(task: Task) -> Answer:
@@ -42,4 +42,4 @@ def waiting(task: Task) -> Answer:
         deadline_s = time.monotonic() + 60
         while not (Path(task.places[0][1]) / RESULT).exists() and time.monotonic() < deadline_s:
             time.sleep(0.02)
-    return told(task)
+    return answer_at_once(task)

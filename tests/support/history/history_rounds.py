@@ -21,7 +21,7 @@ from rig.history.store import open_history
 from support.laboratories.commands import configuration, rig_here
 from support.paths import RECORDINGS, ROOT
 from support.processes.waiting import wait_for
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 OTHERS = ("list", "verify", "import", "floor", "notebook", "station")
 KILLED = 0.3  # of those who come, and of the stations they come to
@@ -159,7 +159,7 @@ class Rounds:
             case "verify":
                 return self._user(f"verify{name}", "history", "verify")
             case "import":
-                recording = recorded(self.folder / f"I{name}")
+                recording = record(self.folder / f"I{name}")
                 return self._user(f"import{name}", "history", "import", "--solve", recording)
             case "floor":
                 words = ("floor", "--history", self.place, "--page-address", "127.0.0.1:0")
@@ -180,7 +180,7 @@ class _User:
     def __init__(self, said: Path, module: str, words: tuple[str | Path, ...], environment: dict[str, str]) -> None:
         self.said = said.with_name(f"{said.name}.txt")
         with self.said.open("wb") as file:
-            self.process: subprocess.Popen[Any] = started(
+            self.process: subprocess.Popen[Any] = start_module(
                 *words, module=module, cwd=ROOT / "tests", env=environment,
                 stdin=subprocess.PIPE, stdout=file, stderr=file,
             )  # fmt: skip
@@ -210,7 +210,7 @@ def _sleep_until(moment_s: float) -> None:
     time.sleep(max(0.0, moment_s - time.monotonic()))
 
 
-def recorded(folder: Path) -> Path:
+def record(folder: Path) -> Path:
     """Return a recording of a sensor named as the folder, solved when it is imported."""
     folder.mkdir()
     shutil.copy(RECORDINGS / "six_observation" / "run.h5", folder)

@@ -28,7 +28,7 @@ def keep(history: History, folder: Path, of: Path = CALIBRATION, change: Change 
     return run
 
 
-def certified(history: History, run: FinishedRun, number: str, *, marks: str = "", replaces: str | None = None) -> None:
+def certify(history: History, run: FinishedRun, number: str, *, marks: str = "", replaces: str | None = None) -> None:
     """Note a certificate of that run, without a mark: what is to be relied on."""
     issued = Issued(number, "Calibration certificate", "2026-01-02", replaces, marks)
     assert history.certify(run.content_sha256, issued)

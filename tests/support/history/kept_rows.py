@@ -30,9 +30,9 @@ def forge(file: str, *statements: str, values: Sequence[str] = ()) -> None:
         for _, trigger in triggers:
             other.execute(trigger)
         other.commit()
-    as_of_another_process()
+    forget_histories()
 
 
-def as_of_another_process() -> None:
+def forget_histories() -> None:
     """Forget what this process has seen of histories, as one that is started later has seen nothing."""
     continuity._identities.clear()

@@ -17,7 +17,7 @@ SCALE, BIAS_RAD_S = (1.01, 0.99, 1.0), (0.01, -0.02, 0.005)
 STD = np.array([4e-5, 4e-5, 4e-5, 2e-5, 2e-5, 2e-5])
 
 
-def finished(
+def finish_run(
     day: float,
     scale: Sequence[float] = SCALE,
     bias_rad_s: Sequence[float] = BIAS_RAD_S,
@@ -87,7 +87,7 @@ def document(
 
 def enter_many(url: str, worker: int, entries: int) -> int:
     """Enter runs that no other `worker` has, and return how many were new. Processes cannot import a test module."""
-    first = finished(worker)
+    first = finish_run(worker)
     began = first.document.provenance.started_utc
     new = 0
     with open_history(url) as history:

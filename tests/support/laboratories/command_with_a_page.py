@@ -6,17 +6,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from support.processes.waiting import wait_for
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 TOLD = "page: "
 
 
 @contextmanager
-def with_a_page(told: Path, *words: str | Path) -> Iterator[tuple["subprocess.Popen[bytes]", str]]:
+def start_with_page(told: Path, *words: str | Path) -> Iterator[tuple["subprocess.Popen[bytes]", str]]:
     """`rig …` without a terminal, and the address that it tells; all it says goes into the file `told`."""
     with (
         told.open("wb") as file,
-        started(*words, stdin=subprocess.DEVNULL, stdout=file, stderr=file) as process,
+        start_module(*words, stdin=subprocess.DEVNULL, stdout=file, stderr=file) as process,
     ):
         try:
             yield process, wait_for(lambda: _address(told), "its page")

@@ -14,7 +14,7 @@ from rig.config.load import load
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 from support.processes.waiting import PATIENCE_S, wait_for
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 CI = CONFIGS / "ci.yaml"
 
@@ -23,7 +23,7 @@ def rig(
     *arguments: str | Path, timeout_s: float = PATIENCE_S, stdin: int = subprocess.DEVNULL
 ) -> subprocess.CompletedProcess[str]:
     """Run `rig …` to its end."""
-    with started(*arguments, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with start_module(*arguments, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
             said, errors = process.communicate(timeout=timeout_s)
         finally:

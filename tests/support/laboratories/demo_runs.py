@@ -12,7 +12,7 @@ from support.laboratories.worlds import fresh_host
 from support.processes.waiting import PATIENCE_S
 
 
-def normalised_errors(rig: Sequence[str | Path], config: Path, seed: int, out: Path) -> np.ndarray:
+def compute_normalised_errors(rig: Sequence[str | Path], config: Path, seed: int, out: Path) -> np.ndarray:
     """(6,) errors of scale and bias over their reported standard deviations, from one run by the command `rig`."""
     host = fresh_host()
     command = [*map(str, rig), "run", str(config), "--json", "--out", str(out)]

@@ -70,7 +70,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
     return {
         "vibration_rms_rad_s": float(rng.uniform(0, 0.004)),
         "vibration_hz": float(rng.uniform(8, 30)),
-        **seen_vibration(rng),
+        **draw_visible_vibration(rng),
         "settling_rad": 5.0e-5,
         "clock_ppm": float(rng.uniform(-50, 50)),
         "state_jitter_s": float(rng.uniform(0, 1e-4)),
@@ -89,7 +89,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def seen_vibration(rng: np.random.Generator) -> dict[str, float]:
+def draw_visible_vibration(rng: np.random.Generator) -> dict[str, float]:
     """Of the servo, beside the one that no encoder sees; what is drawn after it is what it was without."""
     separate_sensor_errors = rng.spawn(1)[0]
     return {

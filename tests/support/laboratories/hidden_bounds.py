@@ -21,7 +21,7 @@ class Asked:
         return self.rms[0] <= rms <= self.rms[1] and self.within[0] <= within <= self.within[1]
 
 
-def asked_of(values: int) -> Asked:
+def require(values: int) -> Asked:
     """Of fewer than enough values no more than that they do not refuse what is asked, in one test of a hundred.
 
     As if a world told one value: χ² with a degree of freedom for each world for the RMS, a binomial count of worlds for

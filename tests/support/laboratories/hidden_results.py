@@ -52,17 +52,17 @@ class Judged:
         return failed if self.fault is None else (self.fault, *failed)
 
 
-def solved(folder: Path) -> Judged:
+def solve(folder: Path) -> Judged:
     """Solve the run in `folder`/run, whose laboratory is `folder`/config.yaml, by today's code."""
     document: dict[str, Any] = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
     try:
         outcome = judged(open_run(folder / "run"), DEFAULT_ESTIMATOR)
     except RigError as error:
         return Judged(folder, (), (), error.name)
-    return Judged(folder, tuple(_stated(outcome, document)), outcome.checks, None)
+    return Judged(folder, tuple(_list_stated(outcome, document)), outcome.checks, None)
 
 
-def _stated(outcome: Outcome, document: Mapping[str, Any]) -> Iterable[Stated]:
+def _list_stated(outcome: Outcome, document: Mapping[str, Any]) -> Iterable[Stated]:
     (recording,) = outcome.recordings
     for name, result in outcome.results.items():
         if name not in outcome.settings.to_calibrate:
@@ -138,16 +138,16 @@ class Held:
         )
 
 
-def held(runs: Iterable[Judged]) -> dict[tuple[str, str], Held]:
+def compare_with_truth(runs: Iterable[Judged]) -> dict[tuple[str, str], Held]:
     """Compare stated values with the truth, by part and parameter."""
     found: dict[tuple[str, str], list[Stated]] = {}
     for run in runs:
         for each in run.stated:
             found.setdefault((each.part, each.parameter), []).append(each)
-    return {key: _held(each) for key, each in sorted(found.items())}
+    return {key: _compare_one(each) for key, each in sorted(found.items())}
 
 
-def _held(stated: Sequence[Stated]) -> Held:
+def _compare_one(stated: Sequence[Stated]) -> Held:
     error, std, expanded = (
         np.concatenate(each) for each in zip(*((one.error, one.std, one.expanded) for one in stated), strict=True)
     )

@@ -20,10 +20,10 @@ from rig.config.judging.judging_keys import UncertaintySection
 from rig.config.load import load
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
-from support.laboratories.drawn_laboratory import PART_ERRORS, SQUARE_DEG, WAVE_RAD, leaning, seen_vibration
+from support.laboratories.drawn_laboratory import PART_ERRORS, SQUARE_DEG, WAVE_RAD, draw_visible_vibration, leaning
 from support.laboratories.worlds import merge
 from support.paths import CONFIGS
-from support.recordings.drawn_ripple import MOST_ORDER, drawn_ripple, in_the_world
+from support.recordings.drawn_ripple import MOST_ORDER, drawn_ripple, make_keys
 
 JOINTS = 6
 WRISTS = np.array([0, 0, 0, 1, 1, 1])
@@ -64,7 +64,7 @@ def noisy(seed: int) -> dict[str, Any]:
 def _single(seed: int, noise_rad_s: float) -> dict[str, Any]:
     rng = np.random.default_rng(seed)
     document = merge(_document("demo"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
-    return _with_sensors(document, rng, {"lsm9ds1": noise_rad_s})
+    return _add_sensors(document, rng, {"lsm9ds1": noise_rad_s})
 
 
 def pair(seed: int) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def pair(seed: int) -> dict[str, Any]:
     document["procedure"]["verify"] = False
     for name in ("role", "turntable"):
         document["sensors"]["reference"].pop(name)
-    return _with_sensors(document, rng, {"lsm9ds1": QUIET_RAD_S, "adis16465": 0.00045})
+    return _add_sensors(document, rng, {"lsm9ds1": QUIET_RAD_S, "adis16465": 0.00045})
 
 
 def imu(seed: int) -> dict[str, Any]:
@@ -84,7 +84,7 @@ def imu(seed: int) -> dict[str, Any]:
     site = document["site"]
     expanded = site["gravity_uncertainty_m_s2"]
     document["world"]["site"]["gravity_m_s2"] = float(rng.normal(site["gravity_m_s2"], expanded / 2))
-    return _with_sensors(document, rng, {"lsm9ds1": 0.0014, "mpu9250": 0.0014, "adis16465": 0.00032})
+    return _add_sensors(document, rng, {"lsm9ds1": 0.0014, "mpu9250": 0.0014, "adis16465": 0.00032})
 
 
 def kvh(seed: int) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def kvh(seed: int) -> dict[str, Any]:
     return changed
 
 
-def by_its_sheet(part: str, seed: int) -> dict[str, Any]:
+def world_by_datasheet(part: str, seed: int) -> dict[str, Any]:
     """Return a world with a part and its accelerometer, with errors up to those of its data sheet."""
     rng = np.random.default_rng(seed)
     document = merge(_document(part), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(45, 90))))
@@ -134,10 +134,10 @@ def by_its_sheet(part: str, seed: int) -> dict[str, Any]:
     drawn["data_rate_ppm"] = float(rng.uniform(-1, 1) * 1e4 * off.rate_percent)
     drawn["accelerometer"]["noise_m_s2"] = float(noise_m_s2)
     document["world"]["sensors"] = {name: drawn}
-    return _with_mountings(document, rng)
+    return _add_mountings(document, rng)
 
 
-def _with_mountings(document: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+def _add_mountings(document: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     mounted: dict[str, Any] = merge(
         document, {"sensors": {name: {"mounting": _mounting(rng)} for name in document["sensors"]}}
     )
@@ -154,7 +154,7 @@ def autopilot(seed: int) -> dict[str, Any]:
     for name in ("autopilot", "temperature_c"):
         document["world"]["sensors"]["imu1"].pop(name)
     document["sensors"]["imu1"].pop("acceleration")
-    changed = _with_sensors(document, rng, {"mavlink": 0.001})
+    changed = _add_sensors(document, rng, {"mavlink": 0.001})
     px4 = seed % 2 == 1
     stem = "CAL_GYRO0_{}OFF" if px4 else "INS_GYROFFS_{}"
     offsets = {stem.format(axis): float(rng.uniform(-0.05, 0.05)) for axis in "XYZ"}
@@ -169,7 +169,7 @@ def autopilot(seed: int) -> dict[str, Any]:
     return changed
 
 
-def by_message(message: str, noise_rad_s: float, *, vibrates: bool, seed: int) -> dict[str, Any]:
+def world_of_message(message: str, noise_rad_s: float, *, vibrates: bool, seed: int) -> dict[str, Any]:
     """Return a world with an autopilot's IMU of this noise before its filter, read by this message.
 
     The arm vibrates only if `vibrates`. One seed of three is an autopilot that provides no temperature.
@@ -182,7 +182,7 @@ def by_message(message: str, noise_rad_s: float, *, vibrates: bool, seed: int) -
     return _shaking(document, vibrates=vibrates)
 
 
-def with_digits(decimals: int, noise_rad_s: float, *, vibrates: bool, seed: int) -> dict[str, Any]:
+def world_with_digits(decimals: int, noise_rad_s: float, *, vibrates: bool, seed: int) -> dict[str, Any]:
     """Return a world with a device that prints °/s with these decimals, which the section states for odd seeds."""
     document = prints_lines(3 * seed)
     document["world"]["sensors"]["imu"]["noise_rad_s"] = noise_rad_s
@@ -211,7 +211,7 @@ def prints_lines(seed: int) -> dict[str, Any]:
     document["world"]["time_scale"] = 8
     for name in ("lines", "temperature_c", "accelerometer"):
         document["world"]["sensors"]["imu"].pop(name)
-    changed = _with_sensors(document, rng, {"lines": 0.001})
+    changed = _add_sensors(document, rng, {"lines": 0.001})
     lines = changed["sensors"]["imu"]["lines"]
     if seed % 3:
         lines["columns"] = ["time", "sequence", *lines["columns"][1:]]
@@ -225,19 +225,19 @@ def prints_lines(seed: int) -> dict[str, Any]:
     return changed
 
 
-def on_another_arm(model: str, seed: int) -> dict[str, Any]:
+def world_on_arm(model: str, seed: int) -> dict[str, Any]:
     """Return the world `quiet` on another arm."""
     document: dict[str, Any] = merge(quiet(seed), {"arm": {"model": model}})
     return document
 
 
-def rippled(family: Callable[[int], dict[str, Any]], seed: int) -> dict[str, Any]:
+def world_with_ripple(family: Callable[[int], dict[str, Any]], seed: int) -> dict[str, Any]:
     """Return a world of a family, on an arm whose ripple and vibrations come at any order of the revolution."""
     document = family(seed)
     turn_hz = document["procedure"]["speed_deg_s"] / 360
     rates_hz = [each["rate_hz"] for each in document["sensors"].values() if each]
     ripple = drawn_ripple(np.random.default_rng([seed, 47]), turn_hz, rates_hz)
-    changed: dict[str, Any] = merge(document, {"world": {"arm": in_the_world(ripple)}})
+    changed: dict[str, Any] = merge(document, {"world": {"arm": make_keys(ripple)}})
     return changed
 
 
@@ -250,12 +250,12 @@ FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
         "pair": pair,
         "imu": imu,
         "kvh": kvh,
-        **{model: partial(on_another_arm, model) for model in (*OTHER_ARMS, *MORE_ARMS)},
-        **{part: partial(by_its_sheet, part) for part in BY_SHEET},
+        **{model: partial(world_on_arm, model) for model in (*OTHER_ARMS, *MORE_ARMS)},
+        **{part: partial(world_by_datasheet, part) for part in BY_SHEET},
         "autopilot": autopilot,
         "lines": prints_lines,
-        "rippled pair": partial(rippled, pair),
-        "rippled imu": partial(rippled, imu),
+        "rippled pair": partial(world_with_ripple, pair),
+        "rippled imu": partial(world_with_ripple, imu),
     }
 )
 WORLDS = MappingProxyType(
@@ -317,7 +317,7 @@ def _drive(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _arm(rng: np.random.Generator) -> dict[str, Any]:
-    seen = seen_vibration(rng)
+    seen = draw_visible_vibration(rng)
     separate = rng.spawn(1)[0]  # what is drawn after it is what it was without
     drive, has_rough_ripple = _drive(separate), bool(separate.random() < 0.3)
     rough = float(rng.uniform(0, 0.05))
@@ -349,7 +349,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _with_sensors(document: dict[str, Any], rng: np.random.Generator, noise: Mapping[str, float]) -> dict[str, Any]:
+def _add_sensors(document: dict[str, Any], rng: np.random.Generator, noise: Mapping[str, float]) -> dict[str, Any]:
     sensors = {name: each for name, each in document["sensors"].items() if each is not None}
     changes = {
         "sensors": {name: {"mounting": _mounting(rng)} for name in sensors},
@@ -374,7 +374,7 @@ def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: f
         "warm_up_s": 300,
         "bias_rad_s_per_k": rng.normal(0, errors["bias_per_k"], 3).tolist(),
         "scale_per_k": rng.normal(0, errors["scale_per_k"], 3).tolist(),
-        "g_sensitivity_rad_s_per_g": _of_force(rng, part),
+        "g_sensitivity_rad_s_per_g": _draw_force(rng, part),
         "bias_instability_rad_s": errors["flicker_rad_s"] * float(rng.uniform(0.5, 1.5)),
         "bias_random_walk_rad_s_per_sqrt_s": errors["walk"] * float(rng.uniform(0.5, 3)),
         "nonlinearity_odd_per_rad_s": _odd(rng, part, section),
@@ -383,7 +383,7 @@ def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: f
     }
 
 
-def _of_force(rng: np.random.Generator, part: str) -> list[list[float]]:
+def _draw_force(rng: np.random.Generator, part: str) -> list[list[float]]:
     g_rad_s = np.radians(PARTS[part].g_sensitivity_deg_s_g)
     drawn: list[list[float]] = rng.uniform(-g_rad_s, g_rad_s, (3, 3)).tolist()
     return drawn
@@ -457,10 +457,10 @@ def first_seed(family: str) -> int:
     return 1000 * (1 + list(FAMILIES).index(family))
 
 
-def recorded(family: str, seed: int, folder: Path) -> None:
+def record(family: str, seed: int, folder: Path) -> None:
     """Run `rig run` in `folder`, which keeps its configuration, its run folder and its output."""
     host = f"127.{100 + seed // 1000}.{seed % 1000 // 200 + 1}.{seed % 200 + 1}"
-    run_in(at_address(FAMILIES[family](seed), host), folder)
+    run_in(move_to_address(FAMILIES[family](seed), host), folder)
 
 
 def run_in(document: Mapping[str, Any], folder: Path) -> None:
@@ -474,7 +474,7 @@ def run_in(document: Mapping[str, Any], folder: Path) -> None:
     (folder / "status").write_text(f"{done.returncode}\n", encoding="utf-8")
 
 
-def at_address(document: dict[str, Any], host: str) -> dict[str, Any]:
+def move_to_address(document: dict[str, Any], host: str) -> dict[str, Any]:
     """Give the laboratory a loopback address of its own, by a change of `document`."""
     document["arm"]["host"] = host
     if "board" in document:

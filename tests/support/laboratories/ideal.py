@@ -31,8 +31,8 @@ def _ideal_document(path: Path) -> dict[str, Any]:
     document: dict[str, Any] = yaml.safe_load(load(path).text)
     world = document["world"]
     world.pop("site", None)
-    world["arm"] = _without(world.get("arm", {}), OF_THE_ARM)
-    world["sensors"] = {name: _without(sensor, OF_A_SENSOR) for name, sensor in world["sensors"].items()}
+    world["arm"] = _remove_keys(world.get("arm", {}), OF_THE_ARM)
+    world["sensors"] = {name: _remove_keys(sensor, OF_A_SENSOR) for name, sensor in world["sensors"].items()}
     return document
 
 
@@ -41,5 +41,5 @@ def ideal(path: Path, overrides: Sequence[str] = ()) -> Loaded:
     return parse(yaml.safe_dump(ideal_document(path), sort_keys=False), overrides=overrides)
 
 
-def _without(section: Mapping[str, Any], keys: set[str]) -> dict[str, Any]:
+def _remove_keys(section: Mapping[str, Any], keys: set[str]) -> dict[str, Any]:
     return {key: value for key, value in section.items() if key not in keys}

@@ -48,7 +48,7 @@ class Host:
         return answer
 
 
-def booted(loaded: Loaded) -> Host:
+def boot(loaded: Loaded) -> Host:
     """A laboratory whose board has started."""
     laboratory = Laboratory(loaded.config, read_world_section(loaded))
     new = Host(laboratory, SerialLine(lambda: laboratory.board), bytearray())
@@ -58,7 +58,7 @@ def booted(loaded: Loaded) -> Host:
 
 def host(loaded: Loaded) -> Host:
     """A laboratory whose board streams every sensor it has."""
-    new = booted(loaded)
+    new = boot(loaded)
     for sensor in loaded.config.sensors.values():
         index = SENSORS.index(sensor.part)
         settings = {"sensor": index, "rate_hz": sensor.rate_hz, "range_deg_s": sensor.range_deg_s}

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from support.processes.waiting import PATIENCE_S
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 
 class Scanner:
@@ -64,7 +64,7 @@ class Scanner:
 
 
 @contextmanager
-def station(*arguments: str | Path, start: Callable[..., "subprocess.Popen[Any]"] = started) -> Iterator[Scanner]:
+def station(*arguments: str | Path, start: Callable[..., "subprocess.Popen[Any]"] = start_module) -> Iterator[Scanner]:
     """Run `rig station …`, ended by force if it has not ended by itself after the block."""
     terminal, far_end = pty.openpty()
     modes = termios.tcgetattr(far_end)

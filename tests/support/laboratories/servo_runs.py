@@ -16,7 +16,7 @@ import yaml
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 from support.processes.waiting import PATIENCE_S
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 # As fast as it goes: no seconds are spared by a clock that runs faster.
 QUICK: dict[str, Any] = {
@@ -63,7 +63,7 @@ class Seen:
         return bool(self.rates) and abs(self.rates[-1][1]) <= STANDS_RAD_S
 
 
-def configured(folder: Path, changes: Mapping[str, Any] | None = None) -> Path:
+def configure(folder: Path, changes: Mapping[str, Any] | None = None) -> Path:
     """Write configs/servo.yaml, shortened and changed, at an address of its own."""
     host = fresh_host()
     document = yaml.safe_load((CONFIGS / "servo.yaml").read_text(encoding="utf-8"))
@@ -75,12 +75,12 @@ def configured(folder: Path, changes: Mapping[str, Any] | None = None) -> Path:
     return path
 
 
-def carried_out(*command: str | Path, config: Path, when: str = "", times: int = 1, act: Act | None = None,
+def carry_out(*command: str | Path, config: Path, when: str = "", times: int = 1, act: Act | None = None,
                 after_s: float = 0.0) -> Seen:  # fmt: skip
     """Run `rig …` to its end; when it prints the words the n-th time, do `act` after this delay."""
     document = yaml.safe_load(config.read_text(encoding="utf-8"))
     host = document["board"]["port"].removeprefix("socket://").partition(":")[0]
-    process = started(*command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    process = start_module(*command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     seen = Seen(process, (host, 7322))
     watching = threading.Thread(target=_watch, args=(seen,), daemon=True)
     assert process.stdout is not None

@@ -28,7 +28,7 @@ class Effect(Enum):
     CLOCK = "controller clock"
 
 
-def with_effect(effect: Effect, seed: int) -> dict[str, Any]:
+def world_with_effect(effect: Effect, seed: int) -> dict[str, Any]:
     """A configuration: a LSM9DS1 that flickers as its kind does, mounted 5° askew; nothing else is wrong or may be."""
     rng = np.random.default_rng(seed)
     document = ideal_document(CONFIGS / "demo.yaml")

@@ -16,7 +16,7 @@ import yaml
 from support.laboratories.ideal import ideal_document
 from support.paths import DEMO
 from support.processes.waiting import PATIENCE_S
-from support.processes.warm import started
+from support.processes.warm import start_module
 
 END_S = 30.0  # that a world is given to end, before it is made to
 
@@ -113,7 +113,7 @@ def worlds(folder: Path) -> Iterator[World]:
         document = merge(merge(ideal_document(DEMO), address), changes or {})
         config_path = folder / f"world-{len(running)}.yaml"
         config_path.write_text(yaml.safe_dump(document, sort_keys=False, allow_unicode=True), encoding="utf-8")
-        process = started(
+        process = start_module(
             *(config_path, "--until-eof", "--late", late_path(config_path)),
             module="rig.world",
             stdin=subprocess.PIPE,

@@ -20,16 +20,16 @@ def attitudes_of(joints: Array) -> Array:
     return np.array([flange_attitude(q).T for q in joints])
 
 
-def crooked(joints: Array, rms_rad: float, rng: np.random.Generator) -> Array:
+def draw_true_attitudes(joints: Array, rms_rad: float, rng: np.random.Generator) -> Array:
     """Return the true attitudes (N, 3, 3), with errors of the wrists' twists, zeros and encoder waves of `rms_rad`
     each.
 
     They are the same in every attitude of one arm.
     """
-    return crooked_arm(rms_rad, rng)(joints)[:, :3, :3]
+    return draw_true_arm(rms_rad, rng)(joints)[:, :3, :3]
 
 
-def crooked_arm(rms_rad: float, rng: np.random.Generator) -> Callable[[Array], Array]:
+def draw_true_arm(rms_rad: float, rng: np.random.Generator) -> Callable[[Array], Array]:
     """Return the true poses (N, 4, 4) of such an arm's flange, at the joint angles (N, 6) that it reports."""
     alpha, theta = np.array(NOMINAL.alpha_rad), np.array(NOMINAL.theta_rad)
     alpha[3:5] += rms_rad * rng.normal(size=2)

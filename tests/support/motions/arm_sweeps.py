@@ -47,7 +47,7 @@ class Truth:
 
 
 @cache
-def planned(axes: int, speed_deg_s: float = 60.0) -> tuple[Sweep, ...]:
+def plan_sweeps(axes: int, speed_deg_s: float = 60.0) -> tuple[Sweep, ...]:
     """Return the sweeps of the procedure about three or six axes."""
     text = CONFIG.format(
         speed_deg_s=speed_deg_s, rest_s=0.0, repeats=1, part="lsm9ds1", procedure=f", axes: {axes}", uncertainty=""
@@ -58,7 +58,7 @@ def planned(axes: int, speed_deg_s: float = 60.0) -> tuple[Sweep, ...]:
     return tuple(step for step in plan.steps if isinstance(step, Sweep))
 
 
-def signed_speed(sweep: Sweep) -> float:
+def find_signed_speed(sweep: Sweep) -> float:
     """Return the joint's speed in rad/s."""
     return sweep.speed_rad_s if sweep.direction == "ccw" else -sweep.speed_rad_s
 
@@ -83,7 +83,7 @@ def specific_force(
     return felt
 
 
-def recorded_sweeps(
+def record_sweeps(
     truth: Truth, poses: Poses, sweeps: tuple[Sweep, ...], density_ug: float, rng: np.random.Generator
 ) -> Sweeps:
     """Return the first harmonics of uniform sweeps, with white noise in µg/√Hz."""
@@ -91,17 +91,17 @@ def recorded_sweeps(
     angle = np.arange(POINTS) * 2 * np.pi / POINTS
     columns = np.column_stack([np.full(POINTS, 0.5), np.cos(angle), np.sin(angle)]) * 2 / POINTS
     for sweep in sweeps:
-        speed = signed_speed(sweep)
+        speed = find_signed_speed(sweep)
         motion = angle - speed * truth.delay_s, np.full(POINTS, speed), np.zeros(POINTS)
         s = specific_force(poses, sweep, motion, truth.reference_m_s2, truth.lever_arm_m)
         variance = (density_ug * MICRO_G) ** 2 * sweep.speed_rad_s / (2 * np.pi) * np.repeat([1.0, 2.0, 2.0], 3)
         m = columns.T @ (s @ truth.matrix.T + truth.bias_m_s2)
         harmonics.append(m + (np.sqrt(variance) * rng.normal(size=9)).reshape(3, 3))
         covariances.append(np.diag(variance))
-    return with_readings(np.array(harmonics), np.array(covariances), sweeps)
+    return make_sweeps(np.array(harmonics), np.array(covariances), sweeps)
 
 
-def with_readings(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...]) -> Sweeps:
+def make_sweeps(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...]) -> Sweeps:
     """Return the sweeps as the arm reports them."""
     joints = np.array([joints_at(sweep, np.zeros(1))[0] for sweep in sweeps])
     places = np.arange(len(sweeps)), slice(None), [sweep.joint for sweep in sweeps]
@@ -110,7 +110,7 @@ def with_readings(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...
         harmonics_m_s2=harmonics,
         covariances_m2_s4=covariances,
         axes_flange=flange_axes(joints)[places],
-        speeds_rad_s=np.array([signed_speed(sweep) for sweep in sweeps]),
+        speeds_rad_s=np.array([find_signed_speed(sweep) for sweep in sweeps]),
         turning_rad2_s2=np.array([evenly_turning(sweep.speed_rad_s) for sweep in sweeps]),
         attitudes=poses[:, :3, :3],
         arms_m=np.array([flange_arm(q, sweep.joint) for q, sweep in zip(joints, sweeps, strict=True)]),
@@ -118,7 +118,7 @@ def with_readings(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...
     )
 
 
-def recorded_dwells(truth: Truth, poses: Poses, joints: Array, density_ug: float, rng: np.random.Generator) -> Dwells:
+def record_dwells(truth: Truth, poses: Poses, joints: Array, density_ug: float, rng: np.random.Generator) -> Dwells:
     """Return rests at joint angles (N, 6), with white noise in µg/√Hz."""
     std = density_ug * MICRO_G / np.sqrt(DWELL_S)
     felt = np.einsum("nji,j->ni", poses(joints)[:, :3, :3], truth.reference_m_s2)
@@ -155,9 +155,9 @@ class Samples:
     speed_rad_s: Array
 
 
-def recorded_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling, rng: np.random.Generator) -> Samples:
+def record_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling, rng: np.random.Generator) -> Samples:
     """Return one revolution as it is recorded."""
-    phases, speed = rng.uniform(0, 2 * np.pi, len(sampling.cycles)), signed_speed(sweep)
+    phases, speed = rng.uniform(0, 2 * np.pi, len(sampling.cycles)), find_signed_speed(sweep)
 
     def motion(time_s: Array) -> tuple[Array, Array, Array]:
         """Return the joint's angle, speed and acceleration, with a ripple locked to the commanded angle."""

@@ -81,7 +81,7 @@ class Far:
         return answer[9:-2].replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
 
 
-def loaded(overrides: tuple[str, ...] = ()) -> Loaded:
+def load_servo(overrides: tuple[str, ...] = ()) -> Loaded:
     """Load configs/servo.yaml."""
     return parse(CONFIG, overrides=overrides, turners={"servo": ServoSection})
 
@@ -103,7 +103,7 @@ def drawn_servo(
     `mounting_deg`, the item's in each stage by `adapter_deg`, in random directions.
     """
     rng = np.random.default_rng([seed, 43])
-    configuration = loaded((*(f"uncertainty.{each}" for each in KNOWN), *overrides))
+    configuration = load_servo((*(f"uncertainty.{each}" for each in KNOWN), *overrides))
     config = configuration.config
     assert isinstance(config.turner, ServoSection) and isinstance(config.procedure, ServoSixObservationSection)
     plan = plan_servo_six_observation(config.turner, config.procedure)
@@ -128,7 +128,7 @@ def drawn_servo(
         states, events, end_s = _driven(far, own, 1 / config.turner.state_rate_hz, rng)
         mount = rotation_by(np.radians(adapter_deg) * _direction(rng)).T @ np.array(each.mount)
         model = scale, bias - felt @ sits @ mount[:, 2]
-        sampled = source or partial(_sampled, rate_hz=config.sensors["gyro"].rate_hz)
+        sampled = source or partial(_sample, rate_hz=config.sensors["gyro"].rate_hz)
         sensor, samples = sampled(far.servo, sits @ mount, model, (end_s, drift, noise_rad_s), rng)
         runs.append(
             RunData(
@@ -207,7 +207,7 @@ def _driven(
     return np.array(rows, SERVO_STATE_DTYPE), tuple(events), next_s
 
 
-def _sampled(
+def _sample(
     servo: SimulatedServo,
     rows: Array,
     model: tuple[Array, Array],

@@ -23,8 +23,8 @@ from rig.observation.statistics.mean import average_tapered
 from rig.observation.statistics.tapered_weights import flank_s
 from rig.observation.windows import Window
 from rig.study.rate_table import GYRO_BIAS_RAD_S, GYRO_MATRIX
-from support.motions.arm_attitudes import crooked_arm, joints_rad
-from support.motions.arm_sweeps import joints_at, planned, signed_speed
+from support.motions.arm_attitudes import draw_true_arm, joints_rad
+from support.motions.arm_sweeps import find_signed_speed, joints_at, plan_sweeps
 
 EARTH_RAD_S = 7.292115e-5
 LATITUDE_RAD = float(np.radians(38.777888))  # TRIAX, section II-A
@@ -101,10 +101,10 @@ class Stretch:
     joint: str | None
 
 
-def recorded(session: Session, seed: int) -> tuple[VectorInputs, Truth]:
+def record(session: Session, seed: int) -> tuple[VectorInputs, Truth]:
     """Return the rig's averages of one session of an arm and a gyroscope drawn by `seed`, sweeps first."""
     rng = np.random.default_rng(seed)
-    poses = crooked_arm(session.arm_rad, rng)
+    poses = draw_true_arm(session.arm_rad, rng)
     heading = rng.uniform(0, 2 * np.pi)
     north = np.array([np.cos(heading), np.sin(heading), 0.0])
     earth = session.earth_rad_s * (np.cos(LATITUDE_RAD) * north + np.sin(LATITUDE_RAD) * UP)
@@ -154,10 +154,10 @@ def _turns(axes: int) -> tuple[tuple[Sweep, float, Array, Array, Array], ...]:
     """
     angles = np.linspace(0, 2 * np.pi, POINTS + 1)
     found = []
-    for sweep in planned(axes):
+    for sweep in plan_sweeps(axes):
         way = joints_at(sweep, angles)
         told = np.swapaxes(flange_pose(way[:-1])[:, :3, :3], -1, -2).mean(axis=0)
-        found.append((sweep, signed_speed(sweep), way, flange_axes(way[:1])[0, :, sweep.joint], told))
+        found.append((sweep, find_signed_speed(sweep), way, flange_axes(way[:1])[0, :, sweep.joint], told))
     return tuple(found)
 
 

@@ -42,7 +42,7 @@ class Seen:
     mounting: np.ndarray
 
 
-def seen(
+def solve_field(
     seed: int,
     *,
     site: Mapping[str, Any] | None = None,

@@ -43,7 +43,7 @@ class Warmed:
     starts_s: tuple[float, ...]
 
 
-def warmed() -> Warmed:
+def warm_board() -> Warmed:
     """Take the board by its heater up through its range and down again."""
     body, course = HeatedBody(BOARD), TemperatureCourse(FROM_C, TO_C, GAP_K, both_directions=True)
     part, ramp, rows, starts, duty = (
@@ -73,7 +73,7 @@ def warmed() -> Warmed:
     return Warmed(time_s, thermometer_c, element_c, branch, tuple(starts))
 
 
-def seen(of: Warmed, seed: int) -> RepeatedMeans:
+def repeat_means(of: Warmed, seed: int) -> RepeatedMeans:
     """Return the estimator's input for one sensor, with drawn noise, drift and tilt of the arm's axes."""
     rng = np.random.default_rng([31, seed])
     windows = np.array([

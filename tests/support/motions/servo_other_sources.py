@@ -30,7 +30,7 @@ DRAINED_S = 1.0  # after so long nothing is on its way any more
 Model = tuple[Array, Array]
 
 
-def by_lines(
+def sample_lines(
     servo: SimulatedServo, rows: Array, model: Model, until: Until, rng: np.random.Generator
 ) -> tuple[RecordedSensor, np.ndarray]:
     """Sample a device that prints its time and three rates in steps of 0.001 °/s."""
@@ -44,7 +44,7 @@ def by_lines(
     assert wanted.lines is not None and wanted.serial is not None
     printer = Printer(
         SensorTruth(wanted, _errors(model, until)),
-        _felt(servo, rows),
+        _make_motion(servo, rows),
         SimulatedLinesSection(oscillator_ppm=-1e6 * drift),
         wanted.lines,
         field_at=lambda time_s: (0.0, 0.0, 0.0),
@@ -74,13 +74,13 @@ def by_lines(
             return source.sensors["gyro"], taken.all_of(source, lambda: ended.is_set() and taken.quiet_s > DRAINED_S)
 
 
-def by_autopilot(
+def sample_autopilot(
     servo: SimulatedServo, rows: Array, model: Model, until: Until, rng: np.random.Generator
 ) -> tuple[RecordedSensor, np.ndarray]:
     """Sample ArduPilot's first IMU behind its low-pass filter, with offsets to be undone."""
     end_s, drift, _ = until
     begun_s: list[float] = []
-    felt = _felt(servo, rows)
+    felt = _make_motion(servo, rows)
 
     def motion_at(time_s: float) -> Sequence[float]:
         return felt(STILL_S + (max(time_s - begun_s[0], 0.0) if begun_s else 0.0))
@@ -123,7 +123,7 @@ class _Taken:
         return np.concatenate(self._parts)
 
 
-def _felt(servo: SimulatedServo, rows: Array) -> Callable[[float], Sequence[float]]:
+def _make_motion(servo: SimulatedServo, rows: Array) -> Callable[[float], Sequence[float]]:
     """Return rate in rad/s and specific force in g on a vertical shaft."""
     along = rows[:, 2]
 

@@ -119,7 +119,7 @@ def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
     return found
 
 
-def repeated(means: Array, of: Session, noise: float) -> RepeatedMeans:
+def repeat_means(means: Array, of: Session, noise: float) -> RepeatedMeans:
     """Return the estimator's input."""
     return RepeatedMeans(means, np.full(means.shape, noise**2), of.felt, of.places, of.windows_s, of.temperature_c)
 
@@ -169,7 +169,7 @@ def external(means: Array, of: Session, noise: float) -> ExternalData:
     return ExternalData(tuple(sweeps), tuple(rests))
 
 
-def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemperature:
+def calibrate(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemperature:
     """Polynomials with all of the uncertainty that sweeps of files have."""
     moved, found = correct_files(external(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C)
     solution = solve_swept(moved, "vector")

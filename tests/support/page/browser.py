@@ -125,7 +125,7 @@ def text(driver: Chrome, element: str) -> str:
     return driver.find_element(By.ID, element).text
 
 
-def typed(driver: Chrome, words: str) -> None:
+def type_line(driver: Chrome, words: str) -> None:
     """A line and Enter, as a keyboard or a scanner types them, wherever the cursor is."""
     driver.switch_to.active_element.send_keys(words, Keys.ENTER)
 
@@ -141,7 +141,7 @@ def severe(driver: Chrome) -> list[str]:
     return [entry["message"] for entry in entries if entry["level"] == "SEVERE"]
 
 
-def asked_hosts(driver: Chrome) -> set[str]:
+def list_requested_hosts(driver: Chrome) -> set[str]:
     """The hosts of every address the browser has asked for since it was asked last."""
     hosts = set()
     for entry in driver.get_log("performance"):  # type: ignore[no-untyped-call]

@@ -10,7 +10,7 @@ from support.processes.waiting import PATIENCE_S
 
 
 @contextmanager
-def opened(url: str, path: str, more: str = "", *, source: str = "") -> Iterator[socket.socket]:
+def open_request(url: str, path: str, more: str = "", *, source: str = "") -> Iterator[socket.socket]:
     """Send a request, and leave its answer unread."""
     place = urlsplit(url)
     address = (place.hostname or "", place.port or 0)
@@ -42,7 +42,7 @@ def alive(connection: socket.socket) -> bool:
 
 
 @contextmanager
-def flooded(url: str, connections: int) -> Iterator[None]:
+def flood(url: str, connections: int) -> Iterator[None]:
     """For the length of the block so many half requests are held; each that is closed is opened anew."""
     place = urlsplit(url)
     address = (place.hostname or "", place.port or 0)

@@ -22,7 +22,7 @@ from rig.page.server.feed import Feed
 from rig.page.server.serving import PageAddress, serving
 from rig.station.events import ArmSeen, HandSeen, Progress, RunEvent, SamplesTaken, StepFinished, StepStarted
 from support.page.browser import text
-from support.page.told_runs import ABOUT, before_it_moves, look, moving, planned
+from support.page.told_runs import ABOUT, before_it_moves, look, moving, plan_demo
 from support.processes.waiting import wait_for
 
 AGAIN_S = 0.2  # a run that goes on tells so all the time
@@ -56,7 +56,7 @@ class Telling:
                     self._seen = None
 
     def look(self, sweeps: int) -> None:
-        self._feed.look(look(planned(), sweeps))
+        self._feed.look(look(plan_demo(), sweeps))
 
     def observed(self, rows: list[dict[str, Any]]) -> None:
         self._feed.look(Look(rows, []))
@@ -131,7 +131,7 @@ def main() -> None:
     ):
         print(url, flush=True)
         for _ in count():
-            events: list[RunEvent] = [*before_it_moves(planned()), *moving(planned(), 60.0)]
+            events: list[RunEvent] = [*before_it_moves(plan_demo()), *moving(plan_demo(), 60.0)]
             for event in events:
                 feed.event(event)
                 if isinstance(event, Progress):

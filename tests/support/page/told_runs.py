@@ -61,7 +61,7 @@ ABOUT = About(
 )
 
 
-def planned() -> Plan:
+def plan_demo() -> Plan:
     """Return the movement of demo.yaml."""
     return load_configured(DEMO).phase.plan()
 
@@ -152,7 +152,7 @@ def moving(plan: Plan, until_s: float, step_s: float = STEP_S) -> Iterator[RunEv
         q = getattr(step, "target_q_rad", q)
         done_s += step.duration_s
         if isinstance(step, Sweep):
-            yield _observed(step)
+            yield _make_observation(step)
         yield StepFinished(number, len(plan.steps), step, step.duration_s)
 
 
@@ -169,7 +169,7 @@ def _samples(name: str, time_s: float, sweep: Sweep | None, lost: int) -> Sensor
     return SensorSamples(name, round(238 * time_s) + 1, lost, latest)
 
 
-def _observed(sweep: Sweep) -> RunEvent:
+def _make_observation(sweep: Sweep) -> RunEvent:
     if sweep.index == 3:
         return BoardNotObserved("gyro", sweep.index, SATURATED)
     x, y, z = (sweep.speed_rad_s * along / 1.15 for along in sweep.axis_flange)
@@ -225,7 +225,7 @@ def look(plan: Plan, sweeps: int) -> Look:
     return Look(rows, parameters)
 
 
-def judged(folder: Path, *, passed: bool) -> Iterator[RunEvent]:
+def judge(folder: Path, *, passed: bool) -> Iterator[RunEvent]:
     """Yield checks and verdict."""
     yield DocumentWritten(folder / "certificate.html")
     limit = 0.002 if passed else 0.0002

@@ -9,7 +9,7 @@ from rig.data.result_file import ResultDocument, read_result, write_result
 from rig.data.run_folder import RESULT
 from rig.page.replay import ended
 from rig.station.events import Checked, DocumentWritten, Remembered, RunEvent, SamplesTaken, Since, VerdictReached
-from support.page.told_runs import ABOUT, moving, planned
+from support.page.told_runs import ABOUT, moving, plan_demo
 from support.paths import RECORDINGS
 
 PARTS = {
@@ -23,7 +23,7 @@ IMU = RECORDINGS / "imu"
 
 def six_moving(until_s: float) -> Iterator[RunEvent]:
     """The arm and the readings of all six, as far as that."""
-    for event in moving(planned(), until_s):
+    for event in moving(plan_demo(), until_s):
         if isinstance(event, SamplesTaken):
             yield SamplesTaken(tuple(replace(event.sensors[1], sensor=name, lost=0) for name in PARTS))
         else:

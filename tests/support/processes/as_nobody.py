@@ -8,7 +8,7 @@ NOBODY = 65534
 
 
 @contextmanager
-def as_nobody() -> Iterator[None]:
+def drop_root() -> Iterator[None]:
     """In this block the process is no root, in no matter whose hands the tests are."""
     root = os.geteuid() == 0
     if root:

@@ -27,16 +27,16 @@ def killable_cluster(folder: Path) -> Iterator[tuple["subprocess.Popen[bytes]", 
     """A scheduler with one worker, each a process of its own: the scheduler's, and its address."""
     file = folder / "scheduler.json"
     at = ("--scheduler-file", str(file), "--no-dashboard")
-    with started("dask_scheduler", *at, "--port", "0") as scheduler:
+    with start_program("dask_scheduler", *at, "--port", "0") as scheduler:
         while not file.exists():
             assert scheduler.poll() is None
             time.sleep(0.02)
-        with started("dask_worker", *at, "--nthreads", "1", "--no-nanny"):
+        with start_program("dask_worker", *at, "--nthreads", "1", "--no-nanny"):
             yield scheduler, json.loads(file.read_text(encoding="utf-8"))["address"]
 
 
 @contextmanager
-def started(module: str, *arguments: str) -> Iterator["subprocess.Popen[bytes]"]:
+def start_program(module: str, *arguments: str) -> Iterator["subprocess.Popen[bytes]"]:
     """One of the programs of distributed, killed in the end."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments]

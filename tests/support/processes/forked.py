@@ -13,7 +13,7 @@ IMPORTED = (
 )
 
 
-def forked() -> ForkServerContext:
+def find_fork_server() -> ForkServerContext:
     """Whose processes are forked so."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(IMPORTED))

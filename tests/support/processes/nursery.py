@@ -91,7 +91,7 @@ class Forked(subprocess.Popen[Any]):
         return self.pid, status
 
 
-def forked_here(modules: Collection[str], address: Callable[[str], str]) -> None:
+def fork_modules(modules: Collection[str], address: Callable[[str], str]) -> None:
     """Have every `python -P -m MODULE …` of these modules forked that this process starts by Popen.
 
     A laboratory is forked only into a session of its own, as a run starts one: then no signal for the run reaches it.
@@ -137,7 +137,7 @@ def address_of(orders: socket.socket) -> str:
     return bytes(orders.getsockname()).hex()
 
 
-def ordered(orders: socket.socket) -> Order | None:
+def serve_orders(orders: socket.socket) -> Order | None:
     """Fork until standard input ends: in a process that was forked what it shall do, None in the end."""
     with selectors.DefaultSelector() as selector:
         selector.register(orders, selectors.EVENT_READ)
@@ -213,8 +213,8 @@ def _serve() -> None:
         import_module("firmware_host.emulator.hooks").address_of("block")  # translated here, for every laboratory
     gc.collect()
     gc.freeze()  # what is never looked through is shared, not copied
-    if order := ordered(reading if reads else everything):
-        forked_here((LABORATORY, READER), addresses.__getitem__)
+    if order := serve_orders(reading if reads else everything):
+        fork_modules((LABORATORY, READER), addresses.__getitem__)
         sys.argv = ["", *order["words"]]
         runpy.run_module(order["module"], run_name="__main__", alter_sys=True)
 

@@ -17,7 +17,7 @@ from threading import Lock
 from typing import Any
 
 from rig.data.processes.reading_process import ENVIRONMENT
-from support.processes.nursery import READER, Forked, forked_here
+from support.processes.nursery import READER, Forked, fork_modules
 
 NURSERY = Path(__file__).with_name("nursery.py")
 
@@ -59,7 +59,7 @@ nursery = _Nursery()
 
 def readers_forked() -> None:
     """Have what takes run files apart forked for this process too."""
-    forked_here((READER,), nursery.address)
+    fork_modules((READER,), nursery.address)
 
 
 @contextmanager
@@ -73,13 +73,13 @@ def readers_of_system() -> Iterator[None]:
         subprocess.Popen.__new__ = forking  # type: ignore[method-assign]
 
 
-def started(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":
+def start_module(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":
     """`python -m MODULE WORDS …`; `options` as of Popen, but for those of what is done before the program begins."""
     if nursery.closed:
-        return of_system(*words, module=module, **options)
+        return start_by_system(*words, module=module, **options)
     return Forked(nursery.address(module), [module, *map(str, words)], safe_path=False, **options)
 
 
-def of_system(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":
+def start_by_system(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":
     """As `started`, always by the system."""
     return subprocess.Popen([sys.executable, "-m", module, *map(str, words)], **options)

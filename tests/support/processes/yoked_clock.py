@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from support.processes.forked import forked
+from support.processes.forked import find_fork_server
 
 STEP_S = 0.002  # of wall time that counts between two looks of who drives the clock
 LEAD_S = 0.002  # that it may be ahead of what whoever is driven by it has read
@@ -22,7 +22,7 @@ class YokedClock:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._cells = forked().RawArray("d", 5)
+        self._cells = find_fork_server().RawArray("d", 5)
         self._wall_s = 0.0
         self.begin()
 

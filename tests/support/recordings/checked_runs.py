@@ -15,7 +15,7 @@ RATE = FALSE_ALARMS / STATISTICS  # of each
 Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], Surroundings]
 
 
-def solved(run: RunData) -> Solved:
+def solve_inputs(run: RunData) -> Solved:
     """Return the inputs of the checks for a recording of one gyroscope."""
     recordings = observe_recordings([run])
     surroundings = surroundings_of(recordings, recordings[0].run.settings)
@@ -30,12 +30,12 @@ def checks_of(found: Solved, rate: float = RATE) -> tuple[Check, ...]:
     ).checks
 
 
-def checked(run: RunData) -> tuple[Check, ...]:
+def check_run(run: RunData) -> tuple[Check, ...]:
     """Check a recording as a run is judged."""
-    return checks_of(solved(run))
+    return checks_of(solve_inputs(run))
 
 
-def failed(checks: Sequence[Check]) -> set[str]:
+def list_failed(checks: Sequence[Check]) -> set[str]:
     """Return the names of failed checks, without the sensor's and the sweep's."""
     return {kind_of(check) for check in checks if not check.passed}
 

@@ -42,7 +42,7 @@ def _single(rates: Array) -> Array:
     return np.asarray(np.float32(rates), dtype=np.float64)
 
 
-def _printed(digit: float, of_a_converter: float = 0.0) -> Callable[[Array], Array]:
+def _make_printer(digit: float, of_a_converter: float = 0.0) -> Callable[[Array], Array]:
     """Numbers whose last digit is `digit`, rad/s, of readings in steps of a converter, if that has any."""
 
     def sent(rates: Array) -> Array:
@@ -56,7 +56,7 @@ def _printed(digit: float, of_a_converter: float = 0.0) -> Callable[[Array], Arr
 def _lines(digit: float, *, stated: bool = True, of_a_converter: float = 0.0) -> Source:
     full = FULL_RAD_S["lines"]
     channel = triad_channel(RATE, digit, int(full / digit), full) if stated else fine_axes(RATE, full)
-    return Source("lines", channel, _printed(digit, of_a_converter))
+    return Source("lines", channel, _make_printer(digit, of_a_converter))
 
 
 _FINE = fine_axes(RATE, FULL_RAD_S["mavlink"])
@@ -82,7 +82,7 @@ class Stated:
     failed: tuple[str, ...]
 
 
-def recorded(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -> Drawn:
+def record(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -> Drawn:
     """A recording of a source, drawn as its part's data sheet and the arm's limits let it be."""
     channels = (source.channel, thermometer_channel(0.01, 0.0))
     sensor = replace(SENSOR, part=source.part, rate_hz=100.0, channels=channels, clock="gyro")
@@ -91,7 +91,7 @@ def recorded(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -
     return drawn(seed, kind, vibrates=vibrates)
 
 
-def stated(seen: Drawn) -> Stated:
+def state_solution(seen: Drawn) -> Stated:
     """What is solved of a recording, held against its truth."""
     recordings = observe_recordings([seen.run])
     surroundings = surroundings_of(recordings, seen.run.settings)

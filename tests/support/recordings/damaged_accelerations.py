@@ -83,7 +83,7 @@ Damage = Callable[[Readings], Readings]
 
 
 @cache
-def recorded(folder: str) -> RunData:
+def load_recording(folder: str) -> RunData:
     """Return a frozen recording."""
     return open_run(RECORDINGS / folder).movement[0]
 
@@ -91,7 +91,7 @@ def recorded(folder: str) -> RunData:
 @cache
 def readings_of(folder: str, sensor: str) -> Readings:
     """Return the readings of an undamaged recording."""
-    run = recorded(folder)
+    run = load_recording(folder)
     observed = observe_recordings([run])[0]
     magnetometer = run.measuring(FIELD).get(sensor)
     if magnetometer is not None:
@@ -120,7 +120,7 @@ class Told:
         return {check.name.split(".")[1] for check in self.checks if not check.passed}
 
 
-def told_of(run: RunData) -> Told:
+def find_contradictions(run: RunData) -> Told:
     """Check a recording's accelerometers and magnetometers. Raise Fault."""
     recordings = observe_recordings([run])
     accelerometers = calibrate_accelerometers(recordings, run.settings)
@@ -138,7 +138,7 @@ def bent(change: Callable[[Array], Array]) -> Damage:
     return lambda readings: readings.feeling(readings.felt + change(readings.felt))
 
 
-def scaled(by: float, where: Callable[[Readings], Mask], axes: Sequence[int] = (0, 1, 2)) -> Damage:
+def scale(by: float, where: Callable[[Readings], Mask], axes: Sequence[int] = (0, 1, 2)) -> Damage:
     def damage(readings: Readings) -> Readings:
         forces = readings.felt
         forces[np.ix_(where(readings), np.array(axes))] *= by
@@ -147,7 +147,7 @@ def scaled(by: float, where: Callable[[Readings], Mask], axes: Sequence[int] = (
     return damage
 
 
-def turned(angle_deg: float, where: Callable[[Readings], Mask]) -> Damage:
+def rotate(angle_deg: float, where: Callable[[Readings], Mask]) -> Damage:
     def damage(readings: Readings) -> Readings:
         forces, chosen = readings.felt, where(readings)
         forces[chosen] = forces[chosen] @ Rotation.from_rotvec(np.radians(angle_deg) * AXIS).as_matrix().T
@@ -156,7 +156,7 @@ def turned(angle_deg: float, where: Callable[[Readings], Mask]) -> Damage:
     return damage
 
 
-def converted(change: Callable[[NDArray[np.int64]], NDArray[np.int64]]) -> Damage:
+def convert(change: Callable[[NDArray[np.int64]], NDArray[np.int64]]) -> Damage:
     """Change the bits of the readings, as a converter or a bus does."""
     return lambda readings: replace(readings, counts=change(readings.counts))
 

@@ -94,7 +94,7 @@ def readings_of(setup: Setup) -> Readings:
     return Readings(run, setup, samples["counts"].astype(np.int64), board_us, time_s, np.random.default_rng(setup.seed))
 
 
-def scaled(by: float, where: Callable[[Readings], Mask], axes: tuple[int, ...] = (0, 1, 2)) -> Damage:
+def scale(by: float, where: Callable[[Readings], Mask], axes: tuple[int, ...] = (0, 1, 2)) -> Damage:
     def damage(readings: Readings) -> Readings:
         rates = readings.felt()
         rates[np.ix_(where(readings), np.array(axes))] *= by
@@ -103,7 +103,7 @@ def scaled(by: float, where: Callable[[Readings], Mask], axes: tuple[int, ...] =
     return damage
 
 
-def turned(angle_deg: float, where: Callable[[Readings], Mask]) -> Damage:
+def rotate(angle_deg: float, where: Callable[[Readings], Mask]) -> Damage:
     """Rotate the readings about a direction that is no sensor axis."""
 
     def damage(readings: Readings) -> Readings:
@@ -121,21 +121,21 @@ def offset(by_rad_s: float, where: Callable[[Readings], NDArray[Any]]) -> Damage
     return lambda raw: raw.feeling(raw.felt() + by_rad_s * np.array([1.0, -0.7, 0.5]) * where(raw)[:, None])
 
 
-def curved(change: Callable[[Array], Array]) -> Damage:
+def bend(change: Callable[[Array], Array]) -> Damage:
     return lambda raw: raw.feeling(raw.felt() + change(raw.felt()))
 
 
-def converted(change: Callable[[NDArray[np.int64]], NDArray[np.int64]], share: float = 1.0) -> Damage:
+def convert(change: Callable[[NDArray[np.int64]], NDArray[np.int64]], share: float = 1.0) -> Damage:
     """Change the bits of some readings, as a converter or a bus does."""
     return lambda raw: raw.reading(np.where(raw.some(share)[:, None], change(raw.counts), raw.counts))
 
 
-def clipped(low_rad_s: float, high_rad_s: float) -> Damage:
+def clip(low_rad_s: float, high_rad_s: float) -> Damage:
     limits = np.round(np.array([low_rad_s, high_rad_s]) / SENSITIVITY).astype(np.int64)
     return lambda readings: readings.reading(np.clip(readings.counts, *limits))
 
 
-def wrapped(at_rad_s: float) -> Damage:
+def wrap(at_rad_s: float) -> Damage:
     span = round(at_rad_s / SENSITIVITY)
     return lambda readings: readings.reading((readings.counts + span) % (2 * span) - span)
 
@@ -163,7 +163,7 @@ def frozen(where: Callable[[Readings], Mask], axes: tuple[int, ...]) -> Damage:
     return damage
 
 
-def replaced(where: Callable[[Readings], Mask], by: int) -> Damage:
+def replace_readings(where: Callable[[Readings], Mask], by: int) -> Damage:
     def damage(readings: Readings) -> Readings:
         counts = readings.counts.copy()
         counts[where(readings)] = by
@@ -172,7 +172,7 @@ def replaced(where: Callable[[Readings], Mask], by: int) -> Damage:
     return damage
 
 
-def rolled(where: Callable[[Readings], Mask], share: float) -> Damage:
+def roll(where: Callable[[Readings], Mask], share: float) -> Damage:
     """Put samples into another order: the first come last."""
 
     def damage(readings: Readings) -> Readings:
@@ -183,7 +183,7 @@ def rolled(where: Callable[[Readings], Mask], share: float) -> Damage:
     return damage
 
 
-def repeated(where: Callable[[Readings], Mask], seconds: float) -> Damage:
+def repeat(where: Callable[[Readings], Mask], seconds: float) -> Damage:
     """Repeat samples in place of those that follow."""
 
     def damage(readings: Readings) -> Readings:
@@ -226,7 +226,7 @@ def noisier(by_rad_s: float, where: Callable[[Readings], Mask]) -> Damage:
     )
 
 
-def swapped(where: Callable[[Readings], Mask]) -> Damage:
+def swap(where: Callable[[Readings], Mask]) -> Damage:
     def damage(readings: Readings) -> Readings:
         counts, chosen = readings.counts.copy(), readings.second(where(readings))
         counts[chosen] = counts[chosen][:, [1, 0, 2]]

@@ -28,8 +28,8 @@ from rig.estimation.reference.reading_errors import per_axis, project_errors, re
 from rig.estimation.statistics.bias_process import flicker_covariance
 from rig.estimation.statistics.expected_variances import OWN_SHARES
 from rig.motion.geometry import NOMINAL, WRIST_1
-from support.motions.arm_attitudes import crooked_arm, joints_rad
-from support.motions.arm_sweeps import DWELL_S, Truth, joints_at, planned, recorded_dwells, recorded_sweeps
+from support.motions.arm_attitudes import draw_true_arm, joints_rad
+from support.motions.arm_sweeps import DWELL_S, Truth, joints_at, plan_sweeps, record_dwells, record_sweeps
 
 GRAVITY = 9.80665
 SITE = Site(up=(0.0, 0.0, 1.0), gravity_m_s2=GRAVITY, earth_rate_rad_s=None, gravity_expanded_m_s2=1e-5)
@@ -103,9 +103,9 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
         lever_arm_m=np.array([0.02, 0.01, 0.03]),
         delay_s=0.004,
     )
-    arm, turned = crooked_arm(arm_rad, rng), planned(AXES)
+    arm, turned = draw_true_arm(arm_rad, rng), plan_sweeps(AXES)
     straight = Movement(
-        recorded_dwells(truth, arm, JOINTS, density, rng), recorded_sweeps(truth, arm, turned, density, rng)
+        record_dwells(truth, arm, JOINTS, density, rng), record_sweeps(truth, arm, turned, density, rng)
     )
     even, odd, bias_k = sheet.even_s2_m, sheet.odd_s4_m2, MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k
     start_s = BETWEEN_S * np.concatenate([len(turned) + np.arange(len(JOINTS)), np.arange(len(turned))])
@@ -131,14 +131,14 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
     bent = project_errors(theta, movement, np.square) @ within(even)
     bent += project_errors(theta, movement, lambda along: along**3) @ chi
     bent += per_axis((warm * movement.constant())[:, None] * np.ones(3)) @ within(bias_k)
-    bent += per_axis(_along(session) * warm[:, None]) @ within(1e-6 * sheet.scale_ppm_k)
+    bent += per_axis(_find_forces(session) * warm[:, None]) @ within(1e-6 * sheet.scale_ppm_k)
     flickered = rng.multivariate_normal(np.zeros(len(pieces)), flicker_covariance(own.windows_s), 3)
     flickering = movement.constant() * [repeat_by_segment(each, movement) for each in flickered]
     bent += own.instability_m_s2 * flickering.T.ravel()
     return session.reading(bent, _parameters(truth, chi) - session.parameters)
 
 
-def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
+def solve_session(session: Session) -> tuple[ImuSolution, Budget, Array]:
     """Return the solution, its budget, and the errors of scale and bias (6,)."""
     movement = session.movement
     solution = solve_imu(
@@ -157,7 +157,7 @@ def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
 
 def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
     """Return the inputs of the checks of consistency."""
-    turned = planned(AXES)
+    turned = plan_sweeps(AXES)
     stood = [
         *map(Posture, JOINTS),
         *(Posture(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned),
@@ -169,7 +169,7 @@ def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
     return ReferenceModel(solution.theta, session.movement, patterns, session.times_s, second_order=False)
 
 
-def told_of(session: Session, solution: ImuSolution, rate: float) -> set[str]:
+def find_detected(session: Session, solution: ImuSolution, rate: float) -> set[str]:
     """Return the names of the statistics beyond their limit."""
     found = check_reference(read_of(session, solution), rate)
     beyond = {name for name, (value, limit) in found.statistics.items() if value > limit}
@@ -193,17 +193,17 @@ def bent(change: Callable[[Array], Array], scale: float = 0.0) -> Damage:
     return damage
 
 
-def stepped(session: Session, size: float) -> Session:
+def step_bias(session: Session, size: float) -> Session:
     """Change the bias half-way; the true value is its mean."""
     more = per_axis((repeat_by_segment(session.late, session.movement) * session.movement.constant())[:, None] * ASKEW)
     return session.reading(size * more @ np.ones(3), np.concatenate([np.zeros(3), size * ASKEW / 2]))
 
 
-def scaled(axes: Array) -> Damage:
+def scale_half(axes: Array) -> Damage:
     """Change the scale factors half-way; the true value is their mean."""
 
     def damage(session: Session, size: float) -> Session:
-        more = per_axis(_along(session) * repeat_by_segment(session.late, session.movement)[:, None])
+        more = per_axis(_find_forces(session) * repeat_by_segment(session.late, session.movement)[:, None])
         return session.reading(size * more @ axes, np.concatenate([-size * axes / 2, np.zeros(3)]) * session.parameters)
 
     return damage
@@ -216,14 +216,14 @@ def swept(session: Session, size: float) -> Session:
     return session.reading(size * per_axis(turning[:, None] * ASKEW) @ np.ones(3))
 
 
-def disturbed(session: Session, size: float) -> Session:
+def disturb(session: Session, size: float) -> Session:
     """Change the readings of one dwell."""
     more = np.zeros((len(session.movement.readings()), 3))
     more[3] = size * ASKEW
     return session.reading(more.ravel())
 
 
-def _along(session: Session) -> Array:
+def _find_forces(session: Session) -> Array:
     """Return the specific force (K, 3) of each axis."""
     return np.asarray(find_force(session.truth.theta(), session.movement) @ session.truth.matrix.T, dtype=np.float64)
 

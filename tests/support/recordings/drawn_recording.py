@@ -142,21 +142,21 @@ def drawn(
     known = motion.settings.uncertainty
     assert known is not None
     board_s, time_s = sample_times(setup, motion)
-    q_rad, qd_rad_s, arm = _beside_the_encoders(motion, time_s, known, rng, setup.encoders_err, vibrates=vibrates)
+    q_rad, qd_rad_s, arm = _draw_true_motion(motion, time_s, known, rng, setup.encoders_err, vibrates=vibrates)
     to_flange = flange_attitude(q_rad, arm)
     place_m = CubicSpline(time_s, flange_pose(q_rad, arm)[:, :3, 3])
     pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
     room = EARTH_RATE_RAD_S * rng.uniform(-1, 1, 3)
     turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
-    felt, scale = _felt(turned, pull, kind, rng, np.radians(setup.speed_deg_s))
+    felt, scale = _sense(turned, pull, kind, rng, np.radians(setup.speed_deg_s))
     bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
     read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
-    run = _looked_at_late(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
+    run = _delay_encoders(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
     settings = replace(run.settings, uncertainty=known.model_copy(update=sizes_of({"gyro": kind.sensor.part})))
     return Drawn(replace(run, sensors={"gyro": kind.sensor}, settings=settings), time_s, felt, scale, bias)
 
 
-def damaged(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
+def add_readings(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
     """Return the recording with this (n, 3) added to the readings."""
     samples = seen.run.samples["gyro"].copy()
     samples["counts"] += np.round(by_rad_s / kind.sensor.channel(RATE).unit_per_count).astype(samples["counts"].dtype)
@@ -170,7 +170,7 @@ def _counts(read: Array, kind: Kind) -> Array:
     return counts
 
 
-def _beside_the_encoders(
+def _draw_true_motion(
     motion: Motion,
     time_s: Array,
     known: Uncertainty,
@@ -222,7 +222,7 @@ def _beside_the_encoders(
     return true, speed, replace(NOMINAL, alpha_rad=alpha)
 
 
-def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, speed_rad_s: float) -> tuple[Array, Array]:
+def _sense(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, speed_rad_s: float) -> tuple[Array, Array]:
     """Return the rates (n, 3) of a misaligned, non-orthogonal, nonlinear sensor that senses gravity, and its scale
     (3,).
     """
@@ -256,7 +256,7 @@ def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:
     return wandered
 
 
-def _looked_at_late(run: RunData, motion: Motion, setup: Setup, rng: np.random.Generator) -> RunData:
+def _delay_encoders(run: RunData, motion: Motion, setup: Setup, rng: np.random.Generator) -> RunData:
     """Read the encoders slightly after the time of a state."""
     arm = run.states.copy()
     late_s = rng.uniform(0, 1e-4) * rng.standard_normal(len(arm))

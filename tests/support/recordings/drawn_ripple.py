@@ -32,7 +32,7 @@ class Ripple:
     seen_hz: float
 
 
-def in_the_world(ripple: Ripple) -> dict[str, Any]:
+def make_keys(ripple: Ripple) -> dict[str, Any]:
     """Return the keys of `world.arm`."""
     return {
         "vibration_cycles_per_turn": list(ripple.orders),

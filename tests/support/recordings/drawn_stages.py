@@ -15,7 +15,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.motion.geometry import flange_attitude, flange_pose, flange_rate
 from rig.plans.motions.six_sweeps import plan_six_observation
-from support.recordings.drawn_recording import Kind, _beside_the_encoders, _counts, _felt, _looked_at_late, _wandering
+from support.recordings.drawn_recording import Kind, _counts, _delay_encoders, _draw_true_motion, _sense, _wandering
 from support.recordings.synthetic_run import Motion, Setup, run_data, sample_times, sizes_of
 
 QUARTER_TURNS = (
@@ -25,7 +25,7 @@ QUARTER_TURNS = (
 )
 
 
-def staged(setup: Setup, stages: Sequence[str] = QUARTER_TURNS) -> Setup:
+def stage_setup(setup: Setup, stages: Sequence[str] = QUARTER_TURNS) -> Setup:
     """Return the same movement in stages."""
     return replace(setup, procedure=(*setup.procedure, ("stages", f"[{', '.join(stages)}]")))
 
@@ -50,11 +50,11 @@ def drawn_stages(seed: int, kind: Kind, setup: Setup, off_deg: Array) -> tuple[l
             boot_s=float(own.uniform(-1e4, 0.0)),
             drift=float(alike.uniform(-5e-5, 5e-5)),
         )
-        motion = of_stage(made, stage, own)
+        motion = move_in_stage(made, stage, own)
         known = motion.settings.uncertainty
         assert known is not None
         board_s, time_s = sample_times(made, motion)
-        q_rad, qd_rad_s, arm = _beside_the_encoders(
+        q_rad, qd_rad_s, arm = _draw_true_motion(
             motion, time_s, known, np.random.default_rng([seed, 2000]), setup.encoders_err
         )
         to_item = rotation_by(off) @ np.array(motion.settings.mount)
@@ -63,16 +63,16 @@ def drawn_stages(seed: int, kind: Kind, setup: Setup, off_deg: Array) -> tuple[l
         pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
         turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
         alike_rng, speed_rad_s = np.random.default_rng([seed, 3000]), float(np.radians(setup.speed_deg_s))
-        felt, scale = _felt(turned @ to_item.T, pull @ to_item.T, kind, alike_rng, speed_rad_s)
+        felt, scale = _sense(turned @ to_item.T, pull @ to_item.T, kind, alike_rng, speed_rad_s)
         read = felt + bias + _wandering(len(time_s), kind, own) + kind.noise_rad_s * own.standard_normal(felt.shape)
-        run = _looked_at_late(run_data(made, motion, board_s, _counts(read, kind)), motion, made, own)
+        run = _delay_encoders(run_data(made, motion, board_s, _counts(read, kind)), motion, made, own)
         sizes = sizes_of({"gyro": kind.sensor.part})
         settings = replace(run.settings, uncertainty=known.model_copy(update=sizes))
         runs.append(replace(run, sensors={"gyro": kind.sensor}, settings=settings))
     return runs, scale
 
 
-def of_stage(setup: Setup, stage: int, rng: np.random.Generator) -> Motion:
+def move_in_stage(setup: Setup, stage: int, rng: np.random.Generator) -> Motion:
     """Return the movement of one stage, and the settings of its recording."""
     motion = Motion(setup, rng)
     config = parse(motion.config).config

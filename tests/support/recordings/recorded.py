@@ -7,7 +7,7 @@ from rig.data.quantity import RATE, Quantity, Scalar
 from rig.data.recording.recorded_sensor import RecordedSensor
 
 
-def with_channel(sensor: RecordedSensor, quantity: Quantity | Scalar = RATE, **changes: Any) -> RecordedSensor:
+def change_channel(sensor: RecordedSensor, quantity: Quantity | Scalar = RATE, **changes: Any) -> RecordedSensor:
     """Return the sensor with changed properties of one of its channels."""
     changed = (
         replace(channel, **changes) if channel.quantity == quantity.name else channel for channel in sensor.channels

@@ -29,33 +29,33 @@ def differences(expected: ResultDocument, found: ResultDocument) -> list[str]:
     A value is compared by its standard uncertainty, an uncertainty by its own size, a check by its limit, a count
     exactly.
     """
-    told = _moved(_numbers(expected), _numbers(found))
-    said = {check.name: _said(check) for check in found.checks}
+    told = _list_moved(_numbers(expected), _numbers(found))
+    said = {check.name: _summarise(check) for check in found.checks}
     told += [
-        f"check {check.name}: {_said(check)}, now {said.get(check.name)}"
+        f"check {check.name}: {_summarise(check)}, now {said.get(check.name)}"
         for check in expected.checks
-        if said.get(check.name) != _said(check)
+        if said.get(check.name) != _summarise(check)
     ]
     return told if expected.verdict == found.verdict else [*told, f"verdict: {expected.verdict}, now {found.verdict}"]
 
 
-def _said(check: CheckEntry) -> tuple[object, ...]:
+def _summarise(check: CheckEntry) -> tuple[object, ...]:
     """Return whether a check passed and its subject; a check of fitness may say more of that in a later version."""
     means = check.means
     return check.passed, means if means.kind == "conformity" else (means.kind, means.sweep)
 
 
-def solved_otherwise(run: Path, printed: str) -> list[str]:
+def find_differences(run: Path, printed: str) -> list[str]:
     """Return the differences between a run's result and the output of `rig solve --json`."""
     return differences(read_result(run), ResultDocument.model_validate_json(printed))
 
 
-def moved_parameters(expected: Iterable[Parameter], found: Iterable[Parameter]) -> list[str]:
+def find_moved_parameters(expected: Iterable[Parameter], found: Iterable[Parameter]) -> list[str]:
     """Return the differences of one sensor's parameters."""
-    return _moved(_of_parameters("", expected), _of_parameters("", found))
+    return _list_moved(_parameter_numbers("", expected), _parameter_numbers("", found))
 
 
-def _moved(expected: Iterable[Number], found: Iterable[Number]) -> list[str]:
+def _list_moved(expected: Iterable[Number], found: Iterable[Number]) -> list[str]:
     values = {name: value for name, value, _ in found}
     return [
         f"{name}: {value!r} (± {std:.2g}), now {values.get(name)!r}"
@@ -66,24 +66,24 @@ def _moved(expected: Iterable[Number], found: Iterable[Number]) -> list[str]:
 
 def _numbers(document: ResultDocument) -> Iterator[Number]:
     for sensor in followed(document):
-        yield from _of_parameters(f"{sensor.sensor} {sensor.quantity} ", sensor.parameters)
+        yield from _parameter_numbers(f"{sensor.sensor} {sensor.quantity} ", sensor.parameters)
     for check in document.checks:
         if check.value is not None:
             yield f"check {check.name}", check.value, abs(check.limit or 0.0)
-    yield from _of_gyroscopes(document)
-    yield from _of_attitudes(document)
+    yield from _gyroscope_numbers(document)
+    yield from _attitude_numbers(document)
     for name, against in document.verification.items():
         yield from _vector(f"{name} rotation", against.rotation.vector_rad, against.rotation.std_rad)
-        yield from _of_comparison(f"{name} after", against.after)
+        yield from _comparison_numbers(f"{name} after", against.after)
         if against.before is not None:
-            yield from _of_comparison(f"{name} before", against.before)
+            yield from _comparison_numbers(f"{name} before", against.before)
     for name, drifts in document.bias_drift.items():
         for quantity, drift in drifts.items():
             for i, repeat in enumerate(drift.repeats):
                 yield from _vector(f"{name} {quantity} repeat {i}", repeat.scale_fixed.bias, repeat.scale_fixed.std)
 
 
-def _of_gyroscopes(document: ResultDocument) -> Iterator[Number]:
+def _gyroscope_numbers(document: ResultDocument) -> Iterator[Number]:
     for name, gyroscope in document.gyroscopes.items():
         averages: list[ObservationEntry | AverageEntry] = [*gyroscope.observations, *gyroscope.rests]
         for i, average in enumerate(averages):
@@ -94,7 +94,7 @@ def _of_gyroscopes(document: ResultDocument) -> Iterator[Number]:
             yield from _vector(f"{name} Earth's rate", gyroscope.earth_rate.rate_rad_s, stds)
 
 
-def _of_attitudes(document: ResultDocument) -> Iterator[Number]:
+def _attitude_numbers(document: ResultDocument) -> Iterator[Number]:
     for name, accelerometer in document.accelerometers.items():
         for dwell in accelerometer.dwells:
             yield from _vector(f"{name} acceleration in {dwell.index}", dwell.mean_m_s2, dwell.mean_std_m_s2)
@@ -106,14 +106,14 @@ def _of_attitudes(document: ResultDocument) -> Iterator[Number]:
                 yield from _vector(f"{name} field in {seen.index}", seen.mean_t, seen.mean_std_t)
 
 
-def _of_parameters(of: str, parameters: Iterable[Parameter]) -> Iterator[Number]:
+def _parameter_numbers(of: str, parameters: Iterable[Parameter]) -> Iterator[Number]:
     for parameter in parameters:
         yield f"{of}{parameter.name}", parameter.value, parameter.std
         yield f"{of}u({parameter.name})", parameter.std, parameter.std
         yield f"{of}s({parameter.name})", parameter.std_statistical, parameter.std_statistical
 
 
-def _of_comparison(name: str, compared: ComparisonEntry) -> Iterator[Number]:
+def _comparison_numbers(name: str, compared: ComparisonEntry) -> Iterator[Number]:
     rms = compared.movement.rms_rad_s
     yield from ((f"{name} rms {axis}", size, size) for axis, size in zip("xyz", rms, strict=True))
     for turn in compared.revolutions:

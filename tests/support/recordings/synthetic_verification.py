@@ -7,7 +7,7 @@ import numpy as np
 from rig.analysis.gyroscope.alignment import LinearCalibration
 from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
-from support.recordings.recorded import with_channel
+from support.recordings.recorded import change_channel
 from support.recordings.synthetic_run import (
     BIAS_RAD_S,
     SCALE,
@@ -72,7 +72,7 @@ def recording(
     if stored is not None:
         raw = samples["gyro"]["counts"] * SENSITIVITY
         samples["gyro"]["counts"] = np.round(1e6 * (raw + stored.bias_rad_s) @ stored.correction_matrix.T)
-        corrected = with_channel(sensors["gyro"], unit_per_count=1e-6, full_scale_counts=2**31 - 1)
+        corrected = change_channel(sensors["gyro"], unit_per_count=1e-6, full_scale_counts=2**31 - 1)
         sensors["gyro"] = replace(corrected, mode="calibrated")
     known = run.settings.stated_uncertainty
     sizes = sizes_of({name: sensor.part for name, sensor in sensors.items()})

@@ -10,7 +10,7 @@ HANG_S = 20  # wall time, far beyond what a reader that waits for the rest may t
 NASTY = (b"\0", b"\xff", b"\n", b"\r", b"\x1b[2J", b"%s%n", b"\xed\xa0\x80", b"(" * 300, b"9" * 400, b"1e999", b"-nan")
 
 
-def damaged(random: Random, messages: Sequence[bytes]) -> bytes:
+def damage_message(random: Random, messages: Sequence[bytes]) -> bytes:
     """One of the messages after one to four faults, unlike each of them."""
     before = random.choice(messages)
     while True:

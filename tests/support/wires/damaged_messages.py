@@ -26,7 +26,7 @@ from rig.world.ur10e.robot import Robot
 from rig.world.world_section import read_world_section
 from support.laboratories.ideal import ideal
 from support.paths import DEMO
-from support.wires.damage import HANG_S, damaged, ending_by_name
+from support.wires.damage import HANG_S, damage_message, ending_by_name
 
 SESSION, RECOVERY = 3, 60  # messages after which a session is made afresh, and the robot put right
 PATIENCE_S = 0.25  # that the rig's readers are given for a controller that is next door
@@ -150,7 +150,7 @@ def readers() -> dict[str, Reader]:
 
 def _dialogue(name: str, random: Random, sound: Sequence[bytes]) -> tuple[list[bytes], bytes]:
     """An answer for each question, with what comes unasked, one message of it all damaged; and that message."""
-    bad = damaged(random, sound)
+    bad = damage_message(random, sound)
     if name == "RTDE":
         protocol, version, recipe, begun, state, message = sound
         messages = [protocol, version, recipe, begun, state, message, state]
@@ -261,7 +261,7 @@ def carry_to_world(name: str, count: int, seed: int) -> Counter[str]:
             "dashboard": lambda: [order + b"\n" for order in ORDERS],
             "primary": lambda: [_program(random), _program(random), PROGRAM],
         }[name]()
-        bad = damaged(random, messages)
+        bad = damage_message(random, messages)
         with ending_by_name(bad):
             ends[_what_was_said(name, session.receive(bad), laboratory.robot)] += 1
             if random.random() < 0.3:

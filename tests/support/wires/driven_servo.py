@@ -26,14 +26,14 @@ def turn(from_rad: float, by_deg: float, speed_deg_s: float = 120.0, ramp_s: flo
 
 
 @contextmanager
-def held(wire: ServoOnAWire, watchdog_s: float = PATIENT_S, **how: Any) -> Iterator[Servo]:
+def control_servo(wire: ServoOnAWire, watchdog_s: float = PATIENT_S, **how: Any) -> Iterator[Servo]:
     """The servo under control."""
     with Servo(wire.port, MODEL, watchdog_s=watchdog_s, clock=wire.clock, **how) as servo:
         servo.take_control(BOARD)
         yield servo
 
 
-def at_speed(wire: ServoOnAWire, act: Callable[[], object]) -> Callable[[], None]:
+def act_at_speed(wire: ServoOnAWire, act: Callable[[], object]) -> Callable[[], None]:
     """A watch that acts once, when the shaft turns."""
     done: list[bool] = []
 

@@ -41,7 +41,7 @@ def sensor_section(port: str, *, rate_hz: float = 100, **changes: Any) -> Sensor
     return SensorSection.model_validate(document)
 
 
-def summed(text: str) -> bytes:
+def add_checksum(text: str) -> bytes:
     """A line with its sum as NMEA has it."""
     return f"{text}*{reduce(xor, text.lstrip('$!').encode(), 0):02X}\r\n".encode()
 

@@ -9,7 +9,7 @@ from rig.world.servo.bus import SimulatedBus
 from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.truth import LineTruth, ServoTruth
 from rig.world.servo.wire_format import REBOOT, WRITE, ServoPacket
-from support.processes.forked import forked
+from support.processes.forked import find_fork_server
 from support.processes.yoked_clock import YokedClock
 from support.wires.bus_on_a_line import BusOnALine
 
@@ -107,7 +107,7 @@ class _Process:
     """The process of all far ends of this one: to begin a process for each would take most of a test's time."""
 
     def __init__(self) -> None:
-        context = forked()
+        context = find_fork_server()
         self.pipe, far = context.Pipe()
         self.clock = YokedClock(LINE)
         self.process = context.Process(target=_serve, args=(far, self.clock), daemon=True)

@@ -12,7 +12,7 @@ from rig.observation.motion.turn_speed import turn_speed
 from rig.turners.servo.servo_driver import Servo
 from rig.turners.servo.servo_state import SERVO_STATE_DTYPE, ServoState
 from rig.world.servo.truth import ServoTruth
-from support.wires.driven_servo import BOARD, MODEL, STANDS_RAD_S, at_speed, held, turn
+from support.wires.driven_servo import BOARD, MODEL, STANDS_RAD_S, act_at_speed, control_servo, turn
 from support.wires.servo_on_a_wire import SET_UP, servo_on_a_wire
 
 pytestmark = pytest.mark.usefixtures("no_crowd")  # their clock stands while the machine is busy
@@ -36,7 +36,7 @@ def test_a_look_moves_nothing_and_switches_no_torque_on() -> None:
 def test_moves_arrive_and_the_shaft_stays_held_without_anybody_speaking_to_it() -> None:
     states: list[ServoState] = []
     with servo_on_a_wire() as wire:
-        with held(wire, on_state=states.append) as servo:
+        with control_servo(wire, on_state=states.append) as servo:
             assert wire.do("register", "Bus Watchdog") == 100
             for by_deg in (60.0, -60.0):
                 before_rad = wire.angle_rad
@@ -73,7 +73,7 @@ def test_a_whole_turn_is_asked_for_to_the_millisecond_and_its_speed_is_measured(
 @pytest.mark.slow
 def test_a_servo_as_delivered_is_put_into_extended_position_and_time_based_profile() -> None:
     with servo_on_a_wire(ServoTruth(settings={"Baud Rate": 3})) as wire:
-        with held(wire) as servo:
+        with control_servo(wire) as servo:
             servo.move(turn(servo.latest.q_rad[0], 20.0))
         assert (wire.do("register", "Operating Mode"), wire.do("register", "Drive Mode")) == (4, 4)
 
@@ -84,18 +84,18 @@ def test_after_a_trip_of_the_watchdog_the_next_run_s_move_is_no_jump() -> None:
     """Its profile is zero then, which is as fast as the servo can."""
     states: list[ServoState] = []
     with servo_on_a_wire() as wire:
-        with held(wire):
+        with control_servo(wire):
             wire.do("put", "Bus Watchdog", 255)
             wire.do("put", "Profile Velocity", 0)
             wire.do("put", "Profile Acceleration", 0)
-        with held(wire, on_state=states.append) as servo:
+        with control_servo(wire, on_state=states.append) as servo:
             servo.move(turn(servo.latest.q_rad[0], 40.0, speed_deg_s=60.0))
         assert max(abs(state.qd_rad_s[0]) for state in states) < math.radians(60.0) * 1.15
 
 
 @pytest.mark.slow
 def test_a_rest_lasts_as_long_as_it_should_by_the_states_clock() -> None:
-    with servo_on_a_wire() as wire, held(wire) as servo:
+    with servo_on_a_wire() as wire, control_servo(wire) as servo:
         began_s = servo.latest.time_s
         servo.rest(0.3)
         assert 0.3 <= servo.latest.time_s - began_s < 0.5
@@ -103,7 +103,7 @@ def test_a_rest_lasts_as_long_as_it_should_by_the_states_clock() -> None:
 
 @pytest.mark.slow
 def test_a_stop_on_request_holds_the_shaft_where_it_is() -> None:
-    with servo_on_a_wire() as wire, held(wire) as servo:
+    with servo_on_a_wire() as wire, control_servo(wire) as servo:
         took_s: list[float] = []
 
         def stop() -> None:
@@ -112,7 +112,7 @@ def test_a_stop_on_request_holds_the_shaft_where_it_is() -> None:
             took_s.append(wire.clock.now_s() - began_s)
 
         with pytest.raises(Fault) as fault:
-            servo.move(turn(servo.latest.q_rad[0], 300.0), at_speed(wire, stop))
+            servo.move(turn(servo.latest.q_rad[0], 300.0), act_at_speed(wire, stop))
         assert fault.value.name == "servo_stopped"
         assert took_s[0] < 1.0
         assert abs(wire.rate_rad_s) < STANDS_RAD_S
@@ -124,8 +124,8 @@ def test_a_stop_on_request_holds_the_shaft_where_it_is() -> None:
 @pytest.mark.slow
 def test_ctrl_c_stops_the_shaft_and_the_last_line_says_how_it_was_left() -> None:
     with servo_on_a_wire() as wire:
-        with pytest.raises(KeyboardInterrupt) as interrupt, held(wire) as servo:
-            watch = at_speed(wire, lambda: signal.raise_signal(signal.SIGINT))
+        with pytest.raises(KeyboardInterrupt) as interrupt, control_servo(wire) as servo:
+            watch = act_at_speed(wire, lambda: signal.raise_signal(signal.SIGINT))
             servo.move(turn(servo.latest.q_rad[0], 300.0), watch)
         assert abs(wire.rate_rad_s) < STANDS_RAD_S
         assert "the shaft stands" in interrupt.value.__notes__[0]
@@ -137,8 +137,8 @@ def test_what_the_watch_raises_stops_the_shaft_and_goes_on_to_the_caller() -> No
         raise OSError(28, "No space left on device")
 
     with servo_on_a_wire() as wire:
-        with pytest.raises(OSError), held(wire) as servo:
-            servo.move(turn(servo.latest.q_rad[0], 300.0), at_speed(wire, disk_full))
+        with pytest.raises(OSError), control_servo(wire) as servo:
+            servo.move(turn(servo.latest.q_rad[0], 300.0), act_at_speed(wire, disk_full))
         assert abs(wire.rate_rad_s) < STANDS_RAD_S
 
 
@@ -151,7 +151,7 @@ def test_a_state_that_nobody_takes_stops_the_shaft() -> None:
             raise ValueError("not mine")
 
     with servo_on_a_wire() as wire:
-        with pytest.raises(Fault) as fault, held(wire, on_state=take) as servo:
+        with pytest.raises(Fault) as fault, control_servo(wire, on_state=take) as servo:
             armed.append(True)
             servo.move(turn(servo.latest.q_rad[0], 300.0))
         assert fault.value.name == "servo_state_not_taken"
@@ -176,7 +176,7 @@ def test_a_move_that_the_servo_cannot_make_is_not_begun(name: str) -> None:
         "servo_move_too_long": turn(0.5, 360.0, 8.0),
     }[name]
     with servo_on_a_wire() as wire:
-        with pytest.raises(Fault) as fault, held(wire) as servo:
+        with pytest.raises(Fault) as fault, control_servo(wire) as servo:
             assert [problem.name for problem in servo.problems(BOARD, [motion])] == [name]
             before_rad = wire.angle_rad
             servo.move(motion)

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from firmware_host.protocol import ERRORS, MESSAGE_BY_NAME
-from support.board.host_board import HostBoard, configured, convert, error_of, first_samples, sample_sequences
+from support.board.host_board import HostBoard, configure, convert, error_of, first_samples, sample_sequences
 from support.board.host_sensors import Nobody
 from support.parts.adis16465 import Adis16465Registers
 
@@ -24,7 +24,7 @@ def test_the_model_of_the_adis16465_has_its_range(
     board: HostBoard, model: int, deg_s: float, counts_per_deg_s: float
 ) -> None:
     board.adis16465.words[0x5E] = model
-    setup = configured(board, 2, range_deg_s=100)
+    setup = configure(board, 2, range_deg_s=100)
     assert setup["range_deg_s"] == deg_s
     assert setup["sensitivity_rad_s"] == pytest.approx(math.radians(1 / counts_per_deg_s), rel=1e-15)
     assert (setup["temperature_scale_c"], setup["temperature_offset_c"]) == (0.1, 0.0)
@@ -47,13 +47,13 @@ def test_a_model_of_the_adis16465_that_nobody_knows_is_another_part(board: HostB
     [(9000, 2000, 0), (1000, 1000, 1), (238, 250, 7), (400, 400, 4), (1.4, 2000 / 1429, 1428), (0.1, 1, 1999)],
 )
 def test_the_adis16465_decimates(board: HostBoard, wanted_hz: float, hz: float, decimation: int) -> None:
-    assert configured(board, 2, rate_hz=wanted_hz)["rate_hz"] == hz
+    assert configure(board, 2, rate_hz=wanted_hz)["rate_hz"] == hz
     assert board.adis16465.words[0x64] == decimation
 
 
 def test_settings_of_the_adis16465_are_written_by_bytes_and_believed_when_they_read_back(board: HostBoard) -> None:
     board.adis16465.words |= {0x5C: 0x0004, 0x60: 0x0002}
-    configured(board, 2, rate_hz=2)
+    configure(board, 2, rate_hz=2)
     biases = [(address, 0x00) for address in range(0x40, 0x58)]  # of the rates, then of the accelerations
     filter_off = [(0x5C, 0x00), (0x5D, 0x00)]
     data_ready_rises = [(0x60, 0xC1), (0x61, 0x00)]
@@ -73,7 +73,7 @@ def test_settings_of_the_adis16465_are_written_by_bytes_and_believed_when_they_r
 def test_an_adis16465_sample_is_a_burst_with_a_checksum_and_the_lower_words_that_averaging_fills(
     board: HostBoard, rate_hz: float, range_g: float, frames: int
 ) -> None:
-    configured(board, 2, rate_hz=rate_hz, range_g=range_g)
+    configure(board, 2, rate_hz=rate_hz, range_g=range_g)
     board.adis16465.transfers.clear()
     batch = first_samples(board, 2, (-32768, 258, 32767))
     at_start = [22]  # what is read before the first conversion is nothing new
@@ -84,7 +84,7 @@ def test_an_adis16465_sample_is_a_burst_with_a_checksum_and_the_lower_words_that
 
 def streaming_adis16465() -> tuple[HostBoard, Adis16465Registers]:
     board = HostBoard()
-    configured(board, 2)
+    configure(board, 2)
     board.ask("start", 2, sensors=0)
     for k in range(3):
         convert(board, 50_000 + 5000 * k, sensor=2)
@@ -142,18 +142,18 @@ def test_biases_somebody_stored_in_the_adis16465_are_cleared(board: HostBoard) -
         == "setup_failed"
     )
     board.adis16465.stuck.clear()
-    configured(board, 2)
+    configure(board, 2)
     assert {board.adis16465.words[address] for address in biases} == {0}
 
 
 def test_an_adis16465_that_reports_a_fault_is_reset_once_and_then_believed(board: HostBoard) -> None:
     board.adis16465.words[0x02] = 0x0002  # data path overrun
     board.adis16465.cured_by_reset = True
-    configured(board, 2)
+    configure(board, 2)
     assert board.adis16465.writes[:2] == [(0x68, 0x80), (0x69, 0x00)]
     assert board.core.port_time_us() >= 200_000
     board.adis16465.writes.clear()
-    configured(board, 2)
+    configure(board, 2)
     assert (0x68, 0x80) not in board.adis16465.writes
     board.adis16465.words[0x02] = 0x0020
     board.adis16465.cured_by_reset = False

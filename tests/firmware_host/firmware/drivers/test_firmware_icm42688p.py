@@ -11,7 +11,7 @@ from firmware_host.emulator.chip.bus import Violation
 from firmware_host.frames import encode
 from support.board import emulated_session
 from support.board.emulated_session import TRUTH, Session, samples
-from support.board.host_board import HostBoard, configured, convert, first_samples
+from support.board.host_board import HostBoard, configure, convert, first_samples
 from support.board.spi_master import integers
 from support.parts import NUMBER
 from support.parts.icm42688p import Icm42688PDriver
@@ -35,7 +35,7 @@ def registers(board: HostBoard) -> Any:
 def test_both_sensors_run_at_the_nearest_rate_and_let_through_half_of_it(
     board: HostBoard, wanted_hz: float, hz: float, code: int
 ) -> None:
-    assert configured(board, SENSOR, rate_hz=wanted_hz)["rate_hz"] == hz
+    assert configure(board, SENSOR, rate_hz=wanted_hz)["rate_hz"] == hz
     values = registers(board).values
     assert (values[0x4F] & 0x0F, values[0x50] & 0x0F, values[0x52], values[0x4E]) == (code, code, 0x00, 0x0F)
 
@@ -56,7 +56,7 @@ def test_both_sensors_run_at_the_nearest_rate_and_let_through_half_of_it(
 def test_its_ranges_have_the_data_sheets_sensitivities(
     board: HostBoard, wanted: float, deg_s: float, code: int, counts_per_deg_s: float
 ) -> None:
-    setup = configured(board, SENSOR, range_deg_s=wanted)
+    setup = configure(board, SENSOR, range_deg_s=wanted)
     assert setup["range_deg_s"] == deg_s
     assert setup["sensitivity_rad_s"] == pytest.approx(math.radians(1 / counts_per_deg_s), rel=1e-15)
     assert (setup["temperature_scale_c"], setup["temperature_offset_c"]) == (1 / 132.48, 25.0)
@@ -69,7 +69,7 @@ def test_its_ranges_have_the_data_sheets_sensitivities(
 def test_its_accelerometer_has_the_data_sheets_sensitivities(
     board: HostBoard, wanted_g: float, g: float, code: int, counts_per_g: float
 ) -> None:
-    setup = configured(board, SENSOR, range_g=wanted_g)
+    setup = configure(board, SENSOR, range_g=wanted_g)
     assert setup["range_m_s2"] == pytest.approx(g * 9.80665, rel=1e-15)
     assert setup["sensitivity_m_s2"] == pytest.approx(9.80665 / counts_per_g, rel=1e-15)
     assert registers(board).values[0x50] >> 5 == code
@@ -79,7 +79,7 @@ def test_it_is_reset_first_and_started_last(board: HostBoard) -> None:
     part = registers(board)
     part.values[0x70], part.values[0x5F] = 0x07, 0x03  # a self-test and a FIFO that another image left on
     part.writes.clear()
-    configured(board, SENSOR)
+    configure(board, SENSOR)
     assert (part.values[0x70], part.values[0x5F]) == (0, 0)
     assert part.writes[:2] == [(0x4C, 0xB3), (0x11, 0x01)], "I2C goes off as soon as it is known"
     assert part.writes[-1] == (0x4E, 0x0F)
@@ -104,7 +104,7 @@ def test_it_is_found_in_whichever_bank_another_image_left_it(board: HostBoard, b
 
 
 def test_a_sample_is_the_status_and_one_burst_high_byte_first(board: HostBoard) -> None:
-    configured(board, SENSOR, range_g=8)
+    configure(board, SENSOR, range_g=8)
     registers(board).transfers.clear()
     batch = first_samples(board, SENSOR, (-32768, 258, 32767), acceleration=(1, -2, 4096))
     assert registers(board).transfers == [2, 16] * 41  # once at the start, to begin with a line that is low
@@ -115,7 +115,7 @@ def test_a_sample_is_the_status_and_one_burst_high_byte_first(board: HostBoard) 
 
 @pytest.mark.parametrize(("rate_hz", "settling"), [(1000, 101), (200, 21), (25, 3)])
 def test_it_has_100_ms_to_start_up_and_settle(board: HostBoard, rate_hz: float, settling: int) -> None:
-    configured(board, SENSOR, rate_hz=rate_hz)
+    configure(board, SENSOR, rate_hz=rate_hz)
     board.ask("start", 2, sensors=0)
     for k in range(110):
         convert(board, round(100_000 + 1e6 / rate_hz * k), (k, 0, 0), sensor=SENSOR)

@@ -11,7 +11,7 @@ from firmware_host.emulator.chip.bus import Violation
 from firmware_host.frames import encode
 from support.board import emulated_session
 from support.board.emulated_session import TRUTH, Session, samples
-from support.board.host_board import HostBoard, configured, convert, first_samples
+from support.board.host_board import HostBoard, configure, convert, first_samples
 from support.parts import NUMBER
 from support.parts.lsm6dsv16x import RATES, Lsm6dsv16xDriver
 
@@ -30,14 +30,14 @@ def registers(board: HostBoard) -> Any:
 @pytest.mark.parametrize("hz", RATES)
 def test_every_rate_of_the_three_sets_is_reached_by_both_sensors(board: HostBoard, hz: float) -> None:
     selection, code = RATES[hz]
-    assert configured(board, SENSOR, rate_hz=hz)["rate_hz"] == hz
+    assert configure(board, SENSOR, rate_hz=hz)["rate_hz"] == hz
     values = registers(board).values
     assert (values[0x62], values[0x10], values[0x11]) == (selection, 0x10 | code, 0x10 | code)
 
 
 @pytest.mark.parametrize(("wanted_hz", "hz"), [(1, 12.5), (110, 100), (238, 240), (952, 960), (9000, 2000)])
 def test_other_rates_become_the_nearest(board: HostBoard, wanted_hz: float, hz: float) -> None:
-    assert configured(board, SENSOR, rate_hz=wanted_hz)["rate_hz"] == hz
+    assert configure(board, SENSOR, rate_hz=wanted_hz)["rate_hz"] == hz
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_other_rates_become_the_nearest(board: HostBoard, wanted_hz: float, hz: 
 def test_its_ranges_have_the_data_sheets_sensitivities(
     board: HostBoard, wanted: float, deg_s: float, code: int, mdps: float
 ) -> None:
-    setup = configured(board, SENSOR, range_deg_s=wanted)
+    setup = configure(board, SENSOR, range_deg_s=wanted)
     assert setup["range_deg_s"] == deg_s
     assert setup["sensitivity_rad_s"] == pytest.approx(math.radians(1e-3 * mdps), rel=1e-15)
     assert (setup["temperature_scale_c"], setup["temperature_offset_c"]) == (1 / 256, 25.0)
@@ -60,7 +60,7 @@ def test_its_ranges_have_the_data_sheets_sensitivities(
 def test_its_accelerometer_has_the_data_sheets_sensitivities(
     board: HostBoard, wanted_g: float, g: float, code: int, mg: float
 ) -> None:
-    setup = configured(board, SENSOR, range_g=wanted_g)
+    setup = configure(board, SENSOR, range_g=wanted_g)
     assert setup["range_m_s2"] == pytest.approx(g * 9.80665, rel=1e-15)
     assert setup["sensitivity_m_s2"] == pytest.approx(9.80665 * 1e-3 * mg, rel=1e-15)
     assert registers(board).values[0x17] == code
@@ -70,7 +70,7 @@ def test_it_is_reset_first_and_started_last(board: HostBoard) -> None:
     part = registers(board)
     part.values[0x19], part.values[0x0A] = 0x04, 0x06  # a self-test and a FIFO that another image left on
     part.writes.clear()
-    configured(board, SENSOR)
+    configure(board, SENSOR)
     assert (part.values[0x19], part.values[0x0A]) == (0, 0)
     assert part.writes[:2] == [(0x03, 0x01), (0x12, 0x45)], "I2C goes off as soon as it is known"
     assert [address for address, _value in part.writes[-2:]] == [0x10, 0x11]
@@ -101,7 +101,7 @@ def test_it_is_found_in_whichever_page_another_image_left_it(board: HostBoard, p
 
 
 def test_a_sample_is_one_burst_low_byte_first(board: HostBoard) -> None:
-    configured(board, SENSOR, range_g=8)
+    configure(board, SENSOR, range_g=8)
     registers(board).transfers.clear()
     batch = first_samples(board, SENSOR, (-32768, 258, 32767), acceleration=(1, -2, 4096))
     assert registers(board).transfers == [18] * 41  # once at the start, to begin with a line that is low
@@ -112,7 +112,7 @@ def test_a_sample_is_one_burst_low_byte_first(board: HostBoard) -> None:
 
 @pytest.mark.parametrize(("rate_hz", "settling"), [(1000, 91), (240, 22), (15, 2)])
 def test_it_has_90_ms_to_start_up_and_settle(board: HostBoard, rate_hz: float, settling: int) -> None:
-    configured(board, SENSOR, rate_hz=rate_hz)
+    configure(board, SENSOR, rate_hz=rate_hz)
     board.ask("start", 2, sensors=0)
     for k in range(100):
         convert(board, round(100_000 + 1e6 / rate_hz * k), (k, 0, 0), sensor=SENSOR)

@@ -8,7 +8,7 @@ import pytest
 from firmware_host.answers import NO_CHANGE
 from firmware_host.frames import Frame
 from support.board.emulated_session import FIELD_T, MAGNETIC, Session
-from support.board.host_board import PERIOD_US, HostBoard, configured, convert, error_of, sample_sequences, settle
+from support.board.host_board import PERIOD_US, HostBoard, configure, convert, error_of, sample_sequences, settle
 from support.parts import NUMBER
 
 SENSOR = NUMBER["lsm9ds1_magnetometer"]
@@ -142,7 +142,7 @@ def test_what_a_line_that_stays_busy_keeps_waiting_is_counted_and_the_rest_is_wh
 
 
 def test_it_streams_beside_a_gyroscope_and_is_not_kept(board: HostBoard) -> None:
-    configured(board, 0, rate_hz=238, range_deg_s=245)
+    configure(board, 0, rate_hz=238, range_deg_s=245)
     ask_for(board)
     assert [f.name for f in board.ask("keep", 2, sensors=1, duration_s=1.0)] == ["ack"]
     board.ask("start", 3, sensors=0)
@@ -159,7 +159,7 @@ def test_asking_who_is_there_and_setting_the_gyroscope_up_leave_it_converting(bo
     """Both dies are told to keep off I2C again and again, which must not power the configured one down."""
     ask_for(board)
     board.ask("hello", 2)
-    configured(board, 0, rate_hz=238, range_deg_s=245)
+    configure(board, 0, rate_hz=238, range_deg_s=245)
     assert board.magnetometer.values[0x22] == 0x80
 
 

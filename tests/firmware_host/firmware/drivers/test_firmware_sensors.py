@@ -6,7 +6,7 @@ import pytest
 
 from firmware_host.parts import BOARD_PARTS, GYROSCOPES, MAGNETOMETERS
 from firmware_host.protocol import ERRORS
-from support.board.host_board import PERIOD_US, HostBoard, configured, convert, error_of, streaming_board
+from support.board.host_board import PERIOD_US, HostBoard, configure, convert, error_of, streaming_board
 from support.board.host_sensors import Nobody
 from support.parts import NUMBER
 
@@ -87,13 +87,13 @@ def test_a_setting_that_does_not_stick_is_refused_and_takes_the_sensor_out(
     )
     assert error_of(board.ask("start", sensors=0)) == "not_configured"
     part.stuck.clear()
-    configured(board, sensor)
+    configure(board, sensor)
     assert board.ask("start", sensors=0)[0].name == "ack"
 
 
 @pytest.mark.parametrize("sensor", range(len(GYROSCOPES)))
 def test_asking_who_is_there_changes_nothing(board: HostBoard, sensor: int) -> None:
-    configured(board, sensor)
+    configure(board, sensor)
     part = list(board.parts.values())[sensor]
     part.writes.clear()
     board.ask("start", 2, sensors=0)
