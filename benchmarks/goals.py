@@ -109,7 +109,11 @@ def main(benchmarks: list[str]) -> int:
         file = Path(folder) / "figures"
         file.touch()
         environment = {**os.environ, FIGURES: str(file)}
-        failed = [each for each in benchmarks if subprocess.run([sys.executable, each], env=environment).returncode]  # noqa: PLW1510
+        failed = [
+            benchmark
+            for benchmark in benchmarks
+            if subprocess.run([sys.executable, benchmark], check=False, env=environment).returncode
+        ]
         figures = [Figure(**json.loads(line)) for line in file.read_text("utf-8").splitlines()]
     print(f"\n{machine()}\n")
     print("\n".join(table(figures)))

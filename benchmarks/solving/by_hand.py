@@ -80,13 +80,13 @@ def main(sessions: int) -> None:
         session = segment_session(recorded.time_s, recorded.rates, recorded.acceleration)
         lasting_s += float(np.ptp(recorded.time_s)) / sessions
         found = (by_imucal(session), solve_by_hand(session, SessionConditions(20.0)).turned.matrix)
-        for each, matrix in zip(errors.values(), found, strict=True):
+        for error, matrix in zip(errors.values(), found, strict=True):
             off = (matrix - recorded.matrix)[~np.eye(3, dtype=bool)]
-            each.append((scale_of(matrix) - recorded.truth[:3], off))
+            error.append((scale_of(matrix) - recorded.truth[:3], off))
     print(f"{sessions} sessions of {lasting_s:.0f} s")
     rms = {
-        name: [float(np.sqrt(np.mean(np.square(part)))) for part in zip(*each, strict=True)]
-        for name, each in errors.items()
+        name: [float(np.sqrt(np.mean(np.square(part)))) for part in zip(*error, strict=True)]
+        for name, error in errors.items()
     }
     for name, (scale, beside) in rms.items():
         print(f"{name:30} scale {scale:.2e}, off-diagonals {beside:.2e}")

@@ -58,7 +58,7 @@ def split(source: io.RawIOBase | io.BytesIO | serial.Serial, size: int) -> float
     while read < size:
         line = source.readline()
         read += len(line)
-        [float(each) for each in line.split(b",")]
+        [float(word) for word in line.split(b",")]
     return read / (time.thread_time() - began_s) * 1e-6
 
 

@@ -72,7 +72,9 @@ def named(checks: Sequence[Check]) -> dict[str, Check]:
 def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
     seen = observed(FAST, 1 - 40 * PPM)
     check = check_clock(seen, KNOWN)
-    assert [each.by for each in check.comparisons] == ["the computer's clock"]  # no crystal drives that board
+    assert [comparison.by for comparison in check.comparisons] == [
+        "the computer's clock"
+    ]  # no crystal drives that board
     assert check.error == pytest.approx(40 * PPM, abs=2 * PPM)
     assert 0.5 * PPM < check.std < 1 * PPM
 
@@ -81,7 +83,7 @@ def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
 def test_where_the_computers_clock_says_nothing_the_crystal_does() -> None:
     seen = observed(with_crystal(40, crystal_ppm=5), 0.2)
     check = check_clock(seen, KNOWN)
-    assert [each.by for each in check.comparisons] == ["the board's crystal"]
+    assert [comparison.by for comparison in check.comparisons] == ["the board's crystal"]
     assert abs(check.error - 40 * PPM) < 2 * check.std
     assert check.std == pytest.approx(10.7 * PPM, rel=0.02)  # 20 ppm / √3, and that it is within 50 ppm anyway
 

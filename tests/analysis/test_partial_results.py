@@ -23,7 +23,7 @@ def run() -> RunData:
 
 def until(run: RunData, sweeps: int) -> RunData:
     """The recording as it was when so many sweeps were done."""
-    ends = [place for place, each in enumerate(run.events) if isinstance(each.event, SweepFinished)]
+    ends = [place for place, event in enumerate(run.events) if isinstance(event.event, SweepFinished)]
     return replace(run, events=run.events[: ends[sweeps - 1] + 1])
 
 

@@ -41,8 +41,8 @@ def test_a_planned_rest_is_where_the_last_motion_ends() -> None:
     config = load(CONFIGS / "demo.yaml", (), sections(installed()), turners.sections()).config
     plan = plan_of(config, config.procedure)
     motion = predict_motion(plan, NOMINAL)
-    rests = [each for each in time_steps(plan) if isinstance(each.step, Rest)]
+    rests = [step for step in time_steps(plan) if isinstance(step.step, Rest)]
     assert rests
-    for each in rests:
-        attitude = motion.attitude(each.start_s, each.end_s)
-        assert predict_attitude(each, NOMINAL, AS_THE_FLANGE) == pytest.approx(attitude, abs=1e-5)
+    for rest in rests:
+        attitude = motion.attitude(rest.start_s, rest.end_s)
+        assert predict_attitude(rest, NOMINAL, AS_THE_FLANGE) == pytest.approx(attitude, abs=1e-5)

@@ -141,12 +141,12 @@ def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_unce
         budget=Budget((_line("noise", 6e-4, 3e-3), _line("gravity", 13**0.5 * 1e-4, 7**0.5 * 1e-3))),
         held_out=None,
     )
-    checks = {each.name: each for each in acceleration_checks("a", cast(AccelerometerResult, found), limits, rule)}
+    checks = {check.name: check for check in acceleration_checks("a", cast(AccelerometerResult, found), limits, rule)}
     held = BiasByRepeat(
         np.array([[0.0, 0, 0], [9.5e-5, 0, 0], [4e-5, 0, 0]]), np.full((3, 3), 3e-6), np.ones(3), (), FOREVER
     )
     drift = cast(BiasDrift, SimpleNamespace(scale_fixed=held, dof=FOREVER))
-    checks |= {each.name: each for each in drift_checks("a", {RATE: drift}, limits, rule)}
+    checks |= {check.name: check for check in drift_checks("a", {RATE: drift}, limits, rule)}
     for name, uncertainty in (
         ("a.acceleration_scale_deviation", 1.4e-3),
         ("a.acceleration_bias", 8e-3),

@@ -46,8 +46,8 @@ def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_conditions_the_temper
     started = datetime.fromisoformat(run.provenance.started_utc)
     first_s = float(recordings[0].motion.time_s[0])
     windows = [*(turn.average for turn in seen.revolutions), *seen.rests]
-    assert held.bias.from_utc == started + timedelta(seconds=min(each.start_s for each in windows) - first_s)
-    assert held.bias.to_utc == started + timedelta(seconds=max(each.end_s for each in windows) - first_s)
+    assert held.bias.from_utc == started + timedelta(seconds=min(window.start_s for window in windows) - first_s)
+    assert held.bias.to_utc == started + timedelta(seconds=max(window.end_s for window in windows) - first_s)
     assert held.bias.from_utc <= held.scale.from_utc < held.scale.mean_utc < held.scale.to_utc < held.bias.to_utc
     for each in (held.scale, held.bias):
         assert each.temperature_c is not None and each.temperature_range_c is not None
@@ -70,7 +70,7 @@ def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
 def without_thermometer(run: RunData) -> RunData:
     """A recording of a sensor whose temperature was stated, by 22 °C and 5 K."""
     (sensor,), (samples,) = run.sensors.values(), run.samples.values()
-    channels = [each for each in sensor.channels if each.quantity != TEMPERATURE.name]
+    channels = [channel for channel in sensor.channels if channel.quantity != TEMPERATURE.name]
     samples = samples.copy()
     samples["temperature_counts"] = 0
     sensor = replace(sensor, channels=(*channels, stated_temperature_channel(22.0, 5.0)))

@@ -40,7 +40,7 @@ def test_a_series_goes_through_its_list_without_questions(tmp_path: Path) -> Non
     assert result["gyroscopes"]["gyro"]["serial_number"] == "G-001"
     assert found[0]["certificate"] in (out / found[0]["folder"] / "certificate.html").read_text(encoding="utf-8")
     assert found[0]["certificate"] in (out / "labels" / "01-G-001.txt").read_text(encoding="utf-8")
-    assert {each.name for each in out.glob("0*")} == {"01-G-001", "04-G-004"}  # nothing was measured of the others
+    assert {path.name for path in out.glob("0*")} == {"01-G-001", "04-G-004"}  # nothing was measured of the others
     assert "A. Person" in (out / "batch.html").read_text(encoding="utf-8")
 
 
@@ -58,7 +58,7 @@ def test_after_a_kill_the_same_command_goes_on_with_the_part_in_hand(tmp_path: P
         begun.wait()
     done = rig(*command)
     assert done.returncode == 0, done.stderr + done.stdout
-    assert [(each["serial_number"], each["verdict"]) for each in rows(out)] == [("G-001", "pass"), ("G-002", "pass")]
+    assert [(row["serial_number"], row["verdict"]) for row in rows(out)] == [("G-001", "pass"), ("G-002", "pass")]
     assert len(list((out / "01-G-001").glob("run*.h5"))) == 2  # what was recorded before the kill counts
 
     # A kill between the result and its entry: the part is not run again.
@@ -66,5 +66,5 @@ def test_after_a_kill_the_same_command_goes_on_with_the_part_in_hand(tmp_path: P
     journal.write_text("".join(journal.read_text(encoding="utf-8").splitlines(keepends=True)[:-2]), encoding="utf-8")
     done = rig(*command)
     assert done.returncode == 0, done.stderr + done.stdout
-    assert [each["verdict"] for each in rows(out)] == ["pass", "pass"]
+    assert [row["verdict"] for row in rows(out)] == ["pass", "pass"]
     assert "sampling" not in done.stderr

@@ -60,13 +60,13 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
         driver.get(url)
         wait_for(lambda: "serial number" in text(driver, "text"), "the question for a number")
         assert text(driver, "part") == "<b>G-003</b>" and "A. Person" in text(driver, "who")
-        assert [each.text for each in driver.find_elements(By.CSS_SELECTOR, "#tray li strong")] == ["✓", "✗", "◉"]
+        assert [element.text for element in driver.find_elements(By.CSS_SELECTOR, "#tray li strong")] == ["✓", "✗", "◉"]
         legible(driver)
         picture(driver, "station-number")
         type_line(driver, "G-004")
         assert answers.get(timeout=PATIENCE_S) == "G-004"
         wait_for(lambda: "Type go" in text(driver, "text"), "the question whether to go")
-        assert all(each in text(driver, "lines") for each in WORDS)
+        assert all(word in text(driver, "lines") for word in WORDS)
         type_line(driver, "G-005")  # scanned too early: no answer
         wait_for(lambda: "does not answer" in text(driver, "hint"), "that a number is no answer")
         assert answers.empty()

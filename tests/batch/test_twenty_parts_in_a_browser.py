@@ -69,7 +69,7 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
                 answers(driver, NUMBER, number)
                 answers(driver, DOUBT, "no")
                 asks(driver, NUMBER)
-        tray = [each.get_attribute("data-is") for each in driver.find_elements(By.CSS_SELECTOR, "#tray li")]
+        tray = [element.get_attribute("data-is") for element in driver.find_elements(By.CSS_SELECTOR, "#tray li")]
         assert tray == ["pass"] * len(numbers)
         picture(driver, "station-tray")
         answers(driver, NUMBER, "")

@@ -43,13 +43,13 @@ def test_a_run_of_somebody_else_connects_to_what_the_user_names(
         monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "of another user"))
         asked = rig_here("resume", folder, "--yes")
         assert asked.returncode == 2 and "foreign_folder" in asked.stderr
-        assert all(f"--connect {each}" in asked.stderr for each in addresses)
+        assert all(f"--connect {address}" in asked.stderr for address in addresses)
         some = rig_here("resume", folder, "--yes", "--connect", addresses[0], "--connect", addresses[1])
         assert "foreign_folder" in some.stderr and f"--connect {addresses[0]}" not in some.stderr
         for server in (board, history):
             with pytest.raises(TimeoutError):
                 server.accept()
-        named = [word for each in addresses for word in ("--connect", each)]
+        named = [word for address in addresses for word in ("--connect", address)]
         assert "foreign_folder" not in rig_here("resume", folder, "--yes", *named).stderr
 
 

@@ -6,8 +6,8 @@ from rig.data.quantity import OF_THE_RIG, SCALARS, TEMPERATURE
 
 
 def test_a_quantity_s_own_unit_is_one() -> None:
-    for each in (*OF_THE_RIG, *SCALARS):
-        assert UNITS[each.unit] == Unit(each.name, 1.0)
+    for scalar in (*OF_THE_RIG, *SCALARS):
+        assert UNITS[scalar.unit] == Unit(scalar.name, 1.0)
 
 
 def test_units_that_are_shown_may_be_written_and_are_as_large() -> None:

@@ -154,7 +154,7 @@ def is_open_in(pid: int, file: Path) -> bool:
     """In the process, or in one that it has started."""
     within = Path(f"/proc/{pid}")
     try:
-        opened = {each.readlink() for each in (within / "fd").iterdir()}
+        opened = {path.readlink() for path in (within / "fd").iterdir()}
         children = (within / "task" / str(pid) / "children").read_text().split()
     except OSError:  # a descriptor, or the process, has just gone
         return False

@@ -28,7 +28,7 @@ def test_the_file_holds_what_the_format_asks_for() -> None:
     assert document["cff-version"] == "1.2.0" and document["type"] == "software"
     for reference in document["references"]:
         assert {"type", "title", "authors"} <= set(reference)
-    for author in [*document["authors"], *(each for r in document["references"] for each in r["authors"])]:
+    for author in [*document["authors"], *(author for r in document["references"] for author in r["authors"])]:
         assert set(author) in ({"name"}, {"family-names", "given-names"})
 
 

@@ -17,9 +17,9 @@ PLACE = TABLE.relative_to(ROOT)
 def raised() -> dict[str, list[Raised]]:
     """Name → where it is made: in the source, or on the board."""
     found: dict[str, list[Raised]] = defaultdict(list)
-    for each in find_errors():
-        if each.name is not None:
-            found[each.name].append(each)
+    for error in find_errors():
+        if error.name is not None:
+            found[error.name].append(error)
     for code, problem in protocol.ERRORS.items():
         found[problem.name].append(Raised(problem.name, "either", f"the board, code {code}"))
     return found
@@ -27,7 +27,7 @@ def raised() -> dict[str, list[Raised]]:
 
 @pytest.mark.slow
 def test_an_error_s_name_is_written_out_where_it_is_made() -> None:
-    hidden = [each.place for each in find_errors() if each.name is None]
+    hidden = [error.place for error in find_errors() if error.name is None]
     assert not hidden, f"write the names out, or nobody finds them: {', '.join(hidden)}"
 
 

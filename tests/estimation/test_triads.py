@@ -27,7 +27,7 @@ def test_the_covariance_is_the_scatter_of_the_turns() -> None:
     gyroscope = skew @ MOUNTING.as_matrix()
     accelerometer = (Rotation.from_rotvec(20 * TURN_RAD) * MOUNTING).as_matrix()
     stds = 1e-4 * rng.uniform(1, 5, size=(2, 9))
-    told = align_triads(gyroscope, accelerometer, *(np.diag(each**2) for each in stds))
+    told = align_triads(gyroscope, accelerometer, *(np.diag(std**2) for std in stds))
     turns = []
     for _ in range(2000):
         moved = stds * rng.normal(size=(2, 9))

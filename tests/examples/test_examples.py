@@ -44,7 +44,7 @@ def test_a_recorded_run_is_enough(name: str, shows: str, tmp_path: Path) -> None
 )
 def test_a_simulated_run_passes(name: str, arguments: tuple[str, ...], shows: str, tmp_path: Path) -> None:
     run = tmp_path / "run"
-    words = [str(run) if each == "RUN" else each for each in arguments]
+    words = [str(run) if argument == "RUN" else argument for argument in arguments]
     done = python(EXAMPLES / f"{name}.py", configuration(tmp_path), *words, "--yes")
     assert done.returncode == 0, done.stderr
     assert shows in (run / "result.json").read_text(encoding="utf-8") and (run / "certificate.html").is_file()

@@ -663,7 +663,7 @@ def test_an_answer_to_somebody_before_is_none_to_the_first_request() -> None:
         {
             "reply_to": 1,
             "sensor": 0,
-            **dict.fromkeys((each.name for each in protocol.MESSAGE_BY_NAME["setup"].fields[2:]), 0.0),
+            **dict.fromkeys((field.name for field in protocol.MESSAGE_BY_NAME["setup"].fields[2:]), 0.0),
         },
     )
     with socket.create_server((HOST, 0)) as server:

@@ -249,7 +249,7 @@ def test_runs_of_bytes_that_come_twice_leave_every_frame_once_and_the_counts_exa
     blocks, whole = bytes(arrived).split(b"\0"), {wire[:-1] for wire in sent.wires}
     arrived_whole = whole.intersection(blocks)
     intact = [wire for wire in sent.wires if wire[:-1] in arrived_whole]
-    assert [encode(each.name, each.sequence, each.values, each.items) for each in frames] == intact
+    assert [encode(frame.name, frame.sequence, frame.values, frame.items) for frame in frames] == intact
     assert reader.lost == len(sent.wires) - len(intact)
     assert reader.repeated == sum(block in whole for block in blocks) - len(intact) > 0
 

@@ -167,7 +167,7 @@ def test_no_row_hides_a_rig_or_makes_the_page_heavy(tmp_path: Path, harm: str) -
                                               f"SELECT *, 'lab-0' FROM ({HARM[harm]})").rowcount  # fmt: skip
         stations.tell(history.engine, "bench 1", "lab-1", Now("running", "G-1").json())
         sections, again = (floor_content.rigs(*stations.heard(history.engine)) for _ in range(2))
-    running = [each for each in sections.values() if each is not None and each.get("rig") == "bench 1"]
+    running = [section for section in sections.values() if section is not None and section.get("rig") == "bench 1"]
     assert [(each["state"], each["part"]) for each in running] == [("running", "G-1")]
     assert sections["rigs"] == {"count": min(made + 1, 100), "more": max(made + 1 - 100, 0)}
     frame = frame_of("all", sections)

@@ -69,11 +69,15 @@ def test_a_u_that_was_too_small_and_a_value_that_is_gone_are_moves_too(history: 
     run = finish_run(0)
     history.enter(run)
     (calibration,) = followed(run.document)
-    wider = tuple(replace(each, std_statistical=1.5 * each.std_statistical) for each in calibration.parameters)
+    wider = tuple(
+        replace(parameter, std_statistical=1.5 * parameter.std_statistical) for parameter in calibration.parameters
+    )
     for parameters, size in ((wider, 0.5), (calibration.parameters[1:], float("inf")), ((), float("inf"))):
         (found,) = again(history, [(run, RecomputedResult("pass", (), (replace(calibration, parameters=parameters),)))])
         assert found.moved == (1,) and found.moves[1][0].size == pytest.approx(size)
-    narrower = tuple(replace(each, std_statistical=0.5 * each.std_statistical) for each in calibration.parameters)
+    narrower = tuple(
+        replace(parameter, std_statistical=0.5 * parameter.std_statistical) for parameter in calibration.parameters
+    )
     (found,) = again(history, [(run, RecomputedResult("pass", (), (replace(calibration, parameters=narrower),)))])
     assert found.same
 
@@ -113,9 +117,9 @@ def test_a_replaced_result_is_solved_again_only_where_a_certificate_relies_on_it
     first, later = finish_run(0, solved_after_s=60), finish_run(0, scaled(U), solved_after_s=3600)
     history.enter(first)
     history.enter(later)
-    assert [each.run_id for each in list_stated_results(history, Selection())] == [2]
+    assert [result.run_id for result in list_stated_results(history, Selection())] == [2]
     certify(history, first, "RIG-1")
-    assert [(each.run_id, len(each.calibrations)) for each in list_stated_results(history, Selection())] == [
+    assert [(result.run_id, len(result.calibrations)) for result in list_stated_results(history, Selection())] == [
         (1, 1),
         (2, 1),
     ]
@@ -125,9 +129,9 @@ def test_what_was_voided_does_not_count_and_a_selection_is_heeded(history: Histo
     for day in range(3):
         history.enter(finish_run(day, serial_number=f"G-{day}"))
     history.void(2, "it was dropped")
-    assert [each.run_id for each in list_stated_results(history, Selection())] == [1, 3]
-    assert [each.run_id for each in list_stated_results(history, Selection(serial_number="G-2"))] == [3]
-    assert [each.run_id for each in list_stated_results(history, Selection(serial_number="G-1"))] == []
+    assert [result.run_id for result in list_stated_results(history, Selection())] == [1, 3]
+    assert [result.run_id for result in list_stated_results(history, Selection(serial_number="G-2"))] == [3]
+    assert [result.run_id for result in list_stated_results(history, Selection(serial_number="G-1"))] == []
 
 
 def test_the_journal_gives_the_same_numbers_back_and_forgets_what_a_kill_left_half_written(tmp_path: Path) -> None:

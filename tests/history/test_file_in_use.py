@@ -124,8 +124,8 @@ def test_a_forked_process_has_connections_of_its_own(file: Path) -> None:
 
 
 def remove(file: Path) -> None:
-    for each in file.parent.glob(f"{file.name}*"):
-        each.unlink()
+    for path in file.parent.glob(f"{file.name}*"):
+        path.unlink()
 
 
 def put_a_new_one_there(file: Path) -> None:
@@ -171,13 +171,13 @@ def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered
     config = load(CONFIGS / "ci.yaml").config
     assert recall_sensors(config, frozenset()).silent is None  # the run begins
     with monkeypatch.context() as forging:
-        forging.setattr("support.history.kept_rows.as_of_another_process", lambda: None)
+        forging.setattr("support.history.kept_rows.forget_histories", lambda: None)
         exchange(file)
-    before = {each.name: each.read_bytes() for each in file.parent.iterdir()}
+    before = {path.name: path.read_bytes() for path in file.parent.iterdir()}
     event, _ = remember(RECORDINGS / "verified", config.history)  # and ends
     assert isinstance(event, NotRemembered) and name in event.why
     assert name in (recall_sensors(config, frozenset()).silent or "")
-    assert {each.name: each.read_bytes() for each in file.parent.iterdir()} == before
+    assert {path.name: path.read_bytes() for path in file.parent.iterdir()} == before
     forget_histories()
     event, _ = remember(RECORDINGS / "verified", config.history)
     assert isinstance(event, Remembered)

@@ -45,7 +45,7 @@ def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(
             )
         assert (runs, calibrations, parameters) == (PROCESSES * entries, PROCESSES * entries, PROCESSES * entries * 10)
         assert list(history.broken()) == []
-        assert len({each.started_utc for each in history.calibrations()}) == PROCESSES * entries
+        assert len({calibration.started_utc for calibration in history.calibrations()}) == PROCESSES * entries
 
 
 def test_a_later_version_has_one_place_for_its_migration(url: str, monkeypatch: pytest.MonkeyPatch) -> None:

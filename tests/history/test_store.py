@@ -47,7 +47,7 @@ def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
     assert entered.new
     (kept,) = history.kept()
     assert kept.result == run.text and content_sha256(kept.result) == kept.content_sha256
-    assert [each.name for each in kept.recordings] == ["run.h5", "verify.h5"]
+    assert [recording.name for recording in kept.recordings] == ["run.h5", "verify.h5"]
     found = history.of_run(entered.run_id)
     stated = followed(read_result(RECORDINGS / "verified"))
     assert [(f.part, f.serial_number, f.estimator, f.temperature_c) for f in found] == [
@@ -58,7 +58,9 @@ def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
 
 def test_the_mean_scale_factor_has_the_uncertainty_of_all_three() -> None:
     sensor = read_result(RECORDINGS / "verified").gyroscopes["gyro"]
-    mean = {each.name: each for each in followed(read_result(RECORDINGS / "verified"))[0].parameters}["k"]
+    mean = {parameter.name: parameter for parameter in followed(read_result(RECORDINGS / "verified"))[0].parameters}[
+        "k"
+    ]
     assert mean.value == pytest.approx(sum(sensor.scale) / 3)
     variance = sum(sensor.covariance[i][j] for i in range(3) for j in range(3)) / 9
     assert mean.std_statistical == pytest.approx(variance**0.5)
@@ -171,7 +173,7 @@ def test_a_history_from_before_version_1_is_refused_and_stays_as_it_was(marked: 
 def test_who_ran_the_rig_and_what_was_noted_is_found_again(history: History) -> None:
     history.enter(replace(finish_run(0), operator="A. Person", note="after the move to room 3"))
     history.enter(finish_run(1))
-    found = [(each.operator, each.note) for each in history.calibrations()]
+    found = [(calibration.operator, calibration.note) for calibration in history.calibrations()]
     assert found == [("A. Person", "after the move to room 3"), (None, None)]
 
 
@@ -308,7 +310,11 @@ def test_check_standards_chart_their_rig_and_shared_sensors_tell_rigs_apart(hist
     assert states["bench A"].charts["k"].out_of_control
     assert not states["bench B"].charts["k"].alarm.any()
     assert states["bench A"].standards == ("G-1", "G-2")
-    quiet = [each for each in history.calibrations() if each.started_utc < (FIRST + timedelta(days=20)).isoformat()]
+    quiet = [
+        calibration
+        for calibration in history.calibrations()
+        if calibration.started_utc < (FIRST + timedelta(days=20)).isoformat()
+    ]
     (effect,) = effects(quiet)["k"]
     sign = 1 if effect.rig == "bench B" else -1
     assert abs(sign * effect.value - 4e-5) < 3 * effect.std < 4e-5

@@ -39,8 +39,8 @@ def printed(table: FittingTable, width: int) -> str:
 
 
 def headings(text: str) -> list[str]:
-    row = next(each for each in text.splitlines() if each.startswith("┃"))
-    return [each.strip() for each in row.strip("┃").split("┃")]
+    row = next(line for line in text.splitlines() if line.startswith("┃"))
+    return [word.strip() for word in row.strip("┃").split("┃")]
 
 
 def a_year(history: History, runs: int = 12, step_days: float = 30.0) -> list[Past]:
@@ -70,9 +70,9 @@ def test_names_and_headings_are_whole_in_a_narrow_terminal(history: History, wid
         text = printed(table, width)
         assert "…" not in text
         shorter = [column.shorter.heading for column in table.columns if column.shorter is not None]
-        assert set(headings(text)) <= {*shorter, *(each.heading for each in table.columns)}
+        assert set(headings(text)) <= {*shorter, *(column.heading for column in table.columns)}
         assert "" not in headings(text)
-        rows = [each for each in text.splitlines() if each.startswith("│")]
+        rows = [line for line in text.splitlines() if line.startswith("│")]
         assert len(rows) == len(table.columns[0].cells)  # no row takes two lines
     for table in tables[1:]:
         assert all(name in printed(table, width) for name in (ANGLE, "nonorth_zx rad", "nonorth_xy rad"))
@@ -83,7 +83,7 @@ def test_a_wider_terminal_shows_more_columns(history: History) -> None:
     table = trends_of(a_year(history))[0]
     narrow, usual, wide = (headings(printed(table, width)) for width in (60, 80, 140))
     assert {"parameter", "last ± U", "trend"} <= set(narrow) < set(usual) < set(wide)
-    assert "drift a year ± U" in usual and wide == [*(each.heading for each in table.columns if any(each.cells))]
+    assert "drift a year ± U" in usual and wide == [*(column.heading for column in table.columns if any(column.cells))]
 
 
 def test_a_column_that_holds_nothing_is_left_out(history: History) -> None:
@@ -110,7 +110,7 @@ def test_a_terminal_without_blocks_gets_letters(history: History, tmp_path: Path
     table = trends_of(a_year(history))[0]
     with TextIOWrapper((tmp_path / "out").open("wb"), encoding="ascii", errors="replace") as out:
         Console(file=out, width=80).print(table)
-    kx = next(each for each in (tmp_path / "out").read_text("ascii").splitlines() if "kx" in each)
+    kx = next(line for line in (tmp_path / "out").read_text("ascii").splitlines() if "kx" in line)
     assert re.search(r"__+\.+-+'+", kx)
 
 

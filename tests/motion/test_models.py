@@ -32,7 +32,7 @@ def arm(model: ModelName, **changes: Any) -> ArmSection:
 
 
 def problems(section: ArmSection, plan: Plan) -> list[str]:
-    return [str(each) for each in plan_problems(plan, read_load(section), model_of(section))]
+    return [str(problem) for problem in plan_problems(plan, read_load(section), model_of(section))]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -55,7 +55,7 @@ def test_two_tables_made_apart_say_the_same_of_an_arm(name: ModelName) -> None:
 def test_every_row_says_where_its_figures_are_from(name: ModelName) -> None:
     row = load_turner_model(name)
     wanted = {"drawing", "limits", "acceleration", "payload", "room", "state_rate", "home"}
-    assert row.sources.keys() == wanted and all(len(each) > 10 for each in row.sources.values())
+    assert row.sources.keys() == wanted and all(len(source) > 10 for source in row.sources.values())
     height, upper_arm, forearm, *_ = lengths_m(row.drawing)
     assert 0.1 < height < 0.3 and 0.2 < forearm < upper_arm < 0.9
     assert 0.03 <= row.forearm.radius_m <= row.upper_arm.radius_m <= 0.1

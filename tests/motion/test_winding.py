@@ -34,7 +34,7 @@ def test_a_wrist_that_stands_a_whole_turn_away_unwinds_to_one_side() -> None:
     words = cable_words(plan(), away, JOINT_NAMES)
     assert f"wrist_3 by {degrees(-low):.0f}° one way (-) and 0° the other (+)" in words[0]
     assert words[1].startswith("wrist_3 stands +360° from home")
-    assert not [each for each in cable_words(plan(), home, JOINT_NAMES) if "from home" in each]
+    assert not [word for word in cable_words(plan(), home, JOINT_NAMES) if "from home" in word]
 
 
 def test_it_is_said_before_the_operator_agrees() -> None:

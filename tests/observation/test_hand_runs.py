@@ -82,7 +82,9 @@ def test_a_face_has_the_name_of_the_axis_that_it_turns_to() -> None:
 def test_an_accelerometer_that_reads_nothing_is_refused_by_name() -> None:
     run = read_run(RECORDINGS / "by_hand" / "run.h5")
     channels = run.sensors["gyro"].channels
-    told = tuple(replace(each, type="<f8") if each.quantity == "acceleration" else each for each in channels)
+    told = tuple(
+        replace(channel, type="<f8") if channel.quantity == "acceleration" else channel for channel in channels
+    )
     sensor = replace(run.sensors["gyro"], channels=told)
     for reading, name in ((0.0, "zero_reading"), (np.nan, "not_finite"), (np.inf, "not_finite")):
         samples = run.samples["gyro"].astype(sensor.sample_dtype)

@@ -23,7 +23,7 @@ SETTINGS = USUAL.settings.observation
 def stuck_in_sweep(index: int) -> RunData:
     """From the middle of a sweep on it reads what it read there, with its noise."""
     seen = readings_of(Setup())
-    window = next(each.window for each in swept(USUAL) if each.sweep.index == index)
+    window = next(sweep.window for sweep in swept(USUAL) if sweep.sweep.index == index)
     turning, after = seen.between(window.start_s + 1, window.end_s - 1), seen.between(window.start_s + 3, 1e9)
     counts = USUAL.samples["gyro"]["counts"].astype(np.int64)
     noise = np.random.default_rng(5).normal(scale=counts[turning].std(axis=0), size=counts.shape)
@@ -51,7 +51,7 @@ def test_when_the_last_sweep_is_sound_the_rest_after_it_still_tells() -> None:
 
 @pytest.mark.slow
 def test_one_that_sticks_at_rest_is_told_from_a_wrong_unit_by_the_turn_the_other_way() -> None:
-    window = next(each.window for each in swept(USUAL) if each.sweep.index == 5)
+    window = next(sweep.window for sweep in swept(USUAL) if sweep.sweep.index == 5)
     samples, late = USUAL.samples["gyro"].copy(), readings_of(Setup()).between(window.start_s - 0.5, 1e9)
     noise = np.random.default_rng(5).normal(scale=20, size=(int(late.sum()), 3))
     samples["counts"][late] = np.round(noise + np.array([20, 150, 10]))

@@ -85,7 +85,7 @@ def test_readings_that_arrive_are_of_now_and_those_told_again_are_not(
         wait_for(lambda: tell.times > 15, "three seconds of readings")
         wait_for(lambda: of_now(driver), "that they are of now")
         tell.repeating.set()
-        wait_for(lambda: any(re.search(r"\d s ago", each) for each in ages(driver)), "their age")
+        wait_for(lambda: any(re.search(r"\d s ago", age) for age in ages(driver)), "their age")
         picture(driver, f"age-{what}")
 
 

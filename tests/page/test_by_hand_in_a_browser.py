@@ -46,7 +46,7 @@ def test_the_line_the_drawing_and_what_is_open(driver: Chrome, tmp_path: Path) -
         wait_for(lambda: "side −x up" in text(driver, "hand-line"), "the next line")
         drawing = driver.find_element(By.CSS_SELECTOR, "#hand-drawing svg")
         assert "−x up" in (drawing.get_attribute("aria-label") or "").replace("side ", "")
-        named = [each.text for each in drawing.find_elements(By.CSS_SELECTOR, ".wanted")]
+        named = [element.text for element in drawing.find_elements(By.CSS_SELECTOR, ".wanted")]
         assert named == ["−x", "−x"]  # as it lies now, and as it is to lie
         assert "12 moves from side to side, 3 whole turns" in text(driver, "hand-wanted")
         assert "✓ +z up" in text(driver, "hand-sides")

@@ -167,8 +167,8 @@ def test_nothing_is_wider_than_a_telephone(driver: Chrome, tmp_path: Path, six: 
         assert wide(driver) == []
         six(*six_judged(tmp_path))
         wait_for(lambda: kind(driver) == "passed", "the verdict")
-        for each in driver.find_elements(By.CSS_SELECTOR, "#found summary"):
-            each.send_keys(Keys.ENTER)
+        for element in driver.find_elements(By.CSS_SELECTOR, "#found summary"):
+            element.send_keys(Keys.ENTER)
         picture(driver, "six-passed-telephone")
         assert wide(driver) == []
         assert driver.execute_script(SCROLLING) == []  # no table hides a column

@@ -200,14 +200,14 @@ def demo() -> RigConfig:
 def test_no_plan_of_the_grid_is_shorter(thorough: bool) -> None:
     """Every plan is predicted; whatever is wanted of them, the search finds the shortest that has it."""
     what = find_search(demo())
-    grid = [each for each in what.candidates() if thorough or coarse(each)]
+    grid = [candidate for candidate in what.candidates() if thorough or coarse(candidate)]
     assert len(grid) >= 30
     known = {id(each): what.predict(each) for each in grid}
     reached = {each: budgets.reached for each, budgets in known.items() if budgets is not None}
     scales = np.quantile([each.scale for each in reached.values()], [0.002, 0.01, 0.05, 0.2, 0.5])
     biases = np.quantile([each.bias_rad_s for each in reached.values()], [0.002, 0.01, 0.05, 0.2, 0.5])
     looked = []
-    for wanted in (TargetUncertainty(*each) for each in product((np.inf, *scales), (np.inf, *biases))):
+    for wanted in (TargetUncertainty(*case) for case in product((np.inf, *scales), (np.inf, *biases))):
         does = [each.duration_s for each in grid if id(each) in reached and wanted.is_met_by(reached[id(each)])]
         found = find_shortest(grid, lambda each: known[id(each)], wanted)
         assert (found.best is None) == (not does)
@@ -281,10 +281,10 @@ def budgets_of(tells: Tells) -> Callable[[Candidate], Budgets]:
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_several_speeds_are_tried_and_keep_what_the_file_says_of_them() -> None:
-    speeds = {each.procedure.speeds_deg_s for each in find_search(demo()).candidates()}  # type: ignore[attr-defined]
+    speeds = {candidate.procedure.speeds_deg_s for candidate in find_search(demo()).candidates()}  # type: ignore[attr-defined]
     assert None in speeds and (15.0, 150.0) in speeds
     said = load(CONFIGS / "demo.yaml", ["procedure.speeds_deg_s=[20, 50]"], sections(installed()), turners.sections())
-    speeds = {each.procedure.speeds_deg_s for each in find_search(said.config).candidates()}  # type: ignore[attr-defined]
+    speeds = {candidate.procedure.speeds_deg_s for candidate in find_search(said.config).candidates()}  # type: ignore[attr-defined]
     assert speeds == {(20.0, 50.0)}
 
 
@@ -332,9 +332,9 @@ def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches(part: st
 @pytest.mark.slow
 def test_arcs_are_tried_where_the_encoders_are_known() -> None:
     known = load(CONFIGS / "demo.yaml", ["uncertainty.angle_std_deg=0.01"], sections(installed()), turners.sections())
-    arcs = {each.sizes[0] for each in find_search(known.config).candidates()}
+    arcs = {candidate.sizes[0] for candidate in find_search(known.config).candidates()}
     assert arcs >= set(ARCS_DEG)
-    assert not {each.sizes[0] for each in find_search(demo()).candidates()} & set(ARCS_DEG)
+    assert not {candidate.sizes[0] for candidate in find_search(demo()).candidates()} & set(ARCS_DEG)
 
 
 def test_a_candidate_lasts_as_long_as_its_plan() -> None:

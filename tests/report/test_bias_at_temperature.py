@@ -46,7 +46,7 @@ def test_biases_move_along_the_slope_and_the_readings_corrected_by_them_do_not()
     beside = accelerometer().model_copy(update={"temperature_c": 22.0})
     before = calibrations(result().model_copy(update={"accelerometers": {"gyro": beside}}))
     after = at_temperature(before, watched(), 30.0)
-    assert [each.temperature_c for each in after.sensors] == [30.0, 30.0]
+    assert [sensor.temperature_c for sensor in after.sensors] == [30.0, 30.0]
     warmer = np.array(SLOPE) * 8.0  # what every reading gains
     for old, new in zip(before.sensors, after.sensors, strict=True):
         assert old.quantity == new.quantity and old.offset + warmer == pytest.approx(new.offset)

@@ -60,7 +60,7 @@ def test_u_of_angles_is_the_same_wherever_it_is_told() -> None:
     assert f"(± U, {k})" in page
     assert f"(± {DEG * max(widths):.2g}, {k})" in terminal(document)
     (kept,) = (each for each in followed(document) if each.quantity == "rate")
-    parameters = {each.name: each.expanded for each in kept.parameters}
+    parameters = {parameter.name: parameter.expanded for parameter in kept.parameters}
     assert [parameters[f"nonorth_{each}"] for each in ("yz", "zx", "xy")] == pytest.approx(widths)
     assert parameters["gxx"] == pytest.approx(factors[0] * vector.g_sensitivity_std_rad_s_per_m_s2[0][0])  # type: ignore[index]
     xml = fromstring(digital_certificate(certificate(document, GERMAN)))
@@ -70,7 +70,7 @@ def test_u_of_angles_is_the_same_wherever_it_is_told() -> None:
         if "less a right one" in each.findtext("dcc:name/dcc:content", "", NAMES)
     )
     listed = {
-        name: [float(each) for each in skew.findtext(f".//si:{name}XMLList", "", NAMES).split()]
+        name: [float(word) for word in skew.findtext(f".//si:{name}XMLList", "", NAMES).split()]
         for name in ("uncertainty", "coverageFactor", "coverageProbability")
     }
     np.testing.assert_allclose(listed["uncertainty"], widths, rtol=1e-12)
@@ -138,7 +138,11 @@ def test_where_nobody_counted_it_says_so_and_is_two_standard_deviations() -> Non
 def test_what_a_run_finds_beside_scale_and_bias_has_freedom_between_the_scarcest_line_s_and_none_to_count() -> None:
     sensor = result().gyroscopes["gyro"]
     assert isinstance(sensor.vector_model, VectorEntry) and sensor.budget is not None
-    fewest = min(each.degrees_of_freedom for each in sensor.budget.contributors if each.degrees_of_freedom is not None)
+    fewest = min(
+        contributor.degrees_of_freedom
+        for contributor in sensor.budget.contributors
+        if contributor.degrees_of_freedom is not None
+    )
     vector = sensor.vector_model
     for dof in (
         vector.non_orthogonality_degrees_of_freedom,

@@ -379,7 +379,7 @@ def test_readings_that_no_arm_turned_are_exported_with_what_is_known_of_their_mo
     assert main(["export", str(run), "--format", "csv", "--out", str(tmp_path)]) == 0
     assert {Path(line).name for line in capsys.readouterr().out.splitlines()} == files
     (readings,) = (name for name in files if name.count("_") == 0 and name.endswith(".csv"))
-    options = [str(tmp_path / each) if each.endswith(".csv") else each for each in again.split()]
+    options = [str(tmp_path / word) if word.endswith(".csv") else word for word in again.split()]
     main(["solve", str(tmp_path / readings), *options, "--json"])
     solved = json.loads(capsys.readouterr().out)
     first = json.loads((run / "result.json").read_text(encoding="utf-8"))

@@ -84,11 +84,11 @@ def test_a_history_follows_the_slopes_and_the_values_at_the_reference(
     result: ResultDocument, entry: OverTemperatureEntry
 ) -> None:
     by_quantity = {each.quantity: each for each in followed(result)}
-    slopes = {each.name: each for each in by_quantity["rate over temperature"].parameters}
+    slopes = {parameter.name: parameter for parameter in by_quantity["rate over temperature"].parameters}
 
     assert by_quantity["rate"].temperature_c == by_quantity["rate over temperature"].temperature_c == REFERENCE_C
     assert [slopes[name].value for name in ("sx", "sy", "sz", "tx", "ty", "tz")] == [*entry.bias[1], *entry.scale[1]]
-    assert all(each.expanded > 0 for each in slopes.values())
+    assert all(slope.expanded > 0 for slope in slopes.values())
 
 
 @pytest.mark.slow

@@ -28,7 +28,7 @@ def bars(picture: Residuals) -> np.ndarray:
     """(n, 3) in the picture's unit: half their heights."""
     (low, first), (high, second) = picture.ticks[0], picture.ticks[2]
     unit = (float(second.replace("−", "-")) - float(first.replace("−", "-"))) / (low - high)
-    return unit * np.array([(each.low - each.high) / 2 for each in picture.points]).reshape(-1, 3)
+    return unit * np.array([(point.low - point.high) / 2 for point in picture.points]).reshape(-1, 3)
 
 
 def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
@@ -59,9 +59,9 @@ def test_bars_of_attitudes_are_what_the_solve_expects_of_them() -> None:
     pictures = (
         (
             attitude_residuals(Finding("imu", ACCELERATION, acceleration)),
-            [each.residual_std_m_s2 for each in acceleration.dwells],
+            [dwell.residual_std_m_s2 for dwell in acceleration.dwells],
         ),
-        (attitude_residuals(Finding("imu", FIELD, field)), [each.residual_std_t for each in field.dwells]),
+        (attitude_residuals(Finding("imu", FIELD, field)), [dwell.residual_std_t for dwell in field.dwells]),
     )
     for picture, expected in pictures:
         assert picture.expectation in (EXPECTED_IN_ATTITUDES[ACCELERATION], EXPECTED_IN_ATTITUDES[FIELD])
@@ -85,10 +85,10 @@ def test_the_picture_of_contributions_is_of_the_values_of_the_budget() -> None:
     assert sensor.budget is not None
     table = lay_out_budget(sensor.budget, sensor.scale, RATE.bias)
     picture = contributions(sensor.budget, sensor.scale)
-    assert picture.axes == tuple(each.axis for each in table.columns)
-    places = [each.index for each in table.columns]
+    assert picture.axes == tuple(column.axis for column in table.columns)
+    places = [column.index for column in table.columns]
     for name, _, *drawn in picture.rows:
-        (line,) = (each for each in sensor.budget.contributors if each.name == name)
+        (line,) = (contributor for contributor in sensor.budget.contributors if contributor.name == name)
         for place, x in zip(places, drawn, strict=True):
             decades = np.log10(np.clip(line.std[place] / sensor.budget.std[place], 1e-4, 1.0))
             assert x == pytest.approx(332 + decades * (332 - 106) / 4, abs=0.1)
@@ -108,7 +108,7 @@ def filled(document: ResultDocument) -> list[float]:
     parts = []
     for page in HTML(string=certificate_page(certificate(document))).render().pages:
         sheet = page._page_box
-        lines = [each for each in sheet.children[0].descendants() if type(each).__name__ == "LineBox"]
+        lines = [descendant for descendant in sheet.children[0].descendants() if type(descendant).__name__ == "LineBox"]
         lowest = max(line.position_y + line.height for line in lines)
         parts.append((lowest - sheet.margin_top) / sheet.height)
     return parts

@@ -85,7 +85,7 @@ def test_resumed_after_whole_repeats_that_are_enough_it_only_goes_home(
 
 def test_after_the_end_only_the_last_way_home_is_made() -> None:
     plan = planned(order=["wrist_3", "wrist_1", "wrist_2"], directions=["cw", "ccw"])
-    last = max(place for place, each in enumerate(plan.motions) if isinstance(each, Sweep))
+    last = max(place for place, motion in enumerate(plan.motions) if isinstance(motion, Sweep))
     for enough in range(1, REPEATS):
         made = made_of(plan, enough)
         assert sum(isinstance(each, Sweep) for each in made) == enough * 6

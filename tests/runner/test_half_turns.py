@@ -28,8 +28,8 @@ def test_half_turns_recover_the_simulated_truth(tmp_path: Path) -> None:
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     truth = yaml.safe_load((tmp_path / "run" / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
     sensor = result["gyroscopes"]["gyro"]
-    assert [each["angle_rad"] for each in sensor["observations"]] == pytest.approx([np.pi] * 6)
-    assert "turner's encoders" in {each["name"] for each in sensor["budget"]["contributors"]}
+    assert [observation["angle_rad"] for observation in sensor["observations"]] == pytest.approx([np.pi] * 6)
+    assert "turner's encoders" in {contributor["name"] for contributor in sensor["budget"]["contributors"]}
     error = np.array(sensor["scale"] + sensor["bias_rad_s"]) - np.array(truth["scale"] + truth["bias_rad_s"])
     assert (np.abs(error) < 4 * np.sqrt(np.diag(sensor["covariance_combined"]))).all()
     page = (tmp_path / "run" / "certificate.html").read_text(encoding="utf-8")

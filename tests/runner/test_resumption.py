@@ -27,8 +27,8 @@ SETUP = Setup(noise_rad_s=0.005)
 
 def known_to_the_board(run: RunData) -> RunData:
     seen = [
-        BoardObserved("gyro", each.sweep.index, float(np.radians(60)), BoardObservation(0, 0, 1, 1, (0.0, 0.0, 0.0)))
-        for each in swept(run)
+        BoardObserved("gyro", sweep.sweep.index, float(np.radians(60)), BoardObservation(0, 0, 1, 1, (0.0, 0.0, 0.0)))
+        for sweep in swept(run)
     ]
     return replace(
         run,
@@ -105,7 +105,7 @@ def test_what_was_read_at_rest_beside_a_repeated_sweep_does_not_count() -> None:
     seen = readings_of(SETUP)
     bad = replace_readings(lambda seen: seen.rest(3) & seen.some(0.1), 20_000)(seen).recording()
     assert "gyro.spikes" in failed([bad])
-    begun_s = next(each.window.start_s for each in swept(seen.run) if each.sweep.index == 4)
+    begun_s = next(sweep.window.start_s for sweep in swept(seen.run) if sweep.sweep.index == 4)
     other = readings_of(replace(SETUP, seed=2)).recording()
     later = replace(other.provenance, started_utc="2026-11-21T00:10:00+00:00")
     assert failed([part(bad, 0.0, begun_s), replace(part(other, begun_s, np.inf), provenance=later)]) == set()
@@ -118,7 +118,7 @@ def failed(runs: list[RunData]) -> set[str]:
 
 def part(run: RunData, from_s: float, to_s: float) -> RunData:
     """What a recording tells of that time: its events. Readings and states are all there."""
-    inside = (each for each in run.events if from_s <= (each.controller_time_s or 0.0) < to_s)
+    inside = (event for event in run.events if from_s <= (event.controller_time_s or 0.0) < to_s)
     return replace(run, events=tuple(inside))
 
 

@@ -30,7 +30,9 @@ def error_over_std(run: WholeRun, sensor: str) -> np.ndarray:
     true = run.truth(sensor, SPEED_RAD_S)
     turns = run.observed.sensors[sensor].revolutions
     averages = [turn.average for turn in turns]
-    noise = [replace(each, variance_rad2_s2=each.variance_rad2_s2 - each.drift_rad2_s2) for each in averages]
+    noise = [
+        replace(average, variance_rad2_s2=average.variance_rad2_s2 - average.drift_rad2_s2) for average in averages
+    ]
     plain = solve_vector([replace(turn, average=each) for turn, each in zip(turns, noise, strict=True)], ())
     return np.array(
         [

@@ -48,7 +48,7 @@ Bench = tuple[AbstractContextManager[Any], Callable[[], object]]  # a source tha
 
 def table() -> Iterator[tuple[str, str, str]]:
     """Part, fault and the error's name."""
-    rows = ([each.strip() for each in line.split("  ") if each.strip()] for line in ROWS.strip().split("\n"))
+    rows = ([word.strip() for word in line.split("  ") if word.strip()] for line in ROWS.strip().split("\n"))
     _, *parts = next(rows)
     for fault, *names in rows:
         yield from ((part, fault, name) for part, name in zip(parts, names, strict=True) if name != "-")

@@ -109,7 +109,7 @@ def units_of(section: type[BaseModel]) -> set[str]:
 
 
 def test_every_unit_of_a_column_is_of_a_quantity_that_is_known() -> None:
-    assert units_of(LineScalarSection) == {each.name for each in SCALARS}
+    assert units_of(LineScalarSection) == {scalar.name for scalar in SCALARS}
     assert units_of(LineRateSection) == {RATE.name} and units_of(LineAccelerationSection) == {ACCELERATION.name}
     assert units_of(LineFieldSection) == {FIELD.name} and units_of(LineTimeSection) == {"time"}
 

@@ -202,7 +202,7 @@ def test_the_command_lists_studies_and_refuses_unknown_ones(capsys: pytest.Captu
     listed = " ".join(capsys.readouterr().out.split())
     assert (
         all(name in listed for name in STUDIES)
-        and listed.count("about ") >= sum(each.core_s is not None for each in STUDIES.values()) > 0
+        and listed.count("about ") >= sum(study.core_s is not None for study in STUDIES.values()) > 0
     )
     assert main(["study", "nosuch"]) == 2
     assert "Choose one of normal" in capsys.readouterr().err

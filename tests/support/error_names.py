@@ -114,7 +114,7 @@ class _Module:
             given = [(call.args[at], call) for call in self._calls.get(function.name, ()) if len(call.args) > at]
         else:
             given = [
-                (node.value, next(each for each in ast.walk(function) if isinstance(each, ast.Call)))
+                (node.value, next(node for node in ast.walk(function) if isinstance(node, ast.Call)))
                 for node in ast.walk(function)
                 if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == variable
             ]

@@ -24,7 +24,7 @@ def later(seen: Drawn) -> Array:
 
 
 def sweep_2(seen: Drawn) -> Array:
-    window = next(each.window for each in swept(seen.run) if each.sweep.index == 2)
+    window = next(sweep.window for sweep in swept(seen.run) if sweep.sweep.index == 2)
     inside = (seen.time_s >= window.start_s) & (seen.time_s <= window.end_s)
     return np.asarray(inside[:, None], dtype=np.float64)
 

@@ -20,7 +20,7 @@ def test_a_sample_lost_where_the_arm_moves_between_two_sweeps_fails_no_check() -
     whole = calibrate([run], DEFAULT_ESTIMATOR)
     time_base = whole.recordings[0].sensors["imu"].time_base
     time_s = time_base.controller_time_s(1e-6 * samples["board_time_us"].astype(np.float64))
-    windows = sorted((each.window.start_s, each.window.end_s) for each in swept(run))
+    windows = sorted((sweep.window.start_s, sweep.window.end_s) for sweep in swept(run))
     between = np.zeros(len(samples), np.bool_)
     for (_, end_s), (start_s, _) in pairwise(windows):
         between |= (time_s > end_s) & (time_s < start_s)

@@ -53,10 +53,10 @@ def held_to_be_uniform(found: Seen, of: str) -> None:
     """Refused once in a hundred is a true uniform distribution, and a true share."""
     from scipy.stats import binom, kstest
 
-    chances = {name: float(kstest(each, "uniform").pvalue) for name, each in found.p_values.items()}
+    chances = {name: float(kstest(p_value, "uniform").pvalue) for name, p_value in found.p_values.items()}
     most = float(binom.ppf(1 - REFUSED, found.recordings, LARGER))
     often = {name: found.beyond[name] for name in MOST_OF_MANY}
-    print(f"{of}: { ({name: round(each, 3) for name, each in chances.items()}) }")
+    print(f"{of}: { ({name: round(chance, 3) for name, chance in chances.items()}) }")
     print(f"{of}: beyond the limit of one in twenty, at most {most:.0f} of {found.recordings}: {often}")
     assert chances and all(chance > REFUSED for chance in chances.values()), (of, chances)
     assert all(each <= most for each in often.values()), (of, often)

@@ -30,8 +30,8 @@ def unseen(run: RunData) -> RunData:
 def without_states(run: RunData, from_s: float, to_s: float) -> RunData:
     """Of each sweep, between so many seconds after it began."""
     kept = np.ones(len(run.states), dtype=np.bool_)
-    for each in swept(run):
-        since_s = run.states["time_s"] - each.window.start_s
+    for sweep in swept(run):
+        since_s = run.states["time_s"] - sweep.window.start_s
         kept &= (since_s < from_s) | (since_s > to_s)
     return replace(run, states=run.states[kept])
 

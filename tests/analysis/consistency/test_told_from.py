@@ -36,8 +36,10 @@ def later(seen: Drawn) -> Array:
 
 def sweeps(seen: Drawn) -> Array:
     """(n, M) one inside each sweep."""
-    windows = [each.window for each in swept(seen.run)]
-    return np.array([(seen.time_s >= each.start_s) & (seen.time_s <= each.end_s) for each in windows], dtype=float).T
+    windows = [sweep.window for sweep in swept(seen.run)]
+    return np.array(
+        [(seen.time_s >= window.start_s) & (seen.time_s <= window.end_s) for window in windows], dtype=float
+    ).T
 
 
 # (n, 3) of one unit, in one of the ways in which each may happen: on an axis, or in one sweep and on one axis.

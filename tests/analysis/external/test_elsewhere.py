@@ -87,7 +87,7 @@ def test_attitudes_are_drawn_and_sweeps_in_the_notebook(kept: tuple[Example, Pat
     result = rig.solve(run)
     picture = result.plot()
     picture.save(folder / "residuals.png")
-    assert {each.get_title("left").split(":")[0] for each in picture.figure.axes} >= {
+    assert {axis.get_title("left").split(":")[0] for axis in picture.figure.axes} >= {
         f"imu, {kind}" for kind in example.kinds.values() if kind != "gyroscope" or example.samples == "samples.csv"
     }
 

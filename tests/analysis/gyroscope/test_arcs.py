@@ -21,10 +21,10 @@ def arcs(arc_deg: float, *, std_deg: float = STD_DEG, **more: object) -> Setup:
 def errors(seen: Drawn) -> tuple[Array, Budget, tuple[Observation, ...]]:
     """(6,) scale and bias less the truth, and what is known of them."""
     found = solve_inputs(seen.run)[1]["gyro"]
-    averages = [*(each.average for each in found.observations), *found.rests]
+    averages = [*(observation.average for observation in found.observations), *found.rests]
     inside = np.zeros(len(seen.time_s), dtype=np.bool_)
-    for each in averages:
-        inside |= (seen.time_s >= each.start_s) & (seen.time_s <= each.end_s)
+    for average in averages:
+        inside |= (seen.time_s >= average.start_s) & (seen.time_s <= average.end_s)
     true = np.concatenate([seen.scale, -seen.bias_rad_s[inside].mean(axis=0)])
     assert found.uncertainty is not None
     return np.concatenate([found.scale, found.bias_rad_s]) - true, found.uncertainty, found.observations
@@ -68,8 +68,8 @@ def test_a_ripple_is_motion_and_no_noise() -> None:
     )
     for found in (still, shaken):
         assert np.abs(found.scale - truth(Setup())[:3]).max() < 4e-4
-    ratio = np.array([each.average.variance_rad2_s2 for each in shaken.observations]).mean() / (
-        np.array([each.average.variance_rad2_s2 for each in still.observations]).mean()
+    ratio = np.array([observation.average.variance_rad2_s2 for observation in shaken.observations]).mean() / (
+        np.array([observation.average.variance_rad2_s2 for observation in still.observations]).mean()
     )
     assert ratio < 1.3  # 0.05 of the speed is fifty times the noise
 
@@ -82,7 +82,7 @@ def test_the_encoders_are_in_the_budget_as_they_are_stated() -> None:
             "gyro"
         ]
         assert found.uncertainty is not None
-        (line,) = (each for each in found.uncertainty.contributors if each.name == ENCODERS)
+        (line,) = (contributor for contributor in found.uncertainty.contributors if contributor.name == ENCODERS)
         assert line.std[:3] / found.scale == pytest.approx([np.sqrt(2) * STD_DEG / arc_deg] * 3, rel=0.02)
         assert np.abs(line.std[3:]).max() < 1e-6
         assert line.source == "uncertainty.angle_std_deg"
@@ -96,10 +96,12 @@ def test_of_whole_turns_the_encoders_err_by_nothing() -> None:
         solve_inputs(synthetic_run(Setup(noise_rad_s=1e-3, angle_std_deg=each)))[1]["gyro"] for each in (STD_DEG, None)
     )
     assert stated.uncertainty is not None and unstated.uncertainty is not None
-    assert ENCODERS not in [each.name for each in stated.uncertainty.contributors]
+    assert ENCODERS not in [contributor.name for contributor in stated.uncertainty.contributors]
     assert np.array_equal(stated.uncertainty.covariance, unstated.uncertainty.covariance)
     assert np.array_equal(stated.solution.scale, unstated.solution.scale)
-    assert all(each.angle_rad == 2 * np.pi and each.arc_rad is None for each in stated.observations)
+    assert all(
+        observation.angle_rad == 2 * np.pi and observation.arc_rad is None for observation in stated.observations
+    )
 
 
 @pytest.mark.slow

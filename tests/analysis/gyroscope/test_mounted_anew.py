@@ -56,7 +56,7 @@ def test_how_the_item_was_mounted_off_is_found() -> None:
     assert mount.stage == 1
     assert mount.rotation_rad == pytest.approx(-np.radians(off_deg[1]), abs=4 * float(mount.std_rad.max()))
     assert mount.std_rad.max() < np.radians(OFF_DEG) / 10
-    line = next(each for each in budget.contributors if each.name == "mounting anew")
+    line = next(contributor for contributor in budget.contributors if contributor.name == "mounting anew")
     assert line.half_width == OFF_DEG
 
 

@@ -62,7 +62,7 @@ def test_a_bias_is_that_at_rest_whatever_is_even_in_the_sensors_curve_which_is_n
 
 
 def test_the_budget_names_what_the_data_sheet_says() -> None:
-    known = [each for each in stated(solved(ODD)).contributors if each.half_width is not None]
+    known = [contributor for contributor in stated(solved(ODD)).contributors if contributor.half_width is not None]
     lines = {each.name: f"{each.half_width:.4g} {each.unit}" for each in known}
     assert lines["nonlinearity"] == "0.1 % of full scale"
     assert lines["scale over temperature"] == "615.4 ppm/K"
@@ -71,7 +71,7 @@ def test_the_budget_names_what_the_data_sheet_says() -> None:
 @pytest.mark.thorough
 def test_several_speeds_find_the_nonlinearity_whatever_the_data_sheet_says() -> None:
     several = replace(ODD, procedure=(("speeds_deg_s", "[30, 60, 120]"),))
-    assert "nonlinearity" not in {each.name for each in stated(solved(several)).contributors}
+    assert "nonlinearity" not in {contributor.name for contributor in stated(solved(several)).contributors}
 
 
 def test_a_bias_that_follows_the_recorded_temperature_is_that_at_the_mean_one() -> None:
@@ -90,7 +90,7 @@ def test_a_bias_follows_a_temperature_of_few_steps_and_one_that_its_steps_hide(s
     recorded_c = 22 + step_k * np.round(np.linspace(0, steps, 8))
     known = KnownSensor(0.0, 1.0, per_k, 0.0, 0.0, recorded_c, step_k)
     errors = own_errors(known, np.eye(3), np.ones((8, 3)), windows_s, ())
-    (line,) = (each for each in errors if each.name == "bias over temperature")
+    (line,) = (error for error in errors if error.name == "bias over temperature")
     seen, hidden = line.patterns[:3], line.patterns[3:]
     for axis in range(3):
         np.testing.assert_allclose(seen[axis, :, axis], per_k * (recorded_c - recorded_c.mean()), atol=1e-15)

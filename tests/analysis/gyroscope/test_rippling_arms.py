@@ -24,9 +24,9 @@ def errors(kind: str, arc_deg: float | None, seed: int) -> tuple[np.ndarray, np.
     ripple = drawn_ripple(rng, speed_deg_s / 360, [KINDS[kind].sensor.rate_hz])
     case = drawn(seed, KINDS[kind], setup, ripple)
     found = solve_inputs(case.run)[1]["gyro"]
-    averages = [*(each.average for each in found.observations), *found.rests]
-    inside = (case.time_s > min(each.start_s for each in averages)) & (
-        case.time_s < max(each.end_s for each in averages)
+    averages = [*(observation.average for observation in found.observations), *found.rests]
+    inside = (case.time_s > min(average.start_s for average in averages)) & (
+        case.time_s < max(average.end_s for average in averages)
     )
     assert found.uncertainty is not None
     off = np.concatenate([found.scale - case.scale, found.bias_rad_s + case.bias_rad_s[inside].mean(axis=0)])

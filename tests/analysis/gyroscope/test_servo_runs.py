@@ -51,7 +51,7 @@ def test_a_run_errs_by_what_it_says_and_the_turning_adds_next_to_nothing() -> No
     result = found.outcome.results["gyro"]
     assert result.solution.estimator == "newton" and result.explained is not None, "the vector model stands beside it"
     assert result.uncertainty is not None
-    names = {each.name for each in result.uncertainty.contributors}
+    names = {contributor.name for contributor in result.uncertainty.contributors}
     assert NOT_SQUARE in names and not names & {AXES, MOUNTS}
     failed = [check.name for check in found.outcome.checks if not check.passed]
     assert all(name.startswith("gyro.board_") for name in failed), failed  # no board was there

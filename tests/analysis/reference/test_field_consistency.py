@@ -38,7 +38,7 @@ def read_of(seed: int) -> ReferenceModel:
     movement = Movement(Dwells(means, variances, told), NO_SWEEPS)
     arm_known = StatedArm(NOMINAL, float(np.degrees(np.sqrt(3) * ARM_RAD)), np.eye(3), found.attitude_std_rad)
     drift, _ = drift_patterns(found.matrix, told, None)
-    of_arm = arm_patterns(theta, movement, [Posture(each) for each in JOINTS], arm_known)
+    of_arm = arm_patterns(theta, movement, [Posture(joint) for joint in JOINTS], arm_known)
     times_s = np.linspace(0.0, 5.0 * len(JOINTS), len(JOINTS))
     return ReferenceModel(theta, movement, np.concatenate([drift / np.sqrt(3), of_arm]), times_s, second_order=False)
 

@@ -105,8 +105,8 @@ def own_spread(budget: Budget) -> Array:
 
 def check(sessions: list[Session], within: tuple[float, float], without: float) -> None:
     """Errors over u are `within` these in the mean; `without`: how far the scale is beyond its own spread at least."""
-    off = np.array([each[0] for each in sessions])
-    alone = np.array([each[2] for each in sessions])
+    off = np.array([session[0] for session in sessions])
+    alone = np.array([session[2] for session in sessions])
     rms = np.sqrt(np.mean(off**2, axis=0))
     for part in (rms[:3], rms[3:]):
         assert within[0] < np.sqrt(np.mean(part**2)) < within[1], rms
@@ -225,7 +225,10 @@ def test_what_nobody_has_stated_is_assumed_and_said() -> None:
     unstated = replace(SITE, gravity_expanded_m_s2=None, magnetic_field_expanded_t=None)
     known, standard = accelerometer(0, unstated)[1], accelerometer(0, replace(unstated, gravity_m_s2=9.80665))[1]
     field = magnetometer(0, unstated)[1]
-    lines = [next(each for each in found.contributors if each.kind == "B") for found in (known, standard, field)]
+    lines = [
+        next(contributor for contributor in found.contributors if contributor.kind == "B")
+        for found in (known, standard, field)
+    ]
     assert [line.half_width for line in lines] == [pytest.approx(each) for each in (0.0005, 0.03, 0.48)]
     assert all(line.distribution == "rectangular" and line.source.endswith("is not given") for line in lines)
 

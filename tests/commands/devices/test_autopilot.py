@@ -94,7 +94,7 @@ def test_of_px4_offsets_are_stored_as_it_has_them(tmp_path: Path) -> None:
         found, kept = result(tmp_path), tmp_path / "old.json"
         done = rig_here("autopilot", "store", config, found, "--old", kept, "--yes")
         assert done.returncode == 0, done.stderr
-        changed = {name for name, each in fields(wire).items() if each != before[name]}
+        changed = {name for name, field in fields(wire).items() if field != before[name]}
         assert changed == {
             *(f"CAL_GYRO0_{axis}OFF" for axis in "XYZ"),
             *(f"CAL_ACC0_{axis}{what}" for axis in "XYZ" for what in ("OFF", "SCALE")),
@@ -113,17 +113,17 @@ def test_killed_at_any_moment_the_set_is_old_or_new_or_said_to_be_a_mixture(thor
         with autopilot_on_a_wire("ardupilot", LEFT) as wire:
             before, config = fields(wire), configuration(folder, wire.port)
             killed_after(wire, [config, result(folder), "--old", folder / "old.json", "--yes"], place, applied=applied)
-            changed = [name for name, each in fields(wire).items() if each != before[name]]
+            changed = [name for name, field in fields(wire).items() if field != before[name]]
             assert len(changed) == place + applied
             problems = seen(wire)
             mixed = 0 < place + applied < STORED
-            assert [each.problem.name for each in problems] == ["autopilot_mixture"] * mixed
+            assert [problem.problem.name for problem in problems] == ["autopilot_mixture"] * mixed
             told += mixed
             if mixed:
                 assert f"after {place + applied} of {STORED}" in problems[0].problem.what
                 assert any(isinstance(each, SensorError) for each in look({"imu": section(wire.port)}))
                 assert rig_here("autopilot", "restore", config, folder / "old.json", "--new", "--yes").returncode == 0
-                assert sum(each != before[name] for name, each in fields(wire).items()) == STORED
+                assert sum(field != before[name] for name, field in fields(wire).items()) == STORED
             assert rig_here("autopilot", "restore", config, folder / "old.json", "--yes").returncode == 0
             assert fields(wire) == before and not seen(wire)
     assert told == (len(moments) - 2 if thorough else 1)

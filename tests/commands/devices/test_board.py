@@ -264,7 +264,7 @@ def test_a_calibration_of_another_sensor_or_range_corrects_nothing(laboratory: W
 
 def test_check_names_what_a_verification_lacks(config: Path) -> None:
     limits = ("limits.verification_rms_rad_s=1", "limits.verification_mean_rad_s=1", "procedure.name=verify")
-    done = commands.rig("check", config, *(word for each in limits for word in ("--set", each)))
+    done = commands.rig("check", config, *(word for limit in limits for word in ("--set", limit)))
     assert done.returncode == 2 and done.stdout.endswith("not ready: 2 to correct\n"), done
     assert [line.split(": ")[1:3] for line in done.stderr.splitlines()] == [
         ["no_calibration", "sensors.gyro"],

@@ -47,7 +47,7 @@ def in_file(folder: Path) -> dict[Path, bytes]:
 def shifted(document: ResultDocument) -> ResultDocument:
     """Half of U beside what the recording gives, in kx."""
     gyro = document.gyroscopes["gyro"]
-    (kx,) = (each for each in followed(document)[0].parameters if each.name == "kx")
+    (kx,) = (parameter for parameter in followed(document)[0].parameters if parameter.name == "kx")
     scale = (gyro.scale[0] + 0.5 * kx.expanded, *gyro.scale[1:])
     return document.model_copy(update={"gyroscopes": {"gyro": gyro.model_copy(update={"scale": scale})}})
 
@@ -145,7 +145,7 @@ def test_another_estimator_moves_what_it_moves_and_answers_are_not_mixed(history
     (row,) = rows()
     solved = rig_here("solve", "run", "--estimator", "newton", "--json")
     document = ResultDocument.model_validate_json(solved.stdout)
-    (now,) = (each for each in followed(document)[0].parameters if each.name == row["parameter"])
+    (now,) = (parameter for parameter in followed(document)[0].parameters if parameter.name == row["parameter"])
     assert float(row["now"]) == now.value and float(row["now_expanded"]) == now.expanded
     refused = rig_here("history", "recompute")
     assert refused.returncode == 2 and "another_question" in refused.stderr

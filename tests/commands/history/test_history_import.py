@@ -101,7 +101,7 @@ def test_what_the_recording_gives_is_entered_and_a_claim_is_refused(folder: Path
     assert imported.returncode == 1 and "result_not_of_recording" in imported.stderr and runs(folder) == 0
     assert "1 entered" in rig_here("history", "import", "--solve", folder).stdout
     with open_history(str(folder.parent / "history.sqlite")) as history:
-        (found,) = (each for each in history.calibrations() if each.sensor == "gyro")
+        (found,) = (calibration for calibration in history.calibrations() if calibration.sensor == "gyro")
         assert abs(found.value("kx") - stated.scale[0]) < 1e-6 * stated.covariance[0][0] ** 0.5
     assert "0 changed" in rig_here("history", "verify").stdout
 

@@ -24,11 +24,13 @@ def test_the_calibrations_of_the_configured_serial_numbers_are_known_the_newest_
             history.enter(finish_run(day, serial_number=serial_number, passed=day != 2))
         history.void(4, "another sensor was mounted")
     known = recall_sensors(load(CI, ["sensors.gyro.serial_number=G-1"], None).config, frozenset({"G-1"}))
-    assert [(each.number, each.day, each.verdict) for each in known.calibrations] == [
+    assert [(calibration.number, calibration.day, calibration.verdict) for calibration in known.calibrations] == [
         (3, "2025-01-08", "pass"),
         (1, "2025-01-06", "pass"),
     ]
-    assert {each.board_unique_id for each in known.calibrations} == {finish_run(0).document.provenance.board_unique_id}
+    assert {calibration.board_unique_id for calibration in known.calibrations} == {
+        finish_run(0).document.provenance.board_unique_id
+    }
     assert known.silent is None and known.moved == {"G-1"}
 
 

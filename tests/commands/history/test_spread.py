@@ -24,8 +24,8 @@ def test_a_process_that_dies_costs_its_recording_and_no_other(monkeypatch: pytes
         answers = {task.key: answer for task, answer in distribute(TASKS, deadly, hands)}
     assert isinstance(lost := answers.pop(DEADLY), Unsolved) and lost.state == "lost"
     assert sorted(answers) == sorted(set(NAMES) - {DEADLY})
-    assert all(isinstance(each, RecomputedResult) and each.verdict == key for key, each in answers.items())
-    workers = {each.failed for each in answers.values() if isinstance(each, RecomputedResult)}
+    assert all(isinstance(answer, RecomputedResult) and answer.verdict == key for key, answer in answers.items())
+    workers = {answer.failed for answer in answers.values() if isinstance(answer, RecomputedResult)}
     assert {threads for _, threads in workers} == {"1"}
     assert str(os.getpid()) not in {number for number, _ in workers}
 
@@ -33,7 +33,7 @@ def test_a_process_that_dies_costs_its_recording_and_no_other(monkeypatch: pytes
 def test_a_defect_at_one_recording_costs_no_other_here() -> None:
     answers = {task.key: answer for task, answer in solve_one_by_one(TASKS, failing)}
     assert answers.pop(DEADLY) == Unsolved("failed", "ZeroDivisionError: a defect")
-    assert all(isinstance(each, RecomputedResult) for each in answers.values()) and len(answers) == len(NAMES) - 1
+    assert all(isinstance(answer, RecomputedResult) for answer in answers.values()) and len(answers) == len(NAMES) - 1
 
 
 @pytest.mark.thorough
@@ -51,8 +51,8 @@ def test_workers_of_a_cluster_work_in_processes_of_their_own_and_one_that_dies_c
                 (tmp_path / RESULT).touch()
                 killed = True
     assert sorted(answers) == sorted(each.key for each in tasks)
-    assert all(isinstance(each, RecomputedResult) and each.verdict == key for key, each in answers.items())
-    workers = {each.failed for each in answers.values() if isinstance(each, RecomputedResult)}
+    assert all(isinstance(answer, RecomputedResult) and answer.verdict == key for key, answer in answers.items())
+    workers = {answer.failed for answer in answers.values() if isinstance(answer, RecomputedResult)}
     assert str(os.getpid()) not in {number for number, _ in workers} and {threads for _, threads in workers} == {"1"}
 
 

@@ -112,7 +112,7 @@ def test_a_table_that_counts_the_other_way_turns_the_other_way(tmp_path: Path) -
 def test_units_are_spelt_as_in_the_section_of_a_device_that_prints_lines() -> None:
     of = {"x_t": "mgauss", "x_rad_s": "mdeg/s", "temperature_c": "degC"}
     told = ColumnMap.model_validate({"samples": {name: {"column": name, "unit": unit} for name, unit in of.items()}})
-    factors = [each.to_si for each in told.samples.values()]
+    factors = [sample.to_si for sample in told.samples.values()]
     assert factors == pytest.approx([1e-7, np.radians(1e-3), 1.0], rel=1e-12)
 
 

@@ -363,7 +363,7 @@ def test_the_allan_deviation_of_rounded_stamps_is_that_of_even_ones(
         path = path.rename(tmp_path / "log.csv.gz")
         path.write_bytes(gzip.compress(path.read_bytes()))
     assert main(["allan", str(path), "--json"]) == 0
-    (rate,) = (each["rate"] for each in json.loads(capsys.readouterr().out)["sensors"].values())
+    (rate,) = (sensor["rate"] for sensor in json.loads(capsys.readouterr().out)["sensors"].values())
     for walk in rate["random_walk_rad_sqrt_s"]:
         assert walk["value"] == pytest.approx(0.01 / rate_hz**0.5, abs=4 * walk["std"])
 
@@ -395,7 +395,7 @@ def test_a_gap_costs_what_it_hides_and_is_named(
 def test_a_turn_with_a_gap_is_less_certain_or_left_out(
     lasts: int, wider: float, omitted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    log = turned_slowly(0.35, np.array([0.02, -0.01, 0.022]))
+    log = turn_slowly(0.35, np.array([0.02, -0.01, 0.022]))
     files = write_rates(tmp_path, log, Stamps(gaps=((1200, lasts),)), "angle_rad")
     off, expanded = off_and_u(solved(capsys, *_interleave(files)))
     assert (off < 1).all() and omitted in in_brief(capsys, *_interleave(files))

@@ -61,7 +61,7 @@ def test_a_rest_that_creeps_is_counted_with_its_time(tmp_path: Path, capsys: pyt
     assert "left out: 1 of 13 rests, bias_jumped: the body crept" in words
     told = re.search(r"the first from (\S+) to (\S+) s", words)
     assert told is not None
-    assert [float(each) for each in told.groups()] == pytest.approx([rest.start_s, rest.end_s], abs=0.3)
+    assert [float(group) for group in told.groups()] == pytest.approx([rest.start_s, rest.end_s], abs=0.3)
 
 
 @pytest.mark.slow

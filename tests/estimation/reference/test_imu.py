@@ -277,9 +277,11 @@ def test_the_uncertainty_of_the_attitude_error_is_its_scatter() -> None:
             replace(sweeps, harmonics_m_s2=read[count:].reshape(-1, 3, 3)),
         )
         told_errors.append(solution.attitude_error)
-    found_rad = [each.std_rad for each in told_errors]
+    found_rad = [told_error.std_rad for told_error in told_errors]
     assert np.mean(found_rad) == pytest.approx(1e-3, rel=0.05)
-    assert np.mean([each.uncertainty_rad for each in told_errors]) == pytest.approx(np.std(found_rad), rel=0.3)
+    assert np.mean([told_error.uncertainty_rad for told_error in told_errors]) == pytest.approx(
+        np.std(found_rad), rel=0.3
+    )
 
 
 @pytest.mark.slow

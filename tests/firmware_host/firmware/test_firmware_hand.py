@@ -100,7 +100,7 @@ def test_a_touched_box_costs_nothing() -> None:
         *TWELVE[4:],
     )  # lifted by a corner, and on that face already
     played = play(handle(actions, 1, rest_s=REST_S))
-    assert [each for each in played.outcomes if each != "nothing"] == ["taken"] * 12
+    assert [outcome for outcome in played.outcomes if outcome != "nothing"] == ["taken"] * 12
     assert "nothing" in played.outcomes
     assert played.agreement.matrix_difference < SCALE_LIMIT
 
@@ -155,7 +155,7 @@ def test_after_ten_refused_moves_in_a_row_it_gives_up() -> None:
     assert played.outcomes == ["clipped"] * 10
     assert played.solved.state == "failed"
     now_us = int(played.times_us[-1])
-    assert {lamp(now_us + 10_000 * each) for each in range(20)} == {True, False}
+    assert {lamp(now_us + 10_000 * index) for index in range(20)} == {True, False}
 
 
 def test_a_box_that_is_held_askew_in_the_hand_is_asked_again() -> None:
@@ -277,7 +277,11 @@ def test_no_button_changes_a_stream_without_accelerations_or_begins_by_a_clock_w
 
 def test_the_button_of_the_shipped_image_lights_the_lamp_at_the_first_rest() -> None:
     session = Session(rate_at=lambda _time_s: (0.0, 0.0, 0.0), noise_rad_s=0.002)
-    (port,) = (each for each in session.board.peripherals if isinstance(each, Port) and each.name == "GPIOB")
+    (port,) = (
+        peripheral
+        for peripheral in session.board.peripherals
+        if isinstance(peripheral, Port) and peripheral.name == "GPIOB"
+    )
     session.run(2.5)  # until the crystal swings
     port.drive(BUTTON, high=True)
     session.run(0.1)

@@ -132,7 +132,7 @@ def test_stamps_are_put_in_order_alike_in_all_three(tmp_path: Path) -> None:
 def test_attitudes_come_from_poses_in_the_same_bag(transform: bool, tmp_path: Path) -> None:
     table = dict(read_columns(EXAMPLES / "swinging_samples.csv", samples_header(), 256))
     poses = read_attitudes(EXAMPLES / "swinging_attitudes.csv")
-    poses = {name: each[:400] for name, each in poses.items()}
+    poses = {name: pose[:400] for name, pose in poses.items()}
     table = {name: each[:400] for name, each in table.items()}
     write_bag(tmp_path / "bag", table, poses, transform)
     found = read_attitudes(Path(f"{tmp_path / 'bag'}::/mocap/body"))

@@ -39,7 +39,7 @@ def test_what_turned_the_encoder_wrong_is_not_in_the_speed() -> None:
     motion, sweep = motion_of(run), next(swept(run))
     turn = motion.turn(sweep.sweep, sweep.window, run.settings.observation)
     times = np.linspace(turn.start_s, turn.end_s, 4001)
-    rate = np.array([drawn.shafts[0].rate_at(each) for each in times.tolist()])
+    rate = np.array([drawn.shafts[0].rate_at(time) for time in times.tolist()])
     truth = float(np.mean((rate[1:] + rate[:-1]) / 2))
     assert truth == pytest.approx(turn.speed_rad_s, rel=4 * SHARE)
 

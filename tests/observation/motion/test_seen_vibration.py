@@ -45,7 +45,10 @@ def test_the_scale_is_as_well_known_as_stated_whatever_the_encoders_see_of_a_vib
     found = []
     for seed in range(3):
         setup = replace(QUIET, seed=seed, seen_vibration_rad_s=seen_rad_s, seen_vibration_hz=HERTZ)
-        found += [(errors(each), each) for each in revolutions(shaken(synthetic_run(setup), unseen_rad_s, seed))]
+        found += [
+            (errors(revolution), revolution)
+            for revolution in revolutions(shaken(synthetic_run(setup), unseen_rad_s, seed))
+        ]
     along = [error["xyz".index(each.axis)] for error, each in found]
     assert all(len(each.average.lines_hz) for _, each in found)
     assert 0.5 < np.sqrt(np.mean(np.square(along))) < 1.35  # a line of 8 cycles is hard to tell from what is smooth
@@ -58,8 +61,8 @@ def test_of_an_arm_that_turns_evenly_the_speed_is_that_of_a_turn_whatever_was_ta
 
     The even steps of an angle are lines in the rate too.
     """
-    for each in revolutions(synthetic_run(QUIET)):
-        assert each.speed_rad_s == pytest.approx(2 * np.pi / each.average.duration_s, rel=2e-6)
+    for revolution in revolutions(synthetic_run(QUIET)):
+        assert revolution.speed_rad_s == pytest.approx(2 * np.pi / revolution.average.duration_s, rel=2e-6)
 
 
 @pytest.mark.slow
@@ -67,6 +70,6 @@ def test_of_an_arm_that_turns_evenly_the_speed_is_that_of_a_turn_whatever_was_ta
 def test_noise_of_the_encoders_between_samples_that_are_far_apart_is_in_no_speed(sample_rate_hz: float) -> None:
     """It makes no more than what is stated of a turn, where the rates at the samples' times would be off by 4e-4."""
     setup = replace(QUIET, vibration=0.05, sample_rate_hz=sample_rate_hz, state_rate_hz=125.0, encoder_step_rad=1e-4)
-    for each in revolutions(synthetic_run(setup)):
-        off = each.speed_rad_s * each.average.duration_s / (2 * np.pi) - 1
-        assert abs(off) < 4 * max(each.speed_std_rad_s / each.speed_rad_s, 2e-5)
+    for revolution in revolutions(synthetic_run(setup)):
+        off = revolution.speed_rad_s * revolution.average.duration_s / (2 * np.pi) - 1
+        assert abs(off) < 4 * max(revolution.speed_std_rad_s / revolution.speed_rad_s, 2e-5)

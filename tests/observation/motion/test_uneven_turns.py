@@ -41,7 +41,7 @@ def test_beside_a_servos_lines_the_noise_is_that_of_the_gyroscope_alone() -> Non
 def test_a_servos_speed_is_as_well_known_as_is_said(thorough: bool) -> None:
     """What its encoder sees of the lines is how single readings scatter: ten times as much as a turn's time is out."""
     off = []
-    for turn, shaft in [each for seed in range(SEEDS * (5 if thorough else 1)) for each in turns(seed)]:
+    for turn, shaft in [turn for seed in range(SEEDS * (5 if thorough else 1)) for turn in turns(seed)]:
         start_s, end_s = turn.average.start_s, turn.average.end_s
         true = abs(shaft.angle_at(end_s) - shaft.angle_at(start_s)) / (end_s - start_s)
         off.append((turn.speed_rad_s - true) / turn.speed_std_rad_s)

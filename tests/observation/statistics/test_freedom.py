@@ -44,8 +44,8 @@ def test_the_freedom_of_a_variance_is_what_its_scatter_shows(
 ) -> None:
     rng = np.random.default_rng(1)
     draws = [made(rng, 1428) for _ in range(DRAWS)]
-    found = [fit_autoregression(each - each.mean()) for each in draws]
-    scatter = shown([left.factor * float(np.var(each)) for left, each in zip(found, draws, strict=True)])
+    found = [fit_autoregression(draw - draw.mean()) for draw in draws]
+    scatter = shown([left.factor * float(np.var(draw)) for left, draw in zip(found, draws, strict=True)])
     assert 1 / within < np.median([left.dof for left in found]) / scatter < within
 
 

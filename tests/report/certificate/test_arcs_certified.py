@@ -11,7 +11,7 @@ from support.documents.dcc_rules import schema_faults
 
 def of_arcs(angle_rad: float) -> ResultDocument:
     sensor = result().gyroscopes["gyro"]
-    turned = tuple(each.model_copy(update={"angle_rad": angle_rad}) for each in sensor.observations)
+    turned = tuple(observation.model_copy(update={"angle_rad": angle_rad}) for observation in sensor.observations)
     return add_comparison(
         result().model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update={"observations": turned})}})
     )

@@ -191,7 +191,9 @@ def test_every_quantity_says_when_it_holds_and_what_its_uncertainty_leaves_out(k
 def test_what_the_budget_has_of_the_run_says_nothing_of_other_speeds_and_temperatures() -> None:
     sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
-    assert {"nonlinearity", "scale over temperature"} <= {each.name for each in sensor.budget.contributors}
+    assert {"nonlinearity", "scale over temperature"} <= {
+        contributor.name for contributor in sensor.budget.contributors
+    }
     assert "nonlinearity at other speeds, other temperatures" in list_omitted_rates(sensor)
 
 
@@ -225,7 +227,8 @@ def test_what_a_gyroscopes_recording_would_have_told_stands_there() -> None:
         fault="gain half-way", check="scale_changed", size=6e-4, unit="1", error_over_expanded=1.2
     )
     sensors = {
-        name: each.model_copy(update={"detection_limits": (told,)}) for name, each in document.gyroscopes.items()
+        name: gyroscope.model_copy(update={"detection_limits": (told,)})
+        for name, gyroscope in document.gyroscopes.items()
     }
     text = read(certificate(document.model_copy(update={"gyroscopes": sensors}))).text
     assert "the checks of this measurement detect" in text and "gain half-way" in text

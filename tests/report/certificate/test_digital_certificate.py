@@ -135,7 +135,7 @@ def read_back(result_element: Element, size: int) -> tuple[list[float], np.ndarr
     """Values and covariance."""
     values = result_element.find(".//si:valueXMLList", NAMES)
     assert values is not None
-    entries = [float(each.text or "") for each in result_element.findall(".//si:covariance/si:value", NAMES)]
+    entries = [float(match.text or "") for match in result_element.findall(".//si:covariance/si:value", NAMES)]
     return numbers(values), np.array(entries).reshape(size, size).T
 
 
@@ -152,7 +152,7 @@ def test_a_magnetometer_s_covariance_is_the_result_s_as_mounted_and_turned_over(
     values, covariance = read_back(own, 6)
     assert values == [*turned.bias_t, *turned.arm_field_t]
     np.testing.assert_allclose(covariance, np.array(turned.covariance), rtol=1e-9)
-    units = {each.text for each in own.findall(".//si:covariance/si:unit", NAMES)}
+    units = {match.text for match in own.findall(".//si:covariance/si:unit", NAMES)}
     assert units == {r"\tesla\tothe{2}"}
     widths = results["bias, as mounted"].find(".//si:uncertaintyXMLList", NAMES)
     assert widths is not None
@@ -179,7 +179,7 @@ def test_biases_by_repeat_are_the_result_s() -> None:
     drift = everything().bias_drift["gyro"]["rate"]
     for i, axis in enumerate("xyz"):
         values = results[f"bias along {axis} by repeat"].find(".//si:valueXMLList", NAMES)
-        assert values is not None and numbers(values) == [each.scale_fixed.bias[i] for each in drift.repeats]
+        assert values is not None and numbers(values) == [repeat.scale_fixed.bias[i] for repeat in drift.repeats]
     assert r"\radian\second\tothe{-1}\kelvin\tothe{-1}" in of_everything().decode()
 
 

@@ -113,7 +113,10 @@ def test_a_byte_of_a_list_cannot_be_changed_unnoticed(signing: Signing) -> None:
     reader = PdfFileReader(io.BytesIO(bytes(made)))
     held = reader.root["/DSS"]["/CRLs"][0].encoded_data
     made[made.index(held) + len(held) // 2] ^= 1
-    assert [each.name for each in seen(bytes(made), signing.trust).problems] == ["not_as_signed", "signer_not_trusted"]
+    assert [problem.name for problem in seen(bytes(made), signing.trust).problems] == [
+        "not_as_signed",
+        "signer_not_trusted",
+    ]
 
 
 @pytest.mark.slow

@@ -142,19 +142,27 @@ def test_page_and_notebook_show_it(document: ResultDocument) -> None:
 @pytest.mark.slow
 def test_a_history_follows_it(document: ResultDocument, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (of,) = (each for each in followed(document) if (each.sensor, each.quantity) == ("gyro", "rate"))
-    assert [each.name for each in of.parameters if each.name in DENSITY.parameters] == ["bow_x", "bow_y", "bow_z"]
+    assert [parameter.name for parameter in of.parameters if parameter.name in DENSITY.parameters] == [
+        "bow_x",
+        "bow_y",
+        "bow_z",
+    ]
     place, serial = str(tmp_path / "history.sqlite"), document.gyroscopes["gyro"].serial_number
     text = compact(json.loads(document.text()))
     with open_history(place) as history:
         history.enter(FinishedRun(text, document, "bench", (), False, "here", "/runs/1", ()))
-        past = next(each for each in history.calibrations(Selection(serial_number=serial)) if each.quantity == "rate")
+        past = next(
+            calibration
+            for calibration in history.calibrations(Selection(serial_number=serial))
+            if calibration.quantity == "rate"
+        )
     names = list(past.parameters)
     assert names.index("gzz") < names.index("bow_x")  # after those of the rig's own
     assert past.parameters["bow_z"].unit == "rad/s/√Hz" and past.parameters["bow_z"].value == VALUES[2]
     assert main(["history", "list", serial, "--history", place]) == 0
     assert "bow_x rad/s/√Hz" in capsys.readouterr().out
     assert name_in_words("bow_y") == "the density of noise along y"
-    (subject,) = (each for each in subjects([past]) if each[2] == "rate")
+    (subject,) = (subject for subject in subjects([past]) if subject[2] == "rate")
     picture = draw_trends({subject: trends([past])}, tmp_path)[1].read_text(encoding="utf-8")
     assert "bow_x" in picture
 
@@ -182,13 +190,15 @@ def test_a_characteristic_is_in_every_outlet_or_says_in_a_line_why_not(character
 
 @pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.name)
 def test_no_two_characteristics_of_a_kind_share_a_name(kind: ResultKind[Any]) -> None:
-    names = [name for each in kind.characteristics for name in (each.name, *each.parameters)]
+    names = [
+        name for characteristic in kind.characteristics for name in (characteristic.name, *characteristic.parameters)
+    ]
     assert len(set(names)) == len(names)
-    assert all(each in characteristics.every_characteristic() for each in kind.characteristics)
+    assert all(characteristic in characteristics.every_characteristic() for characteristic in kind.characteristics)
 
 
 @pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.name)
 def test_an_outlet_that_a_kind_has_not_tells_none_of_its_characteristics(kind: ResultKind[Any]) -> None:
     through = {"certificate": kind.block, "digital certificate": kind.measured, "history": kind.followed}
     for outlet in [outlet for outlet, of in through.items() if isinstance(of, NoOutlet)]:
-        assert all(outlet in each.exempt for each in kind.characteristics)
+        assert all(outlet in characteristic.exempt for characteristic in kind.characteristics)

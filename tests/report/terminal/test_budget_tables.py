@@ -49,14 +49,16 @@ def budgets(document: ResultDocument) -> Iterator[tuple[BudgetEntry, tuple[float
         if sensor.role == "calibrate":
             found += [sensor, *([rest.pop(name)] if name in rest else [])]
     found += rest.values()
-    found += [each for each in document.magnetometers.values() if isinstance(each, MagnetometerEntry)]
+    found += [
+        magnetometer for magnetometer in document.magnetometers.values() if isinstance(magnetometer, MagnetometerEntry)
+    ]
     yield from ((each.budget, each.scale) for each in found if each.budget is not None)
 
 
 def of_the_terminal(document: ResultDocument) -> list[BudgetEntry]:
     """In the order of the terminal: kind by kind."""
     kinds = [*document.gyroscopes.values(), *document.accelerometers.values(), *document.magnetometers.values()]
-    return [each.budget for each in kinds if not isinstance(each, ErrorEntry) and each.budget is not None]
+    return [kind.budget for kind in kinds if not isinstance(kind, ErrorEntry) and kind.budget is not None]
 
 
 def elsewhere(samples: str, table: str, estimator: str | None) -> list[str]:
@@ -139,7 +141,7 @@ def test_the_terminal_shows_the_budgets_of_the_certificate(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "400")
     document = read_result(folder)
-    calibrated = {name: each for name, each in document.gyroscopes.items() if each.role == "calibrate"}
+    calibrated = {name: gyroscope for name, gyroscope in document.gyroscopes.items() if gyroscope.role == "calibrate"}
     document = document.model_copy(update={"gyroscopes": calibrated})
     print_outcome(document, as_json=False, whole=True)
     shown = capsys.readouterr().out
@@ -245,7 +247,7 @@ def test_k_and_its_probability_are_the_same_on_the_page_and_in_the_digital_certi
         covers = int(re.findall(r"approximately (\d+) %", sentence)[0])
         assert covers == round(100 * min(probabilities))
         assert ("95.45 %" in sentence) == (abs(min(probabilities) - 0.9545) < 5e-5)
-        assert ks_of(sentence) == [f"{each:.2f}" for each in factors]
+        assert ks_of(sentence) == [f"{factor:.2f}" for factor in factors]
 
 
 @pytest.mark.slow
@@ -258,7 +260,7 @@ def test_each_value_has_the_coverage_factor_of_its_degrees_of_freedom() -> None:
     np.testing.assert_allclose(by_dof.expanded, np.multiply(by_dof.coverage_factors, by_dof.std), rtol=1e-9)
     assert by_dof.coverage_factors == pytest.approx(coverage_factors(by_dof.effective_dof))
     assert 2.0 < by_dof.coverage_factors[0] < 2.01 and by_dof.coverage_factors[4] > 2.1
-    noise = {each.name: each.degrees_of_freedom for each in by_dof.contributors}["noise"]
+    noise = {contributor.name: contributor.degrees_of_freedom for contributor in by_dof.contributors}["noise"]
     assert noise is not None and 20 < noise < 1e6
     for rows, (budget, _) in zip(printed(document), budgets(document), strict=True):
         check_adds_up(rows, budget)
@@ -268,7 +270,7 @@ def test_each_value_has_the_coverage_factor_of_its_degrees_of_freedom() -> None:
 
 def listed(found, name: str) -> list[float]:  # type: ignore[no-untyped-def]
     """One for each of three values, of which one may stand for all."""
-    numbers = [float(each) for each in found.findtext(f".//si:{name}", "", NAMES).split()]
+    numbers = [float(word) for word in found.findtext(f".//si:{name}", "", NAMES).split()]
     return numbers * 3 if len(numbers) == 1 else numbers
 
 

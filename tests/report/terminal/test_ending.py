@@ -55,11 +55,11 @@ def test_one_sensor_ends_in_twelve_lines(result: ResultDocument) -> None:
 @pytest.mark.parametrize("folder", FROZEN, ids=lambda folder: f"{folder.parent.name}-{folder.name}")
 def test_whatever_fails_the_end_fits_its_lines(folder: Path, width: int) -> None:
     result = read_result(folder)
-    calibrated = [name for name, each in result.gyroscopes.items() if each.role != "reference"]
+    calibrated = [name for name, gyroscope in result.gyroscopes.items() if gyroscope.role != "reference"]
     beside = [*result.accelerometers, *result.magnetometers, *result.bias_drift, *result.over_temperature]
     one = len([*calibrated, *beside]) == 1
     most = 12 if one else 25
-    names = [each.name for each in result.checks]
+    names = [check.name for check in result.checks]
     for broken in ([], *([name] for name in names), names[:2], names):
         lines = ended(fail_checks(result, *broken), width)
         assert len(lines) <= most, lines
@@ -69,7 +69,7 @@ def test_whatever_fails_the_end_fits_its_lines(folder: Path, width: int) -> None
 
 
 def test_a_narrow_screen_says_what_a_wide_one_says() -> None:
-    result = fail_checks(ONE, *(each.name for each in ONE.checks))
+    result = fail_checks(ONE, *(check.name for check in ONE.checks))
     assert sorted(" ".join(ended(result, 60)).split()) == sorted(" ".join(ended(result, 80)).split())
 
 
@@ -83,7 +83,7 @@ def test_six_sensors_end_in_a_screen(names: list[str]) -> None:
 @pytest.mark.parametrize("folder", FROZEN, ids=lambda folder: f"{folder.parent.name}-{folder.name}")
 def test_every_result_fits_the_width_and_ends_with_its_verdict(folder: Path, width: int) -> None:
     result = read_result(folder)
-    for lines in (ended(result, width), ended(fail_checks(result, *(each.name for each in result.checks)), width)):
+    for lines in (ended(result, width), ended(fail_checks(result, *(check.name for check in result.checks)), width)):
         assert max(len(line) for line in lines if not line.startswith(COPYABLE) and "rig " not in line) <= width
         assert lines[-1] in {"verdict: PASS", "verdict: FAIL"}
         assert f"all details: rig show {RUN} --all" in lines
@@ -112,8 +112,8 @@ def test_a_check_of_another_quantity_has_the_same_words_and_no_limit_that_nobody
 
 def test_what_came_near_its_limit_is_named() -> None:
     checks = [
-        each.model_copy(update={"value": 0.95 * each.limit}) if each.name == "gyro.bias" and each.limit else each
-        for each in ONE.checks
+        check.model_copy(update={"value": 0.95 * check.limit}) if check.name == "gyro.bias" and check.limit else check
+        for check in ONE.checks
     ]
     text = " ".join(ended(ONE.model_copy(update={"checks": tuple(checks)})))
     assert "near its limit: gyro.bias" in text
@@ -127,7 +127,7 @@ def test_a_reference_is_no_result_of_the_run() -> None:
 
 @pytest.mark.parametrize("folder", FROZEN, ids=lambda folder: f"{folder.parent.name}-{folder.name}")
 def test_every_check_is_explained(folder: Path) -> None:
-    assert [each.name for each in read_result(folder).checks if words_of(each) is None] == []
+    assert [check.name for check in read_result(folder).checks if words_of(check) is None] == []
 
 
 def test_the_page_of_checks_is_made_of_the_table() -> None:

@@ -63,7 +63,7 @@ def refused(names: Sequence[str]) -> Callable[[], int]:
 
 def ends(sensors: str, how: str) -> Callable[[], int]:
     result, names = RESULTS[sensors], NAMES[sensors]
-    broken = [each.name for each in result.checks if each.name.startswith(tuple(f"{name}.scale" for name in names))]
+    broken = [check.name for check in result.checks if check.name.startswith(tuple(f"{name}.scale" for name in names))]
     return {
         "pass": verdict(result),
         "fail": verdict(fail_checks(result, *broken)),

@@ -90,7 +90,7 @@ def ran(source: str, folder: Path, *changes: dict[str, Any]) -> Ran:
             process.kill()
     assert process.returncode == 0, said
     run = read_run(out / "run.h5")
-    (*_, last) = (each.event for each in run.events if isinstance(each.event, HandRested))
+    (*_, last) = (event.event for event in run.events if isinstance(event.event, HandRested))
     first = run.samples[name][0]
     on_s = (float(first["host_time_s"]) - began_s) * laboratory["world"]["time_scale"]
     rest_s = on_s + 1e-6 * (np.array([last.begin_us, last.end_us]) - int(first["board_time_us"]))
@@ -117,7 +117,7 @@ def test_what_tells_its_own_time_is_calibrated_by_hand(source: str, tmp_path: Pa
     found = ran(source, tmp_path, SHORT)
     assert np.abs(found.off).max() < 4
     entry = found.entry
-    (clock,) = (each for each in entry["budget"]["contributors"] if each["name"] == "clock")
+    (clock,) = (contributor for contributor in entry["budget"]["contributors"] if contributor["name"] == "clock")
     assert clock["half_width"] == CLOCK_PPM and "the sensor's own clock" in clock["source"]
     again = json.loads(rig_here("solve", tmp_path / "run", "--json").stdout)
     assert again["gyroscopes"][SOURCES[source][0]]["scale"] == entry["scale"]

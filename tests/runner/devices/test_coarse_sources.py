@@ -64,5 +64,5 @@ def test_what_is_stated_by_every_message_and_number_of_digits_holds(source: str 
         runs = list(two_at_once.map(run, product(NOISE_RAD_S, (False, True), SEEDS)))
     within, largest = shares(runs)
     print(source, f"{100 * within:.1f} % within U, largest {largest:.2f} U")
-    assert not [(each.folder.name, each.refused) for each in runs if each.refused]
+    assert not [(run.folder.name, run.refused) for run in runs if run.refused]
     assert within >= WITHIN and largest < BEYOND

@@ -55,7 +55,7 @@ def off(entry: dict[str, Any]) -> np.ndarray:
 
 def by_noise(entry: dict[str, Any]) -> np.ndarray:
     """(6,) errors of scale and bias, each by what the scatter of the readings contributes to its uncertainty."""
-    (noise,) = (each for each in entry["budget"]["contributors"] if each["name"] == "noise")
+    (noise,) = (contributor for contributor in entry["budget"]["contributors"] if contributor["name"] == "noise")
     found: np.ndarray = (np.array(entry["scale"] + entry["bias_rad_s"]) - TRUTH) / noise["std"]
     return found
 
@@ -119,7 +119,9 @@ def test_a_time_by_arrival_costs_what_the_budget_says(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr + done.stdout
     entry = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["gyroscopes"]["imu"]
     assert np.abs(off(entry)).max() < 4
-    (stamps,) = (each for each in entry["budget"]["contributors"] if each["name"] == "times of the samples")
+    (stamps,) = (
+        contributor for contributor in entry["budget"]["contributors"] if contributor["name"] == "times of the samples"
+    )
     assert max(stamps["std"][:3]) > 0
 
 

@@ -33,7 +33,7 @@ def test_another_arm_calibrates_a_gyroscope(model: ModelName, tmp_path: Path) ->
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.parametrize("model", [each for each in (*OTHER_ARMS, *MORE_ARMS) if each not in UNLIKE])
+@pytest.mark.parametrize("model", [other_arm for other_arm in (*OTHER_ARMS, *MORE_ARMS) if other_arm not in UNLIKE])
 def test_every_arm_of_the_family_calibrates_a_gyroscope(model: ModelName, tmp_path: Path) -> None:
     _calibrates(model, tmp_path)
 
@@ -65,7 +65,7 @@ def _calibrates(model: ModelName, tmp_path: Path) -> None:
 @pytest.mark.thorough
 @pytest.mark.timeout(3600)
 def test_what_is_stated_holds_on_other_arms(tmp_path: Path) -> None:
-    worlds = [(model, first_seed(model) + each) for model in OTHER_ARMS for each in range(WORLDS[model])]
+    worlds = [(model, first_seed(model) + index) for model in OTHER_ARMS for index in range(WORLDS[model])]
     with ThreadPoolExecutor(2) as two_at_once:
         list(two_at_once.map(lambda world: record(world[0], world[1], tmp_path / str(world[1])), worlds))
     runs = {world: solve(tmp_path / str(world[1])) for world in worlds}

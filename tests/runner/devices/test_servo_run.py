@@ -123,7 +123,7 @@ def test_whatever_happens_the_shaft_stands_the_data_are_kept_and_the_run_goes_on
     names = {name, *ALSO.get(what, ())}
     if moment == "as a turn begins" and name in UNANSWERED:
         names.add("servo_does_not_hear")
-    assert seen.process.returncode == status and any(each in said for each in names), said
+    assert seen.process.returncode == status and any(name in said for name in names), said
     assert seen.at_rest_after_s < KNOWN_S.get(what, 0.0) + silent_s + STANDS_S, seen.at_rest_after_s
     assert seen.stood
     last = read_run(sorted(out.glob("run*.h5"), key=lambda path: path.stat().st_mtime)[-1])

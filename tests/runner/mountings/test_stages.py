@@ -55,7 +55,7 @@ def test_an_instruction_that_was_not_followed_ends_the_run_before_a_sweep(tmp_pa
     assert done.returncode == 3, done.stderr + done.stdout
     assert "mounted_otherwise" in done.stderr
     assert "in the trial of wrist_1 gyro is turned about the item's" in " ".join(done.stderr.split())
-    assert not [each for each in read_run(out / "run-2.h5").events if "Sweep" in type(each.event).__name__]
+    assert not [event for event in read_run(out / "run-2.h5").events if "Sweep" in type(event.event).__name__]
 
 
 @pytest.mark.thorough

@@ -57,7 +57,7 @@ def scale(folder: Path) -> tuple[np.ndarray, np.ndarray]:
 def swept(folder: Path, recording: str) -> int:
     """How many sweeps of a recording were begun; 0 where there is none."""
     path = folder / "run" / recording
-    return sum("Sweep" in type(each.event).__name__ for each in read_run(path).events) if path.exists() else 0
+    return sum("Sweep" in type(event.event).__name__ for event in read_run(path).events) if path.exists() else 0
 
 
 @pytest.mark.slow
@@ -81,7 +81,7 @@ def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path) -> None:
         apart[seed] = (np.abs(in_stages - in_one) / np.hypot(of_stages, of_one)).tolist()
         print(f"seed {seed}: scale factors differ by {max(apart[seed]):.2f} U at most")
     assert not {seed: each for seed, each in apart.items() if max(each) > BEYOND}
-    within = float(np.mean([each <= 1 for axes in apart.values() for each in axes]))
+    within = float(np.mean([axis <= 1 for axes in apart.values() for axis in axes]))
     print(f"{100 * within:.1f} % of {3 * len(apart)} differences are within U")
     assert within >= WITHIN
 

@@ -174,9 +174,9 @@ def turned_by(joint: int, angle_deg: float, dwell: int) -> Damage:
 
     def damaged(run: RunData) -> RunData:
         began_s, ended_s = (
-            each.controller_time_s
-            for each in run.events
-            if isinstance(each.event, DwellStarted | DwellFinished) and each.event.dwell.index == dwell
+            event.controller_time_s
+            for event in run.events
+            if isinstance(event.event, DwellStarted | DwellFinished) and event.event.dwell.index == dwell
         )
         assert began_s is not None and ended_s is not None
         arm = run.states.copy()
@@ -250,10 +250,10 @@ def test_an_interrupted_run_goes_on_where_it_stood(tmp_path: Path) -> None:
     assert resumed.returncode == 0, resumed.stdout + resumed.stderr
     first, second = read_run(out / "run.h5"), read_run(out / "run-2.h5")
     done = [
-        each.event.dwell.index
+        event.event.dwell.index
         for run in (first, second)
-        for each in run.events
-        if isinstance(each.event, DwellFinished)
+        for event in run.events
+        if isinstance(event.event, DwellFinished)
     ]
     assert sorted(done) == list(range(9))
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))

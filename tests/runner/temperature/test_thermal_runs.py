@@ -88,7 +88,7 @@ def test_a_heater_takes_the_sensors_through_the_range(heated: Path) -> None:
     assert max(b - a for a, b in pairwise(temperatures)) <= 5
     assert finished_sweeps(run) == set(range(6 * len(sets)))
     assert [(each.first, each.end) for each in sets] == [(6 * k, 6 * k + 6) for k in range(len(sets))]
-    assert all(each.heated for each in of_events(run, TemperatureWanted))
+    assert all(event.heated for event in of_events(run, TemperatureWanted))
     assert run.settings.reference_c == 30
 
 
@@ -98,7 +98,7 @@ def test_the_heater_goes_on_while_the_rig_looks_at_its_sweeps(heated: Path) -> N
     On a busy machine it may go off for a moment, but not for as long as it takes to find a revolution there.
     """
     run = read_run(heated / "run.h5")
-    cooling = [each for each in run.events if isinstance(each.event, TemperatureWanted) and not each.event.warming]
+    cooling = [event for event in run.events if isinstance(event.event, TemperatureWanted) and not event.event.warming]
     samples = run.samples["gyro"]
     warming = samples["host_time_s"] < min((each.host_time_s for each in cooling), default=np.inf)
     warm = run.sensors["gyro"].channel(TEMPERATURE).values(samples[warming]).ravel()
@@ -210,7 +210,7 @@ def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> No
         laboratory.control({"do": "air", "temperature_c": 41})
         said = run.communicate(timeout=PATIENCE_S)[1]
     assert run.returncode in (0, 1), said
-    assert not any(each.heated for each in of_events(read_run(out / "run.h5"), TemperatureWanted))
+    assert not any(event.heated for event in of_events(read_run(out / "run.h5"), TemperatureWanted))
 
 
 @pytest.mark.thorough

@@ -50,7 +50,11 @@ def _schema(folder: Path) -> etree.XMLSchema:
 def rule_faults(xml: bytes) -> list[str]:
     """Errors by PTB's Schematron; its warnings and remarks are left out."""
     found = _rules().validate_str(xml.decode())
-    return [each.text for each in [*found.failed_assertions, *found.successful_reports] if each.role not in REMARKS]
+    return [
+        failed_assertion.text
+        for failed_assertion in [*found.failed_assertions, *found.successful_reports]
+        if failed_assertion.role not in REMARKS
+    ]
 
 
 @functools.cache

@@ -31,9 +31,9 @@ def write(folder: Path) -> None:
     for name in ("sequence", "board_time_us", "host_time_s"):
         samples[name] = beside[name]
     time_s, noise = observed.time_s("gyro"), np.random.default_rng(4)
-    for each in dwelt(run):
-        inside = (time_s >= each.window.start_s) & (time_s <= each.window.end_s)
-        up = observed.motion.attitude(each.window.start_s, each.window.end_s) @ [0, 0, 1]
+    for dwell in dwelt(run):
+        inside = (time_s >= dwell.window.start_s) & (time_s <= dwell.window.end_s)
+        up = observed.motion.attitude(dwell.window.start_s, dwell.window.end_s) @ [0, 0, 1]
         readings = np.arcsin(up[:2]) / SCALE + BIAS_RAD + noise.normal(0, NOISE_RAD, (int(inside.sum()), 2))
         samples["tilt"][inside] = np.round(readings / PER_COUNT)
     sensors = {**run.sensors, "tilt": tilt}

@@ -81,7 +81,7 @@ class Stamps:
         stamps = time_s.copy()
         if self.burst > 1:
             packet = np.arange(len(time_s)) // self.burst
-            place = np.concatenate([np.arange(kept[packet == each].sum()) for each in range(packet[-1] + 1)])
+            place = np.concatenate([np.arange(kept[packet == index].sum()) for index in range(packet[-1] + 1)])
             late_s = self.late_s * rng.random(packet[-1] + 1)[packet]
             stamps = time_s[0] + (packet + 1) * self.burst * (time_s[1] - time_s[0]) + late_s
             stamps[kept] += self.inner_s * place

@@ -116,7 +116,7 @@ class Bench:
 def children(pid: int) -> list[int]:
     """The process ids of a process' children, none when it has ended."""
     with suppress(OSError):
-        return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+        return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
     return []
 
 

@@ -152,7 +152,7 @@ def _account(here: Bench, fault: Fault | None, cell: Cell, *, fault_s: float, fa
 def _came_late(here: Bench, fault_s: float) -> bool:
     """Whether all was recorded by then that a calibration is found from."""
     run = read_run(recordings(here.out, "raw")[0])
-    windows = [each.window for each in swept(run)] + [each.window for each in dwelt(run)]
+    windows = [sweep.window for sweep in swept(run)] + [dwell.window for dwell in dwelt(run)]
     return all(window.end_s <= fault_s for window in windows)
 
 

@@ -14,7 +14,7 @@ DEADLY, WAITING = "deadly", "waiting"
 
 def task(key: str, *places: Path) -> Task:
     """Return a task without recordings, named by its answer."""
-    return Task(key, (), tuple(("bench", str(each)) for each in places), (), None)
+    return Task(key, (), tuple(("bench", str(place)) for place in places), (), None)
 
 
 def answer_at_once(task: Task) -> Answer:

@@ -128,7 +128,7 @@ class Rounds:
             elif "not entered in the history" in line:
                 self.not_remembered.append(line)
         if this.whole and user.said.name == f"whole{this.seed}.txt":
-            entered = [int(each) for each in re.findall(r"entered in .* as calibration (\d+)", "".join(whole_lines))]
+            entered = [int(match) for match in re.findall(r"entered in .* as calibration (\d+)", "".join(whole_lines))]
             assert len(entered) == WHOLE_PARTS, f"{this}: {''.join(said)}"
             for number, serial_number in zip(entered, self._serial_numbers(this), strict=True):
                 self._entered([number], serial_number, this)

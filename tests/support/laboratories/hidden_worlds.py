@@ -115,7 +115,7 @@ def world_by_datasheet(part: str, seed: int) -> dict[str, Any]:
     site = document["site"]
     expanded = site["gravity_uncertainty_m_s2"]
     document["world"]["site"]["gravity_m_s2"] = float(rng.normal(site["gravity_m_s2"], expanded / 2))
-    document["sensors"] = {name: each for name, each in document["sensors"].items() if each is not None}
+    document["sensors"] = {name: sensor for name, sensor in document["sensors"].items() if sensor is not None}
     ((name, section),) = document["sensors"].items()
     sheet, off = PARTS[part], PARTS[part].delivered
     assert off.bias_deg_s is not None and off.scale_percent is not None and off.rate_percent is not None
@@ -235,7 +235,7 @@ def world_with_ripple(family: Callable[[int], dict[str, Any]], seed: int) -> dic
     """Return a world of a family, on an arm whose ripple and vibrations come at any order of the revolution."""
     document = family(seed)
     turn_hz = document["procedure"]["speed_deg_s"] / 360
-    rates_hz = [each["rate_hz"] for each in document["sensors"].values() if each]
+    rates_hz = [sensor["rate_hz"] for sensor in document["sensors"].values() if sensor]
     ripple = drawn_ripple(np.random.default_rng([seed, 47]), turn_hz, rates_hz)
     changed: dict[str, Any] = merge(document, {"world": {"arm": make_keys(ripple)}})
     return changed
@@ -350,7 +350,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _add_sensors(document: dict[str, Any], rng: np.random.Generator, noise: Mapping[str, float]) -> dict[str, Any]:
-    sensors = {name: each for name, each in document["sensors"].items() if each is not None}
+    sensors = {name: sensor for name, sensor in document["sensors"].items() if sensor is not None}
     changes = {
         "sensors": {name: {"mounting": _mounting(rng)} for name in sensors},
         "world": {"sensors": {name: _sensor(rng, sensor, noise[sensor["part"]]) for name, sensor in sensors.items()}},

@@ -50,5 +50,5 @@ def probability(check: Check, rate: float = RATE) -> float:
     from scipy.special import chdtrc, chdtri
 
     limit = float(check.limit or 0.0)
-    dof = min(range(1, 400), key=lambda each: abs(float(chdtri(each, rate)) - limit))
+    dof = min(range(1, 400), key=lambda index: abs(float(chdtri(index, rate)) - limit))
     return float(chdtrc(dof, float(check.value or 0.0)))

@@ -50,7 +50,7 @@ class Readings:
     @property
     def turning(self) -> Mask:
         """All sweeps."""
-        mask: Mask = np.any([self.within(each.window) for each in swept(self.run)], axis=0)
+        mask: Mask = np.any([self.within(sweep.window) for sweep in swept(self.run)], axis=0)
         return mask
 
     def dwell(self, index: int) -> Mask:

@@ -39,12 +39,12 @@ class Readings:
         return np.isin(np.arange(len(self.counts)), np.concatenate([np.flatnonzero(self.sweep(i)) for i in range(6)]))
 
     def sweep(self, index: int) -> Mask:
-        window = next(each.window for each in swept(self.run) if each.sweep.index == index)
+        window = next(sweep.window for sweep in swept(self.run) if sweep.sweep.index == index)
         return self.between(window.start_s, window.end_s)
 
     def half_of(self, index: int) -> Mask:
         """Return the mask of the second half of a sweep."""
-        window = next(each.window for each in swept(self.run) if each.sweep.index == index)
+        window = next(sweep.window for sweep in swept(self.run) if sweep.sweep.index == index)
         return self.between((window.start_s + window.end_s) / 2, window.end_s)
 
     def rest(self, index: int) -> Mask:

@@ -91,10 +91,10 @@ def test_a_board_too_far_from_the_shaft_is_refused() -> None:
     with servo_on_a_wire() as wire, Servo(wire.port, MODEL, clock=wire.clock) as servo:
         report = servo.report()
     heavy = FlangeLoad(1.0, (0.1, 0.0, 0.0))
-    assert [each.name for each in servo_problems(report, MODEL, heavy, 0.1)] == ["servo_load"]
+    assert [problem.name for problem in servo_problems(report, MODEL, heavy, 0.1)] == ["servo_load"]
     assert servo_problems(report, MODEL, replace(heavy, centre_m=(0.0, 0.0, 0.1)), 0.1) == []
     held_fast = replace(report, torque_on=True, operating_mode=3)
-    assert [each.name for each in servo_problems(held_fast, MODEL, BOARD, 0.1)] == ["servo_torque_on"]
+    assert [problem.name for problem in servo_problems(held_fast, MODEL, BOARD, 0.1)] == ["servo_torque_on"]
 
 
 def test_of_a_run_that_goes_on_the_movements_behind_it_are_judged_too_and_nothing_is_told_twice() -> None:
@@ -104,7 +104,7 @@ def test_of_a_run_that_goes_on_the_movements_behind_it_are_judged_too_and_nothin
     nowhere = Transfer("nowhere", (6.0,), (6.0,), speed_rad_s=1.0, acceleration_rad_s2=1.0, duration_s=0.0)
     whole = Plan((fast, nowhere), start_q_rad=(0.0,), home_q_rad=(0.0,))
     for rest in (whole, replace(whole, steps=(nowhere,))):
-        told = [each.name for each in SERVO.problems([whole, rest], section, None)]
+        told = [problem.name for problem in SERVO.problems([whole, rest], section, None)]
         assert sorted(told) == ["no_duration", "no_travel", "servo_too_fast"]
 
 

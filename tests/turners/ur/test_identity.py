@@ -214,7 +214,7 @@ def told_by(key: ModelName, told: ArmReport) -> ArmReport:
     """What the controller of that model says, by the table of the simulated laboratory."""
     world = MODELS[key]
     a, d, quarters = zip(*world.drawing, strict=True)
-    drawing = DenavitHartenberg((0.0,) * 6, a, d, tuple(each * pi / 2 for each in quarters))
+    drawing = DenavitHartenberg((0.0,) * 6, a, d, tuple(quarter * pi / 2 for quarter in quarters))
     least = tuple(-limit for limit in world.limit_rad)
     limits = JointLimits(least, world.limit_rad, world.speed_rad_s, (40.0,) * 6)
     setup = ArmSetup(world.robot_type, drawing, limits)
