@@ -11,40 +11,40 @@ ITSELF = "calibration-rig"
 
 def list_needed(extras: Iterable[str]) -> dict[str, Distribution]:
     """Every package that an installation with these extras brings, by its name, without the program itself."""
-    found: dict[str, Distribution] = {}
-    asked: set[tuple[str, str]] = set()
+    distributions: dict[str, Distribution] = {}
+    visited: set[tuple[str, str]] = set()
     to_ask = [(ITSELF, extra) for extra in ("", *extras)]
     while to_ask:
         name, extra = to_ask.pop()
-        if (name, extra) in asked:
+        if (name, extra) in visited:
             continue
-        asked.add((name, extra))
+        visited.add((name, extra))
         try:
-            found[name] = distribution(name)
+            distributions[name] = distribution(name)
         except PackageNotFoundError:
             continue  # of another system's, or of an extra that is not installed
-        to_ask += _list_required(found[name], extra)
-    del found[ITSELF]
-    return found
+        to_ask += _list_required(distributions[name], extra)
+    del distributions[ITSELF]
+    return distributions
 
 
 def _list_required(package: Distribution, extra: str) -> Iterator[tuple[str, str]]:
     for line in package.requires or ():
         requirement = Requirement(line)
         if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
-            for each in ("", *requirement.extras):
-                yield canonicalize_name(requirement.name), each
+            for extra_name in ("", *requirement.extras):
+                yield canonicalize_name(requirement.name), extra_name
 
 
 def licence(package: Distribution) -> str:
     """What it says of its licence: an SPDX expression, else classifiers, else the first line of its text; may be ""."""
-    told = package.metadata
-    if "License-Expression" in told:
-        return str(told["License-Expression"])
+    metadata = package.metadata
+    if "License-Expression" in metadata:
+        return str(metadata["License-Expression"])
     classifiers = [
         line.rsplit(" :: ")[-1]
-        for line in told.get_all("Classifier") or ()
+        for line in metadata.get_all("Classifier") or ()
         if line.startswith("License :: ") and line != "License :: OSI Approved"
     ]
-    text = str(told["License"]).strip() if "License" in told else ""
+    text = str(metadata["License"]).strip() if "License" in metadata else ""
     return " / ".join(sorted(classifiers)) or text.split("\n", maxsplit=1)[0]

@@ -39,7 +39,7 @@ def find_errors() -> list[Raised]:
     """Every error that is made anywhere in the packages, by file and line."""
     files = sorted({file for package in PACKAGES for file in (ROOT / package).rglob("*.py")} - {THE_FORM_ITSELF})
     return [
-        found for file in files for found in find_errors_in(file.read_text(encoding="utf-8"), file.relative_to(ROOT))
+        error for file in files for error in find_errors_in(file.read_text(encoding="utf-8"), file.relative_to(ROOT))
     ]
 
 
@@ -55,7 +55,7 @@ def find_errors_in(source: str, file: Path) -> list[Raised]:
 
 def kind_of(raised: Sequence[Raised]) -> str:
     """How the catalogue calls it when an error is made in all these places."""
-    kinds = {each.kind for each in raised}
+    kinds = {error.kind for error in raised}
     return kinds.pop() if len(kinds) == 1 else "either"
 
 
@@ -110,12 +110,14 @@ class _Module:
     def _values(self, variable: str, function: ast.FunctionDef) -> set[str | None]:
         parameters = [argument.arg for argument in function.args.args if argument.arg != "self"]
         if variable in parameters:
-            at = parameters.index(variable)
-            given = [(call.args[at], call) for call in self._calls.get(function.name, ()) if len(call.args) > at]
+            index = parameters.index(variable)
+            arguments = [
+                (call.args[index], call) for call in self._calls.get(function.name, ()) if len(call.args) > index
+            ]
         else:
-            given = [
+            arguments = [
                 (node.value, next(node for node in ast.walk(function) if isinstance(node, ast.Call)))
                 for node in ast.walk(function)
                 if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == variable
             ]
-        return {name for value, call in given for name in self.names(value, call)}
+        return {name for value, call in arguments for name in self.names(value, call)}

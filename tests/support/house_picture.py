@@ -41,8 +41,8 @@ def _inside(path: str, layers: list[list[str]]) -> list[str]:
     return [_row(short if index == 0 else "", line) for index, line in enumerate(lines)]
 
 
-def _rule(left: str, middle: str, right: str) -> str:
-    return f"{left}{'─' * (NAMES + 2)}{middle}{'─' * (WORDS + 2)}{right}\n"
+def _rule(start: str, middle: str, right: str) -> str:
+    return f"{start}{'─' * (NAMES + 2)}{middle}{'─' * (WORDS + 2)}{right}\n"
 
 
 def _contracts() -> dict[str, list[list[str]]]:
@@ -65,10 +65,10 @@ def _read_summary(path: str) -> str:
     return docstring.splitlines()[0]
 
 
-def _row(name: str, said: str) -> str:
-    words = textwrap.wrap(said, WORDS, break_on_hyphens=False)
+def _row(name: str, texts: str) -> str:
+    words = textwrap.wrap(texts, WORDS, break_on_hyphens=False)
     names = [name, *[""] * (len(words) - 1)]
-    return "".join(f"│ {left:{NAMES}} │ {right:{WORDS}} │\n" for left, right in zip(names, words, strict=True))
+    return "".join(f"│ {label:{NAMES}} │ {right:{WORDS}} │\n" for label, right in zip(names, words, strict=True))
 
 
 def drawn(page: str) -> str:

@@ -40,12 +40,12 @@ def page_text() -> str:
 
 def entries() -> Iterator[tuple[str, str, Mapping[str, Any]]]:
     """Yield each entry once: the document it is first in, its name without `Entry`, and the keys it has."""
-    seen: set[str] = set()
+    names: set[str] = set()
     for document, model in DOCUMENTS.items():
         schema = model.model_json_schema()
         for name, entry in {model.__name__: schema, **schema["$defs"]}.items():
-            if name not in seen and "properties" in entry:
-                seen.add(name)
+            if name not in names and "properties" in entry:
+                names.add(name)
                 yield document, name.removesuffix("Entry"), entry["properties"]
 
 

@@ -45,7 +45,7 @@ def exercises() -> dict[str, list[Step]]:
 def _steps(block: str) -> Iterator[Step]:
     """Yield the steps of a block of console text: each prompt begins one."""
     for part in re.split(r"^(?=\$ |laboratory> )", block, flags=re.MULTILINE):
-        prompt = next((known for known in (LABORATORY, RIG) if part.startswith(known)), "")
+        prompt = next((prefix for prefix in (LABORATORY, RIG) if part.startswith(prefix)), "")
         typed, _, shown = part.removeprefix(prompt).partition("\n") if prompt else ("", "", part)
         if part.strip():
             yield Step(prompt, typed, _texts(shown))

@@ -67,12 +67,12 @@ def write_sound(path: Path, sender: str, seed: int) -> Path:
 
 
 def _sound(random: np.random.Generator, message: protocol.Message) -> bytes:
-    each = message.item_dtype.itemsize
+    item_size = message.item_dtype.itemsize
     values: dict[str, Any] = message.name_values(message.head.unpack(random.bytes(message.head.size)))
     items = None
-    if each:
-        number = int(random.integers((protocol.PAYLOAD_MAX - message.head.size) // each + 1))
-        items = np.frombuffer(bytearray(random.bytes(number * each)), message.item_dtype)
+    if item_size:
+        number = int(random.integers((protocol.PAYLOAD_MAX - message.head.size) // item_size + 1))
+        items = np.frombuffer(bytearray(random.bytes(number * item_size)), message.item_dtype)
         if message.name == "identity":
             items["quantity"] %= len(protocol.QUANTITIES)
         values |= {"count": number} if "count" in values else {}
@@ -139,7 +139,7 @@ def damage_answers(program: Path, frames: int, seed: int, sound: Path) -> tuple[
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None and process.stderr is not None
         heard = listen(process.stdout)
-        said = process.stderr.read().decode()
-    assert process.returncode == 0, said
+        complaint = process.stderr.read().decode()
+    assert process.returncode == 0, complaint
     with whole.open("rb") as stream:
-        return Sent(**json.loads(said.splitlines()[-1])), heard, listen(stream)
+        return Sent(**json.loads(complaint.splitlines()[-1])), heard, listen(stream)

@@ -97,13 +97,13 @@ def damage(random: np.random.Generator, stream: bytes, faults: int) -> tuple[byt
         lambda run: noise(len(run)) + run,
     )
     pieces, spans, end = [], [], 0
-    for place, length, kind in zip(
+    for position, length, kind in zip(
         np.sort(random.integers(0, len(stream) - 1, faults)).tolist(),
         random.geometric(1 / MEAN_FAULT_BYTES, faults).tolist(),
         random.integers(0, len(kinds), faults).tolist(),
         strict=True,
     ):
-        begin = max(place, end)
+        begin = max(position, end)
         run = stream[begin : begin + length]
         if run:
             pieces += [stream[end:begin], kinds[kind](run)]

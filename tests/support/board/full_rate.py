@@ -81,12 +81,12 @@ class Stream:
     @property
     def complaints(self) -> list[str]:
         """Everything that was not as it should be."""
-        found = [f"{part}: {account.complaint}" for part, account in self.accounts.items() if account.complaint]
+        texts = [f"{part}: {account.complaint}" for part, account in self.accounts.items() if account.complaint]
         if self.frames_lost or self.tx_overruns or self.bus_errors:
-            found.append(
+            texts.append(
                 f"{self.frames_lost} frames lost, {self.tx_overruns} without room, {self.bus_errors} failed reads"
             )
-        return found
+        return texts
 
 
 def stream(

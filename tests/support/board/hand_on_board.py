@@ -95,8 +95,8 @@ def play(recorded: Recorded, moves: int = 12, scale_std: float = 1e-3, number: n
     numbers = np.arange(len(times_us)) if number is None else number
     reports: list[HandReport] = []
     asked_us = 0
-    for time_us, each, rate, force in zip(times_us.tolist(), numbers.tolist(), counts, forces, strict=True):
-        give(board, time_us, each, rate, force)
+    for time_us, sample_number, rate, force in zip(times_us.tolist(), numbers.tolist(), counts, forces, strict=True):
+        give(board, time_us, sample_number, rate, force)
         if time_us >= asked_us + POLLED_US:
             asked_us = time_us
             report = HandReport.decode(query(board, "hand_status"))
@@ -144,9 +144,9 @@ def _answer(board: HostBoard, host: socket.socket, ended: threading.Event) -> No
         if not heard:
             return
         board.receive(heard)
-        said = bytes(board.wire)
+        answer = bytes(board.wire)
         board.wire.clear()
-        host.sendall(said)
+        host.sendall(answer)
 
 
 def press(board: HostBoard, begin_us: int, lasts_us: int = 60_000) -> None:

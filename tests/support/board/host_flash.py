@@ -77,8 +77,8 @@ class HostFlash:
         noise = rng.getrandbits(8 * PAGE_BYTES)
         sparse = noise & rng.getrandbits(8 * PAGE_BYTES) & rng.getrandbits(8 * PAGE_BYTES)
         one_bit = 1 << rng.randrange(8 * 120)
-        left = rng.choice([old, old | one_bit, old | sparse, old | noise, noise, 2 ** (8 * PAGE_BYTES) - 1])
-        self.put(page, left.to_bytes(PAGE_BYTES, "little"))
+        content = rng.choice([old, old | one_bit, old | sparse, old | noise, noise, 2 ** (8 * PAGE_BYTES) - 1])
+        self.put(page, content.to_bytes(PAGE_BYTES, "little"))
         for offset in range(0, PAGE_BYTES, DOUBLEWORD):
             if rng.random() < rng.choice([0.0, 0.0, 0.02, 0.5]):
                 self.tear(page, offset)
@@ -87,9 +87,9 @@ class HostFlash:
         """The doubleword is as before, whole, on its way to 0, or anything; its ECC may not match."""
         rng = self._rng
         noise = rng.getrandbits(64)
-        left = rng.choice([2**64 - 1, value, value | noise, value | noise & rng.getrandbits(64), noise])
+        content = rng.choice([2**64 - 1, value, value | noise, value | noise & rng.getrandbits(64), noise])
         data = bytearray(self.contents(operation.page))
-        data[operation.offset : operation.offset + DOUBLEWORD] = left.to_bytes(DOUBLEWORD, "little")
+        data[operation.offset : operation.offset + DOUBLEWORD] = content.to_bytes(DOUBLEWORD, "little")
         self.put(operation.page, bytes(data))
-        if left != value and rng.random() < 0.5:
+        if content != value and rng.random() < 0.5:
             self.tear(operation.page, operation.offset)

@@ -133,9 +133,9 @@ def _add_budget(fields: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
     return {**fields, "covariance_combined": budget.covariance.tolist(), "budget": budget_entry(budget)}
 
 
-def add_accelerometer(found: AccelerometerEntry | None = None) -> ResultDocument:
+def add_accelerometer(entry: AccelerometerEntry | None = None) -> ResultDocument:
     """Return the result with an accelerometer."""
-    return result().model_copy(update={"accelerometers": {"gyro": found or accelerometer()}})
+    return result().model_copy(update={"accelerometers": {"gyro": entry or accelerometer()}})
 
 
 def magnetometer() -> MagnetometerEntry:
@@ -210,7 +210,7 @@ def reversal(document: ResultDocument) -> ReversalEntry:
             "degrees_of_freedom": 2,
             "limit": 10.8,
             **dict.fromkeys((f"{name}_degrees_of_freedom" for name in ("scale", "bias", "arm_field")), (None,) * 3),
-            "runs": [{"run": f"run {i}", "started_utc": each, **as_mounted} for i, each in enumerate(began)],
+            "runs": [{"run": f"run {i}", "started_utc": start, **as_mounted} for i, start in enumerate(began)],
         }
     )
 
@@ -378,10 +378,10 @@ class Page(HTMLParser):
                 self.under[clause] = self.under.get(clause, "") + data
 
 
-def read(found: Certificate) -> Page:
+def read(certificate: Certificate) -> Page:
     """Parse the page of a certificate, and assert that every element is closed."""
     page = Page()
-    page.feed(certificate_page(found))
+    page.feed(certificate_page(certificate))
     page.close()
     assert not page._open
     page.text = " ".join(page.text.split())
@@ -391,7 +391,7 @@ def read(found: Certificate) -> Page:
 def plant(value: Any, text: str, kept: Collection[str]) -> Any:
     """Return a document in which every text that others could have written is `text`."""
     if isinstance(value, dict):
-        return {key: each if key in kept else plant(each, text, kept) for key, each in value.items()}
+        return {key: part if key in kept else plant(part, text, kept) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return [plant(each, text, kept) for each in value]
+        return [plant(part, text, kept) for part in value]
     return text if isinstance(value, str) else value

@@ -28,7 +28,7 @@ PLACES = [
 
 def schema_faults(xml: bytes) -> list[str]:
     """What the schema refuses; the test is skipped, by name, where there is none."""
-    folder = next((place for place in PLACES if (place / MAIN).is_file()), None)
+    folder = next((candidate for candidate in PLACES if (candidate / MAIN).is_file()), None)
     if folder is None:
         pytest.skip("PTB's schemas are not here: set RIG_DCC_SCHEMAS to their folder")
     schema = _schema(folder)
@@ -49,10 +49,10 @@ def _schema(folder: Path) -> etree.XMLSchema:
 
 def rule_faults(xml: bytes) -> list[str]:
     """Errors by PTB's Schematron; its warnings and remarks are left out."""
-    found = _rules().validate_str(xml.decode())
+    report = _rules().validate_str(xml.decode())
     return [
         failed_assertion.text
-        for failed_assertion in [*found.failed_assertions, *found.successful_reports]
+        for failed_assertion in [*report.failed_assertions, *report.successful_reports]
         if failed_assertion.role not in REMARKS
     ]
 

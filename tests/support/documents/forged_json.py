@@ -19,23 +19,23 @@ def replace(old: str, new: str) -> Forgery:
 
 def document(change: Callable[[dict[str, Any]], object]) -> Forgery:
     def forge(content: bytes) -> bytes:
-        found = json.loads(content)
-        change(found)
-        return written(found)
+        entries = json.loads(content)
+        change(entries)
+        return written(entries)
 
     return forge
 
 
-def written(found: Any, **form: Any) -> bytes:
-    return (json.dumps(found, **{"indent": 2, "ensure_ascii": False, **form}) + "\n").encode()
+def written(value: Any, **form: Any) -> bytes:
+    return (json.dumps(value, **{"indent": 2, "ensure_ascii": False, **form}) + "\n").encode()
 
 
-def reorder(found: dict[str, Any]) -> None:
-    found["provenance"] = found.pop("provenance")
+def reorder(entries: dict[str, Any]) -> None:
+    entries["provenance"] = entries.pop("provenance")
 
 
 def change_provenance(key: str, value: str) -> Forgery:
-    return document(lambda found: found["provenance"].update({key: value}))
+    return document(lambda entries: entries["provenance"].update({key: value}))
 
 
 FORGED_JSON: dict[str, Forgery] = {

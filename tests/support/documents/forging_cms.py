@@ -88,11 +88,11 @@ def stamp_by_stranger(signed: Any, info: Any) -> None:
 
     del signed
     by = stamping("Time server", holder("Authority"))
-    known = SimpleCertificateStore()
+    store = SimpleCertificateStore()
     private = keys.PrivateKeyInfo.load(by.key.private_bytes(Encoding.DER, PrivateFormat.PKCS8, NoEncryption()))
-    own, authority = (asn1.Certificate.load(each.public_bytes(Encoding.DER)) for each in by.chain)
-    known.register_multiple([authority])
-    stamper = DummyTimeStamper(tsa_cert=own, tsa_key=private, certs_to_embed=known)
+    signer, authority = (asn1.Certificate.load(link.public_bytes(Encoding.DER)) for link in by.chain)
+    store.register_multiple([authority])
+    stamper = DummyTimeStamper(tsa_cert=signer, tsa_key=private, certs_to_embed=store)
     digest = sha256(info["signature"].native).digest()
     token = asyncio.run(stamper.async_timestamp(digest, "sha256"))
     info["unsigned_attrs"] = [cms.CMSAttribute({"type": "signature_time_stamp_token", "values": [token]})]

@@ -56,8 +56,8 @@ class Laboratory:
         return ended.returncode, ended.stdout
 
 
-def names_of(said: str) -> list[str]:
-    return [problem["name"] for file in json.loads(said)["files"] for problem in file["problems"]]
+def names_of(output: str) -> list[str]:
+    return [problem["name"] for file in json.loads(output)["files"] for problem in file["problems"]]
 
 
 @contextmanager

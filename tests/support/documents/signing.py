@@ -52,7 +52,7 @@ class Holder:
 
     def certificates(self) -> bytes:
         """Return the certificate and those above it, in PEM."""
-        return b"".join(each.public_bytes(Encoding.PEM) for each in self.chain)
+        return b"".join(certificate.public_bytes(Encoding.PEM) for certificate in self.chain)
 
 
 def holder(name: str, above: Holder | None = None, *, days: tuple[int, int] = (-1, 30)) -> Holder:
@@ -103,7 +103,7 @@ def signing_as(by: Holder) -> Signatory:
     from pyhanko.sign.signers import SimpleSigner
     from pyhanko_certvalidator.registry import SimpleCertificateStore
 
-    certificate, *above = (asn1.Certificate.load(each.public_bytes(Encoding.DER)) for each in by.chain)
+    certificate, *above = (asn1.Certificate.load(link.public_bytes(Encoding.DER)) for link in by.chain)
     private = by.key.private_bytes(Encoding.DER, PrivateFormat.PKCS8, NoEncryption())
     store = SimpleCertificateStore()
     store.register_multiple(above)
@@ -130,7 +130,7 @@ def time_server(by: Holder, said: Sequence[bytes] = ()) -> Iterator[str]:
     from pyhanko_certvalidator.registry import SimpleCertificateStore
 
     store = SimpleCertificateStore()
-    store.register_multiple(asn1.Certificate.load(each.public_bytes(Encoding.DER)) for each in by.chain)
+    store.register_multiple(asn1.Certificate.load(link.public_bytes(Encoding.DER)) for link in by.chain)
     private = keys.PrivateKeyInfo.load(by.key.private_bytes(Encoding.DER, PrivateFormat.PKCS8, NoEncryption()))
     certificate = asn1.Certificate.load(by.chain[0].public_bytes(Encoding.DER))
     stamper = DummyTimeStamper(tsa_cert=certificate, tsa_key=private, certs_to_embed=store)

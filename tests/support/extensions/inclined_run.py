@@ -26,10 +26,10 @@ def write(folder: Path) -> None:
     run = open_run(RECORDINGS / "imu").movement[0]
     observed = observe_run(run, run.settings.observation)
     tilt = RecordedSensor("tilt2", "I-1", 100.0, (Channel(INCLINATION.name, "tilt", "<i4", PER_COUNT, 0.0, 10**6),))
-    beside = run.samples["gyro"]
-    samples = np.zeros(len(beside), tilt.sample_dtype)
+    gyro_samples = run.samples["gyro"]
+    samples = np.zeros(len(gyro_samples), tilt.sample_dtype)
     for name in ("sequence", "board_time_us", "host_time_s"):
-        samples[name] = beside[name]
+        samples[name] = gyro_samples[name]
     time_s, noise = observed.time_s("gyro"), np.random.default_rng(4)
     for dwell in dwelt(run):
         inside = (time_s >= dwell.window.start_s) & (time_s <= dwell.window.end_s)

@@ -86,15 +86,15 @@ def solve(name: str, placements: Placements, site: Site) -> OfKind:
     variances = read.variances[INCLINATION] + TABLE_STD_RAD**2
     if len(means) < FEWEST:
         raise Fault("too_few_observations", f"{len(means)} attitudes do not tell two lines", "Lay it down more often")
-    found = [_line(*each) for each in zip(rise.T, means.T, variances.T, strict=True)]
-    scale, bias = (np.array([1 / line[0][0] for line in found]), np.array([line[0][1] for line in found]))
+    lines = [_line(*row) for row in zip(rise.T, means.T, variances.T, strict=True)]
+    scale, bias = (np.array([1 / line[0][0] for line in lines]), np.array([line[0][1] for line in lines]))
     covariance = np.zeros((4, 4))
-    for i, ((slope, _), spread) in enumerate(found):
+    for i, ((slope, _), spread) in enumerate(lines):
         turn = np.diag([-1 / slope**2, 1.0])
         covariance[np.ix_((i, 2 + i), (i, 2 + i))] = turn @ spread @ turn
-    left = means - (rise / scale + bias)
-    held = fitness(name, INCLINATION.name, "residuals", float(np.abs(left).max()), 0.01, unit="rad")
-    return OfKind(Solution(scale, bias, covariance, left), (held,))
+    residuals = means - (rise / scale + bias)
+    check = fitness(name, INCLINATION.name, "residuals", float(np.abs(residuals).max()), 0.01, unit="rad")
+    return OfKind(Solution(scale, bias, covariance, residuals), (check,))
 
 
 def _line(rise: Array, means: Array, variances: Array) -> tuple[Array, Array]:
@@ -105,14 +105,14 @@ def _line(rise: Array, means: Array, variances: Array) -> tuple[Array, Array]:
 
 
 def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
-    made = {}
+    entries = {}
     for kind in outcome.installed_kinds:
         if kind.quantity == INCLINATION and kind.solved is not None and isinstance(kind.solved.solution, Solution):
-            found = {key: np.asarray(value).tolist() for key, value in vars(kind.solved.solution).items()}
-            of = kind.sensor.part, kind.sensor.serial_number
-            found["covariance_combined"] = found["covariance"]
-            made[kind.name] = InclinometerEntry(part=of[0], serial_number=of[1], estimator="lines", **found)
-    return made
+            fields = {key: np.asarray(value).tolist() for key, value in vars(kind.solved.solution).items()}
+            item = kind.sensor.part, kind.sensor.serial_number
+            fields["covariance_combined"] = fields["covariance"]
+            entries[kind.name] = InclinometerEntry(part=item[0], serial_number=item[1], estimator="lines", **fields)
+    return entries
 
 
 def _find(document: ResultDocument) -> Iterator[Finding[InclinometerEntry]]:
@@ -120,38 +120,38 @@ def _find(document: ResultDocument) -> Iterator[Finding[InclinometerEntry]]:
         yield Finding(name, INCLINATION, InclinometerEntry.model_validate(entry))
 
 
-def _print(found: Finding[InclinometerEntry]) -> Iterator[Table | str]:
-    yield from tables(f"{found.sensor}: inclinometer, m = φ / k + b", INCLINATION, found.entry)
+def _print(finding: Finding[InclinometerEntry]) -> Iterator[Table | str]:
+    yield from tables(f"{finding.sensor}: inclinometer, m = φ / k + b", INCLINATION, finding.entry)
 
 
-def _shown(found: Finding[InclinometerEntry]) -> DisplayRow:
-    return replace(shown_of(found), combined=found.entry.covariance_combined is not None)
+def _shown(finding: Finding[InclinometerEntry]) -> DisplayRow:
+    return replace(shown_of(finding), combined=finding.entry.covariance_combined is not None)
 
 
-def _record(found: Finding[InclinometerEntry], document: ResultDocument) -> HistoryRecord:
-    entry = found.entry
-    rows = list(scale_and_bias(found.sensor, INCLINATION, entry, entry.bias_rad, document))
-    of = entry.part, entry.serial_number, 0.0, entry.estimator, None
-    return HistoryRecord(found.sensor, INCLINATION.name, *of, select_uncertain(rows))
+def _record(finding: Finding[InclinometerEntry], document: ResultDocument) -> HistoryRecord:
+    entry = finding.entry
+    rows = list(scale_and_bias(finding.sensor, INCLINATION, entry, entry.bias_rad, document))
+    identity = entry.part, entry.serial_number, 0.0, entry.estimator, None
+    return HistoryRecord(finding.sensor, INCLINATION.name, *identity, select_uncertain(rows))
 
 
-def _find_residuals(found: Finding[InclinometerEntry]) -> Unexplained:
-    left = np.array(found.entry.residuals_rad)
-    labels = [f"attitude {number}" for number in range(1, len(left) + 1)]
-    return Unexplained(INCLINATION, labels, left, np.full(left.shape, TABLE_STD_RAD), "the table's attitudes")
+def _find_residuals(finding: Finding[InclinometerEntry]) -> Unexplained:
+    residuals = np.array(finding.entry.residuals_rad)
+    labels = [f"attitude {number}" for number in range(1, len(residuals) + 1)]
+    return Unexplained(INCLINATION, labels, residuals, np.full(residuals.shape, TABLE_STD_RAD), "the table's attitudes")
 
 
-def _header(found: Finding[InclinometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
-    x, y = found.entry.scale
-    yield f"static const float {found.sensor}_inclination_scale[2] = {{{x}f, {y}f}};"
+def _header(finding: Finding[InclinometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+    x, y = finding.entry.scale
+    yield f"static const float {finding.sensor}_inclination_scale[2] = {{{x}f, {y}f}};"
 
 
-def _certify(found: Finding[InclinometerEntry], _: Any) -> CertifiedItem:
-    entry, spread = found.entry, [found.entry.covariance[i][i] ** 0.5 for i in range(2)]
+def _certify(finding: Finding[InclinometerEntry], _: Any) -> CertifiedItem:
+    entry, spread = finding.entry, [finding.entry.covariance[i][i] ** 0.5 for i in range(2)]
     listed = real_list("xy", entry.scale, [r"\one"], expanded=expanded(spread, None))
     result: Element = dcc("result", text("name", "scale factor"), dcc("data", listed))
     name = "calibration of inclinometer"
-    return CertifiedItem("inclinometer", found.sensor, entry.part, entry.serial_number, name, [result])
+    return CertifiedItem("inclinometer", finding.sensor, entry.part, entry.serial_number, name, [result])
 
 
 RESULT = ResultKind(

@@ -31,27 +31,27 @@ BIAS_RAD_S = np.array([0.01, -0.02, 0.005])
 def write(folder: Path) -> None:
     """The run folder, as far as it is recorded."""
     (folder / CONFIG).write_text(TEXT, encoding="utf-8")
-    found = load_configured(folder / CONFIG)
-    config, plan = found.loaded.config, found.phase.plan()
+    loaded = load_configured(folder / CONFIG)
+    config, plan = loaded.loaded.config, loaded.phase.plan()
     kind = kind_of(config.turner)
     report = kind.look(config.turner)
-    made = kind.describe_connected(config.turner, report)
+    turner = kind.describe_connected(config.turner, report)
     recorder = RunRecorder(
         folder / "run.h5",
-        config=found.loaded.rig_text,
+        config=loaded.loaded.rig_text,
         settings=settings_of(config, plan),
         provenance=provenance_of(
-            found.loaded,
+            loaded.loaded,
             None,
             report,
-            made,
+            turner,
             stored={},
-            script=found.script.identity,
+            script=loaded.script.identity,
             script_installed=True,
             follows_crystal=None,
             kind=kind.name,
         ),
-        turner=RecordedTurner.build(kind.name, made, report.joints, kind.fields),
+        turner=RecordedTurner.build(kind.name, turner, report.joints, kind.fields),
         sensors={"gyro": SENSOR},
     )
     states: list[State] = []

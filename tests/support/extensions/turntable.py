@@ -118,10 +118,14 @@ class Turntable:
     def move(self, motion: Motion, watch: Callable[[], None] = lambda: None) -> None:
         """Turn to where the motion ends."""
         assert self._held
-        begin_s, start, (way,) = self._time_s, self.latest.q_rad[0], travel(self.latest.q_rad, motion.target_q_rad)
+        begin_s, start, (travel_rad,) = (
+            self._time_s,
+            self.latest.q_rad[0],
+            travel(self.latest.q_rad, motion.target_q_rad),
+        )
         steps = np.arange(STEP_S, motion.duration_s + STEP_S, STEP_S)
         for since_s, share in zip(steps.tolist(), progress(motion, steps).tolist(), strict=True):
-            self._tell(begin_s + since_s, start + share * way)
+            self._tell(begin_s + since_s, start + share * travel_rad)
             watch()
         self._tell(self._time_s + STEP_S, motion.target_q_rad[0])
 
@@ -188,19 +192,19 @@ def plan(
 ) -> Plan:
     """A turn either way with a rest before each."""
     steps: list[Step] = []
-    here, speed = start_q_rad or (0.0,), radians(procedure.speed_deg_s)
-    beside, rates = pi + speed**2 / ACCELERATION_RAD_S2, (speed, ACCELERATION_RAD_S2)
-    ways: tuple[tuple[Direction, int], ...] = (("ccw", 1), ("cw", -1))
-    for index, (way, sign) in enumerate(ways):
-        start, end = (-sign * beside,), (sign * beside,)
-        if here != start:
-            takes_s = trapezoid_duration(abs(start[0] - here[0]), *rates)
-            steps.append(Transfer("way to the start", here, start, *rates, takes_s))
+    pose, speed = start_q_rad or (0.0,), radians(procedure.speed_deg_s)
+    half_travel, rates = pi + speed**2 / ACCELERATION_RAD_S2, (speed, ACCELERATION_RAD_S2)
+    directions: tuple[tuple[Direction, int], ...] = (("ccw", 1), ("cw", -1))
+    for index, (direction, sign) in enumerate(directions):
+        start, end = (-sign * half_travel,), (sign * half_travel,)
+        if pose != start:
+            takes_s = trapezoid_duration(abs(start[0] - pose[0]), *rates)
+            steps.append(Transfer("way to the start", pose, start, *rates, takes_s))
         steps.append(Rest("rest", 2.0))
-        takes_s, axis = trapezoid_duration(2 * beside, *rates), (0.0, 0.0, float(sign))
-        steps.append(Sweep(index, 0, "table", way, axis, start, end, *rates, takes_s, (-pi, pi)))
-        here = end
-    home = Transfer("way home", here, (0.0,), *rates, trapezoid_duration(abs(here[0]), *rates))
+        takes_s, axis = trapezoid_duration(2 * half_travel, *rates), (0.0, 0.0, float(sign))
+        steps.append(Sweep(index, 0, "table", direction, axis, start, end, *rates, takes_s, (-pi, pi)))
+        pose = end
+    home = Transfer("way home", pose, (0.0,), *rates, trapezoid_duration(abs(pose[0]), *rates))
     return Plan((*steps, home), start_q_rad or (0.0,), (0.0,))
 
 
@@ -220,8 +224,8 @@ def analyse(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> 
     """Whether the gyroscope reads the table's speed along z to a tenth."""
     recordings = observe_runs(runs)
     turns = [turn for recording in recordings for turn in recording.sensors["gyro"].revolutions]
-    off = max(abs(turn.axis_flange[2] * turn.average.mean_rad_s[2] / turn.speed_rad_s - 1) for turn in turns)
-    check = Check("gyro.speed", float(off), 0.1, "1", Meaning(kind="fitness"))
+    error = max(abs(turn.axis_flange[2] * turn.average.mean_rad_s[2] / turn.speed_rad_s - 1) for turn in turns)
+    check = Check("gyro.speed", float(error), 0.1, "1", Meaning(kind="fitness"))
     origin = Origin(runs[0].provenance, {}, (), (), datetime.now(UTC))
     return Outcome(settings=runs[0].settings, provenance=origin, recordings=recordings, checks=(check,))
 

@@ -66,13 +66,15 @@ def follow(world: World, seed: int) -> Followed:
     matrix = np.eye(3) + 0.02 * rng.normal(size=(3, 3))
     bias = 0.01 * rng.normal(size=3)
     attitudes, rates, _ = _stopping(swings, world, time_s)
-    felt = (rates + EARTH_RAD_S @ attitudes) @ matrix.T + bias
-    walk = np.cumsum(rng.normal(size=felt.shape), axis=0) * world.bias_walk_rad_s_sqrt_s / np.sqrt(world.rate_hz)
-    noise = rng.normal(size=felt.shape) * world.random_walk_rad_sqrt_s * np.sqrt(world.rate_hz)
-    told, told_rates, moving = _stopping(swings, world, looks_s + world.late_s)
+    sensed = (rates + EARTH_RAD_S @ attitudes) @ matrix.T + bias
+    walk = np.cumsum(rng.normal(size=sensed.shape), axis=0) * world.bias_walk_rad_s_sqrt_s / np.sqrt(world.rate_hz)
+    noise = rng.normal(size=sensed.shape) * world.random_walk_rad_sqrt_s * np.sqrt(world.rate_hz)
+    reported, told_rates, moving = _stopping(swings, world, looks_s + world.late_s)
     missed = _draw_coloured(world, len(looks_s), rng) * np.where(moving, 1.0, AT_REST)[:, None]
     errors = Rotation.from_rotvec(missed).as_matrix()
-    return Followed(time_s, felt + walk - walk.mean(axis=0) + noise, looks_s, errors @ told, told_rates, matrix, bias)
+    return Followed(
+        time_s, sensed + walk - walk.mean(axis=0) + noise, looks_s, errors @ reported, told_rates, matrix, bias
+    )
 
 
 class _Swings:

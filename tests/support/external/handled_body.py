@@ -72,30 +72,32 @@ def handle(
     for action in actions:
         now_s = hand.act(action, now_s) + rest_s
     time_s = np.arange(0, now_s, 1 / part.rate_hz)
-    felt = hand.motion_at(time_s)
+    sensed = hand.motion_at(time_s)
     matrix, bias = np.eye(3) + 0.02 * rng.normal(size=(3, 3)), 0.01 * rng.normal(size=3)
     walk = part.walk_rad_s_sqrt_s / np.sqrt(part.rate_hz) * np.cumsum(rng.normal(size=(len(time_s), 3)), axis=0)
     sensitivity = np.radians(part.g_sensitivity_deg_s) / 9.81 * rng.normal(size=(3, 3))
-    rates = felt.rate_rad_s @ matrix.T + felt.specific_force_m_s2 @ sensitivity.T + bias + walk + felt.gyro_bias_rad_s
-    rates += bent(felt.rate_rad_s, part.nonlinearity, seed)
+    rates = (
+        sensed.rate_rad_s @ matrix.T + sensed.specific_force_m_s2 @ sensitivity.T + bias + walk + sensed.gyro_bias_rad_s
+    )
+    rates += bent(sensed.rate_rad_s, part.nonlinearity, seed)
     rates += part.noise_rad_s * rng.normal(size=rates.shape)
     if part.range_rad_s is not None:
         rates = np.clip(rates, -part.range_rad_s, part.range_rad_s)
     level, offset = np.eye(3) + 0.01 * rng.normal(size=(3, 3)), 0.3 * rng.normal(size=3)
-    force = felt.specific_force_m_s2 @ level.T + offset + felt.accelerometer_bias_m_s2
+    force = sensed.specific_force_m_s2 @ level.T + offset + sensed.accelerometer_bias_m_s2
     force += part.noise_m_s2 * rng.normal(size=force.shape)
     stamped = time_s * (1 + 1e-6 * part.clock_ppm * rng.uniform(-1, 1))
-    kept = ~felt.lost
-    return Recorded(stamped[kept], rates[kept], force[kept], matrix, bias + walk[-1] + felt.gyro_bias_rad_s[-1])
+    kept = ~sensed.lost
+    return Recorded(stamped[kept], rates[kept], force[kept], matrix, bias + walk[-1] + sensed.gyro_bias_rad_s[-1])
 
 
 def creeping(recorded: Recorded, start_s: float, end_s: float, turning_rad_s: Array) -> Recorded:
     """Return the recording of a body that turned slowly (3,) in a rest; the hand turns it back as it takes it up."""
     rates = recorded.rates.copy()
-    there = (recorded.time_s >= start_s) & (recorded.time_s <= end_s)
+    mask = (recorded.time_s >= start_s) & (recorded.time_s <= end_s)
     after = (recorded.time_s > end_s) & (recorded.time_s <= end_s + 0.15)
-    rates[there] += turning_rad_s
-    rates[after] -= turning_rad_s * there.sum() / after.sum()
+    rates[mask] += turning_rad_s
+    rates[after] -= turning_rad_s * mask.sum() / after.sum()
     return replace(recorded, rates=rates)
 
 

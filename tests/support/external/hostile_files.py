@@ -49,8 +49,8 @@ def schema(number: int = 1, name: str = IMU, definition: str | bytes = "") -> by
 
 
 def channel(topic: str | bytes, number: int = 1, qos: str | None = None, of: int = 1) -> bytes:
-    said = b"" if qos is None else text("offered_qos_profiles") + text(qos)
-    return record(4, struct.pack("<HH", number, of) + text(topic) + text("cdr") + text(said))
+    profile = b"" if qos is None else text("offered_qos_profiles") + text(qos)
+    return record(4, struct.pack("<HH", number, of) + text(topic) + text("cdr") + text(profile))
 
 
 def message(data: bytes, time_ns: int = 1, number: int = 1) -> bytes:
@@ -76,20 +76,20 @@ def mcap(*records: bytes, summary: bytes = b"", ends: bytes | None = None, **sai
 
 def make_indexed(*chunks: bytes) -> Makes:
     """Make a file of these chunks with an index, all for the same time."""
-    said = schema() + channel("/imu")
-    head, index = len(MAGIC + record(1, text("ros2") + text("nobody"))) + len(said), b""
+    header = schema() + channel("/imu")
+    head, index = len(MAGIC + record(1, text("ros2") + text("nobody"))) + len(header), b""
     for chunk in chunks:
         (packed_size,) = struct.unpack_from("<Q", chunk, 9 + 28 + 8)
         (size,) = struct.unpack_from("<Q", chunk, 9 + 16)
-        told = struct.pack("<QQQQ", 0, 2, head, len(chunk)) + text(b"") + struct.pack("<Q", 0) + text("zstd")
-        index += record(8, told + struct.pack("<QQ", packed_size, size))
+        chunk_index = struct.pack("<QQQQ", 0, 2, head, len(chunk)) + text(b"") + struct.pack("<Q", 0) + text("zstd")
+        index += record(8, chunk_index + struct.pack("<QQ", packed_size, size))
         head += len(chunk)
-    return mcap(said, *chunks, summary=said + index)
+    return mcap(header, *chunks, summary=header + index)
 
 
 def topics(count: int, definition: bytes = b"") -> Makes:
-    said = [schema(n, f"my_msgs/msg/T{n}", definition) + channel(f"/t{n}", n, of=n) for n in range(1, count + 1)]
-    return mcap(*said, offers=[f"/t{n}" for n in range(count)])
+    records = [schema(n, f"my_msgs/msg/T{n}", definition) + channel(f"/t{n}", n, of=n) for n in range(1, count + 1)]
+    return mcap(*records, offers=[f"/t{n}" for n in range(count)])
 
 
 # -- metadata and SQLite -------------------------------------------------------------------------------------------
@@ -99,7 +99,7 @@ def metadata(
 ) -> Path:  # fmt: skip
     """Write a bag's metadata: it `offers` these topics, all of one kind."""
     mode = f'  compression_format: zstd\n  compression_mode: "{packed}"\n' if packed else ""
-    told = "".join(f"    - {file}\n" for file in files)
+    listing = "".join(f"    - {file}\n" for file in files)
     topics = "".join(
         f"    - topic_metadata: {{name: {json.dumps(topic)}, type: {json.dumps(kind)}, serialization_format: cdr,"
         " offered_qos_profiles: ''}\n      message_count: 1\n"
@@ -109,22 +109,22 @@ def metadata(
         f"rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: {storage}\n"
         f"  duration: {{nanoseconds: 100}}\n  starting_time: {{nanoseconds_since_epoch: {start}}}\n"
         f"  message_count: 1\n  topics_with_message_count:\n{topics}{mode}"
-        f"  relative_file_paths:\n{told or '    []'}"
+        f"  relative_file_paths:\n{listing or '    []'}"
     )
     return folder
 
 
 def database(folder: Path, *statements: str, data: bytes | None = None, name: str = "bag_0.db3") -> Path:
     """Write a bag of ROS 2 in SQLite, with these statements before its one message."""
-    with sqlite3.connect(folder / name) as made:
-        made.execute("CREATE TABLE topics(id INTEGER, name TEXT, type TEXT, serialization_format TEXT,"
+    with sqlite3.connect(folder / name) as connection:
+        connection.execute("CREATE TABLE topics(id INTEGER, name TEXT, type TEXT, serialization_format TEXT,"
                      " offered_qos_profiles TEXT)")  # fmt: skip
-        made.execute("CREATE TABLE messages(id INTEGER, topic_id INTEGER, timestamp INTEGER, data BLOB)")
-        made.execute("INSERT INTO topics VALUES(1, '/imu', ?, 'cdr', '')", [IMU])
+        connection.execute("CREATE TABLE messages(id INTEGER, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+        connection.execute("INSERT INTO topics VALUES(1, '/imu', ?, 'cdr', '')", [IMU])
         for statement in statements:
-            made.execute(statement)
-        made.execute("INSERT INTO messages VALUES(1, 1, 1, ?)", [reading() if data is None else data])
-    made.close()
+            connection.execute(statement)
+        connection.execute("INSERT INTO messages VALUES(1, 1, 1, ?)", [reading() if data is None else data])
+    connection.close()
     return folder / name
 
 
@@ -191,10 +191,10 @@ def hole(path: Path) -> None:
 
 
 def listener(path: Path) -> None:
-    with socket.socket(socket.AF_UNIX) as made:
+    with socket.socket(socket.AF_UNIX) as listening:
         before = Path.cwd()
         os.chdir(path.parent)  # the address of a socket has room for a hundred letters
-        made.bind(path.name)
+        listening.bind(path.name)
         os.chdir(before)
 
 
@@ -217,7 +217,7 @@ def crowd(folder: Path) -> Path:
 def ulog(*messages: tuple[str, bytes], tail: bytes = b"") -> Makes:
     def make(folder: Path) -> Path:
         path = folder / "log.ulg"
-        body = b"".join(struct.pack("<HB", len(each), ord(kind)) + each for kind, each in messages)
+        body = b"".join(struct.pack("<HB", len(payload), ord(kind)) + payload for kind, payload in messages)
         path.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8) + body + tail)
         return path
 
@@ -254,10 +254,10 @@ def gzip_repetitions(start: bytes, repeated: bytes, size: int) -> Makes:
 def make_on_demand(make: Callable[[], Makes]) -> Makes:
     """Create on demand a file that takes long to compress."""
 
-    def made(folder: Path) -> Path:
+    def create(folder: Path) -> Path:
         return make()(folder)
 
-    return made
+    return create
 
 
 NASTY = "\x1b]0;owned\x07\x1b[2J\n\r\u202e"

@@ -49,10 +49,10 @@ def lay_down(box: Box, seed: int) -> Laid:
     time_s = np.arange(round(count * (REST_S + MOVE_S) * box.rate_hz)) / box.rate_hz
     where, since_s = np.divmod(time_s, REST_S + MOVE_S)
     faces = [FACES[face % 6] * Rotation.from_rotvec(box.tilt_rad * rng.normal(size=3)) for face in range(count)]
-    felt = np.array([face.inv().apply([0, 0, GRAVITY_M_S2]) for face in faces])[where.astype(int)]
+    forces = np.array([face.inv().apply([0, 0, GRAVITY_M_S2]) for face in faces])[where.astype(int)]
     changed = box.changes_m_s2 * rng.normal(size=(count, 3))[where.astype(int)]
-    moving = (since_s > REST_S)[:, None] * 6 * rng.normal(size=felt.shape)
-    readings = (felt + moving) @ matrix.T + bias + changed + box.noise_m_s2 * rng.normal(size=felt.shape)
+    moving = (since_s > REST_S)[:, None] * 6 * rng.normal(size=forces.shape)
+    readings = (forces + moving) @ matrix.T + bias + changed + box.noise_m_s2 * rng.normal(size=forces.shape)
     start_s = np.arange(box.named) * (REST_S + MOVE_S)
     quaternions = FACES[np.arange(box.named) % 6].as_quat()[:, [3, 0, 1, 2]]
     rows = np.column_stack([start_s + 0.3, start_s + REST_S - 0.3, quaternions])

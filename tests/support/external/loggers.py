@@ -81,10 +81,10 @@ class Stamps:
         stamps = time_s.copy()
         if self.burst > 1:
             packet = np.arange(len(time_s)) // self.burst
-            place = np.concatenate([np.arange(kept[packet == index].sum()) for index in range(packet[-1] + 1)])
+            position = np.concatenate([np.arange(kept[packet == index].sum()) for index in range(packet[-1] + 1)])
             late_s = self.late_s * rng.random(packet[-1] + 1)[packet]
             stamps = time_s[0] + (packet + 1) * self.burst * (time_s[1] - time_s[0]) + late_s
-            stamps[kept] += self.inner_s * place
+            stamps[kept] += self.inner_s * position
         if self.rounded_s:
             stamps = np.rint(stamps / self.rounded_s) * self.rounded_s
         return stamps[kept], kept
@@ -97,12 +97,12 @@ def swept(rate_hz: float, seed: int = 1, noise_rad_s: float = 5e-4, bias_rad_s: 
     rng = np.random.default_rng(seed)
     period_s = 2 * REST_S + 2 * RAMP_S + 4.6
     time_s = np.arange(round((6 * period_s) * rate_hz)) / rate_hz
-    way, since_s = np.divmod(time_s, period_s)
+    cycle, since_s = np.divmod(time_s, period_s)
     speed = np.interp(since_s, np.cumsum([0, REST_S, RAMP_S, 4.6, RAMP_S, REST_S]), [0, 0, 1, 1, 0, 0]) * np.pi / 2
-    rates = np.array(SIX_WAYS, dtype=float)[way.astype(int)] * speed[:, None]
+    rates = np.array(SIX_WAYS, dtype=float)[cycle.astype(int)] * speed[:, None]
     begin_s = period_s * np.arange(6)
-    turns = [[at + 3.3, at + 7.3, *axis, np.pi / 2] for at, axis in zip(begin_s, SIX_WAYS, strict=True)]
-    rests = [[at + 0.2, at + 1.8, 0, 0, 1, 0] for at in begin_s]
+    turns = [[start_s + 3.3, start_s + 7.3, *axis, np.pi / 2] for start_s, axis in zip(begin_s, SIX_WAYS, strict=True)]
+    rests = [[start_s + 0.2, start_s + 1.8, 0, 0, 1, 0] for start_s in begin_s]
     return Log(time_s, _read(rates, rng, noise_rad_s, bias_rad_s), np.array(sorted(turns + rests)))
 
 
@@ -114,12 +114,12 @@ def turn_slowly(
     lasts_s = 2 * np.pi / mean_rad_s
     period_s = lasts_s + rest_s
     time_s = np.arange(round((6 * period_s + rest_s) * rate_hz)) / rate_hz
-    way, since_s = np.divmod(time_s - rest_s, period_s)
+    cycle, since_s = np.divmod(time_s - rest_s, period_s)
     part = np.clip(since_s / lasts_s, 0, 1)
-    speed = np.where(way < 0, 0, mean_rad_s * (1 - np.cos(2 * np.pi * part)))
-    rates = np.array(SIX_WAYS, dtype=float)[np.clip(way, 0, 5).astype(int)] * speed[:, None]
+    speed = np.where(cycle < 0, 0, mean_rad_s * (1 - np.cos(2 * np.pi * part)))
+    rates = np.array(SIX_WAYS, dtype=float)[np.clip(cycle, 0, 5).astype(int)] * speed[:, None]
     starts_s = rest_s + period_s * np.arange(6)
-    rows = [[at, at + lasts_s, *axis, 2 * np.pi] for at, axis in zip(starts_s, SIX_WAYS, strict=True)]
+    rows = [[start_s, start_s + lasts_s, *axis, 2 * np.pi] for start_s, axis in zip(starts_s, SIX_WAYS, strict=True)]
     rows.insert(0, [0.2, rest_s - 0.1, 0, 0, 1, 0])
     return Log(time_s, _read(rates, rng, 5e-4, bias_rad_s), np.array(rows))
 
@@ -149,13 +149,13 @@ def laid_down(
 ) -> Log:
     """Draw an accelerometer on six faces in one log, and rows [start_s, end_s, qw, qx, qy, qz] of the faces."""
     rng = np.random.default_rng(seed)
-    each, move_s = round(dwell_s * rate_hz), 4.0
+    count, move_s = round(dwell_s * rate_hz), 4.0
     start_s = np.arange(6) * (dwell_s + move_s)
-    time_s = (start_s[:, None] + np.arange(each) / rate_hz).ravel()
-    felt = GRAVITY_M_S2 * np.repeat(FORCES, each, axis=0).astype(float)
+    time_s = (start_s[:, None] + np.arange(count) / rate_hz).ravel()
+    forces = GRAVITY_M_S2 * np.repeat(FORCES, count, axis=0).astype(float)
     for knock in knocks:
-        felt[knock.sample : knock.sample + knock.samples, knock.axis] += knock.size_m_s2
-    read = felt @ MATRIX.T + [0.3, -0.1, 0.2] + noise_m_s2 * rng.normal(size=felt.shape)
+        forces[knock.sample : knock.sample + knock.samples, knock.axis] += knock.size_m_s2
+    read = forces @ MATRIX.T + [0.3, -0.1, 0.2] + noise_m_s2 * rng.normal(size=forces.shape)
     return Log(time_s, read, np.column_stack([start_s + 0.5, start_s + dwell_s - 0.5, FACES]))
 
 
@@ -175,6 +175,6 @@ def write_forces(folder: Path, log: Log, stamps: Stamps | None = None, *beside: 
     stamped_s, kept = (stamps or Stamps()).of(log.time_s)
     names = ["time_s", *(f"{a}_m_s2" for a in AXES), *(name for name, _ in beside)]
     samples = write_table(
-        folder / "samples.csv", names, stamped_s, log.readings[kept], *(each[kept] for _, each in beside)
+        folder / "samples.csv", names, stamped_s, log.readings[kept], *(column[kept] for _, column in beside)
     )
     return samples, write_table(folder / "attitudes.csv", ["start_s", "end_s", "qw", "qx", "qy", "qz"], log.rows)

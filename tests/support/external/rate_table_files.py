@@ -45,12 +45,12 @@ def _still(folder: Path, rng: np.random.Generator) -> None:
     turned = draw_attitudes(STILL)
     time_s = np.arange(round(STILL * (DWELL_S + BETWEEN_S) * RATE_HZ)) / RATE_HZ
     where = turned[(time_s // (DWELL_S + BETWEEN_S)).astype(int)]
-    felt = ACCELEROMETER_REFERENCE_M_S2 @ where
-    felt = (felt + ACCELEROMETER_SECOND_ORDER * felt**2) @ ACCELEROMETER_MATRIX.T + ACCELEROMETER_BIAS_M_S2
-    felt += ACCELEROMETER_RANDOM_WALK * np.sqrt(RATE_HZ) * rng.normal(size=felt.shape)
-    field = (FIELD_T @ where) @ FIELD_MATRIX.T + FIELD_BIAS_T + FIELD_NOISE_T * rng.normal(size=felt.shape)
+    sensed = ACCELEROMETER_REFERENCE_M_S2 @ where
+    sensed = (sensed + ACCELEROMETER_SECOND_ORDER * sensed**2) @ ACCELEROMETER_MATRIX.T + ACCELEROMETER_BIAS_M_S2
+    sensed += ACCELEROMETER_RANDOM_WALK * np.sqrt(RATE_HZ) * rng.normal(size=sensed.shape)
+    field = (FIELD_T @ where) @ FIELD_MATRIX.T + FIELD_BIAS_T + FIELD_NOISE_T * rng.normal(size=sensed.shape)
     columns = ["time_s", "x_m_s2", "y_m_s2", "z_m_s2", "x_t", "y_t", "z_t"]
-    _write(folder / "still_samples.csv", columns, np.column_stack([time_s, felt, field]))
+    _write(folder / "still_samples.csv", columns, np.column_stack([time_s, sensed, field]))
     start_s = np.arange(STILL) * (DWELL_S + BETWEEN_S)
     rows = np.column_stack([start_s, start_s + DWELL_S, _quaternions(turned)])
     _write(folder / "still_attitudes.csv", ["start_s", "end_s", "qw", "qx", "qy", "qz"], rows)
@@ -59,11 +59,11 @@ def _still(folder: Path, rng: np.random.Generator) -> None:
 def _swinging(folder: Path, rng: np.random.Generator) -> None:
     """Write an attitude and a rate for every sample of the gyroscope, while all three axes oscillate."""
     turned, rates = simulate_oscillation(SWINGING_S)
-    felt = (GYRO_REFERENCE_RAD_S @ turned + rates) @ GYRO_MATRIX.T + GYRO_BIAS_RAD_S
-    felt += GYRO_RANDOM_WALK * np.sqrt(RATE_HZ) * rng.normal(size=felt.shape)
-    time_s = np.arange(len(felt)) / RATE_HZ
+    sensed = (GYRO_REFERENCE_RAD_S @ turned + rates) @ GYRO_MATRIX.T + GYRO_BIAS_RAD_S
+    sensed += GYRO_RANDOM_WALK * np.sqrt(RATE_HZ) * rng.normal(size=sensed.shape)
+    time_s = np.arange(len(sensed)) / RATE_HZ
     _write(
-        folder / "swinging_samples.csv", ["time_s", "x_rad_s", "y_rad_s", "z_rad_s"], np.column_stack([time_s, felt])
+        folder / "swinging_samples.csv", ["time_s", "x_rad_s", "y_rad_s", "z_rad_s"], np.column_stack([time_s, sensed])
     )
     half_s = 0.5 / RATE_HZ
     columns = ["start_s", "end_s", "qw", "qx", "qy", "qz", "rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"]

@@ -17,9 +17,9 @@ PLACES = [Path(os.environ.get("RIG_REAL_RECORDINGS", "")), ROOT.parent / "shared
 
 def recording(name: str) -> Path:
     """The folder of one; the test is skipped, by name, where there is none."""
-    for place in PLACES:
-        if (place / name).is_dir():
-            return place / name
+    for root in PLACES:
+        if (root / name).is_dir():
+            return root / name
     pytest.skip("recordings of others are not here: set RIG_REAL_RECORDINGS to their folder")
 
 

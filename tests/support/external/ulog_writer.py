@@ -34,10 +34,12 @@ def write_ulog(path: Path, time_us: np.ndarray, rates: np.ndarray, forces: np.nd
             message(b"A", pack("<BH", 0, len(FORMATS)) + b"sensor_combined")
         for number, name in enumerate(FORMATS):
             message(b"A", pack("<BH", 0, number) + name.encode())
-        for row, (at, rate, force) in enumerate(zip(time_us.tolist(), rates.tolist(), forces.tolist(), strict=True)):
+        for row, (stamp_us, rate, force) in enumerate(
+            zip(time_us.tolist(), rates.tolist(), forces.tolist(), strict=True)
+        ):
             if raw_every > 1:
-                message(b"D", pack("<HQ3fIi3fI", len(FORMATS), at, *rate, 5000, 0, *force, 5000))
+                message(b"D", pack("<HQ3fIi3fI", len(FORMATS), stamp_us, *rate, 5000, 0, *force, 5000))
             if row % raw_every:
                 continue
             for number, reading in enumerate((rate, force)):
-                message(b"D", pack("<HQQI4f", number, at + 300, at, 1234, *reading, 25.0))
+                message(b"D", pack("<HQQI4f", number, stamp_us + 300, stamp_us, 1234, *reading, 25.0))

@@ -74,7 +74,10 @@ def _switch_on(bench: Bench, random: Random) -> None:
 
 
 def _dashboard(bench: Bench, line: str) -> str:
-    with socket.create_connection((bench.world.host, 29999), PATIENCE_S) as there, there.makefile("rw") as talk:
+    with (
+        socket.create_connection((bench.world.host, 29999), PATIENCE_S) as connection,
+        connection.makefile("rw") as talk,
+    ):
         talk.readline()
         talk.write(f"{line}\n")
         talk.flush()
@@ -87,8 +90,8 @@ def _controller(name: str, do: str, end: str, mend: Act = nothing, **values: obj
 
 
 def _nudge(bench: Bench, random: Random) -> None:
-    with socket.create_connection((bench.world.host, 30002), PATIENCE_S) as there:
-        there.sendall(b"def nudge():\n movej([0.1, -1.57, 1.57, -1.57, -1.57, 0], a=1.4, v=1.0)\nend\n")
+    with socket.create_connection((bench.world.host, 30002), PATIENCE_S) as connection:
+        connection.sendall(b"def nudge():\n movej([0.1, -1.57, 1.57, -1.57, -1.57, 0], a=1.4, v=1.0)\nend\n")
 
 
 def _another_rig(bench: Bench, random: Random) -> None:

@@ -60,111 +60,111 @@ def carry_out(
     """A run of `setup` that meets the fault (None: none) after `moment` of the `span_s` it takes, in `folder`."""
     cell, random, began_s = Cell(name, setup, moment), Random(seed), time.monotonic()
     environment = shift_clock(folder.parent) if fault is not None and "CLOCK_SHIFT" in fault.environment else {}
-    with bench(folder, SETUPS[setup], environment) as here:
-        here.start()
-        if not here.until(lambda state: state["program_running"], START_S):
-            cell.deviations.append(f"did not start: {here.said('run')[-300:]}")
+    with bench(folder, SETUPS[setup], environment) as rig_bench:
+        rig_bench.start()
+        if not rig_bench.until(lambda state: state["program_running"], START_S):
+            cell.deviations.append(f"did not start: {rig_bench.said('run')[-300:]}")
             return cell
-        start_s = here.world.state()["time_s"]
-        cell.met = fault is None or here.until(lambda state: state["time_s"] >= start_s + moment * span_s, START_S)
+        start_s = rig_bench.world.state()["time_s"]
+        cell.met = fault is None or rig_bench.until(lambda state: state["time_s"] >= start_s + moment * span_s, START_S)
         if fault is not None and cell.met:
-            _meet(here, fault, random, cell)
+            _meet(rig_bench, fault, random, cell)
         else:
-            here.ended(END_S)
-            _account(here, None, cell, fault_s=0.0, fault_wall_s=0.0)
+            rig_bench.ended(END_S)
+            _account(rig_bench, None, cell, fault_s=0.0, fault_wall_s=0.0)
         if fault is not None and cell.met and cell.verdict != "pass":
-            here.pace(QUICK)
-            fault.mend(here, random)
-            _resume(here, cell)
+            rig_bench.pace(QUICK)
+            fault.mend(rig_bench, random)
+            _resume(rig_bench, cell)
         if cell.verdict == "pass":
-            cell.worst_u = errors_in_u(here.out)
+            cell.worst_u = errors_in_u(rig_bench.out)
             if not cell.worst_u <= WITHIN_U:
                 cell.deviations.append(f"passed {cell.worst_u:.1f} U from the truth")
     cell.wall_s = time.monotonic() - began_s
     return cell
 
 
-def _meet(here: Bench, fault: Fault, random: Random, cell: Cell) -> None:
-    here.pace(REAL)
-    fault_s, fault_wall_s = here.world.state()["time_s"], time.monotonic()
-    driver_pid = here.driver_pid
-    fault.bring(here, random)
+def _meet(rig_bench: Bench, fault: Fault, random: Random, cell: Cell) -> None:
+    rig_bench.pace(REAL)
+    fault_s, fault_wall_s = rig_bench.world.state()["time_s"], time.monotonic()
+    driver_pid = rig_bench.driver_pid
+    fault.bring(rig_bench, random)
     if fault.lasts_s is not None:
         time.sleep(fault.lasts_s)
-        fault.mend(here, random)
+        fault.mend(rig_bench, random)
     quick = False
-    while here.running and time.monotonic() - fault_wall_s < END_S:
+    while rig_bench.running and time.monotonic() - fault_wall_s < END_S:
         if not quick and time.monotonic() - fault_wall_s > WATCHED_S + (fault.lasts_s or 0.0):
-            here.pace(QUICK)
+            rig_bench.pace(QUICK)
             quick = True
         time.sleep(POLL_S)
-    if here.running:
+    if rig_bench.running:
         cell.deviations.append("hung")
-        here.end()
-    if not here.until(_stands, 30, running=False):
+        rig_bench.end()
+    if not rig_bench.until(_stands, 30, running=False):
         cell.deviations.append("the arm still moves")
-    _account(here, fault, cell, fault_s=fault_s, fault_wall_s=fault_wall_s)
+    _account(rig_bench, fault, cell, fault_s=fault_s, fault_wall_s=fault_wall_s)
     for _ in range(100):
         if driver_pid is None or not alive(driver_pid) or "driver frozen" in cell.fault:
             break
         time.sleep(0.1)
     else:
         cell.deviations.append("left its driver behind")
-    _companions(here, cell)
+    _companions(rig_bench, cell)
 
 
 def _stands(state: dict[str, Any]) -> bool:
     return not state["moving"] and bool(state["time_s"] > state["still_since_s"])
 
 
-def _companions(here: Bench, cell: Cell) -> None:
-    for second in here.companions:
-        _, said = second.communicate(timeout=END_S)
-        if second.returncode != 2 or not re.search(r"^rig: \w+: ", said, re.MULTILINE):
-            cell.deviations.append(f"the second rig ended with {second.returncode}: {said[-200:]}")
+def _companions(rig_bench: Bench, cell: Cell) -> None:
+    for second in rig_bench.companions:
+        _, output = second.communicate(timeout=END_S)
+        if second.returncode != 2 or not re.search(r"^rig: \w+: ", output, re.MULTILINE):
+            cell.deviations.append(f"the second rig ended with {second.returncode}: {output[-200:]}")
 
 
-def _account(here: Bench, fault: Fault | None, cell: Cell, *, fault_s: float, fault_wall_s: float) -> None:
+def _account(rig_bench: Bench, fault: Fault | None, cell: Cell, *, fault_s: float, fault_wall_s: float) -> None:
     """How the run ended, when the arm came to rest, and whether the file holds what was received."""
-    assert here.process is not None
-    said = here.said("run")
-    cell.status = here.process.poll()
-    cell.ending = _ending(cell.status, said)
+    assert rig_bench.process is not None
+    output = rig_bench.said("run")
+    cell.status = rig_bench.process.poll()
+    cell.ending = _ending(cell.status, output)
     if cell.status == 0:
         cell.verdict = "pass"
-    if "Traceback" in said:
-        cell.deviations.append(f"traceback: {said[-400:]}")
+    if "Traceback" in output:
+        cell.deviations.append(f"traceback: {output[-400:]}")
     if fault is None:
         if cell.status != 0:
-            cell.deviations.append(f"undisturbed, and ended with {cell.status}: {said[-300:]}")
+            cell.deviations.append(f"undisturbed, and ended with {cell.status}: {output[-300:]}")
         return
-    passed = cell.status == 0 and (fault.may_pass or (fault.late_may_pass and _came_late(here, fault_s)))
+    passed = cell.status == 0 and (fault.may_pass or (fault.late_may_pass and _came_late(rig_bench, fault_s)))
     named = cell.status in fault.statuses and (not fault.names or cell.status != 3 or cell.ending in fault.names)
     if not (passed or named):
-        cell.deviations.append(f"ended with {cell.status} {cell.ending}: {said[-300:]}")
+        cell.deviations.append(f"ended with {cell.status} {cell.ending}: {output[-300:]}")
     if cell.status != 0:
-        cell.rest_s = here.world.state()["still_since_s"] - fault_s
+        cell.rest_s = rig_bench.world.state()["still_since_s"] - fault_s
         if fault.known_s is not None and cell.rest_s > fault.known_s + AT_REST_S:
             cell.deviations.append(f"at rest only {cell.rest_s:.2f} s after the fault")
-    _files(here, fault, cell, fault_wall_s)
+    _files(rig_bench, fault, cell, fault_wall_s)
 
 
-def _came_late(here: Bench, fault_s: float) -> bool:
+def _came_late(rig_bench: Bench, fault_s: float) -> bool:
     """Whether all was recorded by then that a calibration is found from."""
-    run = read_run(recordings(here.out, "raw")[0])
+    run = read_run(recordings(rig_bench.out, "raw")[0])
     windows = [sweep.window for sweep in swept(run)] + [dwell.window for dwell in dwelt(run)]
     return all(window.end_s <= fault_s for window in windows)
 
 
-def _ending(status: int | None, said: str) -> str:
-    errors = re.findall(r"^rig: (\w+): ", said, re.MULTILINE)
+def _ending(status: int | None, output: str) -> str:
+    errors = re.findall(r"^rig: (\w+): ", output, re.MULTILINE)
     named = {0: "pass", 1: "fail", 130: "interrupted", -9: "killed", None: "hung"}
     return named.get(status) or (errors[-1] if errors else "no name")
 
 
-def _files(here: Bench, fault: Fault, cell: Cell, fault_wall_s: float) -> None:
+def _files(rig_bench: Bench, fault: Fault, cell: Cell, fault_wall_s: float) -> None:
     try:
-        runs = [read_run(path) for path in recordings(here.out, "raw")]
+        runs = [read_run(path) for path in recordings(rig_bench.out, "raw")]
     except RigError as error:
         cell.deviations.append(f"the file is not readable: {error}")
         return
@@ -175,37 +175,39 @@ def _files(here: Bench, fault: Fault, cell: Cell, fault_wall_s: float) -> None:
     if not len(recorded):
         return  # nothing had been received, or the arm had not begun
     to_s = max(fault_wall_s - max(fault.kept_s, BEHIND_S), recorded["host_time_s"].max() - BEHIND_S)
-    delivered = _find_delivered(here, recorded["host_time_s"][0], to_s)
+    delivered = _find_delivered(rig_bench, recorded["host_time_s"][0], to_s)
     cell.missing = len(delivered - set(recorded["board_time_us"].tolist()))
     if cell.missing:
         cell.deviations.append(f"{cell.missing} of {len(delivered)} samples received are not in the file")
 
 
-def _find_delivered(here: Bench, from_s: float, to_s: float) -> set[int]:
+def _find_delivered(rig_bench: Bench, from_s: float, to_s: float) -> set[int]:
     """The board's time stamps of the samples that were handed to the rig in that time."""
     reader, stamps = FrameReader(), set[int]()
-    for wall_s, data in here.wire["board"].delivered or []:
+    for wall_s, data in rig_bench.wire["board"].delivered or []:
         for frame in reader.feed(data):
             if frame.name in SAMPLES and from_s + BEHIND_S < wall_s < to_s:
                 stamps.update(*(batch.samples["board_time_us"].tolist() for batch in sample_batches([frame], wall_s)))
     return stamps
 
 
-def _resume(here: Bench, cell: Cell) -> None:
+def _resume(rig_bench: Bench, cell: Cell) -> None:
     status: int | None = None
     while status != 0 and cell.resumes < RESUMES:
         cell.resumes += 1
-        here.process = here.rig("resume", str(here.out), "--yes")
-        if not here.ended(END_S):
+        rig_bench.process = rig_bench.rig("resume", str(rig_bench.out), "--yes")
+        if not rig_bench.ended(END_S):
             cell.deviations.append("resuming hung")
             return
-        status = here.process.poll()
+        status = rig_bench.process.poll()
         if status not in (0, 1):
             break
-    finished = cell.status == 1 and "already_finished" in here.said("resume")  # the verdict it had is the one it has
+    finished = cell.status == 1 and "already_finished" in rig_bench.said(
+        "resume"
+    )  # the verdict it had is the one it has
     cell.verdict = "fail" if finished else {0: "pass", 1: "fail"}.get(-1 if status is None else status, "none")
     if status != 0 and not finished:
-        cell.deviations.append(f"resumed, it ended with {status}: {here.said('resume')[-400:]}")
+        cell.deviations.append(f"resumed, it ended with {status}: {rig_bench.said('resume')[-400:]}")
 
 
 def span(setup: str, folder: Path) -> tuple[Cell, float]:

@@ -53,9 +53,9 @@ def errors_in_u(folder: Path) -> float:
     gyro = result.gyroscopes["gyro"]
     combined = gyro.covariance_combined if gyro.covariance_combined is not None else gyro.covariance
     errors = [_largest([*gyro.scale, *gyro.bias_rad_s], combined, [v for part in TRUTH["gyro"].values() for v in part])]
-    for found in (result.accelerometers or {}).values():
+    for entry in (result.accelerometers or {}).values():
         truth = [v for part in TRUTH["accelerometer"].values() for v in part]
-        errors.append(_largest([*found.scale, *found.bias_m_s2], found.covariance, truth))
+        errors.append(_largest([*entry.scale, *entry.bias_m_s2], entry.covariance, truth))
     return max(errors)
 
 

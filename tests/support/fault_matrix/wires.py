@@ -41,11 +41,11 @@ class Wire:
     def hang_up(self) -> None:
         """Reset every connection, towards both ends."""
         pairs, self._open = self._open, []
-        for each in (end for pair in pairs for end in pair):
+        for wire_end in (end for pair in pairs for end in pair):
             with suppress(OSError):
-                each.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
-                each.shutdown(socket.SHUT_RDWR)
-            each.close()
+                wire_end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+                wire_end.shutdown(socket.SHUT_RDWR)
+            wire_end.close()
 
     def heal(self) -> None:
         """As new, for the connections to come."""

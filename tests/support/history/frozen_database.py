@@ -14,14 +14,14 @@ def freezing_at(words: bytes, url: str) -> Iterator[tuple[str, threading.Event]]
     """The relay's URL before the database of `url`, and whether it is frozen. Its connections stay open."""
     folder = Path(parse_qs(urlsplit(url).query)["host"][0])
     frozen = threading.Event()
-    with ExitStack() as held:
-        server = held.enter_context(socket.create_server(("127.0.0.1", 0)))
+    with ExitStack() as stack:
+        server = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
 
         def serve() -> None:
             try:
                 while True:
-                    client = held.enter_context(server.accept()[0])
-                    database = held.enter_context(socket.socket(socket.AF_UNIX))
+                    client = stack.enter_context(server.accept()[0])
+                    database = stack.enter_context(socket.socket(socket.AF_UNIX))
                     database.connect(str(folder / ".s.PGSQL.5432"))
                     _pass_on(client, database, words, frozen)
             except OSError:
@@ -34,11 +34,11 @@ def freezing_at(words: bytes, url: str) -> Iterator[tuple[str, threading.Event]]
 
 def _pass_on(client: socket.socket, database: socket.socket, words: bytes, frozen: threading.Event) -> None:
     while not frozen.is_set():
-        for each in select.select([client, database], [], [])[0]:
-            said = each.recv(65536)
-            if not said:
+        for source in select.select([client, database], [], [])[0]:
+            data = source.recv(65536)
+            if not data:
                 return
-            if each is client and words in said:
+            if source is client and words in data:
                 frozen.set()
                 return
-            (database if each is client else client).sendall(said)
+            (database if source is client else client).sendall(data)

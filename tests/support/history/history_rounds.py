@@ -69,11 +69,11 @@ def drawn(seed: int) -> Round:
 class Rounds:
     """Rounds on the history at `place`, with all that was said to be entered in them so far, by calibration number."""
 
-    def __init__(self, place: str, folder: Path) -> None:
-        self.place, self.folder = place, folder
+    def __init__(self, address: str, folder: Path) -> None:
+        self.place, self.folder = address, folder
         self.entered: dict[int, str] = {}
         self.not_remembered: list[str] = []
-        self._environment = {**os.environ, "RIG_HISTORY": place, "RIG_PAGE_TOKEN": "a-token-of-this-test"}
+        self._environment = {**os.environ, "RIG_HISTORY": address, "RIG_PAGE_TOKEN": "a-token-of-this-test"}
 
     def carry_out(self, this: Round) -> None:
         """Let all work and end; then every reported entry is there once, and the history is valid."""
@@ -96,7 +96,7 @@ class Rounds:
                     user.process.send_signal(how)
                 user.ends()
             station.ends()
-            for user in (station, *(each for _, _, each in guests)):
+            for user in (station, *(other for _, _, other in guests)):
                 self._take(user, this)
         self.check(this)
 
@@ -107,29 +107,29 @@ class Rounds:
                 whole = connection.execute("PRAGMA integrity_check").fetchall()
             assert whole == [("ok",)], f"{this}: {whole}"
         with open_history(self.place) as history:
-            there = {past.id: past.serial_number for past in history.calibrations(replaced_too=True)}
-        lost = {number: serial for number, serial in self.entered.items() if there.get(number) != serial}
+            serial_numbers = {past.id: past.serial_number for past in history.calibrations(replaced_too=True)}
+        lost = {number: serial for number, serial in self.entered.items() if serial_numbers.get(number) != serial}
         assert not lost, f"{this}: entered, and not there: {lost}"
         verified = rig_here("history", "verify", "--history", self.place)
         assert verified.returncode == 0, f"{this}: {verified.stdout}"
 
     def _take(self, user: "_User", this: Round) -> None:
         """Note the entries that a user reported: a station's, a run's, an import's."""
-        said = user.said.read_text(encoding="utf-8").splitlines(keepends=True)
-        whole_lines = [line for line in said if line.endswith("\n")]
-        assert user.process.returncode < 0 or "Traceback" not in "".join(said), f"{this}: {''.join(said)}"
+        lines = user.said.read_text(encoding="utf-8").splitlines(keepends=True)
+        whole_lines = [line for line in lines if line.endswith("\n")]
+        assert user.process.returncode < 0 or "Traceback" not in "".join(lines), f"{this}: {''.join(lines)}"
         for line in whole_lines:
             if line.startswith("{"):
-                told = json.loads(line)
-                self._entered(told.get("numbers", ()), told.get("serial_number"), this)
-                self.not_remembered += [told["not_remembered"]] if "not_remembered" in told else []
-            elif found := re.search(r"/([^/]+): entered as calibration (\d+)", line):
-                self._entered([int(found[2])], found[1], this)
+                message = json.loads(line)
+                self._entered(message.get("numbers", ()), message.get("serial_number"), this)
+                self.not_remembered += [message["not_remembered"]] if "not_remembered" in message else []
+            elif entry_match := re.search(r"/([^/]+): entered as calibration (\d+)", line):
+                self._entered([int(entry_match[2])], entry_match[1], this)
             elif "not entered in the history" in line:
                 self.not_remembered.append(line)
         if this.whole and user.said.name == f"whole{this.seed}.txt":
             entered = [int(match) for match in re.findall(r"entered in .* as calibration (\d+)", "".join(whole_lines))]
-            assert len(entered) == WHOLE_PARTS, f"{this}: {''.join(said)}"
+            assert len(entered) == WHOLE_PARTS, f"{this}: {''.join(lines)}"
             for number, serial_number in zip(entered, self._serial_numbers(this), strict=True):
                 self._entered([number], serial_number, this)
 

@@ -79,11 +79,11 @@ def notebook(seconds: float) -> None:
     import rig
     from rig.notebook.notebook_history import calibrations
 
-    place = os.environ["RIG_HISTORY"]
-    with rig.open_history(place) as history:
+    address = os.environ["RIG_HISTORY"]
+    with rig.open_history(address) as history:
         end_s = time.monotonic() + seconds
         while time.monotonic() < end_s:
-            tell(there=len(calibrations(history=place)), here=len(history.calibrations()))
+            tell(there=len(calibrations(history=address)), here=len(history.calibrations()))
 
 
 if __name__ == "__main__":

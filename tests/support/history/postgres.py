@@ -17,9 +17,9 @@ FAST = ("-c", "fsync=off", "-c", "listen_addresses=", "-c", "shared_buffers=16MB
 @contextmanager
 def postgresql() -> Iterator[str]:
     """Its URL. As root it runs as the user `postgres`, since PostgreSQL refuses to be root's."""
-    found = sorted(PROGRAMS.glob("*/bin"), key=lambda path: int(path.parent.name))
-    assert found, "PostgreSQL is not installed: apt-get install postgresql"
-    programs = found[-1]
+    folders = sorted(PROGRAMS.glob("*/bin"), key=lambda path: int(path.parent.name))
+    assert folders, "PostgreSQL is not installed: apt-get install postgresql"
+    programs = folders[-1]
     folder = Path(tempfile.mkdtemp(prefix="rig-pg-"))  # short: the path of a socket may have a hundred characters
     other: dict[str, Any] = {}
     try:

@@ -107,18 +107,18 @@ class Table:
     def _note(self, event: OfTheHand) -> None:
         self.events.append(event)
         if isinstance(event, HandAsked):
-            asked = event.instruction
-            self.operator.instruct(asked.say, asked.face, asked.turns, again=event.again is not None)
+            instruction = event.instruction
+            self.operator.instruct(instruction.say, instruction.face, instruction.turns, again=event.again is not None)
 
     def _pass(self, _: float) -> None:
         """Let time pass, in which readings arrive."""
         count = round(LOOK_S * RATE_HZ)
         times = self.time_s + np.arange(1, count + 1) / RATE_HZ
-        felt = []
+        motions = []
         for time_s in times.tolist():
             while self.operator.time_s < time_s:
                 self.operator.step()
-            felt.append(self.operator.motion_at(time_s))
+            motions.append(self.operator.motion_at(time_s))
         self.time_s = float(times[-1])
         if self.time_s > LONGEST_S:
             raise TimeoutError("the session has no end")
@@ -126,9 +126,9 @@ class Table:
         samples["sequence"] = self._count + np.arange(count)
         samples["board_time_us"] = np.round(1e6 * (times + 100.0) / (1 + NOMINAL_DRIFT))
         samples["host_time_s"] = times + 1.0
-        true_rates = np.array([each.rate_rad_s for each in felt])
+        true_rates = np.array([motion.rate_rad_s for motion in motions])
         rates = (true_rates + self._creeping(true_rates)) @ MATRIX.T + OFFSET
-        forces = np.array([each.force_m_s2 for each in felt])
+        forces = np.array([motion.force_m_s2 for motion in motions])
         self._fill(samples, RATE, rates + self._random.normal(0, NOISE, rates.shape), PER_COUNT)
         self._fill(samples, ACCELERATION, forces + self._random.normal(0, 0.02, forces.shape), PER_COUNT_M_S2)
         self._count += count

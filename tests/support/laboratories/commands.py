@@ -25,10 +25,10 @@ def rig(
     """Run `rig …` to its end."""
     with start_module(*arguments, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
-            said, errors = process.communicate(timeout=timeout_s)
+            output, errors = process.communicate(timeout=timeout_s)
         finally:
             process.kill()
-    return subprocess.CompletedProcess([*map(str, arguments)], process.returncode, said, errors)
+    return subprocess.CompletedProcess([*map(str, arguments)], process.returncode, output, errors)
 
 
 def python(*arguments: str | Path, timeout_s: float = PATIENCE_S) -> subprocess.CompletedProcess[str]:
@@ -39,11 +39,11 @@ def python(*arguments: str | Path, timeout_s: float = PATIENCE_S) -> subprocess.
 
 def rig_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """Run `rig …` in this process, which saves a second: for commands that only read and compute."""
-    said, errors = StringIO(), StringIO()
+    output, errors = StringIO(), StringIO()
     words = [*map(str, arguments)]
-    with redirect_stdout(said), redirect_stderr(errors):
+    with redirect_stdout(output), redirect_stderr(errors):
         status = main(words)
-    return subprocess.CompletedProcess(words, status, said.getvalue(), errors.getvalue())
+    return subprocess.CompletedProcess(words, status, output.getvalue(), errors.getvalue())
 
 
 def configuration(folder: Path, changes: dict[str, Any] | None = None, procedure: dict[str, Any] | None = None) -> Path:
@@ -62,7 +62,7 @@ def wait_for_log(folder: Path, words: str, times: int = 1) -> None:
     """Wait until the run's log has these words this many times."""
     log = folder / "log.txt"
 
-    def said() -> bool:
+    def has_appeared() -> bool:
         return log.exists() and log.read_text(encoding="utf-8").count(words) >= times
 
-    wait_for(said, f"{words!r} in {log}")
+    wait_for(has_appeared, f"{words!r} in {log}")

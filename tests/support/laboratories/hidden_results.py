@@ -70,26 +70,26 @@ def _list_stated(outcome: Outcome, document: Mapping[str, Any]) -> Iterable[Stat
         assert result.uncertainty is not None
         speed_rad_s = float(np.mean([observation.speed_rad_s for observation in result.observations]))
         true = true_gyroscope(document, name, recording, speed_rad_s)
-        found = np.concatenate([result.scale, result.bias_rad_s])
-        yield from _split(result.sensor.part, (SCALE, BIAS), found - true, result.uncertainty)
+        values = np.concatenate([result.scale, result.bias_rad_s])
+        yield from _split(result.sensor.part, (SCALE, BIAS), values - true, result.uncertainty)
     for name, accelerometer in outcome.accelerometers.items():
         assert accelerometer.budget is not None
-        found = np.concatenate([accelerometer.triad.scale, accelerometer.bias_m_s2])
-        error = found - true_accelerometer(document, name, accelerometer)
+        values = np.concatenate([accelerometer.triad.scale, accelerometer.bias_m_s2])
+        error = values - true_accelerometer(document, name, accelerometer)
         yield from _split(accelerometer.sensor.part, OF_GRAVITY, error, accelerometer.budget)
 
 
 def true_gyroscope(document: Mapping[str, Any], name: str, recording: ObservedRun, speed_rad_s: float) -> np.ndarray:
     """Return the true scale over the sweeps' times and the true bias over all averages, together (6,)."""
-    seen = recording.sensors[name]
-    sweeps = [(turn.average.start_s, turn.average.end_s) for turn in seen.revolutions]
-    averages = [*sweeps, *((rest.start_s, rest.end_s) for rest in seen.rests)]
+    recorded = recording.sensors[name]
+    sweeps = [(turn.average.start_s, turn.average.end_s) for turn in recorded.revolutions]
+    averages = [*sweeps, *((rest.start_s, rest.end_s) for rest in recorded.rests)]
     whole = min(start_s for start_s, _ in averages), max(end_s for _, end_s in averages)
     scale = truth(document, name, sweeps, speed_rad_s)[:3]
     return np.concatenate([scale, truth(document, name, [whole], speed_rad_s)[3:]])
 
 
-def true_accelerometer(document: Mapping[str, Any], name: str, found: AccelerometerResult) -> np.ndarray:
+def true_accelerometer(document: Mapping[str, Any], name: str, result: AccelerometerResult) -> np.ndarray:
     """Return (6,) the scale of the readings at 1 g up and down, and the bias of that at 0 g.
 
     Neither moves by φ, for what is even is the same up and down, and nothing at 0 g. The scale is that of a part as
@@ -98,10 +98,10 @@ def true_accelerometer(document: Mapping[str, Any], name: str, found: Accelerome
     """
     sensor = read_world_section(parse(yaml.safe_dump(dict(document)))).sensors[name]
     drawn = sensor.accelerometer
-    assert found.movement.sensor_errors is not None
-    windows_s = found.movement.sensor_errors.windows_s
+    assert result.movement.sensor_errors is not None
+    windows_s = result.movement.sensor_errors.windows_s
     warmer_k = np.average(
-        [_warmer_k(sensor, each) for each in windows_s.mean(axis=1)], weights=np.ptp(windows_s, axis=1)
+        [_warmer_k(sensor, middle_s) for middle_s in windows_s.mean(axis=1)], weights=np.ptp(windows_s, axis=1)
     )
     scale = np.array(drawn.scale) * (1 + float(warmer_k) * np.array(drawn.scale_per_k))
     whole = float(windows_s.min()), float(windows_s.max())
@@ -140,16 +140,16 @@ class Held:
 
 def compare_with_truth(runs: Iterable[Judged]) -> dict[tuple[str, str], Held]:
     """Compare stated values with the truth, by part and parameter."""
-    found: dict[tuple[str, str], list[Stated]] = {}
+    by_key: dict[tuple[str, str], list[Stated]] = {}
     for run in runs:
-        for each in run.stated:
-            found.setdefault((each.part, each.parameter), []).append(each)
-    return {key: _compare_one(each) for key, each in sorted(found.items())}
+        for value in run.stated:
+            by_key.setdefault((value.part, value.parameter), []).append(value)
+    return {key: _compare_one(value) for key, value in sorted(by_key.items())}
 
 
 def _compare_one(stated: Sequence[Stated]) -> Held:
     error, std, expanded = (
-        np.concatenate(each) for each in zip(*((one.error, one.std, one.expanded) for one in stated), strict=True)
+        np.concatenate(arrays) for arrays in zip(*((one.error, one.std, one.expanded) for one in stated), strict=True)
     )
     beyond = np.abs(error) / expanded
     return Held(

@@ -117,21 +117,23 @@ def world_by_datasheet(part: str, seed: int) -> dict[str, Any]:
     document["world"]["site"]["gravity_m_s2"] = float(rng.normal(site["gravity_m_s2"], expanded / 2))
     document["sensors"] = {name: sensor for name, sensor in document["sensors"].items() if sensor is not None}
     ((name, section),) = document["sensors"].items()
-    sheet, off = PARTS[part], PARTS[part].delivered
-    assert off.bias_deg_s is not None and off.scale_percent is not None and off.rate_percent is not None
+    sheet, delivered = PARTS[part], PARTS[part].delivered
+    assert (
+        delivered.bias_deg_s is not None and delivered.scale_percent is not None and delivered.rate_percent is not None
+    )
     half_band_hz = section["rate_hz"] / 2
     noise_rad_s = np.radians(sheet.angle_random_walk_deg_sqrt_h / 60) * np.sqrt(2 * half_band_hz)
     noise_m_s2 = 1e-6 * sheet.acceleration_noise_ug_sqrt_hz * np.sqrt(half_band_hz) * STANDARD_GRAVITY_M_S2
-    bias_rad_s, bias_per_k = np.radians([off.bias_deg_s, sheet.bias_deg_s_k])
+    bias_rad_s, bias_per_k = np.radians([delivered.bias_deg_s, sheet.bias_deg_s_k])
     drawn = {
         **_sensor(rng, section, float(noise_rad_s)),
-        "scale": rng.uniform(-1, 1, 3) * 1e-2 * off.scale_percent + 1,
+        "scale": rng.uniform(-1, 1, 3) * 1e-2 * delivered.scale_percent + 1,
         "bias_rad_s": rng.uniform(-1, 1, 3) * bias_rad_s,
         "bias_rad_s_per_k": rng.uniform(-1, 1, 3) * bias_per_k,
         "scale_per_k": rng.uniform(-1, 1, 3) * 1e-6 * sheet.scale_ppm_k,
     }
     drawn = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in drawn.items()}
-    drawn["data_rate_ppm"] = float(rng.uniform(-1, 1) * 1e4 * off.rate_percent)
+    drawn["data_rate_ppm"] = float(rng.uniform(-1, 1) * 1e4 * delivered.rate_percent)
     drawn["accelerometer"]["noise_m_s2"] = float(noise_m_s2)
     document["world"]["sensors"] = {name: drawn}
     return _add_mountings(document, rng)
@@ -431,8 +433,8 @@ def _full_rad_s(part: str, section: Mapping[str, Any]) -> float:
 
 
 def _askew(rng: np.random.Generator, most_deg: float) -> list[float]:
-    way = rng.standard_normal(3)
-    turn: list[float] = (rng.uniform(0, most_deg) * way / np.linalg.norm(way)).tolist()
+    direction = rng.standard_normal(3)
+    turn: list[float] = (rng.uniform(0, most_deg) * direction / np.linalg.norm(direction)).tolist()
     return turn
 
 
@@ -444,7 +446,10 @@ def _offset(rng: np.random.Generator) -> list[float]:
 def _mounting(rng: np.random.Generator) -> dict[str, str]:
     """Draw one of the 24 right-handed mountings."""
     all_of_them = [
-        {axis: f"{'+' if sign > 0 else '-'}{'xyz'[way]}" for axis, sign, way in zip("xyz", signs, order, strict=True)}
+        {
+            axis: f"{'+' if sign > 0 else '-'}{'xyz'[index]}"
+            for axis, sign, index in zip("xyz", signs, order, strict=True)
+        }
         for order in permutations(range(3))
         for signs in product((1, -1), repeat=3)
         if np.linalg.det(np.eye(3)[list(order)]) * np.prod(signs) > 0

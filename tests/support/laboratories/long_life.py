@@ -235,14 +235,14 @@ class Course:
 def courses(runs: Sequence[Calibration]) -> list[Course]:
     """Return the course of every parameter over the passed runs; the slope's uncertainty is that of their scatter."""
     number = np.array([run.number for run in runs], float)
-    found, std = np.array([run.found for run in runs]), np.array([run.std for run in runs])
-    away = number - number.mean()
+    measured, std = np.array([run.found for run in runs]), np.array([run.std for run in runs])
+    deviation = number - number.mean()
     courses = []
     for index, name in enumerate(PARAMETERS):
-        values = found[:, index]
-        slope = float(away @ values / (away @ away))
-        rest = values - values.mean() - slope * away
-        slope_std = float(np.sqrt(rest @ rest / (len(runs) - 2) / (away @ away)))
+        values = measured[:, index]
+        slope = float(deviation @ values / (deviation @ deviation))
+        rest = values - values.mean() - slope * deviation
+        slope_std = float(np.sqrt(rest @ rest / (len(runs) - 2) / (deviation @ deviation)))
         chi2 = float((((values - values.mean()) / std[:, index]) ** 2).sum())
         courses.append(Course(name, float(values.mean()), slope, slope_std, chi2, len(runs) - 1))
     return courses
@@ -250,17 +250,17 @@ def courses(runs: Sequence[Calibration]) -> list[Course]:
 
 def complaints(life: Life, warm_up: int, sigma: float = 3.0) -> list[str]:
     """Return broken promises after the first `warm_up` runs; chance exceeds `sigma` as often as in a normal law."""
-    found = [f"run {run.number} ended with status {run.status}" for run in life.runs if run.status]
-    if found:
-        return found
+    texts = [f"run {run.number} ended with status {run.status}" for run in life.runs if run.status]
+    if texts:
+        return texts
     tail = float(stats.norm.sf(sigma))
     for course in courses(life.runs):
         if abs(course.slope) > stats.t.isf(tail, course.dof - 1) * course.slope_std:
-            found.append(f"{course.name} drifts by {course.slope:.2g} ± {course.slope_std:.2g} a run")
+            texts.append(f"{course.name} drifts by {course.slope:.2g} ± {course.slope_std:.2g} a run")
         low, high = stats.chi2.isf(1 - tail, course.dof), stats.chi2.isf(tail, course.dof)
         if not low < course.chi2 < high:
-            found.append(f"{course.name} scatters by χ² = {course.chi2:.0f} of {course.dof} about its mean")
-    found += [
+            texts.append(f"{course.name} scatters by χ² = {course.chi2:.0f} of {course.dof} about its mean")
+    texts += [
         f"run {run.number} is {run.error_u:.1f} U (k = {COVERAGE:g}) from the truth"
         for run in life.runs
         if run.error_u > WITHIN_U
@@ -268,12 +268,12 @@ def complaints(life: Life, warm_up: int, sigma: float = 3.0) -> list[str]:
     for name in ("world", "station"):
         warm, last = (getattr(life.runs[index], name) for index in (warm_up, -1))
         if last.rss > warm.rss * (1 + GROWTH_MAX):
-            found.append(f"the {name} has grown from {warm.rss / 2**20:.1f} to {last.rss / 2**20:.1f} MiB")
+            texts.append(f"the {name} has grown from {warm.rss / 2**20:.1f} to {last.rss / 2**20:.1f} MiB")
         if (last.files, last.threads, last.children) != (warm.files, warm.threads, warm.children):
-            found.append(f"the {name} held {warm} and holds {last}")
+            texts.append(f"the {name} held {warm} and holds {last}")
     before, after = life.board
     if after.uptime_s <= before.uptime_s or after.reset_cause != before.reset_cause:
-        found.append(f"the board was reset: {before}, {after}")
+        texts.append(f"the board was reset: {before}, {after}")
     if after.tx_overruns or after.bus_errors or after.rx_errors or after.fault_pc:
-        found.append(f"the board counts errors: {after}")
-    return found
+        texts.append(f"the board counts errors: {after}")
+    return texts

@@ -49,8 +49,8 @@ class Scanner:
 
     def _end(self, words: str) -> int:
         """Return the end of the words behind the reading position; -1 if they are not there."""
-        at = self._told.find(words, self._read)
-        return at + len(words) if at >= 0 else -1
+        position = self._told.find(words, self._read)
+        return position + len(words) if position >= 0 else -1
 
     def _listen(self) -> None:
         assert self.process.stderr is not None

@@ -81,34 +81,34 @@ def carry_out(*command: str | Path, config: Path, when: str = "", times: int = 1
     document = yaml.safe_load(config.read_text(encoding="utf-8"))
     host = document["board"]["port"].removeprefix("socket://").partition(":")[0]
     process = start_module(*command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    seen = Seen(process, (host, 7322))
-    watching = threading.Thread(target=_watch, args=(seen,), daemon=True)
+    record = Seen(process, (host, 7322))
+    watching = threading.Thread(target=_watch, args=(record,), daemon=True)
     assert process.stdout is not None
     heard = 0
     for line in process.stdout:
-        seen.said.append(line)
+        record.said.append(line)
         heard += bool(when) and when in line
-        if act is not None and heard == times and not seen.acted_s:
+        if act is not None and heard == times and not record.acted_s:
             watching.start()
             time.sleep(after_s)
-            seen.acted_s = time.monotonic()
-            act(seen)
+            record.acted_s = time.monotonic()
+            act(record)
     process.stdout.close()
     process.wait(PATIENCE_S)
-    if seen.acted_s:
+    if record.acted_s:
         watching.join(PATIENCE_S)
-    return seen
+    return record
 
 
-def _watch(seen: Seen) -> None:
+def _watch(record: Seen) -> None:
     """Follow the shaft's speed until the laboratory has ended."""
     try:
-        with socket.create_connection(seen.control_at, PATIENCE_S) as channel:
+        with socket.create_connection(record.control_at, PATIENCE_S) as channel:
             replies = channel.makefile("rb")
             while True:
                 channel.sendall(b'{"do": "state"}\n')
                 state = json.loads(replies.readline())
-                seen.rates.append((time.monotonic(), state["rate_rad_s"]))
+                record.rates.append((time.monotonic(), state["rate_rad_s"]))
                 time.sleep(0.01)
     except (OSError, ValueError):
         return

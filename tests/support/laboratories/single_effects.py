@@ -78,10 +78,10 @@ def bound(effect: Effect, run: ObservedRun, document: Mapping[str, Any]) -> np.n
     Generalised least squares for each axis, of a row of the matrix, the bias and gravity's share; with an effect's own
     columns or covariance.
     """
-    seen = run.sensors["gyro"]
-    averages = [*(turn.average for turn in seen.revolutions), *seen.rests]
-    turned = [turn.speed_rad_s * turn.axis_flange for turn in seen.revolutions]
-    rates = np.array([*turned, *np.zeros((len(seen.rests), 3))])
+    recorded = run.sensors["gyro"]
+    averages = [*(turn.average for turn in recorded.revolutions), *recorded.rests]
+    turned = [turn.speed_rad_s * turn.axis_flange for turn in recorded.revolutions]
+    rates = np.array([*turned, *np.zeros((len(recorded.rests), 3))])
     upwards = np.array([average.attitude for average in averages]) @ (0.0, 0.0, 1.0)
     windows_s = [(average.start_s, average.end_s) for average in averages]
     flicker = FLICKER_RAD_S**2 * flicker_covariance(windows_s)
@@ -92,13 +92,13 @@ def bound(effect: Effect, run: ObservedRun, document: Mapping[str, Any]) -> np.n
     for axis, scale in enumerate(document["world"]["sensors"]["gyro"]["scale"]):
         design = np.column_stack([rates, np.ones(len(rates)), upwards])
         row, *_ = np.linalg.lstsq(design, means[:, axis], rcond=None)
-        along = row[:3] / np.linalg.norm(row[:3])
+        sensed_axis = row[:3] / np.linalg.norm(row[:3])
         if effect is Effect.NONLINEARITY:
-            felt = rates @ along
-            design = np.column_stack([design, np.abs(felt) * felt, felt**2])
+            sensed = rates @ sensed_axis
+            design = np.column_stack([design, np.abs(sensed) * sensed, sensed**2])
         spread = np.diag(noise[:, axis]) + flicker + (walk if effect is Effect.WALK else 0.0)
-        left = np.linalg.inv(design.T @ np.linalg.solve(spread, design))
-        stds[:, axis] = scale**2 * np.sqrt(along @ left[:3, :3] @ along), np.sqrt(left[3, 3])
+        covariance = np.linalg.inv(design.T @ np.linalg.solve(spread, design))
+        stds[:, axis] = scale**2 * np.sqrt(sensed_axis @ covariance[:3, :3] @ sensed_axis), np.sqrt(covariance[3, 3])
         if effect is Effect.CLOCK:
             clock = 1e-6 / np.sqrt(3 / 50**2 + 3 / 20**2)
             stds[0, axis] = np.hypot(stds[0, axis], scale * clock)

@@ -35,8 +35,8 @@ class WholeRun:
 
     def truth(self, sensor: str, speed_rad_s: float) -> np.ndarray:
         """Return the true scale and bias (6,) over the times of this run's averages, the scale at that speed."""
-        seen = self.observed.sensors[sensor]
-        averages = [*(turn.average for turn in seen.revolutions), *seen.rests]
+        recorded = self.observed.sensors[sensor]
+        averages = [*(turn.average for turn in recorded.revolutions), *recorded.rests]
         from_s, to_s = min(a.start_s for a in averages), max(a.end_s for a in averages)
         return truth(self.document, sensor, [(from_s, to_s)], speed_rad_s)
 

@@ -75,12 +75,15 @@ def specific_force(
 ) -> Array:
     """Return the specific force (n, 3) in the flange's frame, by the joint's angle, speed, acceleration, each (n,)."""
     angle, speed, acceleration = motion
-    before, here, after = (poses(joints_at(sweep, angle + step)) for step in (-STEP_RAD, 0.0, STEP_RAD))
-    way = [each[:, :3, :3] @ lever_arm_m + each[:, :3, 3] for each in (before, here, after)]
-    slope, bend = (way[2] - way[0]) / (2 * STEP_RAD), (way[2] - 2 * way[1] + way[0]) / STEP_RAD**2
+    before, middle, after = (poses(joints_at(sweep, angle + step)) for step in (-STEP_RAD, 0.0, STEP_RAD))
+    positions = [pose[:, :3, :3] @ lever_arm_m + pose[:, :3, 3] for pose in (before, middle, after)]
+    slope, bend = (
+        (positions[2] - positions[0]) / (2 * STEP_RAD),
+        (positions[2] - 2 * positions[1] + positions[0]) / STEP_RAD**2,
+    )
     moved = acceleration[:, None] * slope + speed[:, None] ** 2 * bend
-    felt: Array = np.einsum("nji,nj->ni", here[:, :3, :3], moved + reference_m_s2)
-    return felt
+    force: Array = np.einsum("nji,nj->ni", middle[:, :3, :3], moved + reference_m_s2)
+    return force
 
 
 def record_sweeps(
@@ -121,10 +124,10 @@ def make_sweeps(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...])
 def record_dwells(truth: Truth, poses: Poses, joints: Array, density_ug: float, rng: np.random.Generator) -> Dwells:
     """Return rests at joint angles (N, 6), with white noise in µg/√Hz."""
     std = density_ug * MICRO_G / np.sqrt(DWELL_S)
-    felt = np.einsum("nji,j->ni", poses(joints)[:, :3, :3], truth.reference_m_s2)
-    readings = felt @ truth.matrix.T + truth.bias_m_s2
-    told = flange_pose(joints)[:, :3, :3]
-    return Dwells(readings + std * rng.normal(size=readings.shape), np.full_like(readings, std**2), told)
+    forces = np.einsum("nji,j->ni", poses(joints)[:, :3, :3], truth.reference_m_s2)
+    readings = forces @ truth.matrix.T + truth.bias_m_s2
+    attitudes = flange_pose(joints)[:, :3, :3]
+    return Dwells(readings + std * rng.normal(size=readings.shape), np.full_like(readings, std**2), attitudes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,10 +175,12 @@ def record_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling,
     half_s = np.pi / sweep.speed_rad_s
     states_s = np.arange(-half_s - 0.5, half_s + 0.5, 1 / sampling.state_rate_hz)
     step = sampling.encoder_step_rad
-    told = CubicSpline(states_s, np.round(motion(states_s)[0] / step) * step)
+    spline = CubicSpline(states_s, np.round(motion(states_s)[0] / step) * step)
     true_s = np.arange(-half_s - 0.1, half_s + 0.1, 1 / sampling.rate_hz)
     time_s = true_s + sampling.clock_error_s
-    inside = (told(time_s) >= 0) & (told(time_s) < 2 * np.pi)
-    felt = specific_force(poses, sweep, motion(true_s[inside] - truth.delay_s), truth.reference_m_s2, truth.lever_arm_m)
-    readings = felt @ truth.matrix.T + truth.bias_m_s2 + sampling.noise_m_s2 * rng.normal(size=felt.shape)
-    return Samples(time_s[inside], readings, told(time_s[inside]), told(time_s[inside], 1))
+    inside = (spline(time_s) >= 0) & (spline(time_s) < 2 * np.pi)
+    forces = specific_force(
+        poses, sweep, motion(true_s[inside] - truth.delay_s), truth.reference_m_s2, truth.lever_arm_m
+    )
+    readings = forces @ truth.matrix.T + truth.bias_m_s2 + sampling.noise_m_s2 * rng.normal(size=forces.shape)
+    return Samples(time_s[inside], readings, spline(time_s[inside]), spline(time_s[inside], 1))

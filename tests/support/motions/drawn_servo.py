@@ -74,9 +74,9 @@ class Far:
         self.servo.obey(ServoPacket(1, WRITE, data, True), time_s)
 
     def read(self, time_s: float, register: Register) -> bytes:
-        asked = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
+        request = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
         self.servo.advance(time_s)
-        answer = self.servo.obey(ServoPacket(1, READ, asked, True), time_s)
+        answer = self.servo.obey(ServoPacket(1, READ, request, True), time_s)
         assert answer is not None and answer[8] & 0x7F == 0
         return answer[9:-2].replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
 
@@ -103,18 +103,18 @@ def drawn_servo(
     `mounting_deg`, the item's in each stage by `adapter_deg`, in random directions.
     """
     rng = np.random.default_rng([seed, 43])
-    configuration = load_servo((*(f"uncertainty.{each}" for each in KNOWN), *overrides))
+    configuration = load_servo((*(f"uncertainty.{key}" for key in KNOWN), *overrides))
     config = configuration.config
     assert isinstance(config.turner, ServoSection) and isinstance(config.procedure, ServoSixObservationSection)
     plan = plan_servo_six_observation(config.turner, config.procedure)
     settings = settings_of(config, plan)
     scale, bias = rng.uniform(*scales, 3), rng.uniform(-0.02, 0.02, 3)
     sits = _leaning(rng, config.uncertainty) @ rotation_by(np.radians(mounting_deg) * _direction(rng)).T
-    felt = np.radians(config.uncertainty.g_sensitivity_deg_s_g or 0.0) * rng.uniform(-1, 1, (3, 3))
+    g_sensitivity = np.radians(config.uncertainty.g_sensitivity_deg_s_g or 0.0) * rng.uniform(-1, 1, (3, 3))
     drift = float(rng.uniform(-3e-5, 3e-5))
     runs: list[RunData] = []
     shafts: list[Shaft] = []
-    for stage, each in enumerate(plan.stages):
+    for stage, key in enumerate(plan.stages):
         gear = truth or ServoTruth(
             start_deg=float(rng.uniform(0, 360)),
             encoder_once_phase_deg=float(rng.uniform(0, 360)),
@@ -123,11 +123,11 @@ def drawn_servo(
         )
         far = Far(gear)
         shafts.append(far.servo.shaft)
-        done = frozenset[int]().union(*(other.indices for other in plan.stages if other is not each))
-        own = plan_servo_six_observation(config.turner, config.procedure, None, done)
-        states, events, end_s = _driven(far, own, 1 / config.turner.state_rate_hz, rng)
-        mount = rotation_by(np.radians(adapter_deg) * _direction(rng)).T @ np.array(each.mount)
-        model = scale, bias - felt @ sits @ mount[:, 2]
+        done = frozenset[int]().union(*(other.indices for other in plan.stages if other is not key))
+        own_plan = plan_servo_six_observation(config.turner, config.procedure, None, done)
+        states, events, end_s = _driven(far, own_plan, 1 / config.turner.state_rate_hz, rng)
+        mount = rotation_by(np.radians(adapter_deg) * _direction(rng)).T @ np.array(key.mount)
+        model = scale, bias - g_sensitivity @ sits @ mount[:, 2]
         sampled = source or partial(_sample, rate_hz=config.sensors["gyro"].rate_hz)
         sensor, samples = sampled(far.servo, sits @ mount, model, (end_s, drift, noise_rad_s), rng)
         runs.append(
@@ -145,9 +145,9 @@ def drawn_servo(
     return Drawn(runs, shafts, scale, bias)
 
 
-def _leaning(rng: np.random.Generator, known: UncertaintySection) -> Array:
+def _leaning(rng: np.random.Generator, uncertainty: UncertaintySection) -> Array:
     """Return unit rows (3, 3): a sensor's axes, not quite orthogonal."""
-    angle = np.radians(known.non_orthogonality_deg or 0.0)
+    angle = np.radians(uncertainty.non_orthogonality_deg or 0.0)
     axes = np.eye(3) + np.tril(angle * rng.uniform(-1, 1, (3, 3)), -1)
     unit: Array = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     return unit
@@ -219,7 +219,7 @@ def _sample(
     """Return the samples of a gyroscope mounted by `rows` (3, 3) on the shaft, `until` a time, by a drifting clock."""
     (scale, bias), (end_s, drift, noise_rad_s) = model, until
     time_s = np.arange(BEGINS_S + 0.2, end_s - 0.2, 1 / rate_hz)
-    rates = np.array([servo.rate_at(each) for each in time_s.tolist()])
+    rates = np.array([servo.rate_at(moment_s) for moment_s in time_s.tolist()])
     read = np.outer(rates, rows[:, 2]) / scale - bias + noise_rad_s * rng.normal(size=(len(time_s), 3))
     samples = np.zeros(len(time_s), SAMPLE_DTYPE)
     samples["sequence"] = np.arange(len(time_s))

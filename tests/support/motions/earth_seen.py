@@ -114,14 +114,14 @@ def record(session: Session, seed: int) -> tuple[VectorInputs, Truth]:
 
     lengths = np.array([stretch.duration_s for stretch in stretches])
     turns = len(sweeps)
-    places = [place for pair in zip(range(turns), range(turns, 2 * turns), strict=True) for place in pair]
+    places = [index for pair in zip(range(turns), range(turns, 2 * turns), strict=True) for index in pair]
     places += range(2 * turns, len(stretches))  # a rest after each sweep, then dwells
     starts = np.zeros(len(stretches))
     starts[places] = np.cumsum([0.0, *(lengths[places[:-1]] + PAUSE_S)])
     windows = np.column_stack([starts, starts + lengths])
 
     attitudes = np.array([stretch.attitude for stretch in stretches])
-    told = np.array([stretch.told for stretch in stretches])
+    reported = np.array([stretch.told for stretch in stretches])
     wandered, whole = _wandering(session.part, windows, rng)
     rates = np.array([stretch.rate_rad_s for stretch in stretches]) + attitudes @ earth
     pulled = attitudes @ -UP @ np.reshape(session.g_sensitivity_rad_s_g, (3, 3)).T
@@ -132,19 +132,19 @@ def record(session: Session, seed: int) -> tuple[VectorInputs, Truth]:
         noise, variances, windows = _vibrating(session, windows, turns, rng)
     else:
         noise = np.sqrt(variances) * rng.normal(size=means.shape)
-    seen = VectorInputs(
+    inputs = VectorInputs(
         means_rad_s=means + noise,
         variances_rad2_s2=variances,
         turns_rad_s=np.array([stretch.turn_rad_s for stretch in stretches]),
         earth_rate_rad_s=np.zeros(3),
         speed_std_rad_s=np.zeros(len(means)),
-        attitudes=told,
-        gravity_m_s2=9.80665 * told @ -UP,
+        attitudes=reported,
+        gravity_m_s2=9.80665 * reported @ -UP,
         windows_s=windows,
         joints=tuple(stretch.joint for stretch in stretches),
         axis_errors_rad_s=std[:, None, None] * np.stack([stretch.axis_errors_rad_s for stretch in stretches], axis=1),
     )
-    return seen, Truth(earth, heading, GYRO_BIAS_RAD_S + whole)
+    return inputs, Truth(earth, heading, GYRO_BIAS_RAD_S + whole)
 
 
 @cache
@@ -153,28 +153,28 @@ def _turns(axes: int) -> tuple[tuple[Sweep, float, Array, Array, Array], ...]:
     them.
     """
     angles = np.linspace(0, 2 * np.pi, POINTS + 1)
-    found = []
+    turns = []
     for sweep in plan_sweeps(axes):
-        way = joints_at(sweep, angles)
-        told = np.swapaxes(flange_pose(way[:-1])[:, :3, :3], -1, -2).mean(axis=0)
-        found.append((sweep, find_signed_speed(sweep), way, flange_axes(way[:1])[0, :, sweep.joint], told))
-    return tuple(found)
+        joints = joints_at(sweep, angles)
+        attitude = np.swapaxes(flange_pose(joints[:-1])[:, :3, :3], -1, -2).mean(axis=0)
+        turns.append((sweep, find_signed_speed(sweep), joints, flange_axes(joints[:1])[0, :, sweep.joint], attitude))
+    return tuple(turns)
 
 
 def _sweeps(session: Session, poses: Callable[[Array], Array], rng: np.random.Generator) -> Iterator[Stretch]:
-    for sweep, speed, told_way, axis, told in _turns(session.axes):
-        way, forwards = told_way.copy(), 1 if speed > 0 else -1
-        way[:, sweep.joint] += forwards * session.hysteresis_rad / 2
-        along = poses(way)[::forwards, :3, :3]
-        steps = Rotation.from_matrix(np.swapaxes(along[:-1], -1, -2) @ along[1:])
-        halfway = along[:-1] @ (steps**0.5).as_matrix()
+    for sweep, speed, told_way, axis, mean_attitude in _turns(session.axes):
+        joints, forwards = told_way.copy(), 1 if speed > 0 else -1
+        joints[:, sweep.joint] += forwards * session.hysteresis_rad / 2
+        rotations = poses(joints)[::forwards, :3, :3]
+        steps = Rotation.from_matrix(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:])
+        halfway = rotations[:-1] @ (steps**0.5).as_matrix()
         duration = 2 * np.pi / abs(speed)
         rate = steps.as_rotvec().sum(axis=0) / duration
         rate = rate + np.cross(session.leaning_rad * rng.normal(size=3), rate)
         late = np.sqrt(2) * session.timing_s / duration * rng.normal()
         errors = speed * axis_errors(told_way[0], sweep.joint)
         attitude = np.swapaxes(halfway, -1, -2).mean(axis=0)
-        yield Stretch(duration, rate * (1 + late), attitude, told, speed * axis, errors, sweep.joint_name)
+        yield Stretch(duration, rate * (1 + late), attitude, mean_attitude, speed * axis, errors, sweep.joint_name)
 
 
 def _rests(session: Session, poses: Callable[[Array], Array], rng: np.random.Generator) -> Iterator[Stretch]:
@@ -182,28 +182,28 @@ def _rests(session: Session, poses: Callable[[Array], Array], rng: np.random.Gen
     home = [(HOME_RAD, REST_S)] * len(_turns(session.axes))
     for angles, duration in [*home, *((dwell, session.dwell_s) for dwell in dwells)]:
         stands = angles + np.r_[np.zeros(3), rng.choice([-0.5, 0.5], 3)] * session.hysteresis_rad
-        attitude, told = (each[0, :3, :3].T for each in (poses(stands[None]), flange_pose(angles[None])))
-        yield Stretch(duration, np.zeros(3), attitude, told, np.zeros(3), np.zeros((len(AXIS_ERRORS), 3)), None)
+        attitude, reported = (pose[0, :3, :3].T for pose in (poses(stands[None]), flange_pose(angles[None])))
+        yield Stretch(duration, np.zeros(3), attitude, reported, np.zeros(3), np.zeros((len(AXIS_ERRORS), 3)), None)
 
 
 def _vibrating(session: Session, windows_s: Array, turns: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
     """(N, 3) what noise and vibration leave in each average, by whole turns evenly, else as the rig averages rests; the
     variances (N, 3) of that, and the windows (N, 2) as the rig tells them."""
     noises, variances, windows = [], [], windows_s.copy()
-    for place, (start, end) in enumerate(windows_s):
+    for index, (start, end) in enumerate(windows_s):
         edges = np.linspace(start, end, round((end - start) * SAMPLES_HZ) + 1)
         turn = 2 * np.pi * VIBRATION_HZ
         swing = np.sqrt(2) * session.vibration_rad_s / turn * np.sin(turn * edges[:, None] + rng.uniform(0, 7, 3))
         sampled = session.part.density * np.sqrt(SAMPLES_HZ) * rng.normal(size=(len(edges) - 1, 3))
         readings = np.diff(swing, axis=0) * SAMPLES_HZ + sampled
-        if place < turns:
+        if index < turns:
             noises.append(readings.mean(axis=0))
             variances.append(np.full(3, session.part.density**2 / (end - start)))
         else:
-            found = average_tapered(readings, (edges[1:] + edges[:-1]) / 2, Window(start, end), Steps(1e-12))
-            noises.append(found.mean)
-            variances.append(found.variance)
-            windows[place] += np.array([0.5, -0.5]) * flank_s(end - start)
+            mean = average_tapered(readings, (edges[1:] + edges[:-1]) / 2, Window(start, end), Steps(1e-12))
+            noises.append(mean.mean)
+            variances.append(mean.variance)
+            windows[index] += np.array([0.5, -0.5]) * flank_s(end - start)
     return np.array(noises), np.array(variances), windows
 
 

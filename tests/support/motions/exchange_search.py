@@ -18,14 +18,14 @@ def log_determinant(information: Array, chosen: list[int]) -> float:
 
 def exchange_search(information: Array, count: int, rng: np.random.Generator, starts: int) -> list[int]:
     """Return the best `count` different attitudes, by exchanges from random starts while any gains."""
-    found = [_exchange(information, rng.permutation(len(information))[:count].tolist()) for _ in range(starts)]
-    return max(found, key=lambda chosen: log_determinant(information, chosen))
+    designs = [_exchange(information, rng.permutation(len(information))[:count].tolist()) for _ in range(starts)]
+    return max(designs, key=lambda chosen: log_determinant(information, chosen))
 
 
 def _exchange(information: Array, chosen: list[int]) -> list[int]:
     while True:
         now = information[chosen].sum(axis=0)
-        others = [place for place in range(len(information)) if place not in chosen]
+        others = [index for index in range(len(information)) if index not in chosen]
         trials = now - information[chosen][:, None] + information[others]
         values = np.linalg.slogdet(trials)[1]
         out, into = np.unravel_index(int(np.argmax(values)), values.shape)

@@ -57,16 +57,16 @@ def solve_field(
     mounted = MountedMagnetometer(section, simulated, offset_mm=(0.0, 0.0, extension_mm))
     field = build_magnetic_field(
         WorldSiteSection.model_validate({"magnetic_field_ut": FIELD_UT, "magnetic_dip_deg": 65.0} | dict(site or {})),
-        [IronSection.model_validate(each) for each in iron],
+        [IronSection.model_validate(iron_section) for iron_section in iron],
     )
     poses = [list(frames([*ARM, *np.radians(wrists)])) for wrists in SETS["magnetic"]]
-    felt = np.array([mounted.sense(field, pose, 0.0) for pose in poses])
+    sensed = np.array([mounted.sense(field, pose, 0.0) for pose in poses])
     matrix = _matrix()
     rng = np.random.default_rng(seed)
-    readings = felt @ matrix.T + np.array(mounted.truth.bias_t) + rng.normal(0.0, NOISE_T, felt.shape)
+    readings = sensed @ matrix.T + np.array(mounted.truth.bias_t) + rng.normal(0.0, NOISE_T, sensed.shape)
     rows = mounting_matrix(section)
     attitudes = np.array([np.array(pose[-1][0]) @ rows.T for pose in poses])
-    variances = np.full(felt.shape, NOISE_T**2)
+    variances = np.full(sensed.shape, NOISE_T**2)
     solution = solve_triaxial(readings, attitudes, variances, KnownNorm(1e-6 * FIELD_UT, (0, 0, -1)), method=method)
     alike = uniformity(solution, readings, attitudes, variances, 0.0)
     return Seen(np.array(mounted.truth.bias_t), matrix, solution, alike, rows)

@@ -73,26 +73,27 @@ def warm_board() -> Warmed:
     return Warmed(time_s, thermometer_c, element_c, branch, tuple(starts))
 
 
-def repeat_means(of: Warmed, seed: int) -> RepeatedMeans:
+def repeat_means(warmed: Warmed, seed: int) -> RepeatedMeans:
     """Return the estimator's input for one sensor, with drawn noise, drift and tilt of the arm's axes."""
     rng = np.random.default_rng([31, seed])
     windows = np.array([
-        (start + at + after, start + at + after + lasts)
-        for start in of.starts_s for at in SWEEP_AT_S for after, lasts in ((0.0, SWEPT_S), (SWEPT_S + 0.4, RESTED_S))
+        (start + offset_s + after, start + offset_s + after + lasts)
+        for start in warmed.starts_s
+        for offset_s in SWEEP_AT_S for after, lasts in ((0.0, SWEPT_S), (SWEPT_S + 0.4, RESTED_S))
     ])  # fmt: skip
-    felt = np.tile(np.stack([TURNS, np.zeros((6, 3))], axis=1).reshape(12, 3), (len(of.starts_s), 1))
-    places = np.tile(np.arange(12), len(of.starts_s))
+    rates = np.tile(np.stack([TURNS, np.zeros((6, 3))], axis=1).reshape(12, 3), (len(warmed.starts_s), 1))
+    places = np.tile(np.arange(12), len(warmed.starts_s))
     drift = Drift(INSTABILITY_RAD_S, 100.0, WALK_RAD_S_SQRT_S, np.random.SeedSequence([31, seed]))
-    powers = (of.element_c[:, None] - REFERENCE_C) ** np.arange(3)
-    bias = powers @ BIAS_RAD_S + of.branch[:, None] * HYSTERESIS_RAD_S + drift.evaluate_all(of.time_s)
+    powers = (warmed.element_c[:, None] - REFERENCE_C) ** np.arange(3)
+    bias = powers @ BIAS_RAD_S + warmed.branch[:, None] * HYSTERESIS_RAD_S + drift.evaluate_all(warmed.time_s)
     inverse = 1 / (SCALE[0] * (1 + powers[:, 1:] @ SCALE[1:]))
 
     def mean(values: Array) -> Array:
         summed = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
-        first, end = np.searchsorted(of.time_s, windows.T)
+        first, end = np.searchsorted(warmed.time_s, windows.T)
         return np.asarray((summed[end] - summed[first]) / (end - first).reshape(-1, *[1] * (values.ndim - 1)))
 
     variances = np.repeat(NOISE_RAD_S**2 / (RATE_HZ * np.diff(windows, axis=1)), 3, axis=1)
-    means = felt * mean(inverse) - mean(bias) + rng.normal(0, 3e-4, (12, 3))[places]
+    means = rates * mean(inverse) - mean(bias) + rng.normal(0, 3e-4, (12, 3))[places]
     means += rng.normal(0, 1, means.shape) * np.sqrt(variances)
-    return RepeatedMeans(means, variances, felt, places, windows, mean(of.thermometer_c), INSTABILITY_RAD_S)
+    return RepeatedMeans(means, variances, rates, places, windows, mean(warmed.thermometer_c), INSTABILITY_RAD_S)

@@ -65,13 +65,15 @@ def sample_lines(
             yield printer.take_sent()
         ended.set()
 
-    taken = _Taken()
+    collected = _Taken()
     with pty_printing(printed(), 0.001) as (port, _):
         at_port = wanted.model_copy(update={"serial": wanted.serial.model_copy(update={"port": port})})
-        with lines("gyro", at_port, taken) as source:
+        with lines("gyro", at_port, collected) as source:
             source.start()
             listening.set()
-            return source.sensors["gyro"], taken.all_of(source, lambda: ended.is_set() and taken.quiet_s > DRAINED_S)
+            return source.sensors["gyro"], collected.all_of(
+                source, lambda: ended.is_set() and collected.quiet_s > DRAINED_S
+            )
 
 
 def sample_autopilot(
@@ -80,21 +82,21 @@ def sample_autopilot(
     """Sample ArduPilot's first IMU behind its low-pass filter, with offsets to be undone."""
     end_s, drift, _ = until
     begun_s: list[float] = []
-    felt = _make_motion(servo, rows)
+    motion = _make_motion(servo, rows)
 
     def motion_at(time_s: float) -> Sequence[float]:
-        return felt(STILL_S + (max(time_s - begun_s[0], 0.0) if begun_s else 0.0))
+        return motion(STILL_S + (max(time_s - begun_s[0], 0.0) if begun_s else 0.0))
 
     offsets = {f"INS_GYROFFS_{axis}": float(rng.uniform(-0.05, 0.05)) for axis in "XYZ"}
-    taken = _Taken()
+    collected = _Taken()
     with autopilot_on_a_wire(
         "ardupilot", offsets, motion_at, pace=PACE, simulated=_errors(model, until), clock_ppm=-1e6 * drift
     ) as wire:
         sections = {"gyro": section(wire.port, acceleration=None)}
-        with mavlink(sections, taken) as source:
+        with mavlink(sections, collected) as source:
             source.start()
             begun_s.append(wire.time_s + 1.0)
-            return source.sensors["gyro"], taken.all_of(
+            return source.sensors["gyro"], collected.all_of(
                 source, lambda: wire.time_s > begun_s[0] + end_s - STILL_S + DRAINED_S * PACE
             )
 
@@ -125,14 +127,14 @@ class _Taken:
 
 def _make_motion(servo: SimulatedServo, rows: Array) -> Callable[[float], Sequence[float]]:
     """Return rate in rad/s and specific force in g on a vertical shaft."""
-    along = rows[:, 2]
+    axis = rows[:, 2]
 
-    def at(time_s: float) -> Sequence[float]:
-        return [*(servo.rate_at(max(time_s, STILL_S)) * along).tolist(), *along.tolist()]
+    def motion_at(time_s: float) -> Sequence[float]:
+        return [*(servo.rate_at(max(time_s, STILL_S)) * axis).tolist(), *axis.tolist()]
 
-    return at
+    return motion_at
 
 
 def _errors(model: Model, until: Until) -> SimulatedSensorSection:
-    scale, bias = (tuple(each.tolist()) for each in model)
+    scale, bias = (tuple(values.tolist()) for values in model)
     return SimulatedSensorSection(scale=scale, bias_rad_s=bias, noise_rad_s=until[2])

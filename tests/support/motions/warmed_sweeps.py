@@ -68,8 +68,8 @@ def drawn(
     """Draw a gyroscope with slopes and curvatures of the size in a data sheet."""
     first = rng.uniform(1.1, 1.2, 3)
     scale = np.array([first, first * rng.uniform(-1, 1, 3) * DATA_SHEET_SCALE_K, first * rng.uniform(-1, 1, 3) * 3e-6])
-    ways = rng.uniform(-1, 1, (2, 3))
-    bias = np.array([rng.normal(0, 0.01, 3), ways[0] * DATA_SHEET_BIAS_K, ways[1] * DATA_SHEET_BIAS_K / 80])
+    directions = rng.uniform(-1, 1, (2, 3))
+    bias = np.array([rng.normal(0, 0.01, 3), directions[0] * DATA_SHEET_BIAS_K, directions[1] * DATA_SHEET_BIAS_K / 80])
     return Drawn(
         scale, bias, hysteresis * rng.uniform(-1, 1, 3), lag_s * rng.uniform(-1, 1),
         (gradient_k * rng.uniform(-1, 1), gradient_k * rng.uniform(-1, 1)),
@@ -90,88 +90,92 @@ class Session:
 
 def session(repeats: int = 14, *, both_directions: bool = True) -> Session:
     """Return a session from 20 to 60 °C and, if `both_directions`, back again."""
-    felt = np.tile(PLACES, (repeats, 1))
-    lasted = np.where(felt.any(axis=1), SWEPT_S, RESTED_S)
+    rates = np.tile(PLACES, (repeats, 1))
+    lasted = np.where(rates.any(axis=1), SWEPT_S, RESTED_S)
     ends = np.cumsum(lasted + BETWEEN_S)
     windows = np.column_stack([ends - lasted, ends])
     middle = windows.mean(axis=1)
     done = (middle - middle[0]) / (middle[-1] - middle[0])
     temperature_c = FROM_C + (TO_C - FROM_C) * (1 - np.abs(1 - 2 * done) if both_directions else done)
     places = np.tile(np.arange(len(PLACES)), repeats)
-    return Session(windows, felt, places, temperature_c, np.gradient(temperature_c, middle))
+    return Session(windows, rates, places, temperature_c, np.gradient(temperature_c, middle))
 
 
-def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
+def readings(sensor: Drawn, course: Session, rng: np.random.Generator) -> Array:
     """Return the mean readings (N, 3)."""
-    warm = of.temperature_c + sensor.lag_s * of.warming_k_s - REFERENCE_C
+    warm = course.temperature_c + sensor.lag_s * course.warming_k_s - REFERENCE_C
     powers = np.vander(warm, 3, increasing=True)
-    within = (of.temperature_c - FROM_C) / (TO_C - FROM_C)
-    loop = np.outer(np.sign(of.warming_k_s) * 4 * within * (1 - within), sensor.hysteresis)
+    within = (course.temperature_c - FROM_C) / (TO_C - FROM_C)
+    loop = np.outer(np.sign(course.warming_k_s) * 4 * within * (1 - within), sensor.hysteresis)
     wandered = np.cumsum(
-        rng.normal(0, 1, of.felt.shape) * np.sqrt(np.diff(of.windows_s[:, 0], prepend=0.0))[:, None], axis=0
+        rng.normal(0, 1, course.felt.shape) * np.sqrt(np.diff(course.windows_s[:, 0], prepend=0.0))[:, None], axis=0
     )
     wandered -= wandered.mean(axis=0)  # a bias is that of the whole run
-    white = rng.normal(0, 1, of.felt.shape) * sensor.noise
-    found: Array = (
-        of.felt / (powers @ sensor.scale) + powers @ sensor.bias + loop
-        + sensor.leaning[of.places] + sensor.walk * wandered + white
+    white = rng.normal(0, 1, course.felt.shape) * sensor.noise
+    noisy: Array = (
+        course.felt / (powers @ sensor.scale) + powers @ sensor.bias + loop
+        + sensor.leaning[course.places] + sensor.walk * wandered + white
     )  # fmt: skip
-    return found
+    return noisy
 
 
-def repeat_means(means: Array, of: Session, noise: float) -> RepeatedMeans:
+def repeat_means(means: Array, course: Session, noise: float) -> RepeatedMeans:
     """Return the estimator's input."""
-    return RepeatedMeans(means, np.full(means.shape, noise**2), of.felt, of.places, of.windows_s, of.temperature_c)
+    return RepeatedMeans(
+        means, np.full(means.shape, noise**2), course.felt, course.places, course.windows_s, course.temperature_c
+    )
 
 
 def write_files(
-    sensor: Drawn, of: Session, rng: np.random.Generator, folder: Path, rate_hz: float = 20.0
+    sensor: Drawn, course: Session, rng: np.random.Generator, folder: Path, rate_hz: float = 20.0
 ) -> tuple[Path, Path]:
     """Write the sweeps and the samples with a column of temperature, as `rig solve --sweeps` takes them."""
-    means, rows = readings(sensor, of, rng), []
-    for mean, (start_s, end_s), warm in zip(means, of.windows_s, of.temperature_c, strict=True):
+    means, rows = readings(sensor, course, rng), []
+    for mean, (start_s, end_s), warm in zip(means, course.windows_s, course.temperature_c, strict=True):
         times = np.arange(start_s + 0.5 / rate_hz, end_s, 1 / rate_hz)
         noise = rng.normal(0, sensor.noise * np.sqrt(len(times)), (len(times), 3))
         rows.append(np.column_stack([times, mean + noise - noise.mean(axis=0), np.full(len(times), warm)]))
     samples, sweeps = folder / "samples.csv", folder / "sweeps.csv"
     header = "time_s,x_rad_s,y_rad_s,z_rad_s,temperature_c"
     np.savetxt(samples, np.vstack(rows), fmt="%.10g", delimiter=",", header=header, comments="")
-    speeds = np.linalg.norm(of.felt, axis=1)
-    axes = np.where(speeds[:, None] > 0, of.felt / np.maximum(speeds, 1e-9)[:, None], np.eye(3)[0])
+    speeds = np.linalg.norm(course.felt, axis=1)
+    axes = np.where(speeds[:, None] > 0, course.felt / np.maximum(speeds, 1e-9)[:, None], np.eye(3)[0])
     header = "start_s,end_s,axis_x,axis_y,axis_z,speed_rad_s"
-    table = np.column_stack([of.windows_s, axes, speeds])
+    table = np.column_stack([course.windows_s, axes, speeds])
     np.savetxt(sweeps, table, fmt="%.12g", delimiter=",", header=header, comments="")
     return samples, sweeps
 
 
-def external(means: Array, of: Session, noise: float) -> ExternalData:
+def external(means: Array, course: Session, noise: float) -> ExternalData:
     """Return the same as `averaged` makes of files."""
     averages = [
         Average(mean, np.full(3, noise**2), np.full(3, noise), 100, start_s, end_s, warm, dof=np.full(3, 99.0))
-        for mean, (start_s, end_s), warm in zip(means, of.windows_s.tolist(), of.temperature_c.tolist(), strict=True)
+        for mean, (start_s, end_s), warm in zip(
+            means, course.windows_s.tolist(), course.temperature_c.tolist(), strict=True
+        )
     ]
     sweeps = [
         Observation(
             row,
             None,
             None,
-            *nearest_axis(felt),
-            felt / np.linalg.norm(felt),
-            float(np.linalg.norm(felt)),
+            *nearest_axis(rate),
+            rate / np.linalg.norm(rate),
+            float(np.linalg.norm(rate)),
             0.0,
             0,
             average,
         )
-        for row, (felt, average) in enumerate(zip(of.felt, averages, strict=True), start=1)
-        if felt.any()
+        for row, (rate, average) in enumerate(zip(course.felt, averages, strict=True), start=1)
+        if rate.any()
     ]
-    rests = [average for felt, average in zip(of.felt, averages, strict=True) if not felt.any()]
+    rests = [average for rate, average in zip(course.felt, averages, strict=True) if not rate.any()]
     return ExternalData(tuple(sweeps), tuple(rests))
 
 
-def calibrate(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemperature:
+def calibrate(sensor: Drawn, course: Session, rng: np.random.Generator) -> OverTemperature:
     """Polynomials with all of the uncertainty that sweeps of files have."""
-    moved, found = correct_files(external(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C)
+    moved, polynomials = correct_files(external(readings(sensor, course, rng), course, sensor.noise), REFERENCE_C)
     solution = solve_swept(moved, "vector")
     sign = np.diag(RATE.parameter_signs)
     lines = tuple(
@@ -185,4 +189,4 @@ def calibrate(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTempe
         )
         for contributor in budget_of(solution, moved).contributors
     )
-    return combine_with_reference(found, np.r_[solution.scale, -solution.bias_rad_s], lines)
+    return combine_with_reference(polynomials, np.r_[solution.scale, -solution.bias_rad_s], lines)

@@ -12,18 +12,18 @@ from support.processes.waiting import PATIENCE_S
 @contextmanager
 def open_request(url: str, path: str, more: str = "", *, source: str = "") -> Iterator[socket.socket]:
     """Send a request, and leave its answer unread."""
-    place = urlsplit(url)
-    address = (place.hostname or "", place.port or 0)
+    parts = urlsplit(url)
+    address = (parts.hostname or "", parts.port or 0)
     with closing(socket.create_connection(address, 10, (source, 0) if source else None)) as connection:
-        connection.sendall(f"GET {path} HTTP/1.1\r\nHost: {place.netloc}\r\n{more}\r\n".encode())
+        connection.sendall(f"GET {path} HTTP/1.1\r\nHost: {parts.netloc}\r\n{more}\r\n".encode())
         yield connection
 
 
 @contextmanager
 def half_a_request(url: str, *, source: str = "") -> Iterator[socket.socket]:
     """Open a connection whose request never ends."""
-    place = urlsplit(url)
-    address = (place.hostname or "", place.port or 0)
+    parts = urlsplit(url)
+    address = (parts.hostname or "", parts.port or 0)
     with closing(socket.create_connection(address, 10, (source, 0) if source else None)) as connection:
         with suppress(ConnectionError):
             connection.sendall(b"GET / HTTP/1.1\r\n")
@@ -44,25 +44,25 @@ def alive(connection: socket.socket) -> bool:
 @contextmanager
 def flood(url: str, connections: int) -> Iterator[None]:
     """For the length of the block so many half requests are held; each that is closed is opened anew."""
-    place = urlsplit(url)
-    address = (place.hostname or "", place.port or 0)
+    parts = urlsplit(url)
+    address = (parts.hostname or "", parts.port or 0)
     over, full = threading.Event(), threading.Event()
 
     def attack() -> None:
-        held: list[socket.socket] = []
+        sockets: list[socket.socket] = []
         while not over.is_set():
             with suppress(OSError):
-                held.append(socket.create_connection(address, 1))
-                held[-1].sendall(b"GET / HTTP/1.1\r\n")
-            if len(held) >= connections:
+                sockets.append(socket.create_connection(address, 1))
+                sockets[-1].sendall(b"GET / HTTP/1.1\r\n")
+            if len(sockets) >= connections:
                 full.set()
                 over.wait(0.05)
-                gone = [each for each in held if not alive(each)]
-                for each in gone:
-                    each.close()
-                held = [each for each in held if each.fileno() >= 0]
-        for each in held:
-            each.close()
+                gone = [connection for connection in sockets if not alive(connection)]
+                for connection in gone:
+                    connection.close()
+                sockets = [connection for connection in sockets if connection.fileno() >= 0]
+        for connection in sockets:
+            connection.close()
 
     thread = threading.Thread(target=attack, daemon=True)
     thread.start()

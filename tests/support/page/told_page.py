@@ -80,21 +80,21 @@ class Telling:
                 self._feed.event(self._seen)
 
 
-def goes_on(seen: ArmSeen | HandSeen) -> bool:
+def goes_on(state: ArmSeen | HandSeen) -> bool:
     """Whether more is to come: the program of an arm plays, a servo is held, a hand always may move."""
     return not (
-        isinstance(seen, ArmSeen)
-        and isinstance(seen.state, ArmState)
-        and seen.state.runtime_state != RuntimeState.PLAYING
+        isinstance(state, ArmSeen)
+        and isinstance(state.state, ArmState)
+        and state.state.runtime_state != RuntimeState.PLAYING
     )
 
 
-def later(seen: ArmSeen | HandSeen) -> ArmSeen | HandSeen:
+def later(latest: ArmSeen | HandSeen) -> ArmSeen | HandSeen:
     """The same a moment later."""
-    if isinstance(seen, HandSeen):
-        return replace(seen, time_s=seen.time_s + AGAIN_S)
-    state: Any = seen.state
-    return replace(seen, state=replace(state, time_s=state.time_s + AGAIN_S))
+    if isinstance(latest, HandSeen):
+        return replace(latest, time_s=latest.time_s + AGAIN_S)
+    state: Any = latest.state
+    return replace(latest, state=replace(state, time_s=state.time_s + AGAIN_S))
 
 
 def more(samples: SamplesTaken | None) -> SamplesTaken | None:

@@ -128,15 +128,15 @@ def moving(plan: Plan, until_s: float, step_s: float = STEP_S) -> Iterator[RunEv
     time_s, done_s, q = 0.0, 0.0, plan.start_q_rad
     for number, step in enumerate(plan.steps, 1):
         yield StepStarted(number, len(plan.steps), step)
-        way = travel(step.start_q_rad, step.target_q_rad) if isinstance(step, Sweep | Transfer) else (0.0,) * 6
+        travel_rad = travel(step.start_q_rad, step.target_q_rad) if isinstance(step, Sweep | Transfer) else (0.0,) * 6
         from_q = getattr(step, "start_q_rad", q)
         began_s = time_s
         while time_s < began_s + step.duration_s:
             if time_s > until_s:
                 return
             fraction = (time_s - began_s) / step.duration_s
-            speeds = tuple(angle / step.duration_s for angle in way)
-            q = tuple(start + fraction * angle for start, angle in zip(from_q, way, strict=True))
+            speeds = tuple(angle / step.duration_s for angle in travel_rad)
+            q = tuple(start + fraction * angle for start, angle in zip(from_q, travel_rad, strict=True))
             yield SamplesTaken(
                 tuple(
                     _samples(name, time_s, step if isinstance(step, Sweep) else None, 0 if name == "gyro" else 3)
@@ -161,7 +161,8 @@ def _samples(name: str, time_s: float, sweep: Sweep | None, lost: int) -> Sensor
     axis = (0.0, 0.0, 0.0) if sweep is None else sweep.axis_flange
     speed = 0.0 if sweep is None else sweep.speed_rad_s
     x, y, z = (
-        speed * along + bias + wave for along, bias, wave in zip(axis, (0.01, -0.02, 0.005), ripple, strict=True)
+        speed * component + bias + wave
+        for component, bias, wave in zip(axis, (0.01, -0.02, 0.005), ripple, strict=True)
     )
     ax, ay, az = (9.8 * math.sin(0.2 * time_s) + 30 * ripple[0], 9.8 * math.cos(0.2 * time_s), 0.4 + 20 * ripple[1])
     acceleration = {"acceleration": (ax, ay, az)} if name == "reference" else {}
@@ -172,7 +173,7 @@ def _samples(name: str, time_s: float, sweep: Sweep | None, lost: int) -> Sensor
 def _make_observation(sweep: Sweep) -> RunEvent:
     if sweep.index == 3:
         return BoardNotObserved("gyro", sweep.index, SATURATED)
-    x, y, z = (sweep.speed_rad_s * along / 1.15 for along in sweep.axis_flange)
+    x, y, z = (sweep.speed_rad_s * component / 1.15 for component in sweep.axis_flange)
     return BoardObserved("gyro", sweep.index, sweep.speed_rad_s, BoardObservation(sweep.index, 0, 1, 1428, (x, y, z)))
 
 
@@ -190,7 +191,7 @@ def look(plan: Plan, sweeps: int) -> Look:
                 "joint": sweep.joint_name,
                 "direction": sweep.direction,
             }
-            mean = [sweep.speed_rad_s * along / scale + 0.004 for along in sweep.axis_flange]
+            mean = [sweep.speed_rad_s * component / scale + 0.004 for component in sweep.axis_flange]
             row |= {
                 "axis": "xyz"[axis],
                 "sign": sign,
@@ -207,18 +208,18 @@ def look(plan: Plan, sweeps: int) -> Look:
             {**UPRIGHT, "sweep": len(plan.sweeps), "dwell": "dwell at -90 -90 0"},
             {**UPRIGHT, "sweep": len(plan.sweeps) + 1, "dwell": "", "refused": SHAKEN},
         ]
-    known = sweeps >= 5
+    is_complete = sweeps >= 5
     parameters = [
         {
             "sensor": name,
             "labels": [*"xyz"],
             "unit": "rad/s",
-            "scale": [1.17776, 1.15521, 1.14266] if known else None,
-            "scale_u": [0.00175, 0.00169, 0.00161] if known else None,
+            "scale": [1.17776, 1.15521, 1.14266] if is_complete else None,
+            "scale_u": [0.00175, 0.00169, 0.00161] if is_complete else None,
             "bias": [0.00766, -0.00977, -0.00452],
             "bias_u": [0.00064, 0.00065, 0.00064],
             "of": "noise only",
-            "missing": None if known else "the observations have rank 3 of 4",
+            "missing": None if is_complete else "the observations have rank 3 of 4",
         }
         for name in SENSORS
     ]

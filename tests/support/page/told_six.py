@@ -52,26 +52,26 @@ def six_judged(folder: Path, *, passed: bool = True, broken: Collection[str] = (
 
     The checks of these names are `broken` of each of the three boards.
     """
-    found = six_found()
-    write_result(found, folder)
+    document = six_found()
+    write_result(document, folder)
     (folder / "certificate.html").write_text("<title>Certificate</title>", encoding="utf-8")
     yield DocumentWritten(folder / "certificate.html")
     yield DocumentWritten(folder / RESULT)
-    *checks, _ = ended(found)
+    *checks, _ = ended(document)
     yield from checks
     if not passed:
-        limit = found.checks[0]
+        limit = document.checks[0]
         yield Checked(Check(limit.name, 0.177, 0.1, "1", limit.means, 0.0012))
-    for check in found.checks:
+    for check in document.checks:
         if check.name.partition(".")[2] in broken and check.limit is not None:
             yield Checked(Check(check.name, 3 * check.limit, check.limit, check.unit, check.means))
     yield VerdictReached(passed and not broken)
-    yield Remembered("the history", (12, 13), tuple(_since(found)))
+    yield Remembered("the history", (12, 13), tuple(_since(document)))
 
 
-def _since(found: ResultDocument) -> Iterator[Since]:
+def _since(document: ResultDocument) -> Iterator[Since]:
     scale, bias = (
-        found.gyroscopes["gyro" if "gyro" in found.gyroscopes else "lsm9ds1"].scale,
+        document.gyroscopes["gyro" if "gyro" in document.gyroscopes else "lsm9ds1"].scale,
         (0.00766, -0.00977, -0.00452),
     )
     names = ("kx", "ky", "kz", "bx", "by", "bz")

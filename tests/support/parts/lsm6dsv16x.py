@@ -99,11 +99,11 @@ class Lsm6dsv16xRegisters(ByteRegisters):
         self.values[0x1E] = 0x07 if self.fresh else 0x00
         if address <= 0x23 < address + size:
             self.fresh = False
-        found = bytearray(super().read(address, size))
+        content = bytearray(super().read(address, size))
         if address == 0x12 and self._resetting:
             self._resetting -= 1
-            found[0] |= 0x01
-        return bytes(found)
+            content[0] |= 0x01
+        return bytes(content)
 
     def convert(
         self, counts: Sequence[int], temperature: int, acceleration: Sequence[int] = (0x11, -0x22, 0x33)

@@ -26,12 +26,12 @@ def local_cluster(**of: Any) -> Iterator[Any]:
 def killable_cluster(folder: Path) -> Iterator[tuple["subprocess.Popen[bytes]", str]]:
     """A scheduler with one worker, each a process of its own: the scheduler's, and its address."""
     file = folder / "scheduler.json"
-    at = ("--scheduler-file", str(file), "--no-dashboard")
-    with start_program("dask_scheduler", *at, "--port", "0") as scheduler:
+    options = ("--scheduler-file", str(file), "--no-dashboard")
+    with start_program("dask_scheduler", *options, "--port", "0") as scheduler:
         while not file.exists():
             assert scheduler.poll() is None
             time.sleep(0.02)
-        with start_program("dask_worker", *at, "--nthreads", "1", "--no-nanny"):
+        with start_program("dask_worker", *options, "--nthreads", "1", "--no-nanny"):
             yield scheduler, json.loads(file.read_text(encoding="utf-8"))["address"]
 
 

@@ -111,15 +111,15 @@ def fork_modules(modules: Collection[str], address: Callable[[str], str]) -> Non
 
 def _born(address: str, order: Order, streams: list[int]) -> tuple[int, socket.socket]:
     """A new process: its identity, and where its status is told (as of `os.waitpid`, 4 bytes) when it has ended."""
-    kept, given = socket.socketpair()
-    with given, socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as orders:
+    kept, child_end = socket.socketpair()
+    with child_end, socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as orders:
         orders.connect(bytes.fromhex(address))
-        socket.send_fds(orders, [json.dumps(order).encode()], [*streams, given.fileno()])
+        socket.send_fds(orders, [json.dumps(order).encode()], [*streams, child_end.fileno()])
     return _number(kept), kept
 
 
-def _number(told: socket.socket, flags: int = 0) -> int:
-    number = told.recv(4, flags)
+def _number(channel: socket.socket, flags: int = 0) -> int:
+    number = channel.recv(4, flags)
     assert number, "the process that all are forked from has ended"
     return int.from_bytes(number, "little")
 
@@ -152,10 +152,10 @@ def serve_orders(orders: socket.socket) -> Order | None:
                     os.close(key.fd)
                     continue
                 with orders.accept()[0] as once:
-                    text, given, _, _ = socket.recv_fds(once, 1 << 20, 4)
+                    text, descriptors, _, _ = socket.recv_fds(once, 1 << 20, 4)
                 if not text:  # who wanted to give one has ended
                     continue
-                *streams, status = given
+                *streams, status = descriptors
                 if not (process := os.fork()):
                     selector.close()
                     order: Order = json.loads(text)
@@ -166,15 +166,15 @@ def serve_orders(orders: socket.socket) -> Order | None:
                 selector.register(os.pidfd_open(process), selectors.EVENT_READ, (process, status))
 
 
-def _tell_status(process: int, told: int) -> None:
+def _tell_status(process: int, channel: int) -> None:
     """How it ended, where somebody still wants to know."""
     _, status = os.waitpid(process, 0)
     with suppress(BrokenPipeError):
-        os.write(told, status.to_bytes(4, "little"))
-    os.close(told)
+        os.write(channel, status.to_bytes(4, "little"))
+    os.close(channel)
 
 
-def _become(order: Order, streams: list[int], told: int) -> None:
+def _become(order: Order, streams: list[int], channel: int) -> None:
     """The environment, folder, session, signals and streams of a process that the system has just started."""
     if order["new_session"]:
         os.setsid()
@@ -193,7 +193,7 @@ def _become(order: Order, streams: list[int], told: int) -> None:
         new = open(stream, mode, buffering, of_old.encoding, of_old.errors, closefd=False)  # noqa: SIM115
         setattr(sys, name, new)
         setattr(sys, f"__{name}__", new)
-    os.write(told, os.getpid().to_bytes(4, "little"))
+    os.write(channel, os.getpid().to_bytes(4, "little"))
     os.closerange(3, os.sysconf("SC_OPEN_MAX"))
 
 

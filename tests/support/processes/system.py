@@ -13,11 +13,11 @@ def resident_kb(process: int) -> int:
 def descendant(process: int, word: str) -> int:
     """The first of the processes that it or its own have started whose command has this word. Raises LookupError."""
     family = [process]
-    for each in family:
+    for relative in family:
         with suppress(OSError):  # one that has ended meanwhile
-            if each != process and word.encode() in Path(f"/proc/{each}/cmdline").read_bytes():
-                return each
-            for thread in Path(f"/proc/{each}/task").iterdir():
+            if relative != process and word.encode() in Path(f"/proc/{relative}/cmdline").read_bytes():
+                return relative
+            for thread in Path(f"/proc/{relative}/task").iterdir():
                 family += map(int, (thread / "children").read_text(encoding="ascii").split())
     raise LookupError(f"process {process} has started no {word}")
 

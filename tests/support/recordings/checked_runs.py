@@ -22,9 +22,9 @@ def solve_inputs(run: RunData) -> Solved:
     return recordings, solve_observed(run.sensors, recordings, surroundings), surroundings
 
 
-def checks_of(found: Solved, rate: float = RATE) -> tuple[Check, ...]:
+def checks_of(inputs: Solved, rate: float = RATE) -> tuple[Check, ...]:
     """Check with limits that undamaged recordings exceed with this probability each."""
-    recordings, results, surroundings = found
+    recordings, results, surroundings = inputs
     return contradictions(
         recordings, results, ["gyro"], surroundings, recordings[0].run.settings, false_alarms=rate * STATISTICS
     ).checks

@@ -91,19 +91,19 @@ def record(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -> 
     return drawn(seed, kind, vibrates=vibrates)
 
 
-def state_solution(seen: Drawn) -> Stated:
+def state_solution(recording: Drawn) -> Stated:
     """What is solved of a recording, held against its truth."""
-    recordings = observe_recordings([seen.run])
-    surroundings = surroundings_of(recordings, seen.run.settings)
-    results = solve_observed(seen.run.sensors, recordings, surroundings=surroundings)
+    recordings = observe_recordings([recording.run])
+    surroundings = surroundings_of(recordings, recording.run.settings)
+    results = solve_observed(recording.run.sensors, recordings, surroundings=surroundings)
     result = results["gyro"]
     assert result.uncertainty is not None
     (observed,) = recordings
     averages = [turn.average for turn in observed.sensors["gyro"].revolutions] + [*observed.sensors["gyro"].rests]
     first_s, last_s = min(average.start_s for average in averages), max(average.end_s for average in averages)
-    inside = (seen.time_s >= first_s) & (seen.time_s <= last_s)
-    true = np.concatenate([seen.scale, -seen.bias_rad_s[inside].mean(axis=0)])
-    checks = contradictions(recordings, results, ["gyro"], surroundings, seen.run.settings).checks
+    inside = (recording.time_s >= first_s) & (recording.time_s <= last_s)
+    true = np.concatenate([recording.scale, -recording.bias_rad_s[inside].mean(axis=0)])
+    checks = contradictions(recordings, results, ["gyro"], surroundings, recording.run.settings).checks
     return Stated(
         np.concatenate([result.scale, result.bias_rad_s]) - true,
         result.uncertainty.expanded,

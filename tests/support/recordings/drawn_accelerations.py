@@ -78,13 +78,13 @@ class Session:
 
 def sheet_of(part: str) -> Datasheet:
     """Return the data sheet of an accelerometer of this kind."""
-    known = PARTS[part]
+    spec = PARTS[part]
     return Datasheet(
-        known.acceleration_nonlinearity_percent,
-        known.acceleration_nonlinear_over_g or RANGES_G[part],
-        known.acceleration_bias_mg_k,
-        known.acceleration_scale_ppm_k,
-        known.acceleration_bias_instability_ug,
+        spec.acceleration_nonlinearity_percent,
+        spec.acceleration_nonlinear_over_g or RANGES_G[part],
+        spec.acceleration_bias_mg_k,
+        spec.acceleration_scale_ppm_k,
+        spec.acceleration_bias_instability_ug,
     )
 
 
@@ -113,28 +113,28 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
     warm_c = 22 + warmer_k * np.sin(start_s / 60 + rng.uniform(0, 2 * np.pi))
     stood = [
         *map(Posture, JOINTS),
-        *(Posture(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned),
+        *(Posture(joints_at(sweep, np.zeros(1))[0], sweep.joint - WRIST_1) for sweep in turned),
     ]
     pieces = [
-        ReferenceWindow(number, (start, start + length), round(SAMPLE_RATE_HZ * length), warm, place)
-        for number, (start, length, warm, place) in enumerate(zip(start_s, length_s, warm_c, stood, strict=True))
+        ReferenceWindow(number, (start, start + length), round(SAMPLE_RATE_HZ * length), warm, pose)
+        for number, (start, length, warm, pose) in enumerate(zip(start_s, length_s, warm_c, stood, strict=True))
     ]
-    own = list_sensor_errors(sheet, pieces, STEPS_K[part], second_order=False)
-    movement = replace(straight, sensor_errors=own, arm_turns=list_arm_rotations(stood, NOMINAL, np.eye(3)))
+    sensor_errors = list_sensor_errors(sheet, pieces, STEPS_K[part], second_order=False)
+    movement = replace(straight, sensor_errors=sensor_errors, arm_turns=list_arm_rotations(stood, NOMINAL, np.eye(3)))
     session = Session(part, truth, movement, _parameters(truth, np.zeros(3)), arm_rad)
 
     def within(half_width: float) -> Array:
         return rng.uniform(-half_width, half_width, 3) if evenly else half_width / STANDARD * rng.normal(size=3)
 
     chi, theta = within(odd), truth.theta()
-    warm = repeat_by_segment(own.warmer_k + rng.uniform(-1, 1) * own.unseen_k, movement)
+    warm = repeat_by_segment(sensor_errors.warmer_k + rng.uniform(-1, 1) * sensor_errors.unseen_k, movement)
     bent = project_errors(theta, movement, np.square) @ within(even)
-    bent += project_errors(theta, movement, lambda along: along**3) @ chi
+    bent += project_errors(theta, movement, lambda force: force**3) @ chi
     bent += per_axis((warm * movement.constant())[:, None] * np.ones(3)) @ within(bias_k)
     bent += per_axis(_find_forces(session) * warm[:, None]) @ within(1e-6 * sheet.scale_ppm_k)
-    flickered = rng.multivariate_normal(np.zeros(len(pieces)), flicker_covariance(own.windows_s), 3)
-    flickering = movement.constant() * [repeat_by_segment(each, movement) for each in flickered]
-    bent += own.instability_m_s2 * flickering.T.ravel()
+    flickered = rng.multivariate_normal(np.zeros(len(pieces)), flicker_covariance(sensor_errors.windows_s), 3)
+    flickering = movement.constant() * [repeat_by_segment(sweep, movement) for sweep in flickered]
+    bent += sensor_errors.instability_m_s2 * flickering.T.ravel()
     return session.reading(bent, _parameters(truth, chi) - session.parameters)
 
 
@@ -151,8 +151,8 @@ def solve_session(session: Session) -> tuple[ImuSolution, Budget, Array]:
     )
     dof = np.full(movement.readings().size, AVERAGED)
     budget = accelerometer_budget(solution, movement, SITE, 0.0, datasheet=sheet_of(session.part), noise_dof=dof)
-    found = np.concatenate([1 / np.linalg.norm(solution.matrix, axis=1), solution.bias_m_s2])
-    return solution, budget, found - session.parameters
+    values = np.concatenate([1 / np.linalg.norm(solution.matrix, axis=1), solution.bias_m_s2])
+    return solution, budget, values - session.parameters
 
 
 def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
@@ -160,20 +160,20 @@ def read_of(session: Session, solution: ImuSolution) -> ReferenceModel:
     turned = plan_sweeps(AXES)
     stood = [
         *map(Posture, JOINTS),
-        *(Posture(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned),
+        *(Posture(joints_at(sweep, np.zeros(1))[0], sweep.joint - WRIST_1) for sweep in turned),
     ]
-    known = StatedArm(
+    stated = StatedArm(
         NOMINAL, float(np.degrees(STANDARD * session.arm_rad)), np.eye(3), solution.attitude_error.std_rad
     )
-    patterns = arm_patterns(solution.theta, session.movement, stood, known)
+    patterns = arm_patterns(solution.theta, session.movement, stood, stated)
     return ReferenceModel(solution.theta, session.movement, patterns, session.times_s, second_order=False)
 
 
 def find_detected(session: Session, solution: ImuSolution, rate: float) -> set[str]:
     """Return the names of the statistics beyond their limit."""
-    found = check_reference(read_of(session, solution), rate)
-    beyond = {name for name, (value, limit) in found.statistics.items() if value > limit}
-    return beyond | ({"disturbed"} if found.disturbed else set())
+    statistics = check_reference(read_of(session, solution), rate)
+    beyond = {name for name, (value, limit) in statistics.statistics.items() if value > limit}
+    return beyond | ({"disturbed"} if statistics.disturbed else set())
 
 
 Damage = Callable[[Session, float], Session]
@@ -184,7 +184,7 @@ def bent(change: Callable[[Array], Array], scale: float = 0.0) -> Damage:
 
     def damage(session: Session, size: float) -> Session:
         more = project_errors(
-            session.truth.theta(), session.movement, lambda along: size * change(along / GRAVITY) * GRAVITY
+            session.truth.theta(), session.movement, lambda force: size * change(force / GRAVITY) * GRAVITY
         )
         then = np.zeros(6)
         then[:3] = 1 / (1 / session.parameters[:3] + size * scale) - session.parameters[:3]

@@ -114,7 +114,7 @@ def drawn(
 ) -> Drawn:
     """Draw a recording. The movement is that of `setup`; its unevenness is `ripple`, or usual, or none."""
     rng = np.random.default_rng(seed)
-    seen = rng.spawn(1)[0]
+    generator = rng.spawn(1)[0]
     is_rough = seed % 4 == 0  # as no arm was seen to be; the others ripple as logged ones
     setup = Setup() if setup is None else setup
     setup = replace(
@@ -123,8 +123,8 @@ def drawn(
         sample_rate_hz=kind.sensor.rate_hz,
         vibration=vibrates * float(rng.uniform(0.0, 0.05)) * (1.0 if is_rough else MEASURED_TO_ROUGH),
         orders=ROUGH_ORDERS if is_rough else setup.orders,
-        seen_vibration_rad_s=vibrates * float(seen.uniform(0.0, 0.002)),
-        seen_vibration_hz=float(seen.uniform(8.0, 30.0)),
+        seen_vibration_rad_s=vibrates * float(generator.uniform(0.0, 0.002)),
+        seen_vibration_hz=float(generator.uniform(8.0, 30.0)),
         boot_s=float(rng.uniform(-1e4, 0.0)),
         drift=float(rng.uniform(-5e-5, 5e-5)),
     )
@@ -139,28 +139,28 @@ def drawn(
             unseen_vibration_hz=tuple(ripple.unseen_hz),
         )
     motion = Motion(setup, rng)
-    known = motion.settings.uncertainty
-    assert known is not None
+    uncertainty = motion.settings.uncertainty
+    assert uncertainty is not None
     board_s, time_s = sample_times(setup, motion)
-    q_rad, qd_rad_s, arm = _draw_true_motion(motion, time_s, known, rng, setup.encoders_err, vibrates=vibrates)
+    q_rad, qd_rad_s, arm = _draw_true_motion(motion, time_s, uncertainty, rng, setup.encoders_err, vibrates=vibrates)
     to_flange = flange_attitude(q_rad, arm)
     place_m = CubicSpline(time_s, flange_pose(q_rad, arm)[:, :3, 3])
     pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
     room = EARTH_RATE_RAD_S * rng.uniform(-1, 1, 3)
     turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
-    felt, scale = _sense(turned, pull, kind, rng, np.radians(setup.speed_deg_s))
+    rates, scale = _sense(turned, pull, kind, rng, np.radians(setup.speed_deg_s))
     bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
-    read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
+    read = rates + bias + kind.noise_rad_s * rng.standard_normal(rates.shape)
     run = _delay_encoders(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
-    settings = replace(run.settings, uncertainty=known.model_copy(update=sizes_of({"gyro": kind.sensor.part})))
-    return Drawn(replace(run, sensors={"gyro": kind.sensor}, settings=settings), time_s, felt, scale, bias)
+    settings = replace(run.settings, uncertainty=uncertainty.model_copy(update=sizes_of({"gyro": kind.sensor.part})))
+    return Drawn(replace(run, sensors={"gyro": kind.sensor}, settings=settings), time_s, rates, scale, bias)
 
 
-def add_readings(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
+def add_readings(recording: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
     """Return the recording with this (n, 3) added to the readings."""
-    samples = seen.run.samples["gyro"].copy()
+    samples = recording.run.samples["gyro"].copy()
     samples["counts"] += np.round(by_rad_s / kind.sensor.channel(RATE).unit_per_count).astype(samples["counts"].dtype)
-    return replace(seen.run, samples={"gyro": samples})
+    return replace(recording.run, samples={"gyro": samples})
 
 
 def _counts(read: Array, kind: Kind) -> Array:
@@ -173,7 +173,7 @@ def _counts(read: Array, kind: Kind) -> Array:
 def _draw_true_motion(
     motion: Motion,
     time_s: Array,
-    known: Uncertainty,
+    uncertainty: Uncertainty,
     rng: np.random.Generator,
     encoders_err: float,
     *,
@@ -181,12 +181,12 @@ def _draw_true_motion(
 ) -> tuple[Array, Array, DenavitHartenberg]:
     """Return true angles, true speeds and the arm's true geometry, none of which the encoders see."""
     q, qd = motion.joints(time_s)
-    axis_rad, again_rad = np.radians([known.axis_deg, known.repeatability_deg])
+    axis_rad, again_rad = np.radians([uncertainty.axis_deg, uncertainty.repeatability_deg])
     true, speed = q.copy(), qd.copy()
     once, twice = WAVE_SHARE * axis_rad / np.sqrt(3) * rng.standard_normal((2, 2, 6))
     encoders = rng.spawn(1)[0].standard_normal((len(ARC_WAVES), 2, 6))  # drawn beside all else
     if motion.settings.has_arcs:
-        encoders *= encoders_err * known.angle_std_rad / np.sqrt(len(ARC_WAVES))
+        encoders *= encoders_err * uncertainty.angle_std_rad / np.sqrt(len(ARC_WAVES))
         once, twice = np.zeros((2, 2, 6))  # are among them
         for joint in WRISTS:
             angle, home = np.outer(q[:, joint], ARC_WAVES), motion.plan.home_q_rad[joint] * ARC_WAVES
@@ -199,16 +199,16 @@ def _draw_true_motion(
         true[:, joint] += a * np.cos(e) + b * np.sin(e) + c * np.cos(2 * e) + d * np.sin(2 * e)
         speed[:, joint] *= 1 - a * np.sin(e) + b * np.cos(e) - 2 * c * np.sin(2 * e) + 2 * d * np.cos(2 * e)
         true[:, joint] += axis_rad * rng.uniform(-1, 1)
-    off = np.zeros(6)
+    errors = np.zeros(6)
     for step, end in zip(motion.plan.steps, motion.ends, strict=True):
         if not isinstance(step, (Sweep, Transfer)):
             continue
         moves = np.not_equal(step.start_q_rad, step.target_q_rad)
-        then = np.where(moves, again_rad * rng.uniform(-1, 1, 6), off)
+        then = np.where(moves, again_rad * rng.uniform(-1, 1, 6), errors)
         share = np.clip((time_s - (end - step.duration_s)) / OUTWARDS_S, 0, 1)
-        true += share[:, None] * (then - off)
-        speed += ((share > 0) & (share < 1))[:, None] * (then - off) / OUTWARDS_S
-        off = then
+        true += share[:, None] * (then - errors)
+        speed += ((share > 0) & (share < 1))[:, None] * (then - errors) / OUTWARDS_S
+        errors = then
     vibration, hertz = vibrates * rng.uniform(0, 0.004), rng.uniform(8, 30)
     lines_hz = [hertz]
     if motion.unseen_hz:
@@ -227,17 +227,17 @@ def _sense(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, spe
     (3,).
     """
     part = PARTS[kind.sensor.part]
-    along = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
+    rates = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
     most_rad = np.radians(part.non_orthogonality_deg) / 2  # the other axis of an angle may lean as far
     leaning = np.eye(3) + np.clip(rng.normal(0, np.sqrt(2) / 3 * most_rad, (3, 3)), -most_rad, most_rad)
-    along = along @ leaning
+    rates = rates @ leaning
     cube = part.nonlinearity_percent / 100 / CUBE_MISSED / kind.sensor.range_rad_s**2 * rng.uniform(-1, 1, 3)
     to_gravity = np.radians(part.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2 * rng.uniform(-1, 1, (3, 3))
     scale = rng.uniform(0.9, 1.1, 3)
     even = part.asymmetry_percent / 100 / kind.sensor.range_rad_s * rng.uniform(-1, 1, 3)
-    felt: Array = along * (1 + cube * along**2 + even * along) / scale + pull @ to_gravity.T
+    readings: Array = rates * (1 + cube * rates**2 + even * rates) / scale + pull @ to_gravity.T
     whole = np.linalg.norm(leaning, axis=0)
-    return felt, scale / (whole * (1 + cube * (whole * speed_rad_s) ** 2))
+    return readings, scale / (whole * (1 + cube * (whole * speed_rad_s) ** 2))
 
 
 def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:

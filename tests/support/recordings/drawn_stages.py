@@ -38,36 +38,43 @@ def drawn_stages(seed: int, kind: Kind, setup: Setup, off_deg: Array) -> tuple[l
     """
     runs: list[RunData] = []
     scale: Array = np.ones(3)
-    for stage, off in enumerate(np.radians(off_deg)):
-        alike, own = np.random.default_rng([seed, 1000]), np.random.default_rng([seed, stage])
+    for stage, offset in enumerate(np.radians(off_deg)):
+        alike, own_rng = np.random.default_rng([seed, 1000]), np.random.default_rng([seed, stage])
         room = EARTH_RATE_RAD_S * alike.uniform(-1, 1, 3)
         bias = alike.uniform(-0.02, 0.02, 3)
-        made = replace(
+        stage_setup_of = replace(
             setup,
             seed=seed,
             sample_rate_hz=kind.sensor.rate_hz,
-            vibration=float(own.uniform(0.0, 0.05)),
-            boot_s=float(own.uniform(-1e4, 0.0)),
+            vibration=float(own_rng.uniform(0.0, 0.05)),
+            boot_s=float(own_rng.uniform(-1e4, 0.0)),
             drift=float(alike.uniform(-5e-5, 5e-5)),
         )
-        motion = move_in_stage(made, stage, own)
-        known = motion.settings.uncertainty
-        assert known is not None
-        board_s, time_s = sample_times(made, motion)
+        motion = move_in_stage(stage_setup_of, stage, own_rng)
+        uncertainty = motion.settings.uncertainty
+        assert uncertainty is not None
+        board_s, time_s = sample_times(stage_setup_of, motion)
         q_rad, qd_rad_s, arm = _draw_true_motion(
-            motion, time_s, known, np.random.default_rng([seed, 2000]), setup.encoders_err
+            motion, time_s, uncertainty, np.random.default_rng([seed, 2000]), setup.encoders_err
         )
-        to_item = rotation_by(off) @ np.array(motion.settings.mount)
+        to_item = rotation_by(offset) @ np.array(motion.settings.mount)
         to_flange = flange_attitude(q_rad, arm)
         place_m = CubicSpline(time_s, flange_pose(q_rad, arm)[:, :3, 3])
         pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
         turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
         alike_rng, speed_rad_s = np.random.default_rng([seed, 3000]), float(np.radians(setup.speed_deg_s))
-        felt, scale = _sense(turned @ to_item.T, pull @ to_item.T, kind, alike_rng, speed_rad_s)
-        read = felt + bias + _wandering(len(time_s), kind, own) + kind.noise_rad_s * own.standard_normal(felt.shape)
-        run = _delay_encoders(run_data(made, motion, board_s, _counts(read, kind)), motion, made, own)
+        rates, scale = _sense(turned @ to_item.T, pull @ to_item.T, kind, alike_rng, speed_rad_s)
+        read = (
+            rates
+            + bias
+            + _wandering(len(time_s), kind, own_rng)
+            + kind.noise_rad_s * own_rng.standard_normal(rates.shape)
+        )
+        run = _delay_encoders(
+            run_data(stage_setup_of, motion, board_s, _counts(read, kind)), motion, stage_setup_of, own_rng
+        )
         sizes = sizes_of({"gyro": kind.sensor.part})
-        settings = replace(run.settings, uncertainty=known.model_copy(update=sizes))
+        settings = replace(run.settings, uncertainty=uncertainty.model_copy(update=sizes))
         runs.append(replace(run, sensors={"gyro": kind.sensor}, settings=settings))
     return runs, scale
 
@@ -77,7 +84,7 @@ def move_in_stage(setup: Setup, stage: int, rng: np.random.Generator) -> Motion:
     motion = Motion(setup, rng)
     config = parse(motion.config).config
     assert isinstance(config.procedure, SixSweepsSection)
-    others = {index for place, each in enumerate(motion.plan.stages) for index in each.indices if place != stage}
+    others = {index for number, other in enumerate(motion.plan.stages) for index in other.indices if number != stage}
     motion.plan = plan_six_observation(config.arm, config.procedure, done=others)
     motion.settings = replace(motion.settings, stage=stage)
     motion.ends = 101.0 + np.cumsum([step.duration_s for step in motion.plan.steps])

@@ -23,20 +23,22 @@ SHARE = 1e-6
 Number = tuple[str, float, float]  # its name, its value, and of what it may move by that share
 
 
-def differences(expected: ResultDocument, found: ResultDocument) -> list[str]:
+def differences(expected: ResultDocument, actual: ResultDocument) -> list[str]:
     """Return every number of `expected` that differs in `found` or is missing, with verdict and checks.
 
     A value is compared by its standard uncertainty, an uncertainty by its own size, a check by its limit, a count
     exactly.
     """
-    told = _list_moved(_numbers(expected), _numbers(found))
-    said = {check.name: _summarise(check) for check in found.checks}
-    told += [
-        f"check {check.name}: {_summarise(check)}, now {said.get(check.name)}"
+    moved = _list_moved(_numbers(expected), _numbers(actual))
+    summaries = {check.name: _summarise(check) for check in actual.checks}
+    moved += [
+        f"check {check.name}: {_summarise(check)}, now {summaries.get(check.name)}"
         for check in expected.checks
-        if said.get(check.name) != _summarise(check)
+        if summaries.get(check.name) != _summarise(check)
     ]
-    return told if expected.verdict == found.verdict else [*told, f"verdict: {expected.verdict}, now {found.verdict}"]
+    return (
+        moved if expected.verdict == actual.verdict else [*moved, f"verdict: {expected.verdict}, now {actual.verdict}"]
+    )
 
 
 def _summarise(check: CheckEntry) -> tuple[object, ...]:
@@ -50,13 +52,13 @@ def find_differences(run: Path, printed: str) -> list[str]:
     return differences(read_result(run), ResultDocument.model_validate_json(printed))
 
 
-def find_moved_parameters(expected: Iterable[Parameter], found: Iterable[Parameter]) -> list[str]:
+def find_moved_parameters(expected: Iterable[Parameter], actual: Iterable[Parameter]) -> list[str]:
     """Return the differences of one sensor's parameters."""
-    return _list_moved(_parameter_numbers("", expected), _parameter_numbers("", found))
+    return _list_moved(_parameter_numbers("", expected), _parameter_numbers("", actual))
 
 
-def _list_moved(expected: Iterable[Number], found: Iterable[Number]) -> list[str]:
-    values = {name: value for name, value, _ in found}
+def _list_moved(expected: Iterable[Number], actual: Iterable[Number]) -> list[str]:
+    values = {name: value for name, value, _ in actual}
     return [
         f"{name}: {value!r} (± {std:.2g}), now {values.get(name)!r}"
         for name, value, std in expected
@@ -102,15 +104,15 @@ def _attitude_numbers(document: ResultDocument) -> Iterator[Number]:
             yield from _vector(f"{name} lever arm", accelerometer.lever_arm_m, accelerometer.lever_arm_std_m)
     for name, magnetometer in document.magnetometers.items():
         if isinstance(magnetometer, MagnetometerEntry):
-            for seen in magnetometer.dwells:
-                yield from _vector(f"{name} field in {seen.index}", seen.mean_t, seen.mean_std_t)
+            for field_dwell in magnetometer.dwells:
+                yield from _vector(f"{name} field in {field_dwell.index}", field_dwell.mean_t, field_dwell.mean_std_t)
 
 
-def _parameter_numbers(of: str, parameters: Iterable[Parameter]) -> Iterator[Number]:
+def _parameter_numbers(subject: str, parameters: Iterable[Parameter]) -> Iterator[Number]:
     for parameter in parameters:
-        yield f"{of}{parameter.name}", parameter.value, parameter.std
-        yield f"{of}u({parameter.name})", parameter.std, parameter.std
-        yield f"{of}s({parameter.name})", parameter.std_statistical, parameter.std_statistical
+        yield f"{subject}{parameter.name}", parameter.value, parameter.std
+        yield f"{subject}u({parameter.name})", parameter.std, parameter.std
+        yield f"{subject}s({parameter.name})", parameter.std_statistical, parameter.std_statistical
 
 
 def _comparison_numbers(name: str, compared: ComparisonEntry) -> Iterator[Number]:

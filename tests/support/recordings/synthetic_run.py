@@ -131,18 +131,18 @@ class Motion:
 
     def joints(self, time_s: Array) -> tuple[Array, Array]:
         """Return q (n, 6) and its time derivative (n, 6) at increasing times (n,)."""
-        here = np.array(self.plan.home_q_rad)
-        smooth, speed = np.tile(here, (len(time_s), 1)), np.zeros((len(time_s), 6))
+        pose = np.array(self.plan.home_q_rad)
+        smooth, speed = np.tile(pose, (len(time_s), 1)), np.zeros((len(time_s), 6))
         places = [np.searchsorted(time_s, 101.0), *np.searchsorted(time_s, self.ends, side="right")]
         for step, end_s, inside in zip(self.plan.steps, self.ends, map(slice, places[:-1], places[1:]), strict=True):
             if isinstance(step, (Rest, Dwell)):
-                smooth[inside] = here
+                smooth[inside] = pose
                 continue
             fraction, rate = _trapezoid(time_s[inside] - (end_s - step.duration_s), step)
             start, target = np.array(step.start_q_rad), np.array(step.target_q_rad)
             smooth[inside] = start + fraction[:, None] * (target - start)
             speed[inside] = rate[:, None] * (target - start)
-            here = target
+            pose = target
         q, gain = smooth.copy(), np.ones_like(smooth)
         for cycles, rate_share, phase in zip(self.cycles, self.rates, self.phases, strict=True):
             turned = cycles * smooth[:, 3:] + phase
@@ -185,10 +185,10 @@ def true_force(setup: Setup, motion: Motion, time_s: Array) -> Array:
     (q, qd), step_s = motion.joints(time_s), 1e-4
     qdd = (motion.joints(time_s + step_s)[1] - motion.joints(time_s - step_s)[1]) / (2 * step_s)
     turns = [(np.cos(angle), np.sin(angle)) for angle in q.T]
-    felt = find_motion(
+    flange_motion = find_motion(
         turns, list(qd.T), list(qdd.T), links(), SiteTruth((0.0, 0.0, 0.0), (0.0, 0.0, STANDARD_GRAVITY_M_S2))
     )
-    return np.column_stack(transfer_force(*felt, setup.offset_m)) / STANDARD_GRAVITY_M_S2
+    return np.column_stack(transfer_force(*flange_motion, setup.offset_m)) / STANDARD_GRAVITY_M_S2
 
 
 def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
@@ -271,14 +271,14 @@ def _events(step: Step) -> tuple[Event, ...]:
 
 def _trapezoid(since_s: Array, step: Sweep | Transfer) -> tuple[Array, Array]:
     """Return the fraction of the motion (n,) and its derivative (n,) in 1/s."""
-    way = float(np.max(np.abs(np.array(step.target_q_rad) - np.array(step.start_q_rad))))
+    distance = float(np.max(np.abs(np.array(step.target_q_rad) - np.array(step.start_q_rad))))
     ramp = min(step.speed_rad_s / step.acceleration_rad_s2, step.duration_s / 2)
     top = step.acceleration_rad_s2 * ramp
-    left = np.minimum(since_s, step.duration_s - since_s)
-    rate = np.minimum(left / ramp, 1.0) * top
-    ramped = 0.5 * top * np.minimum(left, ramp) ** 2 / ramp
-    half = ramped + top * np.maximum(left - ramp, 0)
-    return np.where(since_s < step.duration_s / 2, half, way - half) / way, rate / way
+    remaining_s = np.minimum(since_s, step.duration_s - since_s)
+    rate = np.minimum(remaining_s / ramp, 1.0) * top
+    ramped = 0.5 * top * np.minimum(remaining_s, ramp) ** 2 / ramp
+    half = ramped + top * np.maximum(remaining_s - ramp, 0)
+    return np.where(since_s < step.duration_s / 2, half, distance - half) / distance, rate / distance
 
 
 def rotation(vector: Array) -> Array:

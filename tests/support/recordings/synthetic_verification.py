@@ -64,8 +64,8 @@ def recording(
     runs = {}
     for name, part in (("gyro", setup), ("reference", replace(reference, boot_s=setup.boot_s))):
         board_s, controller_s = sample_times(part, motion)
-        felt = true_rate(motion, controller_s - (lag_s if name == "gyro" else 0.0))
-        runs[name] = run_data(setup, motion, board_s, readings(part, felt @ skew[name].T, rng))
+        rates = true_rate(motion, controller_s - (lag_s if name == "gyro" else 0.0))
+        runs[name] = run_data(setup, motion, board_s, readings(part, rates @ skew[name].T, rng))
     run = runs["gyro"]
     sensors = {**run.sensors, "reference": replace(run.sensors["gyro"], part="adis16465", rate_hz=200.0)}
     samples = {**run.samples, "reference": runs["reference"].samples["gyro"]}
@@ -74,7 +74,7 @@ def recording(
         samples["gyro"]["counts"] = np.round(1e6 * (raw + stored.bias_rad_s) @ stored.correction_matrix.T)
         corrected = change_channel(sensors["gyro"], unit_per_count=1e-6, full_scale_counts=2**31 - 1)
         sensors["gyro"] = replace(corrected, mode="calibrated")
-    known = run.settings.stated_uncertainty
+    uncertainty = run.settings.stated_uncertainty
     sizes = sizes_of({name: sensor.part for name, sensor in sensors.items()})
-    settings = replace(run.settings, uncertainty=known.model_copy(update=sizes))
+    settings = replace(run.settings, uncertainty=uncertainty.model_copy(update=sizes))
     return replace(run, sensors=sensors, samples=samples, settings=settings)
