@@ -49,7 +49,7 @@ class _LimitSet:
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of the value nearest to its limit, of three, by the decision rule."""
+        """Return the check of that value, of three axes, which is nearest to its limit by the decision rule."""
         check = self.check(what, _largest(values))
         if uncertainty is None or check.value is None:
             return check

@@ -147,7 +147,7 @@ class Shortest:
 
     def least(self, size: str) -> Budgets:
         """Return the budgets of the run with the smallest U of this name in `ReachedUncertainty`."""
-        return min(self.endless, key=lambda each: float(getattr(each.reached, size)))
+        return min(self.endless, key=lambda candidate: float(getattr(candidate.reached, size)))
 
     @property
     def at_any_length(self) -> ReachedUncertainty:

@@ -143,7 +143,10 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
 
 
 def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
-    """Return the solution. Raise Fault `field_not_uniform`, as the accelerometer confirms the same attitudes."""
+    """Return the solution.
+
+    Raise Fault `field_not_uniform` for large residuals, because the accelerometer confirms the attitudes.
+    """
     try:
         return solve(method=ESTIMATOR)
     except Fault as fault:

@@ -44,10 +44,10 @@ def accelerometer_budget(
     noise_dof: Array,
     datasheet: Datasheet | None = None,
 ) -> Budget:
-    """Return the budget of the solution of the `movement`; `lag_s` is the half-width of the sensor's filter lag.
+    """Return the budget of the solution of the `movement`.
 
-    `noise_dof` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics. By the
-    `datasheet` the solution's `own` errors are known.
+    `lag_s` is the half-width of the sensor's filter lag. `noise_dof` (3 N + 9 M,) is as in `Spread`: of the dwells'
+    readings, then of the sweeps' harmonics. With a `datasheet` the sensor's own errors are contributors.
     """
     spread = _propagate(
         solution,

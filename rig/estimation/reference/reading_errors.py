@@ -47,7 +47,10 @@ def bending(theta: Array, movement: Movement) -> Array:
 
 
 def bias_warming(movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of β of each axis, by one standard uncertainty: as recorded, and hidden by steps."""
+    """Return the patterns (6, 3 K) of β of each axis, by one standard uncertainty.
+
+    Three are for the temperature as recorded, three for its change within the recorded steps.
+    """
     sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))

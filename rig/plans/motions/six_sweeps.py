@@ -187,7 +187,7 @@ def _connect(sweeps: Sequence[Sweep], arm: ArmSection, procedure: SixSweepsSecti
     carried, model = read_load(arm), model_of(arm)
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)
     return connect_sweeps(
-        sweeps, find_home(arm), pace, procedure.rest_s, lambda here, there: _clear(here, there, carried, model)
+        sweeps, find_home(arm), pace, procedure.rest_s, lambda start, target: _clear(start, target, carried, model)
     )
 
 
