@@ -4,24 +4,25 @@ Their variance is divided among the budget's contributors of type A, each with i
 Satterthwaite, JCGM 100, G.4); the rest, errors of the arm of a stated size, counts as known.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from rig.analysis.gyroscope.calibration import SensorResult
-from rig.analysis.reference.accelerometer import AccelerometerResult
-from rig.analysis.reference.magnetometer import MagnetometerResult
-from rig.analysis.reversal import MagnetometerReversal
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import NOISE, WANDERING, Budget
 from rig.estimation.gyroscope.vector_fit import Explained
 from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, regress
-from rig.estimation.reference.accelerometer_model import SECOND
-from rig.estimation.reference.reference_budget import ATTITUDES, response_in_attitudes
-from rig.estimation.reference.reference_model import F
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.statistics.coverage import effective_dof
 
+if TYPE_CHECKING:
+    from rig.analysis.gyroscope.calibration import SensorResult
+    from rig.analysis.reference.accelerometer import AccelerometerResult
+    from rig.analysis.reference.magnetometer import MagnetometerResult
+    from rig.analysis.reversal import MagnetometerReversal
 
-def of_angles(result: SensorResult) -> Array | None:
+
+def of_angles(result: "SensorResult") -> Array | None:
     """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then mounting; None without budget."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
@@ -33,7 +34,7 @@ def of_angles(result: SensorResult) -> Array | None:
     return _split(np.diag(solution.angles_covariance_rad2), _of_readings(readings - walk, walk, explained), budget)
 
 
-def of_sensitivity(result: SensorResult) -> Array | None:
+def of_sensitivity(result: "SensorResult") -> Array | None:
     """Return the degrees of freedom (3, 3) of a gyroscope's sensitivity to gravity; None without it or a budget."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
@@ -46,26 +47,30 @@ def of_sensitivity(result: SensorResult) -> Array | None:
     return _split(whole, _of_readings(whole - walk, walk, explained), budget)
 
 
-def of_acceleration_angles(result: AccelerometerResult) -> Array:
+def of_acceleration_angles(result: "AccelerometerResult") -> Array:
     """Return the degrees of freedom (3,) of an accelerometer's non-orthogonality."""
     return _of_axes(result, result.solution.response, result.movement.noise())
 
 
-def of_second_order(result: AccelerometerResult) -> Array | None:
+def of_second_order(result: "AccelerometerResult") -> Array | None:
     """Return the degrees of freedom (3,) of an accelerometer's φ; None if it was not estimated."""
+    from rig.estimation.reference.accelerometer_model import SECOND
+
     if result.solution.second_order_s2_m is None:
         return None
     std = np.sqrt(np.diag(result.solution.covariance)[SECOND])
     return _in_attitudes(result.budget, result.solution.response[SECOND], result.movement.noise(), std)
 
 
-def of_field_angles(result: MagnetometerResult) -> Array:
+def of_field_angles(result: "MagnetometerResult") -> Array:
     """Return the degrees of freedom (3,) of a magnetometer's non-orthogonality."""
+    from rig.estimation.reference.reference_budget import response_in_attitudes
+
     response = response_in_attitudes(result.solution, result.measurements)
     return _of_axes(result, response, np.diag(result.measurements.variances_m2_s4.ravel()))
 
 
-def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:
+def of_reversal(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
     The latter are the fewest of any run's bias, a lower bound for a sum of independent parts.
@@ -78,14 +83,18 @@ def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:
     return scale, np.full(6, min(float(budget.dof[3:].min()) for budget in budgets))
 
 
-def _of_axes(result: AccelerometerResult | MagnetometerResult, response: Array, noise: Array) -> Array:
+def _of_axes(result: "AccelerometerResult | MagnetometerResult", response: Array, noise: Array) -> Array:
     """Return the degrees of freedom of the angles between the axes, from the `response` (p, n) of all parameters."""
+    from rig.estimation.reference.reference_model import F
+
     derivative = _to_angles(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
     return _in_attitudes(result.budget, derivative, noise, result.triad.non_orthogonality_std_rad)
 
 
 def _in_attitudes(budget: Budget, response: Array, noise: Array, std: Array) -> Array:
     """Return the degrees of freedom of `std` (q,), from the `response` (q, n) to readings with that `noise` (n, n)."""
+    from rig.estimation.reference.reference_budget import ATTITUDES
+
     by_noise = np.einsum("qn,nm,qm->q", response, noise, response)
     return _split(std**2, {NOISE: by_noise, ATTITUDES: std**2 - by_noise}, budget)
 

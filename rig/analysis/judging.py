@@ -2,34 +2,22 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from rig.analysis.check import Check, list_unsolved
-from rig.analysis.clock_comparison import ClockCheck
-from rig.analysis.consistency.contradictions import check_references, contradictions
+from rig.analysis.consistency.contradictions import NOTHING, ConsistencyChecks, check_references, contradictions
 from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.analysis.environment import surroundings_of
 from rig.analysis.estimator_names import Estimator, find_estimator
 from rig.analysis.gyroscope.board_averages import board_averages
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
-from rig.analysis.gyroscope.comparison import Reference, list_revolutions
 from rig.analysis.gyroscope.mounts import observe_as_mounted
 from rig.analysis.gyroscope.onboard_check import Agreement, check_arithmetic
 from rig.analysis.gyroscope.vector_inputs import lever_arms_m
-from rig.analysis.gyroscope.verification import Verification, verify
 from rig.analysis.installed_solvers import KindFound, kinds_on_arm
 from rig.analysis.outcome import Outcome, origin_of
-from rig.analysis.reference.accelerometer import AccelerometerResult, calibrate_accelerometers
-from rig.analysis.reference.magnetometer import MagnetometerResult, calibrate_magnetometers
-from rig.analysis.temperature.bias_drift import estimate_bias_drifts
-from rig.analysis.temperature.over_temperature import (
-    Polynomials,
-    add_acceleration_polynomials,
-    add_rate_polynomials,
-    correct_recordings,
-)
 from rig.analysis.verdict import acceleration_checks, clock_checks, drift_checks, judge, verification_checks
 from rig.config.judging.judging_keys import DecisionRule
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
@@ -40,8 +28,16 @@ from rig.errors.attempts import Attempts
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_fit import centripetal_m_s2
 from rig.estimation.gyroscope.vector_model import VectorSolution
-from rig.estimation.temperature.over_temperature import OverTemperature
 from rig.observation.observed_run import ObservedRun, observe_runs
+
+if TYPE_CHECKING:
+    from rig.analysis.clock_comparison import ClockCheck
+    from rig.analysis.gyroscope.comparison import Reference
+    from rig.analysis.gyroscope.verification import Verification
+    from rig.analysis.reference.accelerometer import AccelerometerResult
+    from rig.analysis.reference.magnetometer import MagnetometerResult
+    from rig.analysis.temperature.over_temperature import Polynomials
+    from rig.estimation.temperature.over_temperature import OverTemperature
 
 ResultT = TypeVar("ResultT")
 
@@ -60,18 +56,17 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
         )
     polynomials: Polynomials = {}
     if settings.reference_c is not None:
+        from rig.analysis.temperature.over_temperature import correct_recordings
+
         corrected = correct_recordings(recordings, settings, settings.reference_c)
         recordings, polynomials = corrected.recordings, corrected.polynomials
     swept = _GyroscopeOutcome(polynomials=polynomials)
     if settings.planned_sweeps:
         swept = _judge_gyroscopes(runs, recordings, settings, chosen, polynomials)
-    accelerometers = calibrate_accelerometers(recordings, settings, swept.results)
-    accelerometers, polynomials = _add_polynomials(
-        accelerometers, ACCELERATION, add_acceleration_polynomials, swept.polynomials
-    )
-    magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
+    dwells = _DwellOutcome(polynomials=swept.polynomials)
+    if settings.planned_dwells or runs[0].measuring(FIELD):
+        dwells = _judge_dwells(recordings, settings, swept, drifting=drifting)
     installed_kinds = kinds_on_arm(recordings, settings)
-    among_dwells = check_references(recordings, accelerometers, magnetometers.results, settings, drifting=drifting)
     return Outcome(
         recordings=recordings,
         settings=settings,
@@ -80,25 +75,25 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
         checks=(
             *swept.checks,
             *(check for average in averages for check in average),
-            *_acceleration_checks(accelerometers, settings),
-            *among_dwells.checks,
+            *_acceleration_checks(dwells.accelerometers, settings),
+            *dwells.contradictions.checks,
             *(check for kind in installed_kinds for check in kind.checks),
-            *_check_unsolved(magnetometers, installed_kinds),
+            *_check_unsolved(dwells.magnetometers, installed_kinds),
         ),
         installed_kinds=installed_kinds,
         mounts=mounts,
         provenance=origin_of(runs),
         clock=swept.clock,
-        accelerometers=accelerometers,
-        magnetometers=magnetometers,
+        accelerometers=dwells.accelerometers,
+        magnetometers=dwells.magnetometers,
         detection_limits=swept.detection_limits,
-        reference_detection_limits=among_dwells.detection_limits,
-        polynomials=polynomials,
+        reference_detection_limits=dwells.contradictions.detection_limits,
+        polynomials=dwells.polynomials,
     )
 
 
 def _check_unsolved(
-    magnetometers: Attempts[str, MagnetometerResult], installed_kinds: Sequence[KindFound]
+    magnetometers: "Attempts[str, MagnetometerResult]", installed_kinds: Sequence[KindFound]
 ) -> Iterator[Check]:
     """Yield the checks of sensors that were to be calibrated and have no solution."""
     yield from list_unsolved((name, FIELD.name, fault) for name, fault in magnetometers.faults.items())
@@ -109,11 +104,11 @@ def _check_unsolved(
 class _GyroscopeOutcome:
     """The gyroscopes' part of an outcome, from sweeps; empty if none was planned."""
 
-    polynomials: Polynomials
+    polynomials: "Polynomials"
     results: Mapping[str, SensorResult] = field(default_factory=dict)
     onboard: Mapping[str, Agreement] = field(default_factory=dict)
     checks: tuple[Check, ...] = ()
-    clock: ClockCheck | None = None
+    clock: "ClockCheck | None" = None
     detection_limits: Mapping[str, tuple[DetectionLimit, ...]] = field(default_factory=dict)
 
 
@@ -122,11 +117,14 @@ def _judge_gyroscopes(
     recordings: tuple[ObservedRun, ...],
     settings: RunSettings,
     estimator: Estimator,
-    polynomials: Polynomials,
+    polynomials: "Polynomials",
 ) -> _GyroscopeOutcome:
     surroundings = surroundings_of(recordings, settings)
     results = solve_observed(runs[0].measuring(RATE), recordings, surroundings, estimator, settings.matrix_corrected)
-    results, polynomials = _add_polynomials(results, RATE, add_rate_polynomials, polynomials)
+    if polynomials:
+        from rig.analysis.temperature.over_temperature import add_rate_polynomials
+
+        results, polynomials = _add_polynomials(results, RATE, add_rate_polynomials, polynomials)
     among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings, settings)
     onboard = {name: check_arithmetic(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
@@ -150,12 +148,44 @@ def _judge_gyroscopes(
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _DwellOutcome:
+    """The part of an outcome from attitudes at rest; empty if none was planned."""
+
+    polynomials: "Polynomials"
+    accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
+    magnetometers: "Attempts[str, MagnetometerResult]" = field(default_factory=Attempts)
+    contradictions: ConsistencyChecks = NOTHING
+
+
+def _judge_dwells(
+    recordings: tuple[ObservedRun, ...], settings: RunSettings, swept: _GyroscopeOutcome, *, drifting: bool
+) -> _DwellOutcome:
+    from rig.analysis.reference.accelerometer import calibrate_accelerometers
+    from rig.analysis.reference.magnetometer import calibrate_magnetometers
+
+    accelerometers, polynomials = calibrate_accelerometers(recordings, settings, swept.results), swept.polynomials
+    if polynomials:
+        from rig.analysis.temperature.over_temperature import add_acceleration_polynomials
+
+        accelerometers, polynomials = _add_polynomials(
+            accelerometers, ACCELERATION, add_acceleration_polynomials, polynomials
+        )
+    magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
+    return _DwellOutcome(
+        polynomials=polynomials,
+        accelerometers=accelerometers,
+        magnetometers=magnetometers,
+        contradictions=check_references(recordings, accelerometers, magnetometers.results, settings, drifting=drifting),
+    )
+
+
 def _add_polynomials(
     results: Mapping[str, ResultT],
     quantity: Quantity,
-    add: Callable[[ResultT, OverTemperature], tuple[ResultT, OverTemperature]],
-    polynomials: Polynomials,
-) -> tuple[dict[str, ResultT], Polynomials]:
+    add: Callable[[ResultT, "OverTemperature"], tuple[ResultT, "OverTemperature"]],
+    polynomials: "Polynomials",
+) -> tuple[dict[str, ResultT], "Polynomials"]:
     """Return a quantity's results with the polynomials over temperature in their uncertainty, and these."""
     settled = {name: add(results[name], fits[quantity]) for name, fits in polynomials.items() if quantity in fits}
     added = {name: result for name, (result, _) in settled.items()}
@@ -165,6 +195,8 @@ def _add_polynomials(
 
 def estimate_bias_drift(runs: Sequence[RunData], estimator: str) -> Outcome:
     """Solve and judge attitudes visited several times, as in `rig.analysis.analyses.estimate_bias_drift`."""
+    from rig.analysis.temperature.bias_drift import estimate_bias_drifts
+
     outcome = calibrate(runs, estimator, drifting=True)
     settings = outcome.settings
     drifts, rule = estimate_bias_drifts(outcome.recordings, settings), _decision_rule(settings)
@@ -172,7 +204,7 @@ def estimate_bias_drift(runs: Sequence[RunData], estimator: str) -> Outcome:
     return replace(outcome, drifts=drifts, checks=(*outcome.checks, *checks))
 
 
-def _acceleration_checks(results: Mapping[str, AccelerometerResult], settings: RunSettings) -> tuple[Check, ...]:
+def _acceleration_checks(results: "Mapping[str, AccelerometerResult]", settings: RunSettings) -> tuple[Check, ...]:
     rule = _decision_rule(settings)
     return tuple(
         check for name, result in results.items() for check in acceleration_checks(name, result, settings.limits, rule)
@@ -185,6 +217,9 @@ def _decision_rule(settings: RunSettings) -> DecisionRule:
 
 def verify_calibration(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
     """Verify a calibration by `repeated`, as in `rig.analysis.analyses.verify_calibration`."""
+    from rig.analysis.gyroscope.comparison import Reference
+    from rig.analysis.gyroscope.verification import verify
+
     settings = outcome.settings
     reference = settings.reference
     verifications: dict[str, Verification | None] = dict.fromkeys(settings.to_calibrate)
@@ -217,7 +252,7 @@ def verify_calibration(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome
 
 def _gravity_effects(
     results: Mapping[str, SensorResult],
-    pair: tuple[str, Reference],
+    pair: "tuple[str, Reference]",
     after: Sequence[ObservedRun],
     settings: RunSettings,
 ) -> tuple[Array, Array] | None:
@@ -225,6 +260,8 @@ def _gravity_effects(
 
     The centripetal acceleration acts as gravity does. None if the calibration has no g-sensitivity.
     """
+    from rig.analysis.gyroscope.comparison import list_revolutions
+
     name, reference = pair
     corrections = {name: results[name].correction_matrix} if name in results else {}
     corrections[reference.name] = reference.correction_matrix

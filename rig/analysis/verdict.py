@@ -3,15 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from rig.analysis.check import Check, fitness, name_check
 from rig.analysis.clock_comparison import PPM, ClockCheck, worst_differences
-from rig.analysis.gyroscope.verification import Verification
-from rig.analysis.reference.accelerometer import AccelerometerResult
-from rig.analysis.temperature.bias_drift import BiasDrift
 from rig.config.judging.judging_keys import DecisionRule
 from rig.config.judging.verdict_limits import Limits, limit_of
 from rig.data.meaning import Meaning
@@ -20,6 +17,11 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.estimate import Estimate
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR, coverage_factors
+
+if TYPE_CHECKING:
+    from rig.analysis.gyroscope.verification import Verification
+    from rig.analysis.reference.accelerometer import AccelerometerResult
+    from rig.analysis.temperature.bias_drift import BiasDrift
 
 CLOCKS = "clocks_agree"
 
@@ -109,7 +111,7 @@ def judge(
     return tuple(checks)
 
 
-def verification_checks(sensor: str, verification: Verification | None, limits: Limits | None) -> tuple[Check, ...]:
+def verification_checks(sensor: str, verification: "Verification | None", limits: Limits | None) -> tuple[Check, ...]:
     """Return the checks of calibrated readings: the worst axis, and the worst mean over a revolution.
 
     The reference is compared with the arm too, by the limit of those means, because its own error may be the cause.
@@ -142,7 +144,7 @@ def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
 
 
 def acceleration_checks(
-    sensor: str, result: AccelerometerResult, limits: Limits | None, rule: DecisionRule = "simple"
+    sensor: str, result: "AccelerometerResult", limits: Limits | None, rule: DecisionRule = "simple"
 ) -> tuple[Check, ...]:
     """Return the checks of an accelerometer's scale and bias, their uncertainty, and gravity in held-out attitudes.
 
@@ -155,7 +157,7 @@ def acceleration_checks(
 
 
 def drift_checks(
-    sensor: str, drifts: Mapping[Quantity, BiasDrift], limits: Limits | None, rule: DecisionRule = "simple"
+    sensor: str, drifts: Mapping[Quantity, "BiasDrift"], limits: Limits | None, rule: DecisionRule = "simple"
 ) -> tuple[Check, ...]:
     """Return the checks of the largest change of a bias between any two repeats."""
     checks = []

@@ -1,18 +1,18 @@
 """The standard deviations that a solve expects of its residuals: all modelled errors, less what the fit absorbs."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.vector_fit import Explained
 from rig.estimation.gyroscope.vector_model import design_matrix, propagate_speed_std, regress
-from rig.estimation.reference import accelerometer_model, attitude_error, reference_model
-from rig.estimation.reference.accelerometer_model import Dwells, Movement
-from rig.estimation.reference.imu import ImuSolution
-from rig.estimation.reference.reading_errors import noise
-from rig.estimation.reference.reference_budget import response_in_attitudes
-from rig.estimation.reference.triaxial import TriaxialSolution
+
+if TYPE_CHECKING:
+    from rig.estimation.reference.accelerometer_model import Dwells, Movement
+    from rig.estimation.reference.imu import ImuSolution
+    from rig.estimation.reference.triaxial import TriaxialSolution
 
 
 def residual_std_rad_s(explained: Explained) -> Array:
@@ -30,8 +30,11 @@ def residual_std_rad_s(explained: Explained) -> Array:
     return std
 
 
-def dwell_residual_std_m_s2(solution: ImuSolution, movement: Movement) -> Array:
+def dwell_residual_std_m_s2(solution: "ImuSolution", movement: "Movement") -> Array:
     """Return the standard deviations (N, 3) of residuals of an accelerometer's dwells, solved from the `movement`."""
+    from rig.estimation.reference import accelerometer_model
+    from rig.estimation.reference.reading_errors import noise
+
     movement, theta = (
         replace(movement, sensor_errors=solution.sensor_errors, own_share=solution.own_share),
         solution.theta,
@@ -41,8 +44,11 @@ def dwell_residual_std_m_s2(solution: ImuSolution, movement: Movement) -> Array:
     return _residual_std(fit_matrix, noise(theta, movement) + arm @ arm.T)[: len(movement.dwells.readings_m_s2)]
 
 
-def attitude_residual_std(solution: TriaxialSolution, inputs: Dwells) -> Array:
+def attitude_residual_std(solution: "TriaxialSolution", inputs: "Dwells") -> Array:
     """Return the standard deviations (N, 3) of residuals in attitudes without sweeps, in the readings' unit."""
+    from rig.estimation.reference import attitude_error, reference_model
+    from rig.estimation.reference.reference_budget import response_in_attitudes
+
     theta, v_bar = solution.theta[: reference_model.SECOND.start], np.zeros_like(inputs.readings_m_s2)
     by_attitude = solution.attitude_std_rad * attitude_error.effects(theta, inputs.attitudes, v_bar)
     variances = np.eye(3) * inputs.variances_m2_s4[:, :, None] + by_attitude @ np.swapaxes(by_attitude, -1, -2)

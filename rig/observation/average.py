@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,13 @@ from rig.data.quantity import RATE, TEMPERATURE, Quantity
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
-from rig.estimation.temperature.over_temperature import OverTemperature
 from rig.observation.motion.reference_motion import KnownMotion
 from rig.observation.statistics.mean import Mean
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
+
+if TYPE_CHECKING:
+    from rig.estimation.temperature.over_temperature import OverTemperature
 
 NO_STEPS = Steps(0.0)
 
@@ -79,10 +81,10 @@ class Stream:
     board_time_s: Array
     readings_rad_s: Array
     raw: NDArray[Any]
-    polynomials: Mapping[Quantity, OverTemperature] = field(default_factory=dict)
+    polynomials: Mapping[Quantity, "OverTemperature"] = field(default_factory=dict)
     steps: Steps = NO_STEPS
 
-    def at_reference(self, polynomials: Mapping[Quantity, OverTemperature]) -> "Stream":
+    def at_reference(self, polynomials: Mapping[Quantity, "OverTemperature"]) -> "Stream":
         """Return the stream with its rates corrected to the reference temperature of these polynomials."""
         stream = replace(self, polynomials=polynomials)
         return replace(stream, readings_rad_s=stream.correct_temperature(RATE, self.readings_rad_s, slice(None)))

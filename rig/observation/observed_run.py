@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import pairwise
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,12 +13,14 @@ from rig.data.quantity import RATE, Quantity
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.over_temperature import OverTemperature
 from rig.observation.average import Stream, convert_stream
 from rig.observation.finished_steps import finished_dwells, finished_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import TimeBase
+
+if TYPE_CHECKING:
+    from rig.estimation.temperature.over_temperature import OverTemperature
 
 AS_STATED: Mapping[int, Array] = MappingProxyType({})  # every stage is mounted as its settings say
 
@@ -41,7 +44,7 @@ class ObservedRun:
     run: RunData
     motion: ArmMotion
     sensors: Mapping[str, SensorObservations]
-    polynomials: Mapping[str, Mapping[Quantity, OverTemperature]] = field(default_factory=dict)
+    polynomials: Mapping[str, Mapping[Quantity, "OverTemperature"]] = field(default_factory=dict)
     clock_offset_s: float = 0.0
 
     def stream(self, sensor: str) -> Stream:

@@ -8,8 +8,7 @@ from rig.analysis.outcome import Origin, Outcome
 from rig.data.meaning import Meaning
 from rig.data.result_file import SCHEMA, CheckEntry, MountEntry, ProvenanceEntry, ResultDocument
 from rig.report.entries.budget import clock_entry
-from rig.report.entries.external import unsolved_entries
-from rig.report.entries.omission_entries import notes, omitted_entries
+from rig.report.entries.omission_entries import notes, omitted_entries, unsolved_entries
 from rig.report.entry import entry
 from rig.report.findings.result_kind import NoOutlet
 from rig.report.kinds.kind_registry import kinds

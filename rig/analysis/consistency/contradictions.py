@@ -3,44 +3,34 @@
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.check import Check, fitness
 from rig.analysis.consistency import converter_tests, gyroscope_checks
 from rig.analysis.consistency.detection_limits import DetectionLimit, find_gyroscope_limits, find_reference_limits
+from rig.analysis.consistency.false_alarms import FALSE_ALARMS, NON_ORTHOGONALITY, false_alarm_per_check
 from rig.analysis.consistency.frozen_axis import find_longest_frozen
-from rig.analysis.consistency.reference_contradictions import (
-    DISTURBED_SWEEP,
-    ReferenceReadings,
-    compute_reference_statistics,
-    read_accelerometer,
-    read_magnetometer,
-)
+from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
 from rig.analysis.consistency.residual_tests import Statistic
 from rig.analysis.consistency.systematic_errors import build_error_patterns, collect_known_errors
 from rig.analysis.environment import Surroundings, surroundings_of
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
-from rig.analysis.gyroscope.mounts import observe_as_mounted
 from rig.analysis.gyroscope.segment_table import append_transfers, stack_segments
 from rig.analysis.numeric_errors import solvable
-from rig.analysis.reference.accelerometer import AccelerometerResult, calibrate_accelerometers
-from rig.analysis.reference.magnetometer import MagnetometerResult
-from rig.analysis.temperature.over_temperature import correct_recordings
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import RigError
 from rig.estimation.gyroscope.vector_model import VectorSolution
-from rig.estimation.statistics import coverage
 from rig.observation.consistency.segments import segment_recordings
 from rig.observation.consistency.transfers import average_transfers
 from rig.observation.observed_run import ObservedRun
 
-FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
-NON_ORTHOGONALITY = "non_orthogonality"
-# Of a gyroscope: they share the false alarms. Other kinds of readings count as many.
-CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *converter_tests.CHECKS, NON_ORTHOGONALITY)
+if TYPE_CHECKING:
+    from rig.analysis.reference.accelerometer import AccelerometerResult
+    from rig.analysis.reference.magnetometer import MagnetometerResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,8 +125,8 @@ def _non_orthogonality_deg(solution: VectorSolution, stated_deg: float, false_al
 
 def check_references(
     recordings: Sequence[ObservedRun],
-    accelerometers: Mapping[str, AccelerometerResult],
-    magnetometers: Mapping[str, MagnetometerResult],
+    accelerometers: "Mapping[str, AccelerometerResult]",
+    magnetometers: "Mapping[str, MagnetometerResult]",
     settings: RunSettings,
     *,
     drifting: bool = False,
@@ -146,6 +136,13 @@ def check_references(
     Dwells and sweeps are named as a gyroscope's sweeps are: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the
     bias may change steadily.
     """
+    from rig.analysis.consistency.reference_contradictions import (
+        ReferenceReadings,
+        compute_reference_statistics,
+        read_accelerometer,
+        read_magnetometer,
+    )
+
     known_errors = settings.stated_uncertainty
     readings_of: dict[tuple[str, Quantity], ReferenceReadings] = {
         **{(name, ACCELERATION): read_accelerometer(name, recordings, result, known_errors)
@@ -172,11 +169,6 @@ def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: Run
     return false_alarm_per_check(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 
 
-def false_alarm_per_check(kinds: int, *, of_all: float = FALSE_ALARMS) -> float:
-    """Return the false-alarm probability of each statistic, for a number of kinds of readings."""
-    return coverage.false_alarm_of_each(of_all, len(CHECKS) * kinds)
-
-
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
     """Return the sweeps of a run so far that contradict the others, by any sensor, as the verdict would name them.
 
@@ -185,12 +177,17 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
     settings = runs[0].settings if runs else None
     if settings is None or not settings.planned_sweeps:
         return frozenset()
+    from rig.analysis.gyroscope.mounts import observe_as_mounted
+    from rig.analysis.reference.accelerometer import calibrate_accelerometers
+
     disturbed = frozenset[int]()
     with suppress(RigError), solvable():
         recordings, _ = observe_as_mounted(runs, settings)
         if not recordings:
             return disturbed
         if settings.reference_c is not None:
+            from rig.analysis.temperature.over_temperature import correct_recordings
+
             recordings = correct_recordings(recordings, settings, settings.reference_c).recordings
         chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
         surroundings = surroundings_of(recordings, settings)

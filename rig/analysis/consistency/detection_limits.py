@@ -2,13 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.consistency.alternatives import FAULT_MODES, Means
-from rig.analysis.consistency.reference_alternatives import FAULT_MODES as REFERENCE_FAULT_MODES
 from rig.analysis.environment import Surroundings
-from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.vector_inputs import list_uncertainties
 from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault
@@ -16,6 +15,9 @@ from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Unknown, budget
 from rig.estimation.gyroscope.vector_fit import Explained, explain
 from rig.observation.consistency.raw_readings import REST
+
+if TYPE_CHECKING:
+    from rig.analysis.gyroscope.calibration import SensorResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +36,7 @@ class DetectionLimit:
 
 
 def find_gyroscope_limits(
-    sizes: Mapping[str, float], name: str, result: SensorResult, surroundings: Surroundings
+    sizes: Mapping[str, float], name: str, result: "SensorResult", surroundings: Surroundings
 ) -> Iterator[DetectionLimit]:
     """Yield the detection limits of the gyroscope `name`, with these `sizes` by fault mode."""
     explained = result.explained
@@ -53,6 +55,8 @@ def find_gyroscope_limits(
 
 def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tuple[DetectionLimit, ...]:
     """Return the detection limits of a calibration by gravity or field; its checks bear the quantity's name."""
+    from rig.analysis.consistency.reference_alternatives import FAULT_MODES as REFERENCE_FAULT_MODES
+
     return tuple(
         DetectionLimit(mode.what, f"{quantity}_{mode.check}", sizes[mode.what], mode.unit or quantity.unit)
         for mode in REFERENCE_FAULT_MODES

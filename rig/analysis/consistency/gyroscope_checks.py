@@ -48,6 +48,8 @@ from rig.analysis.gyroscope.segment_table import Segments
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process, select_by_akaike
 
+DISTURBED_SWEEP = "disturbed_sweep"
+
 # At most these of one gyroscope, besides the check of its worst sweep.
 CHECKS = (
     "axis_changed",

@@ -2,19 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.consistency.converter_tests import COUNTS, Digits, find_digits, judge_readings
+from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
 from rig.analysis.consistency.knocked_dwells import compare_dwell_halves
 from rig.analysis.consistency.reference_alternatives import ReferenceModel
 from rig.analysis.consistency.reference_checks import check_reference
 from rig.analysis.consistency.residual_tests import Statistic
-from rig.analysis.reference.accelerometer import AccelerometerResult
 from rig.analysis.reference.arm_patterns import Posture, StatedArm, arm_patterns
 from rig.analysis.reference.datasheet_errors import list_windows
-from rig.analysis.reference.magnetometer import MagnetometerResult
 from rig.analysis.reference.reference_budgets import drift_patterns, lag_pattern
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.recording.settings import Uncertainty
@@ -30,7 +30,11 @@ from rig.observation.consistency.raw_dwells import (
 from rig.observation.consistency.raw_readings import RawReadings
 from rig.observation.observed_run import ObservedRun
 
-DISTURBED_DWELL, DISTURBED_SWEEP = "disturbed_dwell", "disturbed_sweep"
+if TYPE_CHECKING:
+    from rig.analysis.reference.accelerometer import AccelerometerResult
+    from rig.analysis.reference.magnetometer import MagnetometerResult
+
+DISTURBED_DWELL = "disturbed_dwell"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +83,7 @@ class ReferenceStatistics:
 
 
 def read_accelerometer(
-    name: str, recordings: Sequence[ObservedRun], result: AccelerometerResult, uncertainty: Uncertainty
+    name: str, recordings: Sequence[ObservedRun], result: "AccelerometerResult", uncertainty: Uncertainty
 ) -> ReferenceReadings:
     """Return an accelerometer's readings in a run, in the order of its solution, with its stated `uncertainty`."""
     matrix = result.solution.matrix
@@ -116,7 +120,7 @@ def read_accelerometer(
 
 
 def read_magnetometer(
-    name: str, recordings: Sequence[ObservedRun], result: MagnetometerResult, uncertainty: Uncertainty
+    name: str, recordings: Sequence[ObservedRun], result: "MagnetometerResult", uncertainty: Uncertainty
 ) -> ReferenceReadings:
     """Return a magnetometer's readings in a run, which has no sweeps."""
     solution, movement = result.solution, Movement(result.measurements, NO_SWEEPS)

@@ -7,19 +7,18 @@ Along the swept axis only the arm's clock, encoders and times may have errors.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.consistency.gyroscope_checks import ErrorPatterns
 from rig.analysis.environment import Surroundings
-from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.segment_table import Segments
 from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION, list_uncertainties
 from rig.config.judging.judging_keys import OfSensor
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.gyroscope.earth_rate import EarthRate
 from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED, bending, curvature
 from rig.estimation.gyroscope.own_errors import KnownSensor, own_errors, rounding_errors
 from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3
@@ -27,6 +26,10 @@ from rig.observation.consistency.raw_readings import REST
 from rig.observation.consistency.segments import MotionInterval
 from rig.observation.consistency.transfers import STANDS_RAD
 from rig.observation.motion.arm_motion import ArmMotion
+
+if TYPE_CHECKING:
+    from rig.analysis.gyroscope.calibration import SensorResult
+    from rig.estimation.gyroscope.earth_rate import EarthRate
 
 ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
 WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),
@@ -78,7 +81,7 @@ class KnownErrors:
 
 
 def collect_known_errors(
-    surroundings: Surroundings, name: str, result: SensorResult, stamp_std_s: float | None = None
+    surroundings: Surroundings, name: str, result: "SensorResult", stamp_std_s: float | None = None
 ) -> KnownErrors:
     """Return the standard uncertainties of gyroscope and arm, from the configuration and the recording.
 
@@ -147,7 +150,7 @@ def build_error_patterns(
     )
 
 
-def _earth(surroundings: Surroundings, name: str, earth_rate: EarthRate | None) -> Array:
+def _earth(surroundings: Surroundings, name: str, earth_rate: "EarthRate | None") -> Array:
     """Return the uncertainty of the Earth's rate as k independent vectors of one standard deviation, (3, k), rad/s."""
     unknown = list_uncertainties(surroundings, name, earth_rate)
     if unknown.earth_covariance_rad2_s2 is not None:

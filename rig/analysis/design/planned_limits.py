@@ -5,15 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency import reference_checks
 from rig.analysis.consistency.alternatives import FAULT_MODES
-from rig.analysis.consistency.contradictions import false_alarm_per_check
 from rig.analysis.consistency.detection_limits import DetectionLimit, find_reference_limits
+from rig.analysis.consistency.false_alarms import false_alarm_per_check
 from rig.analysis.consistency.gyroscope_checks import predict_detection_limits
 from rig.analysis.consistency.systematic_errors import build_error_patterns, build_known_errors, unknown_earth_rate
 from rig.analysis.design.cut_plan import PlannedSegments, plan_segments
 from rig.analysis.design.planned_motion import PlannedRun, plan_run
-from rig.analysis.design.planned_reference import list_accelerometers, predict_readings
 from rig.analysis.gyroscope.vector_inputs import describe_sensor
 from rig.config.models import ArmSection, RigConfig
 from rig.config.sensors.sensor_catalogue import PARTS
@@ -50,12 +48,12 @@ def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> 
             name: _gyroscope_limits(run, name, sensor, segments, false_alarm_probability)
             for name, sensor in config.to_calibrate.items()
         }
-    on_arm = isinstance(config.turner, ArmSection) and run.plan.dwells
-    models = (
-        {accelerometer.name: predict_readings(accelerometer) for accelerometer in list_accelerometers(config, run)}
-        if on_arm
-        else {}
-    )
+    if not (isinstance(config.turner, ArmSection) and run.plan.dwells):
+        return DetectionLimits(rates, {})
+    from rig.analysis.consistency import reference_checks
+    from rig.analysis.design.planned_reference import list_accelerometers, predict_readings
+
+    models = {accelerometer.name: predict_readings(accelerometer) for accelerometer in list_accelerometers(config, run)}
     limits = {
         name: reference_checks.predict_detection_limits(model, false_alarm_probability)
         for name, model in models.items()

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,13 +17,10 @@ from rig.data.recording.run_file import RunData
 from rig.errors import Fault, Refused
 from rig.errors.attempts import attempt
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand import HandSolution
 from rig.estimation.gyroscope.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.gyroscope.budget import Budget, Unknown, budget
 from rig.estimation.gyroscope.earth_rate import EarthRate, find_earth_rate
 from rig.estimation.gyroscope.estimate import Estimate
-from rig.estimation.gyroscope.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
-from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.gyroscope.six_observation_budget import six_observation_budget
 from rig.estimation.gyroscope.vector_fit import Explained, VectorInputs, explain
 from rig.estimation.gyroscope.vector_model import VectorSolution, solve_vector_model
@@ -32,6 +30,11 @@ from rig.observation.finished_steps import finished_sweeps
 from rig.observation.observe import Observation
 from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase
+
+if TYPE_CHECKING:
+    from rig.estimation.by_hand import HandSolution
+    from rig.estimation.gyroscope.levenberg_marquardt import LevenbergMarquardtSolution
+    from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 
 VECTOR, NEWTON, ALGORITHM_1, EARTH_RATE = "vector", "newton", "algorithm_1", "earth_rate"
 
@@ -58,7 +61,7 @@ class SensorResult:
 
     sensor: RecordedSensor | Item
     solution: Estimate
-    vector_model: VectorSolution | TurnedSolution | None
+    vector_model: "VectorSolution | TurnedSolution | None"
     explained: Explained | None
     uncertainty: Budget | None
     six_observation: Solution | None
@@ -68,7 +71,7 @@ class SensorResult:
     time_bases: tuple[TimeBase, ...]
     corrected_by: Correction
     earth: EarthRate | None = None
-    by_hand: HandSolution | None = None
+    by_hand: "HandSolution | None" = None
     faults: Mapping[str, Fault] = field(default_factory=dict)
 
     @property
@@ -259,7 +262,9 @@ def solve_six_observation(observations: Sequence[Observation], estimator: SixObs
     return accumulated.solve(estimator)
 
 
-def _solve_levenberg_marquardt(observations: Sequence[Observation]) -> LevenbergMarquardtSolution:
+def _solve_levenberg_marquardt(observations: Sequence[Observation]) -> "LevenbergMarquardtSolution":
+    from rig.estimation.gyroscope.levenberg_marquardt import solve_levenberg_marquardt
+
     return solve_levenberg_marquardt(
         np.array([observation.average.mean_rad_s for observation in observations]),
         [observation.speed_rad_s for observation in observations],

@@ -8,13 +8,15 @@ rotates no reading that K would not, and gives the frame in which a verification
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.gyroscope.vector_model import VectorSolution
+
+if TYPE_CHECKING:
+    from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 
 CorrectionKind = Literal["matrix", "diagonal"]
 
@@ -32,6 +34,6 @@ def diagonal_correction(scale: Array) -> Correction:
     return Correction("diagonal", np.diag(scale))
 
 
-def matrix_correction(solution: VectorSolution | TurnedSolution) -> Correction:
+def matrix_correction(solution: "VectorSolution | TurnedSolution") -> Correction:
     """Return M = R F⁻¹: the rates in the orthogonal frame nearest to the sensor's axes."""
     return Correction("matrix", solution.mounting @ np.linalg.inv(solution.matrix))

@@ -71,16 +71,6 @@ def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
     }  # fmt: skip
 
 
-def unsolved_entries(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
-    """Return why recorded quantities have no solution, by sensor and quantity; solved sensors are left out."""
-    reasons: dict[str, dict[str, ErrorEntry]] = {}
-    faults = [(name, *failure) for name, sensor in outcome.external.items() for failure in sensor.unsolved.items()]
-    faults += [(kind.name, kind.quantity, kind.fault) for kind in outcome.installed_kinds if kind.fault is not None]
-    for name, quantity, fault in faults:
-        reasons.setdefault(name, {})[quantity.name] = ErrorEntry(error=str(fault))
-    return reasons
-
-
 def rates_in_attitudes(sensor: OfSensor) -> AttitudesEntry | None:
     """Return a gyroscope's results by attitudes in addition to scale and bias; None if it was swept."""
     if sensor.rates is None:

@@ -1,12 +1,11 @@
 """The entry of one gyroscope in `result.json`."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.analysis.effective_dof import of_angles, of_sensitivity
 from rig.analysis.gyroscope.calibration import ALGORITHM_1, EARTH_RATE, NEWTON, VECTOR, SensorResult
-from rig.analysis.gyroscope.onboard_check import Agreement
 from rig.data.entries.result_types import ErrorEntry, Role
 from rig.data.quantity import RATE
 from rig.data.result_file import (
@@ -23,7 +22,6 @@ from rig.data.result_file import (
 from rig.errors import Fault
 from rig.estimation.gyroscope import vector_model
 from rig.estimation.gyroscope.estimate import Estimate
-from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
 from rig.estimation.gyroscope.six_observation import MODEL, PARAMETERS
 from rig.estimation.residuals import residual_std_rad_s
 from rig.observation.average import Average
@@ -33,9 +31,13 @@ from rig.report.entries.earth_rate import earth_rate_entry
 from rig.report.entries.error import error_entry
 from rig.report.entry import counted, entry
 
+if TYPE_CHECKING:
+    from rig.analysis.gyroscope.onboard_check import Agreement
+    from rig.estimation.gyroscope.rotations_by_angle import TurnedSolution
+
 
 def sensor_entry(
-    result: SensorResult, role: Role = "calibrate", board: Agreement | None = None, **more: Any
+    result: SensorResult, role: Role = "calibrate", board: "Agreement | None" = None, **more: Any
 ) -> GyroscopeEntry:
     """Return scale, bias and covariance by the chosen estimator, and the other estimators' solutions or errors.
 
@@ -117,7 +119,7 @@ def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
     return vector_entry(outcome, **more)
 
 
-def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution, **more: Any) -> VectorEntry:
+def vector_entry(outcome: "vector_model.VectorSolution | TurnedSolution", **more: Any) -> VectorEntry:
     """Return the vector model's solution with the angles between the axes, and the fields of `more`."""
     angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
     sensitivity: dict[str, Any] = {}
@@ -139,6 +141,6 @@ def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution, **more: 
     )  # fmt: skip
 
 
-def _board(board: Agreement) -> BoardEntry:
+def _board(board: "Agreement") -> BoardEntry:
     solutions = {method: entry(BoardSolutionEntry, event, event.solution) for method, event in board.solutions.items()}
     return entry(BoardEntry, board, solutions=solutions)

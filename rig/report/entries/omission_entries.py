@@ -3,18 +3,18 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from rig.analysis.outcome import Outcome
-from rig.data.entries.result_types import OmittedEntry
+from rig.data.entries.result_types import ErrorEntry, OmittedEntry
 from rig.data.result_file import ResultDocument
 from rig.report.entry import entry
 
 if TYPE_CHECKING:
+    from rig.analysis.outcome import Outcome
     from rig.estimation.by_hand import HandSolution
 
 LEFT_OUT = "omitted"  # a move by hand that gives no information
 
 
-def omitted_entries(outcome: Outcome) -> dict[str, tuple[OmittedEntry, ...]]:
+def omitted_entries(outcome: "Outcome") -> dict[str, tuple[OmittedEntry, ...]]:
     """Return the omitted parts of the recording, by sensor; sensors without any are left out."""
     by_sensor = {
         name: [entry(OmittedEntry, part, quantity=quantity and quantity.name) for quantity, part in sensor.omitted]
@@ -26,7 +26,17 @@ def omitted_entries(outcome: Outcome) -> dict[str, tuple[OmittedEntry, ...]]:
     return {name: tuple(parts) for name, parts in by_sensor.items() if parts}
 
 
-def notes(outcome: Outcome) -> dict[str, tuple[str, ...]]:
+def unsolved_entries(outcome: "Outcome") -> dict[str, dict[str, ErrorEntry]]:
+    """Return why recorded quantities have no solution, by sensor and quantity; solved sensors are left out."""
+    reasons: dict[str, dict[str, ErrorEntry]] = {}
+    faults = [(name, *failure) for name, sensor in outcome.external.items() for failure in sensor.unsolved.items()]
+    faults += [(kind.name, kind.quantity, kind.fault) for kind in outcome.installed_kinds if kind.fault is not None]
+    for name, quantity, fault in faults:
+        reasons.setdefault(name, {})[quantity.name] = ErrorEntry(error=str(fault))
+    return reasons
+
+
+def notes(outcome: "Outcome") -> dict[str, tuple[str, ...]]:
     """Return remarks on how recordings were read and solved, by sensor; the usual way has none."""
     return {name: sensor.notes for name, sensor in outcome.external.items() if sensor.notes}
 

@@ -27,9 +27,11 @@ if TYPE_CHECKING:
 
 
 def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
+    on_arm = {name: _entry(outcome, name, result) for name, result in outcome.accelerometers.items()}
+    if not outcome.external:
+        return on_arm
     from rig.report.entries.external import accelerometers_elsewhere
 
-    on_arm = {name: _entry(outcome, name, result) for name, result in outcome.accelerometers.items()}
     return accelerometers_elsewhere(outcome) | on_arm
 
 

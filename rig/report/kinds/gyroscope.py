@@ -33,13 +33,14 @@ def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
     """Return the entries of all gyroscopes; the key is in every result, even without sweeps."""
     from rig.analysis.measurement_conditions import of_gyroscope
     from rig.report.entries.conditions_entry import when_entry
-    from rig.report.entries.external import angles_entry, rates_in_attitudes
     from rig.report.entries.gyroscope import sensor_entry
 
     entries = {}
     for name, result in outcome.results.items():
         role: Role = "calibrate" if name in outcome.settings.to_calibrate else "reference"
         if (external := outcome.external.get(name)) is not None:
+            from rig.report.entries.external import angles_entry, rates_in_attitudes
+
             entries[name] = sensor_entry(
                 result, role, in_attitudes=rates_in_attitudes(external), by_angles=angles_entry(external)
             )

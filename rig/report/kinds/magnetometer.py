@@ -29,14 +29,15 @@ FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT 
 
 
 def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
+    on_arm: dict[str, MagnetometerEntry | ErrorEntry] = {
+        **{name: _entry(outcome, name, result) for name, result in outcome.magnetometers.results.items()},
+        **{name: error_entry(fault) for name, fault in outcome.magnetometers.faults.items()},
+    }
+    if not outcome.external:
+        return on_arm
     from rig.report.entries.external import magnetometers_elsewhere
 
-    on_arm = outcome.magnetometers
-    return {
-        **magnetometers_elsewhere(outcome),
-        **{name: _entry(outcome, name, result) for name, result in on_arm.results.items()},
-        **{name: error_entry(fault) for name, fault in on_arm.faults.items()},
-    }
+    return {**magnetometers_elsewhere(outcome), **on_arm}
 
 
 def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> MagnetometerEntry:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from math import degrees
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rig.config.models import ArmSection
 from rig.errors import Problem, refuse
@@ -13,29 +14,35 @@ from rig.motion.steps import Plan
 from rig.motion.turner_state import ARM_FIELDS, TurnerIdentity
 from rig.turners.turner import Turner
 from rig.turners.turner_kind import OnState, TurnerKind, Wording
-from rig.turners.ur import arm_driver, arm_preflight
-from rig.turners.ur.arm_report import ArmReport
-from rig.turners.ur.identity import identity_problems
 from rig.turners.ur.plan_problems import plan_problems
+
+if TYPE_CHECKING:
+    from rig.turners.ur.arm_report import ArmReport
 
 
 def _connect(section: ArmSection, on_state: OnState, log: Path) -> AbstractContextManager[Turner]:
+    from rig.turners.ur import arm_driver  # with multiprocessing and HTTP: a plan needs neither
+
     rate_hz = min(section.state_rate_hz, model_of(section).state_rate_hz)
     return arm_driver.Arm(section.host, on_state, rate_hz, log, robot_api_port=section.robot_api_port)
 
 
-def _look(section: ArmSection) -> ArmReport:
+def _look(section: ArmSection) -> "ArmReport":
+    from rig.turners.ur import arm_driver
+
     return arm_driver.look(section.host, section.robot_api_port)
 
 
-def _stance(report: ArmReport) -> str:
+def _stance(report: "ArmReport") -> str:
     angles = " ".join(f"{degrees(angle):.1f}" for angle in report.state.q_rad)
     return f"arm joints: {angles} °, speed slider {100 * report.state.target_speed_fraction:.0f} %"
 
 
-def _problems(plans: Sequence[Plan], section: ArmSection, report: ArmReport | None) -> list[Problem]:
+def _problems(plans: Sequence[Plan], section: ArmSection, report: "ArmReport | None") -> list[Problem]:
     if report is None:
         return [problem for plan in plans for problem in plan_problems(plan, read_load(section), model_of(section))]
+    from rig.turners.ur import arm_preflight
+
     return arm_preflight.preflight_problems(plans, section, report)
 
 
@@ -44,7 +51,10 @@ def _make_nominal(section: ArmSection) -> TurnerIdentity:
     return TurnerIdentity(model.maker, model.name, model.drawing)
 
 
-def _make_recorded(section: ArmSection, report: ArmReport) -> TurnerIdentity:
+def _make_recorded(section: ArmSection, report: "ArmReport") -> TurnerIdentity:
+    from rig.turners.ur import arm_preflight
+    from rig.turners.ur.identity import identity_problems
+
     refuse(identity_problems(section, report))
     return arm_preflight.make_recorded(section, report)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.consistency.contradictions import CHECKS
+from rig.analysis.consistency.false_alarms import CHECKS
 from rig.estimation.arrays import Array
 from rig.motion.geometry import NOMINAL
 from rig.observation.windows import swept

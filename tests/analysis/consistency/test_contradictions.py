@@ -7,8 +7,9 @@ import pytest
 
 from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
-from rig.analysis.consistency.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps
+from rig.analysis.consistency.contradictions import contradictions, disturbed_sweeps
 from rig.analysis.consistency.converter_tests import judge_readings
+from rig.analysis.consistency.false_alarms import FALSE_ALARMS
 from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.data.recording.run_file import RunData

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 from rig.analysis.check import Check
-from rig.analysis.consistency.contradictions import CHECKS, FALSE_ALARMS, contradictions
+from rig.analysis.consistency.contradictions import contradictions
+from rig.analysis.consistency.false_alarms import CHECKS, FALSE_ALARMS
 from rig.analysis.environment import Surroundings, surroundings_of
 from rig.analysis.gyroscope.calibration import SensorResult, observe_recordings, solve_observed
 from rig.data.recording.run_file import RunData

@@ -1,0 +1,15 @@
+"""How often the checks against contradictions may fail an undamaged run, and the share of each."""
+
+from rig.analysis.consistency import converter_tests, gyroscope_checks
+from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
+from rig.estimation.statistics.coverage import false_alarm_of_each
+
+FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
+NON_ORTHOGONALITY = "non_orthogonality"
+# Of a gyroscope: they share the false alarms. Other kinds of readings count as many.
+CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *converter_tests.CHECKS, NON_ORTHOGONALITY)
+
+
+def false_alarm_per_check(kinds: int, *, of_all: float = FALSE_ALARMS) -> float:
+    """Return the false-alarm probability of each statistic of so many kinds of readings."""
+    return false_alarm_of_each(of_all, len(CHECKS) * kinds)
