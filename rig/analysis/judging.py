@@ -13,8 +13,9 @@ from rig.analysis.environment import surroundings_of
 from rig.analysis.estimator_names import Estimator, find_estimator
 from rig.analysis.gyroscope.board_averages import board_averages
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
-from rig.analysis.gyroscope.mounts import observe_as_mounted
+from rig.analysis.gyroscope.comparison import Reference, list_revolutions
 from rig.analysis.gyroscope.onboard_check import Agreement, check_arithmetic
+from rig.analysis.gyroscope.stage_mounts import observe_as_mounted
 from rig.analysis.gyroscope.vector_inputs import lever_arms_m
 from rig.analysis.installed_solvers import KindFound, kinds_on_arm
 from rig.analysis.outcome import Outcome, origin_of

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from rig.analysis.consistency.detection_limits import DetectionLimit
     from rig.analysis.external.external_recordings import OfSensor
     from rig.analysis.gyroscope.calibration import SensorResult
-    from rig.analysis.gyroscope.mounts import EstimatedMount
     from rig.analysis.gyroscope.onboard_check import Agreement
+    from rig.analysis.gyroscope.stage_mounts import EstimatedMount
     from rig.analysis.gyroscope.verification import Verification
     from rig.analysis.installed_solvers import KindFound
     from rig.analysis.reference.accelerometer import AccelerometerResult

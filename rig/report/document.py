@@ -3,7 +3,7 @@
 from typing import Any
 
 from rig.analysis.check import Check
-from rig.analysis.gyroscope.mounts import EstimatedMount
+from rig.analysis.gyroscope.stage_mounts import EstimatedMount
 from rig.analysis.outcome import Origin, Outcome
 from rig.data.meaning import Meaning
 from rig.data.result_file import SCHEMA, CheckEntry, MountEntry, ProvenanceEntry, ResultDocument

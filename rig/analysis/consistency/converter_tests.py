@@ -33,14 +33,6 @@ FEWEST_OF_NOISE = 4 * MEMORY  # readings of a window that tell their noise
 VIBRATION_LEFT = 0.1  # of the arm's vibration, which the sensor's filter changes and the arm's states tell in part
 HEAP = 10  # readings
 SETTLING = 5  # readings at a window's beginning, in which a low-pass filter may still follow the arm
-CHECKS = (
-    "clipping",
-    "repeated_readings",
-    "skewed_noise",
-    "spikes",
-    "stuck_axis",
-    "stuck_bit",
-)  # of one sensor, at most
 LEAST_TO_SKEW = 0.7  # steps of noise: less falls on so few numbers that a mean between two of them makes it skewed
 BETWEEN_COUNTS = 1.5  # counts: readings that are farther apart are not a converter's
 

@@ -7,7 +7,7 @@ import pytest
 
 from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import solve_observed
-from rig.analysis.gyroscope.mounts import EstimatedMount, observe_as_mounted
+from rig.analysis.gyroscope.stage_mounts import EstimatedMount, observe_as_mounted
 from rig.data.recording.settings import settings_from_json
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget
