@@ -347,6 +347,11 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
         for name in sorted(set(named) ^ set(simulated)):
             where = f"world.{kind}" if name in named else kind
             yield f"{where}.{name}: missing; every sensor stands both in {kind} and in world.{kind}"
+    yield from _instruments_fit(config, world)
+
+
+def _instruments_fit(config: RigConfig, world: WorldSection) -> Iterator[str]:
+    """Yield the simulated instruments at ports where the rig has another sensor."""
     for name in sorted(config.sensors.keys() & world.sensors.keys()):
         where = "the sensor is on the board" if name in config.on_board else "the sensor is at another's port"
         if world.sensors[name].kvh1775 is not None and config.sensors[name].part != "kvh1775":

@@ -101,22 +101,31 @@ class World:
             if mounts[name].pty
         }
         self._ptys = [*([pty] if pty else []), *ptys.values()]
+        paths = {name: port.path for name, port in ptys.items()}
         self._description = {
             "ready": True,
             "arm": loaded.config.turner.address or None,
             "board": None if board is None else board.port,
             "pty": pty.path if pty else None,
-            "kvh_ports": {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None},
-            **{
-                f"{kind}_ptys": {name: port.path for name, port in ptys.items() if mounts[name].kind == kind}
-                for kind in KINDS
-            },
+            **self._describe_instruments(loaded.config, paths),
             "control": f"{host}:{control_port}",
         }
 
     def describe(self) -> str:
         """Return the line of JSON with the addresses of all ports."""
         return json.dumps(self._description)
+
+    def _describe_instruments(self, config: RigConfig, paths: Mapping[str, str]) -> dict[str, dict[str, str]]:
+        """Return the ports of the instruments by name, and the `paths` of their pseudo-terminals, kind by kind."""
+        mounts = self.laboratory.instruments
+        ports = {name: sensor.serial.port for name, sensor in config.sensors.items() if sensor.serial is not None}
+        return {
+            "kvh_ports": ports,
+            **{
+                f"{kind}_ptys": {name: path for name, path in paths.items() if mounts[name].kind == kind}
+                for kind in KINDS
+            },
+        }
 
     def _listen_as_arm(self, turner: TurnerSection, section: WorldSection) -> list[PortListener]:
         """Open the ports of the arm's controller, if an arm turns the sensors."""

@@ -56,43 +56,48 @@ def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings:
         )
         for recording in recordings
     ]
-    inputs = combine_recordings(parts, surroundings)
-    averages = [average for part in parts for average in (turn.average for turn in part.turns)]
-    averages += [rest for part in parts for rest in part.rests]
-    return replace(inputs, sensor=_describe_recorded(surroundings, sensor, run.sensors[sensor], averages))
+    known = _describe_recorded(surroundings, sensor, run.sensors[sensor], _list_averages(parts)[0])
+    return replace(combine_recordings(parts, surroundings), sensor=known)
 
 
 def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surroundings) -> VectorInputs:
     """Return the inputs of all parts of a run, revolutions before rests, without those of the sensor."""
     site, extension_m = surroundings.site, np.array(surroundings.extension_m)
-    turns = [(turn, part.clock_offset_s) for part in parts for turn in part.turns]
-    rests = [(rest, part.clock_offset_s) for part in parts for rest in part.rests]
-    windows = [*((turn.average, offset_s) for turn, offset_s in turns), *rests]
-    averages = [average for average, _ in windows]
+    turns = [turn for part in parts for turn in part.turns]
+    averages, offsets_s = _list_averages(parts)
+    rests = len(averages) - len(turns)
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
-    rates_rad_s = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
+    rates_rad_s = np.array([turn.speed_rad_s * turn.axis_flange for turn in turns])
     lever_arms = np.concatenate([lever_arms_m(part.turns, extension_m, part.mount) for part in parts])
     stages = [part.stage for part in parts for _ in part.turns]
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     return VectorInputs(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
         variances_rad2_s2=np.array([average.variance_rad2_s2 - average.drift_rad2_s2 for average in averages]),
-        turns_rad_s=np.concatenate([rates_rad_s * (1 + surroundings.clock.error), np.zeros((len(rests), 3))]),
+        turns_rad_s=np.concatenate([rates_rad_s * (1 + surroundings.clock.error), np.zeros((rests, 3))]),
         earth_rate_rad_s=earth,
-        speed_std_rad_s=np.array([*(turn.speed_std_rad_s for turn, _ in turns), *np.zeros(len(rests))]),
+        speed_std_rad_s=np.array([*(turn.speed_std_rad_s for turn in turns), *np.zeros(rests)]),
         attitudes=attitudes,
         gravity_m_s2=attitudes @ site.down_m_s2,
-        windows_s=np.array([(average.start_s + offset_s, average.end_s + offset_s) for average, offset_s in windows]),
-        joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
-        axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
-        return_errors_rad_s=_return_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
-        encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
-        mount_turns_rad=list_mount_rotations(stages, len(rests), surroundings.uncertainty.mount_deg),
-        arms_m=np.concatenate([lever_arms, np.zeros((len(rests), 3))]),
+        windows_s=np.array([(average.start_s, average.end_s) for average in averages]) + offsets_s[:, None],
+        joints=(*(turn.joint_name for turn in turns), *[None] * rests),
+        axis_errors_rad_s=_axis_errors(turns, rests, surroundings.uncertainty.axis_deg),
+        return_errors_rad_s=_return_errors(turns, rests, surroundings.uncertainty),
+        encoder_errors_rad_s=_encoder_errors(turns, rests, surroundings.uncertainty),
+        mount_turns_rad=list_mount_rotations(stages, rests, surroundings.uncertainty.mount_deg),
+        arms_m=np.concatenate([lever_arms, np.zeros((rests, 3))]),
         noise_dof=by_axis(average.dof for average in averages),
-        ripples=np.array([*(turn.ripple for turn, _ in turns), *np.zeros(len(rests))]),
+        ripples=np.array([*(turn.ripple for turn in turns), *np.zeros(rests)]),
         roundings_rad_s=np.sqrt(by_axis(average.rounding_rad2_s2 for average in averages)),
     )
+
+
+def _list_averages(parts: Sequence[RecordingPart]) -> tuple[list[Average], Array]:
+    """Return the N averages of all parts, revolutions before rests, and the clock's offset (N,) of each, s."""
+    averages = [turn.average for part in parts for turn in part.turns]
+    averages += [rest for part in parts for rest in part.rests]
+    counts = [*(len(part.turns) for part in parts), *(len(part.rests) for part in parts)]
+    return averages, np.repeat(2 * [part.clock_offset_s for part in parts], counts)
 
 
 def _describe_recorded(

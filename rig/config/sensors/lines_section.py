@@ -235,6 +235,11 @@ class LinesSection(Section):
                 raise ValueError(f"give the column {column} and the section {key} both, or neither")
         if self.acceleration is not None and "ax" not in self.columns:
             raise ValueError("there is a section acceleration, but no columns ax ay az")
+        return self
+
+    @model_validator(mode="after")
+    def the_clock_has_its_column(self) -> Self:
+        """Refuse a clock without the column that it needs, and a checksum over text that is unknown."""
         if self.clock == "device" and self.time is None:
             raise ValueError(
                 "the clock is the device's, but there is no column time: write clock: counted if the device samples by "

@@ -103,16 +103,7 @@ def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> Hand
     `table_moved`, `bias_jumped`, `wrong_face`, `mirrored_axis`, `swapped_axes`, `wrong_unit`, `no_fit`, `zero_reading`,
     `too_many_moves`; Refused `first_face_not_told`.
     """
-    if len(session.rests) < 2:
-        raise insufficient_session(session, None)
-    if 2 * sum(move.lost or move.clipped for move in session.moves) > len(session.moves):
-        raise insufficient_session(session, None)
-    if len(session.rests) > MOST_RESTS:
-        what = f"there are {len(session.rests)} rests; no more than {MOST_RESTS} are solved together"
-        raise Fault("too_many_moves", what, "Split the recording")
-    if session.acceleration is not None:
-        refusals.check_signal(np.array([rest.acceleration_m_s2 for rest in session.rests]))
-    check_axes(session)
+    _check_session(session)
     fitted: GraphFit | None = None
     try:
         fitted = fit_session(session, conditions)
@@ -131,6 +122,19 @@ def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> Hand
     refusals.check_handedness(fitted.state.matrix)
     one = find_masked_fault(fitted)
     return summarise_fit(fitted, () if one is None else (f"{one.what}: for this one alone U is larger",))
+
+
+def _check_session(session: HandRecording) -> None:
+    """Refuse a session that no fit can solve. Raise as `solve_by_hand` does."""
+    lost = sum(move.lost or move.clipped for move in session.moves)
+    if len(session.rests) < 2 or 2 * lost > len(session.moves):
+        raise insufficient_session(session, None)
+    if len(session.rests) > MOST_RESTS:
+        what = f"there are {len(session.rests)} rests; no more than {MOST_RESTS} are solved together"
+        raise Fault("too_many_moves", what, "Split the recording")
+    if session.acceleration is not None:
+        refusals.check_signal(np.array([rest.acceleration_m_s2 for rest in session.rests]))
+    check_axes(session)
 
 
 def summarise_fit(fit: GraphFit, warnings: tuple[str, ...] = ()) -> HandSolution:

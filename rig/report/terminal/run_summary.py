@@ -109,19 +109,9 @@ def _one(item: _SensorValues, width: int) -> Iterator[str]:
 
 def _several(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
     """Yield many sensors' values, kind by kind, one line each, or two on a narrow screen."""
-    blocks: dict[str, list[tuple[str, AxisValues]]] = {}
-    for item in items:
-        scaled = item.shown.scale is not None
-        if item.shown.scale is not None:
-            blocks.setdefault(f"{item.kind}, scale factor", []).append((item.label, item.shown.scale))
-        heading = f"{item.kind}, {_heading(item)}" if scaled else _heading(item)
-        blocks.setdefault(heading, []).append((item.label, item.shown.numbers))
-    if not blocks:
+    table = _tabulate(items)
+    if not table:
         return
-    table: list[tuple[str, Sequence[str]]] = []
-    for heading, rows in blocks.items():
-        table.append((heading, [*"xyz"[: len(rows[0][1].values)], "± U"]))
-        table += [(f"{INDENT}{label}", _add_largest(three)) for label, three in rows]
     number = max(len(cell) for _, cells in table for cell in cells)
     columns = max(len(cells) for _, cells in table)
     name = max(len(label) for label, _ in table)
@@ -136,6 +126,22 @@ def _several(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
             yield f"{label:{name}}{numbers}"
         else:
             yield from (label, f"{'':{name}}{numbers}" if fits else f"{INDENT}{numbers}")
+
+
+def _tabulate(items: Sequence[_SensorValues]) -> list[tuple[str, Sequence[str]]]:
+    """Return the label and the cells of each line: the heading of a kind's values, then its sensors."""
+    blocks: dict[str, list[tuple[str, AxisValues]]] = {}
+    for item in items:
+        heading = _heading(item)
+        if item.shown.scale is not None:
+            blocks.setdefault(f"{item.kind}, scale factor", []).append((item.label, item.shown.scale))
+            heading = f"{item.kind}, {heading}"
+        blocks.setdefault(heading, []).append((item.label, item.shown.numbers))
+    table: list[tuple[str, Sequence[str]]] = []
+    for heading, rows in blocks.items():
+        table.append((heading, [*"xyz"[: len(rows[0][1].values)], "± U"]))
+        table += [(f"{INDENT}{label}", _add_largest(three)) for label, three in rows]
+    return table
 
 
 def _heading(item: _SensorValues) -> str:

@@ -142,32 +142,46 @@ def _find_impossible(numbers: Sequence[Sequence[str]], values: Array) -> str:
 
 def _find_field_shape(checked: Sequence[_CheckedLine]) -> Shape | None:
     """Return the shape of lines with a separator between fields, of which some hold a text or nothing."""
-    for sign, name in sorted(_SEPARATORS.items(), reverse=True):
-        rows = [[field.strip() for field in text.split(sign or None)] for _, text, _ in checked]
-        count, frequency = Counter(map(len, rows)).most_common(1)[0]
-        alike = [index for index, row in enumerate(rows) if len(row) == count]
-        if not 3 <= count <= MOST_NUMBERS or frequency < ENOUGH * len(checked):
-            continue
-        fields = [rows[index] for index in alike]
-        if not any(row[-1] for row in fields):
-            fields, count = [row[:-1] for row in fields], count - 1
-        prefix, fields = _split_prefix(fields)
-        columns = [_parse_column(column) for column in zip(*fields, strict=True)]
-        numbers = [column for column in columns if column is not None]
-        if len(numbers) < 3 or not all(checked[index][2] for index in alike if _SUM.search(checked[index][0].text)):
-            continue
-        return Shape(
-            name,
-            prefix,
-            (),
-            all(_SUM.search(checked[index][0].text) for index in alike),
-            _find_header([text for index, (_, text, _) in enumerate(checked) if index not in set(alike)], name, count),
-            np.column_stack([np.full(len(fields), np.nan) if column is None else column for column in columns]),
-            np.array([checked[index][0].arrived_s for index in alike]),
-            tuple(_common_decimals(column) for column in zip(*fields, strict=True)),
-            len(checked) - len(alike),
-        )
-    return None
+    shapes = (_split_by(sign, name, checked) for sign, name in sorted(_SEPARATORS.items(), reverse=True))
+    return next((shape for shape in shapes if shape is not None), None)
+
+
+def _split_by(sign: str, name: str, checked: Sequence[_CheckedLine]) -> Shape | None:
+    """Return the shape of lines with the separator `sign`, called `name`; None if they have another."""
+    rows = [[field.strip() for field in text.split(sign or None)] for _, text, _ in checked]
+    count, frequency = Counter(map(len, rows)).most_common(1)[0]
+    if not 3 <= count <= MOST_NUMBERS or frequency < ENOUGH * len(checked):
+        return None
+    alike = [line for line, row in zip(checked, rows, strict=True) if len(row) == count]
+    others = [text for (_, text, _), row in zip(checked, rows, strict=True) if len(row) != count]
+    return _find_columns(name, alike, [row for row in rows if len(row) == count], others)
+
+
+def _find_columns(
+    name: str, alike: Sequence[_CheckedLine], fields: list[list[str]], others: Sequence[str]
+) -> Shape | None:
+    """Return the shape of the lines `alike` by their fields, beside the texts of others; None without three numbers."""
+    if not any(row[-1] for row in fields):
+        fields = [row[:-1] for row in fields]
+    count = len(fields[0])
+    prefix, fields = _split_prefix(fields)
+    columns = [_parse_column(column) for column in zip(*fields, strict=True)]
+    has_sum = [_SUM.search(line.text) is not None for line, _, _ in alike]
+    if sum(column is not None for column in columns) < 3 or any(
+        np.greater(has_sum, [sum_ok for _, _, sum_ok in alike])
+    ):
+        return None
+    return Shape(
+        name,
+        prefix,
+        (),
+        all(has_sum),
+        _find_header(others, name, count),
+        np.column_stack([np.full(len(fields), np.nan) if column is None else column for column in columns]),
+        np.array([line.arrived_s for line, _, _ in alike]),
+        tuple(_common_decimals(column) for column in zip(*fields, strict=True)),
+        len(others),
+    )
 
 
 def _split_prefix(fields: list[list[str]]) -> tuple[str, list[list[str]]]:
