@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from rig.errors.table_rows import read_rows
+
 TABLE = Path(__file__).with_name("catalogue.txt")
 KINDS = (
     "refused",
@@ -25,12 +27,5 @@ class CatalogueEntry:
 
 def catalogue() -> tuple[CatalogueEntry, ...]:
     """Return the table in its order. Raise ValueError for a line not of the form `name | kind | when | remedy`."""
-    entries = []
-    for number, line in enumerate(TABLE.read_text(encoding="utf-8").splitlines(), 1):
-        if line.startswith("#"):
-            continue
-        cells = line.split(" | ")
-        if len(cells) != 4 or cells[1] not in KINDS:
-            raise ValueError(f"{TABLE.name}, line {number}: not `name | {' or '.join(KINDS)} | when | what to do`")
-        entries.append(CatalogueEntry(*cells))
-    return tuple(entries)
+    form = f"name | {' or '.join(KINDS)} | when | what to do"
+    return tuple(CatalogueEntry(*cells) for cells in read_rows(TABLE, form, 1, KINDS))

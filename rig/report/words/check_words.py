@@ -11,6 +11,7 @@ from rig.data.installed_kinds import quantities
 from rig.data.quantity import OF_THE_RIG
 from rig.data.result_file import CheckEntry
 from rig.errors import Refused
+from rig.errors.table_rows import read_rows
 
 TABLE = Path(__file__).with_name("checks.txt")
 ALLOWING = ", or allow it"  # begins the advice to set another limit
@@ -28,15 +29,7 @@ class CheckWords:
 @cache
 def check_words() -> Mapping[str, CheckWords]:
     """Return the table by name. Raise ValueError for a line of another form than `name | means | what to do`."""
-    by_name = {}
-    for number, line in enumerate(TABLE.read_text(encoding="utf-8").splitlines(), 1):
-        if line.startswith("#"):
-            continue
-        cells = line.split(" | ")
-        if len(cells) != 3:
-            raise ValueError(f"{TABLE.name}, line {number}: not `name | what it means | what to do`")
-        by_name[cells[0]] = CheckWords(*cells)
-    return by_name
+    return {cells[0]: CheckWords(*cells) for cells in read_rows(TABLE, "name | what it means | what to do")}
 
 
 def words_of(check: CheckEntry) -> CheckWords | None:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from rig.errors.table_rows import read_rows
+
 OWNERS = ("field", "machine", "project")
 TABLE = Path(__file__).with_name("glossary.txt")
 OWN_WORDS = Path(__file__).with_name("words.toml")
@@ -35,14 +37,7 @@ class Word:
 @cache
 def glossary() -> tuple[Word, ...]:
     """Return every word. Raise ValueError for a line of another form than `owner | names | meaning`."""
-    words = []
-    for number, line in enumerate(TABLE.read_text(encoding="utf-8").splitlines(), 1):
-        if line.startswith("#"):
-            continue
-        cells = line.split(" | ")
-        if len(cells) != 3 or cells[0] not in OWNERS:
-            raise ValueError(f"{TABLE.name}, line {number}: not `owner | names | meaning`")
-        words.append(Word(*cells))
+    words = (Word(*cells) for cells in read_rows(TABLE, "owner | names | meaning", 0, OWNERS))
     house = tomllib.loads(OWN_WORDS.read_text(encoding="utf-8"))["house"]
     return (*words, *(Word("project", names, meaning) for names, meaning in house.items()))
 

@@ -1,0 +1,18 @@
+"""The rows of the tables of words: a line each, its cells between bars, comments behind `#`."""
+
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+
+def read_rows(table: Path, form: str, column: int = 0, allowed: Collection[str] | None = None) -> Iterator[list[str]]:
+    """Yield the cells of each row; those of `column` must be `allowed`, if that is given.
+
+    Raise ValueError naming the line of another form than `form`, which has as many cells.
+    """
+    for number, line in enumerate(table.read_text(encoding="utf-8").splitlines(), 1):
+        if line.startswith("#"):
+            continue
+        cells = line.split(" | ")
+        if len(cells) != len(form.split(" | ")) or (allowed is not None and cells[column] not in allowed):
+            raise ValueError(f"{table.name}, line {number}: not `{form}`")
+        yield cells
