@@ -261,7 +261,6 @@ def _gravity_effects(
 
     The centripetal acceleration acts as gravity does. None if the calibration has no g-sensitivity.
     """
-    from rig.analysis.gyroscope.comparison import list_revolutions
 
     name, reference = pair
     corrections = {name: results[name].correction_matrix} if name in results else {}

@@ -17,4 +17,5 @@ def remedies_by_method(name: str) -> Mapping[CalibrationMethod, str]:
     """
     methods: tuple[CalibrationMethod, ...] = get_args(CalibrationMethod)
     rows = [*read_rows(TABLE, f"name | {' or '.join(methods)} | what to do", 1, methods)]
-    return {method: remedy for key, of, remedy in rows for method in methods if (key, of) == (name, method)}
+    remedies = {(key, method): remedy for key, method, remedy in rows}
+    return {method: remedies[name, method] for method in methods if (name, method) in remedies}

@@ -18,7 +18,6 @@ from rig.analysis.consistency.systematic_errors import build_error_patterns, col
 from rig.analysis.environment import Surroundings, surroundings_of
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.analysis.gyroscope.segment_table import append_transfers, stack_segments
-from rig.analysis.gyroscope.stage_mounts import observe_as_mounted
 from rig.analysis.numeric_errors import solvable
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recording.run_file import RunData
@@ -178,7 +177,7 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
     settings = runs[0].settings if runs else None
     if settings is None or not settings.planned_sweeps:
         return frozenset()
-    from rig.analysis.gyroscope.mounts import observe_as_mounted
+    from rig.analysis.gyroscope.stage_mounts import observe_as_mounted
     from rig.analysis.reference.accelerometer import calibrate_accelerometers
 
     disturbed = frozenset[int]()

@@ -56,8 +56,8 @@ def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings:
         )
         for recording in recordings
     ]
-    known = _describe_recorded(surroundings, sensor, run.sensors[sensor], _list_averages(parts)[0])
-    return replace(combine_recordings(parts, surroundings), sensor=known)
+    described = _describe_recorded(surroundings, sensor, run.sensors[sensor], _list_averages(parts)[0])
+    return replace(combine_recordings(parts, surroundings), sensor=described)
 
 
 def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surroundings) -> VectorInputs:
