@@ -28,7 +28,10 @@ NAMED_PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w./<>*-]*\w/?")
 NAMES_ALONE = re.compile(r"\((`[a-z]\w*_\w+`(?:(?:, | or | and )(?:`\w+`|…))*)\)")  # an error behind what it is about
 NO_ERRORS = {"board_scale", "board_bias", "degenerate", "not_converged"}  # checks, and outcomes on the board
 SNAKE_CASE = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)+")
-SOURCES = ("rig/**/*.py", "firmware_host/**/*.[ch]", "firmware_host/**/*.py", "procedures/*.py", "configs/**/*.yaml")
+SOURCES = (
+    *("rig/**/*.py", "firmware_host/**/*.[ch]", "firmware_host/**/*.py", "procedures/*.py", "configs/**/*.yaml"),
+    "tests/support/**/*.py",
+)
 OF_OTHERS = {"ur_description"}
 WIDTH = 128
 LEFT_OUT = "--left-out"  # no command has it
