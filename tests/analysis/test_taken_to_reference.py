@@ -84,7 +84,7 @@ def test_u_at_the_reference_is_that_of_the_budget(outcome: Outcome) -> None:
     entry = document_of(outcome).over_temperature["gyro"]["rate"]
 
     assert np.allclose(outcome.polynomials["gyro"][RATE].evaluate(REFERENCE_C).std, budget.std, rtol=1e-6)
-    assert {line.name for line in entry.contributors} > {"noise", "controller clock", "thermometer beside the sensor"}
+    assert {line.name for line in entry.contributors} > {"noise", "controller clock", "temperature gradient"}
 
 
 @pytest.mark.slow

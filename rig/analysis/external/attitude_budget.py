@@ -20,11 +20,11 @@ from rig.estimation.reference.triaxial import TriaxialSolution
 
 SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
     placement.NOISE: ("A", "scatter of the readings"),
-    placement.ATTITUDES: ("A", f"what the readings say of them, {IN_U}"),
-    placement.PLACEMENTS: ("A", f"how the placements differ beside their attitudes, {IN_U}"),
-    increment_solution.DELAY: ("A", f"found, within 50 ms of none, {IN_U}"),
+    placement.ATTITUDES: ("A", f"estimated from the residuals, {IN_U}"),
+    placement.PLACEMENTS: ("A", f"scatter of the placements beyond their attitudes, {IN_U}"),
+    increment_solution.DELAY: ("A", f"estimated, with a prior of 50 ms, {IN_U}"),
     increment_solution.EARTHS_RATE: ("B", "its size, whichever way it points"),
-    increment_solution.STRETCHES: ("A", f"how six stretches of the recording differ, {IN_U}"),
+    increment_solution.STRETCHES: ("A", f"scatter of six intervals of the recording, {IN_U}"),
 }
 
 

@@ -53,7 +53,7 @@ from rig.observation.timebase import TimeBase
 BySweeps = Estimator | Literal["increments"]
 BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
 FROM_READINGS = "scatter of the readings"
-SWEEPS, FROM_RESIDUALS = "sweeps", "what the sweeps contradict each other by"
+SWEEPS, FROM_RESIDUALS = "sweeps", "contradictions of the sweeps"
 NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweeps", "Give sweeps in six directions")
 
 

@@ -169,8 +169,8 @@ def _attitude_error_rad(
 def _describe_nonuniformity(uniformity: Uniformity, solution: TriaxialSolution) -> str:
     residual_t = np.sqrt(np.mean(solution.residuals**2))
     return (
-        f"the field is not the same in all attitudes: χ² of what the model leaves is {uniformity.chi_square:.4g}, "
-        f"{uniformity.limit:.3g} at most by noise and by attitudes off by "
+        f"the field is not the same in all attitudes: χ² of the residuals is {uniformity.chi_square:.4g}, "
+        f"{uniformity.limit:.3g} at most by noise and by attitude errors of "
         f"{1e3 * uniformity.attitude_error_rad:.2g} mrad; "
-        f"{1e6 * residual_t:.3f} µT are left in the mean"
+        f"{1e6 * residual_t:.3f} µT is their RMS"
     )

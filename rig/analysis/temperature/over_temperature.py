@@ -127,7 +127,7 @@ def _combine(
     )
     powers = powers_at(0.0)
     corrected = sign @ powers @ combine_with_reference(polynomials, values, ()).covariance @ powers.T @ sign
-    source = "what the repeats tell of the way to the reference temperature"
+    source = "fit of the polynomials to the repeats"
     added = Contributor(CONTRIBUTOR, "A", "normal", None, "", source, float(polynomials.process.dof), corrected)
     return replace(budget, contributors=(*budget.contributors, added)), combine_with_reference(
         polynomials, values, lines

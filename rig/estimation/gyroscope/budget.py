@@ -205,7 +205,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
             "g-sensitivity",
             float(np.degrees(unknown.g_sensitivity_rad_s_per_g)),
             "°/s/g",
-            "what is known of the part; rests at more attitudes would tell it",
+            "stated properties of the part; rests in more attitudes determine it",
             np.array([inputs.apparent_gravity_m_s2 @ unit.T for unit in unit_sensitivities]),
         )
     outwards = np.array([inputs.centripetal_m_s2(offset) for offset in unknown.sensor_offset_m * np.eye(3)])

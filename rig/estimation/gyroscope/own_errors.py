@@ -15,7 +15,7 @@ from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED, SQUARE_MISSED, be
 
 NONLINEARITY = "nonlinearity"
 BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
-OF_THE_PART = "what is known of the part"
+OF_THE_PART = "stated properties of the part"
 ROUNDING = "rounding of the readings"
 NEGLIGIBLE = 1e-3  # of a mean's variance: a smaller common rounding error
 

@@ -41,7 +41,7 @@ def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown
     effects = np.einsum(
         "qni,kni->kq", response, _tilt_axes(inputs.turns_rad_s @ solution.mounting.T, six.scale, axes_rad) / np.sqrt(3)
     )
-    half_width, source = float(np.degrees(axes_rad)), "what is known of the part"
+    half_width, source = float(np.degrees(axes_rad)), "stated properties of the part"
     square = Contributor(NOT_SQUARE, "B", "rectangular", half_width, "°", source, np.inf, effects.T @ effects)
     contributors = [
         contributor for contributor in of_readings.contributors if contributor.name not in (AXES, REPEATABILITY, MOUNTS)

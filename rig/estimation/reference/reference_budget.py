@@ -113,7 +113,7 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
         evaluate_a(NOISE, "scatter of the readings", noise, spread.known_noise),
         evaluate_a(
             ATTITUDES,
-            "what the readings say of them",
+            "estimated from the residuals",
             spread.covariance - noise,
             find_uncertainty_dof(spread.attitude_error),
         ),
@@ -123,7 +123,7 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
         model_covariance = excess * spread.covariance
         contributors.append(
             evaluate_a(
-                "what the model leaves", "residuals beside noise and attitudes", model_covariance, float(spread.dof)
+                "residuals of the model", "residuals beyond noise and attitudes", model_covariance, float(spread.dof)
             )
         )
     return Budget((*contributors, _evaluate_norm(spread.scale, size), *others))

@@ -36,8 +36,8 @@ AS_GOOD_AS_EQUAL = 0.03  # difference of one pose's inputs, of the largest of al
 STEPS = 6  # Gauss–Newton steps: the model is linear except for products of small numbers
 COEFFICIENTS = 6 * (HIGHEST + 1)  # scale of order 0 xyz, of order 1 xyz, …, then the bias
 
-NOISE, ORDER, LAG = "noise and a wandering bias", "order of the polynomials", "thermometer's lag"
-HYSTERESIS, GRADIENT = "warming against cooling", "thermometer beside the sensor"
+NOISE, ORDER, LAG = "noise and bias drift", "order of the polynomials", "thermometer's lag"
+HYSTERESIS, GRADIENT = "warming against cooling", "temperature gradient"
 
 
 @dataclass(frozen=True, slots=True)
