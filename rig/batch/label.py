@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 
 if TYPE_CHECKING:
     from segno import QRCode
@@ -74,10 +74,8 @@ def refuse_without_library() -> None:
 
 
 def _qr(content: str) -> "QRCode":
-    try:
+    with requiring("station"):
         import segno
-    except ImportError as error:
-        raise missing_extra(error, "station") from error
     return segno.make(content or "RIG", error="m", micro=False)
 
 

@@ -41,7 +41,7 @@ def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: Script
     Raise Refused `run_folder`.
     """
     parent = Path(loaded.config.output.folder)
-    with _refuse_unwritable(out or parent):
+    with refuse_unwritable(out or parent):
         folder = out or folder_of_its_own(parent, loaded.config.procedure.name)
         empty_folder(folder, or_else=f", or go on with: {resuming(folder)}")
         note_run(folder)
@@ -63,7 +63,7 @@ def empty_folder(folder: Path, *, or_else: str = "") -> Path:
 
     Raise Refused `run_folder`.
     """
-    with _refuse_unwritable(folder):
+    with refuse_unwritable(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
             raise Refused("run_folder", f"{folder} is not empty", f"Choose another with --out{or_else}")
@@ -71,7 +71,7 @@ def empty_folder(folder: Path, *, or_else: str = "") -> Path:
 
 
 @contextmanager
-def _refuse_unwritable(folder: Path) -> Iterator[None]:
+def refuse_unwritable(folder: Path) -> Iterator[None]:
     """Raise Refused `run_folder` if the system refuses to write there."""
     try:
         yield

@@ -1,6 +1,18 @@
 """The error for a missing library of an optional part of the program, with the command to install it."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from rig.errors import Refused
+
+
+@contextmanager
+def requiring(extra: str) -> Iterator[None]:
+    """Import in the block what the optional part `extra` installs. Raise Refused `missing_extra` without it."""
+    try:
+        yield
+    except ImportError as error:
+        raise missing_extra(error, extra) from error
 
 
 def missing_extra(error: ImportError, extra: str) -> Refused:

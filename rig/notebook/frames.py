@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
 def frame(columns: Mapping[str, Any], index: Sequence[Any], name: str) -> "DataFrame":
     """Return a table of `columns` (n,) by name over an `index` (n,) of that `name`. Raise Refused `missing_extra`."""
-    try:
+    with requiring("pandas"):
         import pandas
-    except ImportError as error:
-        raise missing_extra(error, "pandas") from error
     return pandas.DataFrame(dict(columns), index=pandas.Index(index, name=name))

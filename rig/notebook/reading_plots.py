@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.analysis.gyroscope.comparison import Comparison
 from rig.errors import Refused
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.observation.windows import Window
@@ -94,8 +94,6 @@ def _finish(axes: "Axes", title: str) -> None:
 
 
 def _figure(width: float, height: float) -> "Figure":
-    try:
+    with requiring("study"):
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing_extra(error, "study") from error
     return Figure(figsize=(width, height), layout="constrained")

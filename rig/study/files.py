@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rig.errors import Refused
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 from rig.study.study_report import Columns, StudyFinding, StudyReport, table
 from rig.study.style import use_style
 
@@ -82,11 +82,9 @@ def _format_value(value: Any) -> str:
 
 
 def _write_parquet(columns: Columns, path: Path) -> None:
-    try:
+    with requiring("parquet"):
         import pyarrow
         import pyarrow.parquet
-    except ImportError as error:
-        raise missing_extra(error, "parquet") from error
     pyarrow.parquet.write_table(pyarrow.table(dict(columns)), path)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_columns, add_run, find_logs, read_column_map
+from rig.commands.report_folder import refuse_unwritable
 from rig.config.files.safe_writing import replace_together, write_new
 from rig.errors import Refused
 from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibrations, writer_of_readings
@@ -61,7 +62,7 @@ def export_files(options: Namespace) -> list[Path]:
     if options.columns is not None and name not in OF_READINGS:
         raise Refused("bad_option", f"--columns is for readings, and {name} holds calibrations", "Leave it out")
     folder: Path = out or (run if run.is_dir() else run.parent) / "export" / name
-    try:
+    with refuse_unwritable(folder):
         if name in OF_READINGS:
             write = writer_of_readings(name)
             say_on_terminal("reading the recordings")
@@ -76,8 +77,6 @@ def export_files(options: Namespace) -> list[Path]:
             with replace_together():
                 for path, text in zip(written, texts.values(), strict=True):
                     write_new(path, text)
-    except OSError as error:
-        raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     for path in written:
         say(str(path))
     return written

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_run, add_set
 from rig.commands.history.named_history import add_history, read_history_name
+from rig.commands.report_folder import refuse_unwritable
 from rig.config.files.safe_writing import replace_together, write_new
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
@@ -111,7 +112,7 @@ def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path
     if options.dcc:
         written |= digital
     folder: Path = options.out or file.parent
-    try:
+    with refuse_unwritable(folder):
         folder.mkdir(parents=True, exist_ok=True)
         refuse_links(*(folder / name for name in (*written, *([PDF] if pdf else []))))
         with replace_together():
@@ -125,8 +126,6 @@ def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path
                     write_new(folder / PDF, written[PDF])
                 except Refused as error:
                     left_out.append(error)
-    except OSError as error:
-        raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     for name in written:
         say(str(folder / name))
     issued = issue_certificate(certificate, written)

@@ -14,12 +14,10 @@ if TYPE_CHECKING:
 @contextmanager
 def connect_client(address: str) -> Iterator["Client"]:
     """Connect to the scheduler at `address` for the block. Raise Refused `missing_extra`, `no_cluster`."""
-    from rig.errors.extras import missing_extra
+    from rig.errors.extras import requiring
 
-    try:
+    with requiring("dask"):
         from distributed import Client
-    except ImportError as error:
-        raise missing_extra(error, "dask") from error
     try:
         client = Client(address, timeout="5s")  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:

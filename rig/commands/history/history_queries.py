@@ -3,17 +3,17 @@
 import json
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
 from rich.console import Console
 
 from rig.commands.history.named_history import read_history_name
+from rig.commands.report_folder import draw_into
 from rig.config.files.regular_file import UnfitFile
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
-from rig.errors.extras import missing_extra
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.entered.finished_run import PAGE, FinishedRun, read_finished_run
 from rig.history.series import Change, changes_between, effects, rig_states, subjects, trends
@@ -90,7 +90,7 @@ def plot(options: Namespace) -> int:
 
         return draw_trends({subject: trends(past) for subject, past in subjects(pasts).items()}, folder)
 
-    for path in _draw(options.out, draw):
+    for path in draw_into(options.out, draw, "--out"):
         say(str(path))
     return 0
 
@@ -99,20 +99,6 @@ def _draw_changes(title: str, changes: Sequence[Change], folder: Path, name: str
     from rig.history.series_plots import draw_changes
 
     return draw_changes(title, changes, folder, name)
-
-
-def _draw(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
-    """Draw into a folder and return the files. Raise Refused `missing_extra`, `report_folder`."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise missing_extra(error, "study") from error
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return draw(folder)
-    except OSError as error:
-        why = f"{folder} cannot be written: {error}"
-        raise Refused("report_folder", why, "Choose another folder") from error
 
 
 def rigs(options: Namespace) -> int:
@@ -194,7 +180,7 @@ def compare(options: Namespace) -> int:
     title = f"{title_of(first.subject)}: {first.id} and {second.id}"
     if options.plot is not None:
         name = f"compare_{first.id}_{second.id}"
-        for path in _draw(options.plot, lambda folder: _draw_changes(title, changes, folder, name)):
+        for path in draw_into(options.plot, lambda folder: _draw_changes(title, changes, folder, name), "--plot"):
             say(str(path), sys.stderr)
     if options.json:
         numbers = {"before": first.id, "now": second.id}

@@ -12,6 +12,7 @@ from rig.commands.history.history_queries import open_named_history
 from rig.commands.history.recompute_worker import Task, solve_task
 from rig.commands.history.waiting import await_answer
 from rig.commands.history.worker_pools import Cluster, Processes, Solve, SolvedTask, distribute, solve_one_by_one
+from rig.commands.report_folder import refuse_unwritable
 from rig.config.files.safe_writing import write_new
 from rig.data.recording.settings import find_setting
 from rig.data.run_folder import refuse_links
@@ -40,7 +41,7 @@ def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
     label, stated = await_answer(lambda: _load_stated(options, selection))
     out: Path = options.out
     refuse_links(*(out / name for name in (JOURNAL, CSV, PAGE)))
-    with _refuse_unwritable(out):
+    with refuse_unwritable(out):
         out.mkdir(parents=True, exist_ok=True)
     with RecomputeJournal(out, question) as journal:
         answers = dict(journal.solved)
@@ -53,7 +54,7 @@ def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
         ]
         lost = _solve_all(tasks, options, solve, journal, answers)
     outcome = compared(stated, answers, options.u_fraction)
-    with _refuse_unwritable(out):
+    with refuse_unwritable(out):
         write_new(out / CSV, again_csv(outcome))
         write_new(out / PAGE, again_page(outcome, question, label))
     _print(outcome, out)
@@ -131,14 +132,6 @@ def _track_progress(answers_by_task: Iterable[SolvedTask], total: int) -> Iterab
 
     console = Console(stderr=True)
     return track(answers_by_task, total=total, description="solving", console=console, disable=not console.is_terminal)
-
-
-@contextmanager
-def _refuse_unwritable(out: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise Refused("report_folder", f"{out} cannot be written: {error}", "Choose another with --out") from error
 
 
 def _print(outcome: RecomputeOutcome, out: Path) -> None:

@@ -2,11 +2,12 @@
 
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_columns, add_json, add_run, find_logs, read_column_map
+from rig.commands.report_folder import draw_into
 from rig.errors import Refused, raised_as
 from rig.station.plain_text import say
 
@@ -29,7 +30,7 @@ def run(options: Namespace) -> int:
     Return 0. Raise Refused `report_folder`, `missing_extra`, `not_at_rest`; for a log as `read_samples`; for a run
     `bad_option`, `no_raw_readings`, and as `open_run` and `at_rest`.
     """
-    from rig.report.figures.allan import print_at_rest
+    from rig.report.figures.allan import draw_at_rest, print_at_rest
 
     with raised_as(Refused):  # no arm moves: wrong data is a refusal
         logs = find_logs(options.run)
@@ -38,7 +39,8 @@ def run(options: Namespace) -> int:
         sensors = _analyse_logs(logs, options.columns) if logs else _analyse_run(options.run)
     print_at_rest(sensors, as_json=options.json)
     if options.plot is not None:
-        _draw(sensors, options.plot)
+        for path in draw_into(options.plot, lambda folder: draw_at_rest(sensors, folder), "--plot"):
+            say(f"written: {path}", file=sys.stderr)
     return 0
 
 
@@ -71,19 +73,3 @@ def _analyse_run(path: Path) -> "dict[str, SensorAtRest]":
     if (read := recorded[0].external) is not None:
         return {read.item.name: log_at_rest(samples_in(read.readings, str(path)))}
     return at_rest(recorded)
-
-
-def _draw(sensors: "Mapping[str, SensorAtRest]", folder: Path) -> None:
-    from rig.errors.extras import missing_extra
-    from rig.report.figures.allan import draw_at_rest
-
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise missing_extra(error, "study") from error
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for path in draw_at_rest(sensors, folder):
-            say(f"written: {path}", file=sys.stderr)
-    except OSError as error:
-        raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --plot") from error

@@ -248,19 +248,17 @@ def _keep_run(options: Namespace, recording: "RunData", outcome: "Outcome") -> "
     from rig.commands.history.remember import remember_own
     from rig.data.latest_run import note_run
     from rig.data.recording.run_file import write_elsewhere
-    from rig.data.run_folder import empty_folder, next_recording
+    from rig.data.run_folder import empty_folder, next_recording, refuse_unwritable
     from rig.report.writers import write_outcome
     from rig.station.events import RunFolderWritten
     from rig.station.view import PlainView
 
     folder, tell = empty_folder(options.out), PlainView().event
     note_run(folder)
-    try:
+    with refuse_unwritable(folder):
         write_elsewhere(next_recording(folder, "raw"), recording)
         for event in write_outcome(folder, outcome):
             tell(event)
-    except OSError as error:
-        raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     tell(RunFolderWritten(folder))
     if options.serial_number is None:
         say("rig: not entered in a history: --serial-number is not given", sys.stderr)

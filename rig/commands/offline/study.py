@@ -61,7 +61,7 @@ def _run_study(options: Namespace) -> int:
     Raises Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and as `refuse_links`.
     """
     from rig.data.run_folder import refuse_links
-    from rig.errors.extras import missing_extra
+    from rig.errors.extras import requiring
     from rig.study.files import write
     from rig.study.study_catalogue import find
     from rig.study.study_report import Settings
@@ -71,16 +71,12 @@ def _run_study(options: Namespace) -> int:
         value = getattr(options, option)
         if value is not None and value < least:
             raise Refused("bad_option", f"--{option} {value} is too small", f"Give {least} or more")
-    try:
+    with requiring("study"):
         import joblib  # noqa: F401
         import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise missing_extra(error, "study") from error
     if options.format == "parquet":
-        try:
+        with requiring("parquet"):
             import pyarrow  # noqa: F401  # now, not after all is computed
-        except ImportError as error:
-            raise missing_extra(error, "parquet") from error
     refuse_links(*options.out.glob("*"))
     if options.runs is None and options.dask is None and (about := _describe_duration(entry, options.jobs or 1)):
         say(f"study {options.name}: {about}", file=sys.stderr)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sqlalchemy import URL, Connection, Engine, create_engine
 
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 from rig.history.storage import continuity, schema
 from rig.history.storage.address import HistoryAddress
 from rig.history.storage.forks import kept_from_children
@@ -79,8 +79,6 @@ def _server_engine(server: URL) -> Iterator[Engine]:
 
 def _postgresql(server: URL) -> Engine:
     limits = f"-c lock_timeout={WAIT_S}s -c statement_timeout={WAIT_S}s"
-    try:
+    with requiring("postgres"):
         arguments = {"options": limits, **connect_arguments(server)}
         return kept_from_children(create_engine(server, connect_args=arguments))
-    except ImportError as error:
-        raise missing_extra(error, "postgres") from error

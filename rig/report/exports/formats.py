@@ -36,13 +36,11 @@ FORMATS: Final = (*OF_READINGS, *OF_CALIBRATIONS)
 def writer_of_readings(name: str) -> "ReadingsWriter":
     """Load and return the writer of a format of readings. Raise Refused `missing_extra`."""
     if name in EXTRAS:
-        library, extra = EXTRAS[name]
-        try:
-            importlib.import_module(library)
-        except ImportError as error:
-            from rig.errors.extras import missing_extra
+        from rig.errors.extras import requiring
 
-            raise missing_extra(error, extra) from error
+        library, extra = EXTRAS[name]
+        with requiring(extra):
+            importlib.import_module(library)
     writer: ReadingsWriter = _load(OF_READINGS[name])
     return writer
 

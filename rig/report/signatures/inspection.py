@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 from rig.report.signatures.findings import FileInspection, not_as_signed, not_signed
 from rig.report.signatures.signatory import EXTRA, SIZE_MAX_BYTES
 from rig.report.signatures.trust import Trust
@@ -19,11 +19,9 @@ def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
 
     Raise Refused `missing_extra`.
     """
-    try:
+    with requiring(EXTRA):
         from rig.report.signatures.pdf_signatures import inspect_pdf
         from rig.report.signatures.xml_signature import inspect_xml
-    except ImportError as error:
-        raise missing_extra(error, EXTRA) from error
     if content.startswith(b"%PDF-"):
         inspect = inspect_pdf
     elif _is_xml(content):
@@ -48,11 +46,9 @@ def _is_xml(content: bytes) -> bool:
 
 def read_trusted_certificates(files: Sequence[Path]) -> tuple[bytes, ...]:
     """Return the certificates in these files, PEM or DER, as DER. Raise Refused `trust_file`, `missing_extra`."""
-    try:
+    with requiring(EXTRA):
         from cryptography.hazmat.primitives.serialization import Encoding
         from cryptography.x509 import load_der_x509_certificate, load_pem_x509_certificates
-    except ImportError as error:
-        raise missing_extra(error, EXTRA) from error
     certificates = []
     for file in files:
         try:

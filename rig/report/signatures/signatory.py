@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 from rig.report.signatures.token_address import PASSPHRASE, TokenKey, is_token_address, token_key
 from rig.report.signatures.trust import chain_of, unfit_for_documents
 
@@ -44,11 +44,9 @@ def signatory(where: str) -> Iterator[Signatory]:
 
     Raise Refused `signing_key`, `missing_extra`.
     """
-    try:
+    with requiring(EXTRA):
         import pyhanko.sign  # noqa: F401
         import signxml  # noqa: F401
-    except ImportError as error:
-        raise missing_extra(error, EXTRA) from error
     if is_token_address(where):
         key = token_key(where)
         with _open_token(key) as opened:
@@ -114,13 +112,11 @@ def _order_chain(certificates: "Sequence[Certificate]", key: Any) -> "list[Certi
 @contextmanager
 def _open_token(key: TokenKey) -> Iterator[Signatory]:
     """Open the key in a token and its certificate, both with the same label."""
-    try:
+    with requiring(EXTRA):
         import pkcs11
         from pyhanko.config.pkcs11 import TokenCriteria
         from pyhanko.keys.internal import translate_pyca_cryptography_cert_to_asn1
         from pyhanko.sign.pkcs11 import PKCS11Signer, open_pkcs11_session
-    except ImportError as error:
-        raise missing_extra(error, EXTRA) from error
     from cryptography.x509 import load_der_x509_certificate
 
     try:

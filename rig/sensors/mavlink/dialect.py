@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 
 ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT of a heartbeat
 FIRMWARES = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
@@ -11,8 +11,6 @@ ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED in its base_mode
 
 def dialect() -> Any:
     """Return the module with messages and parser of MAVLink 2, ArduPilot's included. Raise Refused `missing_extra`."""
-    try:
+    with requiring("autopilot"):
         from pymavlink.dialects.v20 import ardupilotmega
-    except ImportError as error:
-        raise missing_extra(error, "autopilot") from error
     return ardupilotmega

@@ -5,7 +5,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from rig.errors import Problem, Refused
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 from rig.turners.servo.driver_clock import HOST, Clock
 from rig.turners.servo.latency import lower_latency
 from rig.turners.servo.servo_port import Port
@@ -54,10 +54,8 @@ class Bus:
 
     def __init__(self, path: str, baud: int, servo_id: int, clock: Clock = HOST) -> None:
         """Open and lock the port. Raise Refused `missing_extra`, `servo_port_in_use`, `no_servo_port`, …."""
-        try:
+        with requiring("servo"):
             from dynamixel_sdk import PacketHandler
-        except ImportError as error:
-            raise missing_extra(error, "servo") from error
         self._id, self._path, self.clock = servo_id, path, clock
         self._packets: Any = PacketHandler(2.0)
         self._gone = False

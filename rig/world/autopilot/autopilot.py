@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.errors.extras import missing_extra
+from rig.errors.extras import requiring
 from rig.world.autopilot.autopilot_imu import RATE_HZ, SimulatedImu
 from rig.world.autopilot.parameters import Parameters
 
@@ -62,11 +62,9 @@ class SimulatedAutopilot:
         seed: int,
         time_s: float,
     ) -> None:
-        try:
+        with requiring("autopilot"):
             from pymavlink.dialects.v10 import ardupilotmega as first_version
             from pymavlink.dialects.v20 import ardupilotmega
-        except ImportError as error:
-            raise missing_extra(error, "autopilot") from error
         self._mavlink: Any = ardupilotmega
         self._sizes: Any = first_version.mavlink_map
         self._out = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
