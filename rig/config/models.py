@@ -23,11 +23,11 @@ from rig.config.section import (
     AccelerometerOrder,
     JointAngle,
     Offset,
+    Port,
     Section,
     SensorName,
     Vector3,
     check_host,
-    check_port,
 )
 from rig.config.sensors.link_budget import LinkLoad, over_budget
 from rig.config.sensors.mavlink_section import autopilots_over_budget
@@ -150,7 +150,7 @@ class ArmSection(TurnerSection):
 class BoardSection(Section):
     """The microcontroller board. Leave it out if every sensor has a port of its own."""
 
-    port: str = Field(
+    port: Port = Field(
         min_length=1,
         max_length=255,
         description="serial port, such as `/dev/ttyACM0` or `COM3`, or `socket://host:port`",
@@ -158,12 +158,6 @@ class BoardSection(Section):
     baud: Literal[115200, 230400, 460800, 921600] = Field(
         default=921600, description="speed of the serial line", json_schema_extra={"unit": "Bd"}
     )
-
-    @field_validator("port")
-    @classmethod
-    def an_address_has_host_and_port(cls, value: str) -> str:
-        """Refuse `socket://` without host and port. The system knows the names of serial ports."""
-        return check_port(value)
 
 
 class ProcedureSection(Section):

@@ -3,7 +3,7 @@
 from typing import Annotated, Any, Literal, get_args
 from urllib.parse import urlsplit
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, ValidationInfo, field_validator
 
 from rig.config.ranges import JOINT_RANGE_DEG
 
@@ -66,3 +66,6 @@ def check_port(value: str) -> str:
         if not complete:
             raise ValueError("must be the name of a port, or socket://host:port with a port from 1 to 65535")
     return value
+
+
+Port = Annotated[str, AfterValidator(check_port)]  # the system knows the names of serial ports

@@ -14,6 +14,7 @@ from rig.station.events import NotRemembered, Remembered, RunEvent, Since
 
 if TYPE_CHECKING:
     from rig.config.judging.judging_sections import HistorySection
+    from rig.config.load import Loaded
     from rig.history.entered.finished_run import FinishedRun
     from rig.history.entered.issued_certificate import Issued
     from rig.history.series import Change
@@ -79,12 +80,10 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
     as the folder may come from anywhere.
     """
     try:
-        from rig.history.entered.finished_run import content_sha256, read_configuration
-        from rig.history.storage.address import own_history_address
+        from rig.history.entered.finished_run import content_sha256
 
-        loaded = read_configuration(folder)
-        address = own_history_address(history)
-        if address is None or (history is None and loaded is not None and loaded.config.history.off):
+        loaded, address = _find_own(folder, history)
+        if address is None:
             return None
         noted = ask_history(address, lambda: _certify(address, content_sha256(result), certificate))
     except Exception as error:  # whatever it is, the certificate is written
@@ -96,18 +95,27 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
     return f"{address.label} does not know this run; rig history import {folder} enters it{hint}"
 
 
+def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, HistoryAddress | None]":
+    """Return the configuration of the run in `folder`, and the address of `history`, else of the user's own.
+
+    No address if there is none, or if that configuration wants no history and none is named.
+    """
+    from rig.history.entered.finished_run import read_configuration
+    from rig.history.storage.address import own_history_address
+
+    loaded = read_configuration(folder)
+    is_off = history is None and loaded is not None and loaded.config.history.off
+    return loaded, None if is_off else own_history_address(history)
+
+
 def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | None:
     """Return number and SHA-256 of the last entry in the journal to which `remember_certificate` would add.
 
     None if there is no history, if it does not answer, or if it is empty.
     """
     try:
-        from rig.history.entered.finished_run import read_configuration
-        from rig.history.storage.address import own_history_address
-
-        loaded = read_configuration(folder)
-        address = own_history_address(history)
-        if address is None or (history is None and loaded is not None and loaded.config.history.off):
+        _, address = _find_own(folder, history)
+        if address is None:
             return None
         return ask_history(address, lambda: _read_journal_end(address))
     except Exception:  # whatever it is, the certificate is signed; a later message says that it is in no history

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Literal
 from urllib.parse import urlsplit
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from rig.config.models import TurnerSection
 from rig.config.ranges import PAYLOAD_RANGE_KG
-from rig.config.section import RATIO, JointAngle, Offset, check_port
+from rig.config.section import RATIO, JointAngle, Offset, Port
 
 ServoName = Literal["xl430_w250", "xm430_w350", "xm430_w210"]
 FASTEST_DEG_S = 460.0  # no load, of the fastest of them
@@ -17,7 +17,7 @@ FASTEST_DEG_S = 460.0  # no load, of the fastest of them
 class ServoSection(TurnerSection):
     """The Dynamixel X servo on whose shaft the item turns."""
 
-    port: str = Field(
+    port: Port = Field(
         min_length=1,
         max_length=255,
         description="serial port of the servo's adapter, such as `/dev/ttyUSB0` or `COM4`, or `socket://host:port`",
@@ -50,12 +50,6 @@ class ServoSection(TurnerSection):
         le=2.0,
         description="the servo stops by itself if nobody has spoken to it for so long",
     )
-
-    @field_validator("port")
-    @classmethod
-    def an_address_has_host_and_port(cls, value: str) -> str:
-        """Refuse `socket://` without host and port. The system knows the names of serial ports."""
-        return check_port(value)
 
     @property
     def address(self) -> str:

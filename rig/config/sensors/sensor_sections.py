@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Protocol, Self
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from rig.config.section import RATIO, Positive, Section, Vector3, check_port
+from rig.config.section import RATIO, Port, Positive, Section, Vector3
 from rig.config.sensors.lines_section import GAP, LinesSection
 from rig.config.sensors.link_budget import KVH1775_MESSAGE_BYTES, sensor_line_over_budget
 from rig.config.sensors.mavlink_section import MavlinkSection
@@ -54,7 +54,7 @@ Baud = Literal[
 class OwnPortSection(Section):
     """The serial port of a sensor that is not on the board, and what it sends there."""
 
-    port: str = Field(
+    port: Port = Field(
         min_length=1,
         max_length=255,
         description="serial port, such as `/dev/ttyUSB0` or `COM4`, or `socket://host:port`",
@@ -75,12 +75,6 @@ class OwnPortSection(Section):
         description="of a `kvh1775`: `delta`: the angle since the message before, without aliasing; `rate`: the rate "
         "after the sensor's own filter",
     )
-
-    @field_validator("port")
-    @classmethod
-    def an_address_has_host_and_port(cls, value: str) -> str:
-        """Refuse `socket://` without host and port."""
-        return check_port(value)
 
 
 class MountingSection(Section):
