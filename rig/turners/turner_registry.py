@@ -19,8 +19,11 @@ GROUP = "rig.turners"
 @cache
 def installed() -> Mapping[str, AnyTurner]:
     """Return the kinds of turners in stock and in installed packages, by name. Raise Refused `turner_not_loaded`."""
-    stock = (EntryPoint(name, f"rig.turners.{name}.{name}_kind:{name.upper()}", GROUP) for name in STOCK_TURNERS)
-    return {kind.name: kind for _, kind in added(GROUP, _not_loaded, stock)}
+    return {kind.name: kind for _, kind in added(GROUP, _not_loaded, map(_stock, STOCK_TURNERS))}
+
+
+def _stock(name: str) -> EntryPoint:
+    return EntryPoint(name, f"rig.turners.{name}.{name}_kind:{name.upper()}", GROUP)
 
 
 def _not_loaded(what: str, remedy: str) -> Refused:
@@ -46,7 +49,8 @@ def kind_of(section: TurnerSection) -> AnyTurner:
 
 def words_of(name: str) -> Wording:
     """Return the wording for a kind of turner, in general terms if it is not installed."""
-    kind = installed().get(name)
+    # One in stock alone: to look for those of packages takes as long as to write the certificate that needs the words.
+    kind: AnyTurner | None = _stock(name).load() if name in STOCK_TURNERS else installed().get(name)
     if kind is not None:
         return kind.words
     return Wording(

@@ -94,17 +94,18 @@ def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, refer
     rows = figure.subplots(3, 2, sharex=True, sharey="col", width_ratios=(3, 2), gridspec_kw=MARGINS)
     elapsed_s = comparison.time_s - comparison.time_s[0]
     error = comparison.reading_rad_s - comparison.reference_rad_s
+    # Titles say their height `y`: matplotlib would measure all labels for it, a sixth of the time of drawing.
     for i, (readings, difference) in enumerate(rows):
         readings.plot(*envelope(elapsed_s, comparison.reading_rad_s[:, i]), lw=0.7, color="C0", label=sensor)
         readings.plot(*envelope(elapsed_s, comparison.reference_rad_s[:, i]), lw=0.7, color="C1", label=reference)
         readings.set_ylabel(f"{'xyz'[i]}   rad/s")
         difference.plot(*envelope(elapsed_s, error[:, i]), lw=0.5, color="C3")
-        difference.set_title(f"RMS {comparison.movement.rms_rad_s[i]:.4f} rad/s", loc="right", fontsize=9)
+        difference.set_title(f"RMS {comparison.movement.rms_rad_s[i]:.4f} rad/s", loc="right", y=1.0, fontsize=9)
     reach = 1.05 * float(np.abs(error).max())
     rows[0, 1].set_ylim(-reach, reach)
     rows[0, 0].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=2, frameon=False)
-    rows[0, 0].set_title("readings", loc="left", fontsize=9)
-    rows[0, 1].set_title("reading − reference", loc="left", fontsize=9)
+    rows[0, 0].set_title("readings", loc="left", y=1.0, fontsize=9)
+    rows[0, 1].set_title("reading − reference", loc="left", y=1.0, fontsize=9)
     for axes in rows[2]:
         axes.set_xlabel("time s")
 
