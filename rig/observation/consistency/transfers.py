@@ -36,6 +36,7 @@ SPARSE_S = 0.0105  # samples that are farther apart miss the servo's vibration w
 # Samples add up to a transfer but for the corners of its rate: each by its change of slope times dt² B₂(x) / 2, at x
 # of an interval (Euler and Maclaurin). B₂, Bernoulli's second polynomial, is √(1/180) RMS; either end has two corners.
 CORNERS = (2 / 180) ** 0.5 / 2
+SMOOTHED_S = 0.05  # in which noise of the encoders is no rate: 24 µrad make 4 mrad/s of angles that are 8 ms apart
 LOST = 0.01  # largest fraction of missing samples, by the nominal rate, which a board keeps as well
 GAP = 1.5  # of the interval between samples: a longer step misses one
 STEPS = 48
@@ -98,10 +99,19 @@ def average_transfers(
 def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInterval | None:
     """Return the interval from before the arm moves until it stands; None if it does not move within the window."""
     inside = (motion.time_s >= start_s) & (motion.time_s <= end_s)
-    moving = motion.time_s[inside][np.linalg.norm(motion.rate(motion.time_s[inside]), axis=1) > MIN_RATE_RAD_S]
+    rates, smoothed = _rate_norms(motion, motion.time_s[inside])
+    moving = motion.time_s[inside][(rates > MIN_RATE_RAD_S) & (smoothed > MIN_RATE_RAD_S / 2)]
     if not len(moving):
         return None
     return MotionInterval(motion, max(start_s, float(moving[0]) - BEYOND_S), min(end_s, float(moving[-1]) + BEYOND_S))
+
+
+def _rate_norms(motion: ArmMotion, time_s: Array) -> tuple[Array, Array]:
+    """Return norms (n,) of the flange's rate at times (n,), and of its mean over `SMOOTHED_S` around them, rad/s."""
+    half_s = SMOOTHED_S / 2
+    within_s = np.clip(time_s, motion.time_s[0] + half_s, motion.time_s[-1] - half_s)
+    rates, smoothed = motion.rate(time_s), motion.mean_rates(within_s, SMOOTHED_S)
+    return np.linalg.norm(rates, axis=1), np.linalg.norm(smoothed, axis=1)
 
 
 def is_by_wrists(interval: MotionInterval) -> bool:
@@ -166,8 +176,8 @@ def _whole_transfer(start_s: float, end_s: float, stream: Stream, motion: ArmMot
     transfer = MotionInterval(motion, float(time_s[0]) - step_s / 2, float(time_s[-1]) + step_s / 2, unseen_rad)
     complete = len(time_s) >= (1 - LOST) * (transfer.end_s - transfer.start_s) * stream.sensor.rate_hz
     complete &= bool(np.diff(time_s).max() < GAP * step_s)
-    ends = np.linalg.norm(motion.rate(np.array([transfer.start_s, transfer.end_s])), axis=1)
+    ends = np.minimum(*_rate_norms(motion, np.array([transfer.start_s, transfer.end_s])))
     in_range = not stream.sensor.channel(RATE).is_saturated(stream.raw[samples]).any()
-    stands = ends.max() < 2 * MIN_RATE_RAD_S
+    stands = ends.max() < 3 * MIN_RATE_RAD_S
     if is_by_wrists(transfer) and complete and in_range and stands and motion.covered(time_s).all():
         yield transfer

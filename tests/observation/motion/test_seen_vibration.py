@@ -61,7 +61,7 @@ def test_of_an_arm_that_turns_evenly_the_speed_is_that_of_a_turn_whatever_was_ta
 
     The even steps of an angle are lines in the rate too.
     """
-    for revolution in revolutions(synthetic_run(QUIET)):
+    for revolution in revolutions(synthetic_run(replace(QUIET, encoder_noise_rad=0.0))):
         assert revolution.speed_rad_s == pytest.approx(2 * np.pi / revolution.average.duration_s, rel=2e-6)
 
 
