@@ -38,7 +38,7 @@ def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
     return ratio
 
 
-def bisect(is_too_small: Callable[[Array], Array], highest: Array) -> Array:
+def bisect(is_too_small: Callable[[Array], Array | NDArray[np.bool_]], highest: Array) -> Array:
     """Return the values (q,) from 0 to `highest` (q,) above which `is_too_small` is false, by bisection."""
     low, high = np.zeros_like(highest), highest
     for _ in range(BISECTIONS):

@@ -251,6 +251,15 @@ def untrustworthy_attitudes(what: str) -> Fault:
     )
 
 
+def report_inverted() -> Fault:
+    """Return the error for attitudes whose inverses the readings agree with."""
+    return Fault(
+        "inverted_attitudes",
+        "the readings contradict the attitudes and agree with their inverses",
+        "Give quaternions that take body to table coordinates: conjugate those that take table to body",
+    )
+
+
 @contextmanager
 def convergence_required() -> Iterator[None]:
     """Raise Fault `attitude_untrustworthy` if the linear algebra of a fit in attitudes does not converge."""

@@ -67,6 +67,11 @@ class TimeBase:
         """Return board times on the controller's clock."""
         return board_time_s + self.offset_s + self.drift * (board_time_s - self.reference_s)
 
+    def correct(self, by_s: float, std_s: float) -> "TimeBase":
+        """Return the time base with its offset changed by `by_s`, then known to `std_s`."""
+        covariance = np.diag([std_s**2, self.covariance[1, 1]])
+        return replace(self, offset_s=self.offset_s + by_s, covariance=covariance)
+
     def board_time_s(self, controller_time_s: float) -> float:
         """Return a controller time on the board's clock."""
         since_reference_s = (controller_time_s - self.offset_s - self.reference_s) / (1 + self.drift)
@@ -188,6 +193,13 @@ def _search_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> 
     if explained < MIN_EXPLAINED:
         raise _not_found(f"the arm's motion explains {100 * explained:.0f} % of what the gyroscope reads")
     return TimeBase(float(offset - reference), float(drift), float(reference), np.zeros((2, 2)), np.zeros(3))
+
+
+def estimate_coarse_offset(board_time_s: Array, readings_rad_s: Array, motion: KnownMotion) -> tuple[float, float]:
+    """Return the fraction of the readings' variance (n, 3) explained, and the offset of clocks without drift, s."""
+    reference_s = float(board_time_s[0] + board_time_s[-1]) / 2
+    explained, offset_s = _coarse_offset(board_time_s - reference_s, readings_rad_s, partial(_arm_rate, motion))
+    return explained, offset_s - reference_s
 
 
 def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:

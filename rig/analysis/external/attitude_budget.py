@@ -22,9 +22,9 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
     placement.NOISE: ("A", "scatter of the readings"),
     placement.ATTITUDES: ("A", f"estimated from the residuals, {IN_U}"),
     placement.PLACEMENTS: ("A", f"scatter of the placements beyond their attitudes, {IN_U}"),
-    increment_solution.DELAY: ("A", f"estimated, with a prior of 50 ms, {IN_U}"),
+    increment_solution.DELAY: ("A", f"estimated, with the jitter of the stamps, {IN_U}"),
     increment_solution.EARTHS_RATE: ("B", "its size, whichever way it points"),
-    increment_solution.STRETCHES: ("A", f"scatter of six intervals of the recording, {IN_U}"),
+    increment_solution.STRETCHES: ("A", f"change of F and b with attitude and time, {IN_U}"),
 }
 
 

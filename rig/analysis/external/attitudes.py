@@ -19,14 +19,15 @@ from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Fault, or_fault
 from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.external.placement import NOISE, LaidDown, laid_down
+from rig.estimation.external.sole_attitude import find_sole_attitude
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.earth_rate import check_earth_seen
 from rig.estimation.reference.accelerometer_model import Dwells
 from rig.estimation.reference.reference_model import BIAS, REFERENCE, SECOND, F
 from rig.estimation.reference.triaxial import EqualWeights, Method, TriaxialSolution
 from rig.observation.external.attitude_import import PlacedReadings
-from rig.observation.external.fixes import Turning
 from rig.observation.external.placements import Placements
+from rig.observation.external.reference_rows import Turning
 from rig.observation.statistics.mean import StaticReading
 from rig.observation.stuck_check import check_reads
 
@@ -147,6 +148,7 @@ def _solve_placements(
     """Return the calibration from placements, with their differences if the method models wrong attitudes."""
     unplaced, moving = placements.unplaced, placements.left_out
     solution, laid = _solve(equations, method, placements), None
+    _check_not_sole(solution, equations, placements, quantity)
     if method == "attitude_weighted":
         laid = laid_down(
             solution.theta,
@@ -171,6 +173,23 @@ def _solve_placements(
         unplaced_rests=len(unplaced.windows),
         moving=moving,
         dwells=tuple(_dwells(placements, quantity)),
+    )
+
+
+def _check_not_sole(
+    solution: TriaxialSolution, equations: Equations, placements: Placements, quantity: Quantity
+) -> None:
+    """Raise Fault `too_few_observations` if a scale factor hangs on one attitude."""
+    sole = find_sole_attitude(solution.theta, equations.placed)
+    if sole is None:
+        return
+    axis, placement = sole
+    window = placements.read.windows[placement]
+    raise Fault(
+        "too_few_observations",
+        f"the scale factor of {quantity.sensor} {quantity.axes[axis]} hangs on one attitude, from {window.start_s:.4g} "
+        f"to {window.end_s:.4g} s: no other would contradict it if it were wrong",
+        "Let the body lie still in more attitudes: with each axis up, down and aslant",
     )
 
 

@@ -257,6 +257,8 @@ def _solve_attitudes(read: ReadElsewhere, samples: Samples, settings: RunSetting
 def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:
     """Return the calibration of a gyroscope in attitudes, described as one of sweeps."""
     solution = _describe_as_swept(result)
+    if clock is not None and isinstance(result, InIncrements):
+        clock = clock.correct(-result.solution.clock_s, result.solution.clock_std_s)
     return SensorResult(
         sensor=item,
         solution=solution,

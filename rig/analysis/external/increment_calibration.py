@@ -12,8 +12,10 @@ from rig.estimation.arrays import scale_of
 from rig.estimation.external.increment_solution import KnownIncrements, solve_known_increments
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.refusals import check_axes, check_unit
-from rig.observation.external.fixes import Gathered, LeftOut, Turning, gather, rough_matrix
+from rig.observation.external.fixes import Gathered, LeftOut, gather
 from rig.observation.external.omission import Omitted
+from rig.observation.external.reference_rows import Turning, select_covered
+from rig.observation.external.robust_start import find_start
 
 CONTRADICTING = ("attitude_untrustworthy", "mirrored_axis", "wrong_unit", "ill_conditioned")
 PASSES = 3  # by the clock of the one before
@@ -69,9 +71,9 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
 
 def _solve(turning: Turning, window_s: float | None) -> InIncrements:
     """Return the solution; its clock offset determines which readings are missing, so it is iterated."""
-    start = rough_matrix(turning)
-    check_unit(scale_of(start))
-    gathered = gather(turning, window_s)
+    start = find_start(select_covered(turning)).state
+    check_unit(scale_of(start.matrix))
+    gathered = gather(turning, window_s, start.clock_s)
     for _ in range(PASSES):
         solution = solve_known_increments(turning.time_s, turning.readings_rad_s, gathered.fixes, start)
         regathered = gather(turning, window_s, solution.clock_s)

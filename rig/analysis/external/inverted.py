@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.refusals import report_inverted
 
 Solved = TypeVar("Solved")
 
@@ -25,8 +26,4 @@ def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], co
             solve(np.swapaxes(attitudes, -1, -2))
         except Fault:
             raise fault from None
-        raise Fault(
-            "inverted_attitudes",
-            "the readings contradict the attitudes and agree with their inverses",
-            "Give quaternions that take body to table coordinates: conjugate those that take table to body",
-        ) from None
+        raise report_inverted() from None

@@ -14,8 +14,8 @@ from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.external.increment_solution import KnownIncrements
 from rig.estimation.reference.reference_model import BIAS
 from rig.estimation.statistics.coverage import false_alarm_of_each
-from rig.observation.external.fixes import Turning
 from rig.observation.external.means_at_rest import means_at_rest
+from rig.observation.external.reference_rows import Turning
 
 FALSE_ALARM = 1e-3  # of recordings whose bias is that at rest, for one of three axes
 G_SENSITIVITY_RAD_S = 1e-3  # of one g, of a MEMS gyroscope: it lies in one attitude, and moves through many

@@ -24,9 +24,29 @@ from rig.estimation.statistics.bias_process import walk_covariance
 from rig.estimation.statistics.variance_components import Mixed
 
 MATRIX, BIAS, CLOCK, EARTH, COMMON = slice(0, 9), slice(9, 12), 12, slice(13, 16), 16
-CLOCK_STD_S = 0.05  # prior std of the offset of a common clock: cameras' exposure, a sensor's filter
+CLOCK_STD_S = 0.1  # prior std of the offset of a common clock: a controller's reports, cameras' exposure
+MATRIX_PRECISION = 1.0  # of F's elements: keeps those finite that no turn tells
 EARTH_PRECISION = 3 / EARTH_RATE_RAD_S**2  # its norm is known, its direction is not
-INTERVALS, FEWEST_OF_INTERVAL = 6, 5  # intervals of a recording; increments in one
+INTERVALS = 6  # of a recording, over which a bias is alike
+FIELD, VISIT = "error with attitude", "error with attitude, of each visit"
+NEW_AT_REST, NEW_IN_MOTION = "error of each rest", "error of each fix in motion"
+JITTER = "jitter of the stamps"
+MATRIX_CHANGES, BIAS_CHANGES, WALK = "changes of F", "changes of b", "random walk"
+SCALES = {  # medians of the half-Cauchy priors: rad, s, 1, rad/s, rad/√s
+    FIELD: 5e-3,
+    VISIT: 1e-3,
+    NEW_AT_REST: 1e-3,
+    NEW_IN_MOTION: 3e-3,
+    JITTER: 3e-3,
+    MATRIX_CHANGES: 5e-4,
+    BIAS_CHANGES: 5e-5,
+    WALK: 3e-4,
+}
+REACH = 1.5  # rad: over which an error with attitude is alike
+VISIT_S = 5.0  # over which what an attitude does not tell of an arm is alike: its elbow, its load
+WANDER = 0.1  # of the variance of the jitter: that which a fix's samples have in common
+LOOKS_AT = np.array([0.0, 0.34, 0.67])  # of a fix's samples, at which its error with attitude is averaged
+LEAST_RAD = 1e-7  # of an increment: rounding
 OUTLYING, FEWEST_SAMPLES = 6.0, 10  # times a fix's median error: an outlier; fewest samples to judge by
 LEAST = 1e-3  # of the usual std: the least of a sample stated to be exact
 
@@ -39,6 +59,7 @@ class Fixes:
     - `placement` (N,): fixes with one number share one error: the body lay still.
     - `joined` (N − 1,): True if the gyroscope's readings are complete from one fix to the next.
     - `std_rad` (k,): the stated standard deviation of each sample, None if none is stated.
+    - `blind_rad` (N − 1,): standard deviation of the rotation that missing readings hide, None if none are missing.
     """
 
     at_s: Array
@@ -47,6 +68,7 @@ class Fixes:
     placement: NDArray[np.intp]
     joined: NDArray[np.bool_]
     std_rad: Array | None = None
+    blind_rad: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +97,10 @@ class DriftState:
 
 @dataclass(frozen=True, slots=True)
 class FixedAttitudes:
-    """N fixes: E (N, 3, 3), S (N, 3, 12), C ω (N, 3), middle times (N,), windows (N, 2); E (k, 3, 3) of all samples."""
+    """N fixes: E (N, 3, 3), S (N, 3, 12), C ω (N, 3), middle times (N,), windows (N, 2).
+
+    Of all samples: E (k, 3, 3) and C ω (k, 3).
+    """
 
     attitudes: Array
     sensitivities: Array
@@ -83,6 +108,7 @@ class FixedAttitudes:
     middles_s: Array
     windows_s: Array
     samples: Array
+    rates: Array
 
 
 def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitudes:
@@ -111,6 +137,7 @@ def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitude
         mean(fixes.at_s),
         np.column_stack([fixes.at_s[first], fixes.at_s[last - 1]]),
         samples,
+        turning,
     )
 
 
@@ -134,7 +161,19 @@ def find_inliers(recorded: AttitudeSamples, fixes: FixedAttitudes) -> NDArray[np
     return kept
 
 
-def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> Mixed:
+@dataclass(frozen=True, slots=True)
+class DriftModel:
+    """The mixed linear model of the increments between fixes, with the names of its `causes` (k,) of errors."""
+
+    mixed: Mixed
+    causes: tuple[str, ...]
+
+    def std_of(self, cause: str, std: Array) -> float:
+        """Return the standard deviation of a cause by those of all (k,); 0 if the recording has none of it."""
+        return float(std[self.causes.index(cause)]) if cause in self.causes else 0.0
+
+
+def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
     """Return the mixed linear model of the increments between fixes."""
     joined = np.flatnonzero(fixes.joined)
     count, increments = len(fixes.placement), len(joined)
@@ -144,17 +183,101 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> Mixed:
     observed = rotation_vectors(inverse @ averaged.attitudes[joined + 1])
     sensitivities, turning = (np.tensordot(step, values, 1) for values in (averaged.sensitivities, averaged.turning))
     earth = -inverse * (step @ averaged.middles_s)[:, None, None]
-    intervals = increments // FEWEST_OF_INTERVAL if increments < INTERVALS * FEWEST_OF_INTERVAL else INTERVALS
-    interval_of = np.arange(increments) * intervals // increments if intervals > 1 else np.zeros(increments)
-    by_interval = [sensitivities * (interval_of == i)[:, None, None] for i in range(intervals if intervals > 1 else 0)]
-    design = np.concatenate([sensitivities, turning[..., None], earth, *by_interval], axis=2)
-    precision = np.zeros(design.shape[2])
+    design = np.concatenate([sensitivities, turning[..., None], earth], axis=2)
+    precision = np.zeros(COMMON)
+    precision[MATRIX] = MATRIX_PRECISION
     precision[CLOCK] = CLOCK_STD_S**-2.0
     precision[EARTH] = EARTH_PRECISION
-    columns = np.arange(COMMON, design.shape[2]).reshape(-1, 12)
-    groups = (columns[:, MATRIX].ravel(), columns[:, BIAS].ravel()) if by_interval else ()
+    correlation = _correlate(fixes)
+    between = np.abs(step) / 2
+    nearby = between @ correlation @ between.T
+    errors = {
+        **_list_errors(averaged, fixes, correlation, step),
+        MATRIX_CHANGES: _find_matrix_changes(sensitivities, nearby),
+        BIAS_CHANGES: _find_bias_changes(sensitivities, nearby, between @ averaged.middles_s),
+        WALK: _expand_axes(step @ walk_covariance(averaged.windows_s) @ step.T),
+    }
+    causes = tuple(name for name in SCALES if name in errors and errors[name].any())
+    scales = np.array([SCALES[name] for name in causes])
+    if fixes.std_rad is not None and fixes.std_rad.any():
+        stated = float(np.median(fixes.std_rad[fixes.std_rad > 0]))
+        scales = np.where(np.isin(causes, (NEW_AT_REST, NEW_IN_MOTION)), stated, scales)
+    blind = np.zeros(increments) if fixes.blind_rad is None else fixes.blind_rad[joined]
+    mixed = Mixed(
+        observed.reshape(-1),
+        design.reshape(-1, COMMON),
+        np.diag(np.repeat(np.square(blind) + LEAST_RAD**2, 3)),
+        np.array([errors[name] for name in causes]),
+        precision,
+        scales,
+    )
+    return DriftModel(mixed, causes)
+
+
+def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, step: Array) -> dict[str, Array]:
+    """Return the covariances (3n, 3n) of the increments by unit errors of the reference, by cause."""
+    count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
     ratio = _relative(fixes)[first]
     same = (fixes.placement[:, None] == fixes.placement) * ratio[:, None] * ratio
-    walk = walk_covariance(averaged.windows_s)
-    return Mixed(observed, design, step @ same @ step.T, step @ walk @ step.T, precision, groups)
+    at_rest = fixes.placement < 0
+    late = np.zeros((count, 3, 3))
+    np.add.at(late, fixes.fix, averaged.rates[:, :, None] * averaged.rates[:, None, :])
+    late /= (np.bincount(fixes.fix).astype(np.float64) ** 2)[:, None, None]
+    apart = np.sqrt(3) * np.abs(averaged.middles_s[:, None] - averaged.middles_s) / VISIT_S
+    together = averaged.turning[:, :, None] * averaged.turning[:, None, :]
+    return {
+        FIELD: _expand_axes(step @ correlation @ step.T),
+        VISIT: _expand_axes(step @ (correlation * (1 + apart) * np.exp(-apart)) @ step.T),
+        NEW_AT_REST: _expand_axes(step @ (same * at_rest * at_rest[:, None]) @ step.T),
+        NEW_IN_MOTION: _expand_axes(step @ (same * ~at_rest * ~at_rest[:, None]) @ step.T),
+        JITTER: _combine_blocks(step, late + WANDER * together),
+    }
+
+
+def _correlate(fixes: Fixes) -> Array:
+    """Return the correlation (N, N) of an error that is a smooth function of attitude, as its mean over each fix.
+
+    Matérn's function, ν = 3/2, of the chordal distance ‖R − R′‖/√2, which for small angles is the angle: positive
+    definite on SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
+    """
+    counts = np.bincount(fixes.fix)
+    begins = np.cumsum(counts) - counts
+    looks = np.unique(begins[:, None] + (counts[:, None] * LOOKS_AT).astype(np.intp))
+    flat = fixes.attitudes[looks].reshape(-1, 9)
+    scaled = np.sqrt(3 * np.maximum(3 - flat @ flat.T, 0.0)) / REACH
+    mean = np.zeros((len(counts), len(looks)))
+    mean[fixes.fix[looks], np.arange(len(looks))] = 1.0
+    mean /= mean.sum(axis=1, keepdims=True)
+    return np.asarray(mean @ ((1 + scaled) * np.exp(-scaled)) @ mean.T, dtype=np.float64)
+
+
+def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
+    """Return the covariance (3n, 3n) of the increments by unit changes of F's elements with attitude.
+
+    `nearby` (n, n) is the correlation between the increments. Readings and reference may differ by a factor that
+    depends on where the body is: the sensor's nonlinearity, its sensitivity to gravity, gears.
+    """
+    flat = sensitivities[..., MATRIX].reshape(-1, 9)
+    return np.asarray((flat @ flat.T) * np.kron(nearby, np.ones((3, 3))), dtype=np.float64)
+
+
+def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array) -> Array:
+    """Return the covariance (3n, 3n) of the increments by unit changes of b with attitude and time.
+
+    `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times.
+    """
+    apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / INTERVALS + 1e-9)
+    flat = sensitivities[..., BIAS].reshape(-1, 3)
+    return np.asarray((flat @ flat.T) * np.kron((nearby + np.exp(-apart)) / 2, np.ones((3, 3))), dtype=np.float64)
+
+
+def _expand_axes(covariance: Array) -> Array:
+    """Return the covariance (3n, 3n) of n vectors whose components have `covariance` (n, n) each."""
+    return np.asarray(np.kron(covariance, np.eye(3)), dtype=np.float64)
+
+
+def _combine_blocks(step: Array, blocks: Array) -> Array:
+    """Return the covariance (3n, 3n) of increments by `step` (n, N) of vectors with covariances `blocks` (N, 3, 3)."""
+    spread = np.einsum("ik,kab,jk->iajb", step, blocks, step, optimize=True)
+    return np.asarray(spread.reshape(3 * len(step), -1), dtype=np.float64)

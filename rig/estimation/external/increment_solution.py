@@ -19,13 +19,22 @@ from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.external.attitude_drift import (
     BIAS,
+    BIAS_CHANGES,
     CLOCK,
     CLOCK_STD_S,
-    COMMON,
     EARTH,
     EARTH_PRECISION,
+    FIELD,
+    JITTER,
     MATRIX,
+    MATRIX_CHANGES,
+    MATRIX_PRECISION,
+    NEW_AT_REST,
+    NEW_IN_MOTION,
+    VISIT,
+    WALK,
     AttitudeSamples,
+    DriftModel,
     DriftState,
     Fixes,
     average_fixes,
@@ -33,21 +42,13 @@ from rig.estimation.external.attitude_drift import (
     find_inliers,
 )
 from rig.estimation.gyroscope.earth_rate import check_earth_seen
-from rig.estimation.statistics.variance_components import (
-    SPREAD,
-    Mixed,
-    MixedFit,
-    MixedModel,
-    VarianceComponents,
-    inflate_to_student,
-)
+from rig.estimation.statistics.variance_components import Mixed, MixedFit, MixedModel
 
 PASSES, SIZED = 12, 3  # iterations of the fit; those that estimate the variances
 SETTLED = 1e-2  # of the standard uncertainty
 OUTLIER, OUTLIER_RAD = 4.0, 1e-3  # an increment with errors above both is an outlier: ratio to the ninth decile; rad
 SOME_OUTLIERS, MOST_OUTLIERS, SETTINGS_ASIDE = 4, 0.1, 3  # outliers, at most, and their fraction; passes
 UNTRUSTWORTHY_RAD = 0.1  # larger errors: the attitudes are those of another body
-STATED_SPREAD = 1.0  # of the logarithm of a stated standard deviation
 MOST_CLOCK = 3.0  # prior standard deviations of a common clock's offset
 UNIDENTIFIED = 0.1  # standard deviation of an unidentified element of F
 LARGEST_STEP = 10.0  # of F: beyond, the fit diverges
@@ -111,14 +112,14 @@ class KnownIncrements:
         return len(self.aside_s)
 
 
-def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: Array) -> KnownIncrements:
-    """Solve readings (n, 3) in rad/s at times (n,), beginning at F = `start` (3, 3) and b = 0.
+def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: DriftState) -> KnownIncrements:
+    """Solve readings (n, 3) in rad/s at times (n,), beginning at `start`.
 
     Raise Fault `rank_deficient`, `ill_conditioned`, `attitude_untrustworthy`, `clocks_apart`, `wrong_unit`,
     `mirrored_axis`.
     """
     recorded = AttitudeSamples(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))
-    settled = _settle(recorded, DriftState(start, np.zeros(3), 0.0))
+    settled = _settle(recorded, start)
     for _ in range(SETTINGS_ASIDE):
         outliers = _find_outliers(settled)
         if not outliers.any() or outliers.sum() > _limit_outliers(fixes):
@@ -128,7 +129,9 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
         recorded = replace(recorded, fixes=replace(recorded.fixes, joined=joined))
         settled = _settle(recorded, settled.state)
     _check(fixes, recorded.fixes, settled)
-    return _summarise(settled, _times_s(fixes, fixes.joined & ~recorded.fixes.joined))
+    result = _summarise(settled, _times_s(fixes, fixes.joined & ~recorded.fixes.joined))
+    _check_identified(result.matrix, result.covariance)
+    return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,63 +139,43 @@ class _Settled:
     """The converged fit, its model and its variance components."""
 
     state: DriftState
+    causes: DriftModel
     model: MixedModel
-    sizes: VarianceComponents
+    std: Array
     solved: MixedFit
     iterations: int
 
 
 def _settle(recorded: AttitudeSamples, state: DriftState) -> _Settled:
     """Solve by Gauss–Newton; the variances are re-estimated in the first iterations only."""
-    sizes: VarianceComponents | None = None
+    std: Array | None = None
     for iteration in range(1, PASSES + 1):
         averaged = average_fixes(recorded, state)
         if iteration == 2:
             recorded = replace(recorded, kept=find_inliers(recorded, averaged))
             averaged = average_fixes(recorded, state)
-        model = MixedModel(drift_model(averaged, recorded.fixes))
+        causes = drift_model(averaged, recorded.fixes)
+        model = MixedModel(causes.mixed)
         if iteration == 1:
             conditioning = _conditioning(model.mixed)
             refusals.check_conditioning(conditioning, BIAS.stop, MAX_CONDITION, "some of F and bias", REMEDY)
-        if sizes is None or iteration <= SIZED:
-            sizes = model.estimate_components(*_find_priors(model, recorded.fixes), start=sizes)
-        solved = model.solve(sizes)
+        if std is None or iteration <= SIZED:
+            std = model.estimate(std)
+        solved = model.solve(std)
         if not np.linalg.norm(solved.theta[MATRIX]) < LARGEST_STEP:
             raise refusals.untrustworthy_attitudes(refusals.NO_FIT)
         state = state.after_step(solved.theta)
-        settled = _Settled(state, model, sizes, solved, iteration)
-        std = np.sqrt(np.diag(solved.covariance))[: CLOCK + 1]
-        if iteration > 2 and (np.abs(solved.theta[: CLOCK + 1]) < SETTLED * std).all():
+        settled = _Settled(state, causes, model, std, solved, iteration)
+        u = np.sqrt(np.diag(solved.covariance))[: CLOCK + 1]
+        if iteration > 2 and (np.abs(solved.theta[: CLOCK + 1]) < SETTLED * u).all():
             break
     return settled
 
 
-def _find_priors(model: MixedModel, fixes: Fixes) -> tuple[VarianceComponents, Array]:
-    """Return prior standard deviations that share the residuals evenly, and the stds of their logarithms.
-
-    If the reference's error is stated, that of a fix is about as large, or smaller by the mean over samples.
-    """
-    mixed = model.mixed
-    common = mixed.design[:, :, :COMMON].reshape(-1, COMMON)
-    flat = mixed.observed.reshape(-1)
-    residuals = flat - common @ np.linalg.lstsq(common, flat, rcond=None)[0]
-    rms = max(float(np.sqrt(np.mean(residuals**2))), 1e-9)
-    of_fix, of_walk = (float(np.sqrt(np.mean(np.diag(matrix)))) for matrix in (mixed.scattered, mixed.walked))
-    groups = (3e-4, 3e-4) if mixed.groups else ()
-    log_std = np.full(2 + len(groups), SPREAD)
-    fix_std = rms / of_fix
-    if fixes.std_rad is not None and fixes.std_rad.any():
-        samples = float(np.median(np.bincount(fixes.fix)))
-        fix_std = float(np.median(fixes.std_rad[fixes.std_rad > 0])) / samples**0.25
-        log_std[0] = STATED_SPREAD + np.log(samples) / 4
-    return VarianceComponents(fix_std, rms / of_walk, groups), log_std
-
-
 def _find_outliers(settled: _Settled) -> NDArray[np.bool_]:
-    """Return the increments (n,) far beyond the ninth decile of errors, a quantile that few outliers do not change."""
-    mixed, sizes = settled.model.mixed, settled.sizes
-    variances = sizes.scattered**2 * np.diag(mixed.scattered) + sizes.walked**2 * np.diag(mixed.walked)
-    errors, expected = np.abs(settled.solved.residuals).max(axis=1), np.sqrt(variances)
+    """Return the increments (n,) far beyond the ninth decile of errors, which few outliers cannot inflate."""
+    expected = np.sqrt(np.diag(settled.model.covariance(settled.std)).reshape(-1, 3).max(axis=1))
+    errors = np.abs(settled.solved.residuals.reshape(-1, 3)).max(axis=1)
     decile = float(np.quantile(errors / expected, 0.9))
     outliers: NDArray[np.bool_] = errors > np.maximum(OUTLIER * decile * expected, OUTLIER_RAD)
     return outliers
@@ -205,7 +188,7 @@ def _limit_outliers(fixes: Fixes) -> float:
 
 def _conditioning(mixed: Mixed) -> refusals.Conditioning:
     """Return the conditioning of the design with F and b scaled alike."""
-    columns = mixed.design[:, :, : BIAS.stop].reshape(-1, BIAS.stop)
+    columns = mixed.design[:, : BIAS.stop]
     sizes = [np.linalg.norm(columns[:, block]) for block in (MATRIX, BIAS)]
     return refusals.condition_of(columns / np.repeat(sizes, [9, 3]), BIAS.stop)
 
@@ -231,11 +214,25 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _Settled) -> None:
         raise refusals.untrustworthy_attitudes(
             f"{len(outliers)} of {fixes.joined.sum()} increments contradict all others, the first after {where_s:.2f} s"
         )
-    worst = float(np.sqrt(np.diag(settled.solved.covariance)[MATRIX].max()))
-    if worst > UNIDENTIFIED:
-        raise Fault("ill_conditioned", f"an element of F is only known to {worst:.2g}", REMEDY)
+    _check_identified(settled.state.matrix, settled.solved.covariance)
     refusals.check_unit(scale_of(settled.state.matrix))
     refusals.check_handedness(settled.state.matrix)
+
+
+def _check_identified(matrix: Array, covariance: Array) -> None:
+    """Raise Fault `ill_conditioned` if the body hardly turned about an axis, with what its turns about others tell."""
+    std = np.sqrt(np.diag(covariance)[MATRIX]).reshape(3, 3).max(axis=0)
+    unknown = std > UNIDENTIFIED
+    if not unknown.any():
+        return
+    names = " and ".join("xyz"[axis] for axis in np.flatnonzero(unknown))
+    sizes = np.linalg.norm(matrix, axis=0)
+    identified = "; ".join(
+        f"a turn about {'xyz'[axis]} reads {sizes[axis]:.4g} ± {2 * std[axis]:.1g} times as large"
+        for axis in np.flatnonzero(~unknown)
+    )
+    what = f"the body hardly turned about {names}: what the sensor reads of it is only known to {std.max():.2g}"
+    raise Fault("ill_conditioned", f"{what}{f'; {identified}' if identified else ''}", REMEDY)
 
 
 def _times_s(fixes: Fixes, increments: NDArray[np.bool_]) -> Array:
@@ -246,51 +243,53 @@ def _times_s(fixes: Fixes, increments: NDArray[np.bool_]) -> Array:
 
 def _summarise(settled: _Settled, aside_s: Array) -> KnownIncrements:
     """Return the result of a converged fit; the bias is the mean over this recording's intervals."""
-    solved, sizes, state = settled.solved, settled.sizes, settled.state
-    # The matrix is that of any recording, the bias the mean over this one.
-    intervals = (len(solved.theta) - COMMON) // 12
-    combinations = np.eye(len(solved.theta))[np.r_[MATRIX, EARTH, BIAS]]
-    for interval in range(intervals):
-        combinations[12:, COMMON + 12 * interval :][:, BIAS] = np.eye(3) / intervals
-    residual_dof = solved.residuals.size - BIAS.stop - 1  # less F, b and the clock
-    dof = np.minimum(settled.model.dof(sizes, combinations), residual_dof)
-    causes = {
-        name: inflate_to_student(combinations @ cause @ combinations.T, dof) for name, cause in _causes(settled).items()
-    }
+    solved, state = settled.solved, settled.state
+    wanted = np.eye(len(solved.theta))[np.r_[MATRIX, EARTH, BIAS]]
+    half_width = settled.model.expand(settled.std, wanted)
+    ratio = half_width / (2 * np.sqrt(np.einsum("qi,ij,qj->q", wanted, solved.covariance, wanted)))
+    causes = {name: wanted @ cause @ wanted.T * ratio[:, None] * ratio for name, cause in _causes(settled).items()}
+    sizes = partial(settled.causes.std_of, std=settled.std)
     return KnownIncrements(
         matrix=state.matrix,
-        bias=state.bias + combinations[12:, COMMON:] @ solved.theta[COMMON:],
+        bias=state.bias,
         covariance=np.sum(list(causes.values()), axis=0),
         causes=causes,
         earth=_earth(solved.theta[EARTH], solved.covariance[EARTH, EARTH]),
         clock_s=state.clock_s,
         clock_std_s=float(np.sqrt(solved.covariance[CLOCK, CLOCK])),
-        fix_std_rad=sizes.scattered,
-        random_walk_rad_sqrt_s=sizes.walked,
-        matrix_scatter=sizes.groups[0] if sizes.groups else 0.0,
-        bias_scatter_rad_s=sizes.groups[1] if sizes.groups else 0.0,
-        residuals_rad=solved.residuals,
+        fix_std_rad=float(np.sqrt(sum(sizes(cause) ** 2 for cause in (FIELD, VISIT, NEW_IN_MOTION)))),
+        random_walk_rad_sqrt_s=sizes(WALK),
+        matrix_scatter=sizes(MATRIX_CHANGES),
+        bias_scatter_rad_s=sizes(BIAS_CHANGES),
+        residuals_rad=solved.residuals.reshape(-1, 3),
         aside_s=aside_s,
         condition=_conditioning(settled.model.mixed).condition,
         iterations=settled.iterations,
     )
 
 
+OF_CAUSES = {
+    ATTITUDES: (FIELD, VISIT, NEW_AT_REST, NEW_IN_MOTION),
+    DELAY: (JITTER,),
+    STRETCHES: (MATRIX_CHANGES, BIAS_CHANGES),
+    NOISE: (WALK,),
+}
+
+
 def _causes(settled: _Settled) -> dict[str, Array]:
     """Return the parts of θ's covariance by the estimated errors and by the priors of θ itself."""
     covariance = settled.solved.covariance
-    attitudes, noise = settled.model.causes(settled.sizes, covariance)
-    precision = np.zeros(len(covariance))
-    precision[CLOCK], precision[EARTH] = CLOCK_STD_S**-2.0, EARTH_PRECISION
-    for group, size in zip(settled.model.mixed.groups, settled.sizes.groups, strict=True):
-        precision[group] = size**-2.0
-    return {
-        NOISE: noise,
-        ATTITUDES: attitudes,
-        DELAY: np.outer(covariance[CLOCK], covariance[CLOCK]) * precision[CLOCK],
-        EARTHS_RATE: covariance[:, EARTH] * precision[EARTH] @ covariance[EARTH],
-        STRETCHES: covariance[:, COMMON:] * precision[COMMON:] @ covariance[COMMON:],
+    blind, *parts, _ = settled.model.causes(settled.std, settled.solved)
+    by_cause = dict(zip(settled.causes.causes, parts, strict=True))
+    nothing = np.zeros_like(covariance)
+    causes = {
+        name: np.sum([by_cause.get(cause, nothing) for cause in group], axis=0) for name, group in OF_CAUSES.items()
     }
+    causes[NOISE] = causes[NOISE] + blind
+    causes[DELAY] = causes[DELAY] + np.outer(covariance[CLOCK], covariance[CLOCK]) * CLOCK_STD_S**-2.0
+    causes[ATTITUDES] = causes[ATTITUDES] + covariance[:, MATRIX] * MATRIX_PRECISION @ covariance[MATRIX]
+    causes[EARTHS_RATE] = covariance[:, EARTH] * EARTH_PRECISION @ covariance[EARTH]
+    return causes
 
 
 def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:

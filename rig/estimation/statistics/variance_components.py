@@ -1,60 +1,50 @@
 """A linear fit with variance components estimated from its residuals: restricted maximum likelihood of a mixed model.
 
-    y = X θ + e,   cov e = (δ² A + σ² B) ⊗ 1₃,   θ_g ~ N(0, ψ_g²) for groups g of the columns
+    y = X θ + e,   cov e = C₀ + Σ σ_k² A_k
 
-y are n vectors in space, A and B the covariances by two causes of error, isotropic each. The standard deviations δ, σ,
-ψ maximise the likelihood of y with θ integrated out (Patterson and Thompson, Biometrika 58 (1971) 545; Harville, J. Am.
-Stat. Assoc. 72 (1977) 320). One generalised eigendecomposition diagonalises A and B together, so that a trial of other
-values only weights the rows.
+The standard deviations σ_k have the likelihood of y with θ integrated out (Patterson and Thompson, Biometrika 58 (1971)
+545; Harville, J. Am. Stat. Assoc. 72 (1977) 320) and half-Cauchy priors (Gelman, Bayesian Analysis 1 (2006) 515). A few
+residuals hardly determine them, so the uncertainty of θ is that over all σ_k, each as likely as the data make it: by
+adaptive importance sampling (JCGM 101, 6.4.9).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.estimation.arrays import Array
-from rig.estimation.statistics.coverage import COVERAGE_FACTOR, coverage_factors
+from rig.estimation.arrays import Array, bisect
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR, PROBABILITY
 
-SPREAD = 4.0  # prior std of ln size: a factor of 50 either way
-STEP = 0.25  # of ln size, for numerical derivatives
-TRIALS = 300
-FEWEST_FREEDOM = 3.0  # below, Student's t hardly has a variance
+DRAWS, ROUNDS, TAILS = 40, 3, 5.0  # samples of a round of importance sampling; dof of the t that proposes them
+FLOOR, LEAST_POWER = 0.02, 0.05  # of the variance of a proposal; of the power that evens out weights
+STEP = 0.1  # of ln σ, for the curvature at the maximum
+LEAST_CURVATURE = 0.1  # of the negative log-posterior over (ln σ)²: the priors have about this themselves
+RANGE = 30.0  # of ln σ about its prior scale, either way
+TOLERANCE = 1e-3  # of the log-posterior
+MOST_STEPS = 60
 
 
 @dataclass(frozen=True, slots=True)
 class Mixed:
-    """`observed` (n, 3), `design` (n, 3, p), A `scattered` and B `walked` (n, n), B positive definite.
+    """`observed` (m,), `design` (m, p), C₀ `fixed` (m, m) and A_k `components` (k, m, m).
 
-    `precision` (p,): the prior precision of each column's coefficient, 0 if none; `groups` of columns whose
-    coefficients have a common prior of unknown variance.
+    `precision` (p,): the prior precision of each column's coefficient, 0 if none. `scales` (k,): the medians of the
+    half-Cauchy priors of σ.
     """
 
     observed: Array
     design: Array
-    scattered: Array
-    walked: Array
+    fixed: Array
+    components: Array
     precision: Array
-    groups: tuple[NDArray[np.intp], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class VarianceComponents:
-    """The standard deviations δ, σ, and ψ of every group."""
-
-    scattered: float
-    walked: float
-    groups: tuple[float, ...]
-
-    def logarithms(self) -> Array:
-        """Return the logarithms (2 + groups,) of the standard deviations."""
-        return np.asarray(np.log([self.scattered, self.walked, *self.groups]), dtype=np.float64)
+    scales: Array
 
 
 @dataclass(frozen=True, slots=True)
 class MixedFit:
-    """θ (p,) with its `covariance` (p, p), the log-likelihood, and `residuals` (n, 3)."""
+    """θ (p,) with its `covariance` (p, p), the log-likelihood, and `residuals` (m,)."""
 
     theta: Array
     covariance: Array
@@ -63,136 +53,179 @@ class MixedFit:
 
 
 class MixedModel:
-    """A `Mixed` with A and B diagonalised."""
+    """A `Mixed` with its likelihood."""
 
     def __init__(self, mixed: Mixed) -> None:
-        from scipy.linalg import eigh
-
         self.mixed = mixed
-        spread, rotation = eigh(mixed.scattered, mixed.walked)
-        self._spread = np.maximum(spread, 0.0)  # of A, if B is the identity
-        count, _, columns = mixed.design.shape
-        self._design = (rotation.T @ mixed.design.reshape(count, -1)).reshape(count, 3, columns)
-        self._observed = rotation.T @ mixed.observed
+        self._flat = mixed.components.reshape(len(mixed.components), -1)
 
-    def solve(self, sizes: VarianceComponents) -> MixedFit:
-        """Return θ for given variance components."""
-        theta, covariance, likelihood = self._fit(sizes)
+    def covariance(self, std: Array) -> Array:
+        """Return the covariance (m, m) of the errors for standard deviations (k,)."""
+        total: Array = self.mixed.fixed + (np.square(std) @ self._flat).reshape(self.mixed.fixed.shape)
+        return total
+
+    def solve(self, std: Array) -> MixedFit:
+        """Return θ for given standard deviations (k,). Raise LinAlgError if the equations are singular."""
+        _, design, observed, information, likelihood = self._whiten(std)
+        covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+        theta = covariance @ (design.T @ observed)
         return MixedFit(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
 
-    def causes(self, sizes: VarianceComponents, covariance: Array) -> tuple[Array, Array]:
-        """Return the parts of θ's `covariance` (p, p) by δ and by σ; the remainder is due to the prior of θ."""
-        variances = sizes.scattered**2 * self._spread + sizes.walked**2
-        columns = self._design.shape[2]
-
-        def propagate(part: Array) -> Array:
-            design = (self._design * (np.sqrt(part) / variances)[:, None, None]).reshape(-1, columns)
-            effect = covariance @ design.T
-            return np.asarray(effect @ effect.T, dtype=np.float64)
-
-        return propagate(sizes.scattered**2 * self._spread), propagate(np.full_like(variances, sizes.walked**2))
-
-    def dof(self, sizes: VarianceComponents, wanted: Array) -> Array:
-        """Return the degrees of freedom (q,) of the variances of `wanted` (q, p) combinations of θ.
-
-        ½ (u/Δu)² of JCGM 100, G.4.2, with Δu from the curvature of the log-likelihood at its maximum (Satterthwaite):
-        variance components by few residuals are themselves uncertain.
-        """
-        middle = sizes.logarithms()
-        steps = STEP * np.eye(len(middle))
-
-        def evaluate(logarithms: Array) -> tuple[float, Array]:
-            _, covariance, likelihood = self._fit(_sizes(logarithms))
-            return likelihood, np.log(np.einsum("qi,ij,qj->q", wanted, covariance, wanted))
-
-        neighbours = [[evaluate(middle + sign * step) for sign in (1, -1)] for step in steps]
-        slopes = np.array([(up[1] - down[1]) / (2 * STEP) for up, down in neighbours])
-        curvature = np.eye(len(middle)) / SPREAD**2
-        top = evaluate(middle)[0]
-        for i, (up, down) in enumerate(neighbours):
-            curvature[i, i] -= (up[0] + down[0] - 2 * top) / STEP**2
-            for j in range(i):
-                corners = [evaluate(middle + a * steps[i] + b * steps[j])[0] * a * b for a in (1, -1) for b in (1, -1)]
-                curvature[i, j] = curvature[j, i] = curvature[i, j] - sum(corners) / (4 * STEP**2)
-        values, directions = np.linalg.eigh(curvature)
-        variances = (directions.T @ slopes) ** 2 / np.maximum(values, SPREAD**-2)[:, None]
-        dof: Array = 2 / np.maximum(variances.sum(axis=0), 1e-9)
-        return dof
-
-    def estimate_components(
-        self, expected: VarianceComponents, spread: Array | float = SPREAD, start: VarianceComponents | None = None
-    ) -> VarianceComponents:
-        """Return the variance components of maximum posterior probability, with log-normal priors about `expected`.
-
-        `spread` is the prior standard deviation of their logarithms; `start` is the first iterate, if not `expected`.
-        """
+    def estimate(self, start: Array | None = None) -> Array:
+        """Return the standard deviations (k,) of maximum posterior probability."""
         from scipy.optimize import minimize
 
-        middle = expected.logarithms()
-        begin, reach = (middle, 1.5) if start is None else (start.logarithms(), 0.3)
-
-        def negative_log_posterior(logarithms: Array) -> float:
-            penalty = float(np.sum(((logarithms - middle) / spread) ** 2)) / 2
-            try:
-                return penalty - self._factorise(_sizes(logarithms))[2]
-            except np.linalg.LinAlgError:  # ratios so large that rounding dominates
-                return float("inf")
-
-        simplex = np.vstack([begin, begin + reach * np.eye(len(begin)) * np.where(np.arange(len(begin)) % 2, 1, -1)])
+        middle = np.log(self.mixed.scales)
         optimum = minimize(
-            negative_log_posterior,
-            begin,
-            method="Nelder-Mead",
-            options={"maxfev": TRIALS, "xatol": 0.05, "fatol": 0.02, "initial_simplex": simplex},
+            self._evaluate,
+            middle if start is None else np.log(start),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[(value - RANGE, value + RANGE) for value in middle],
+            options={"ftol": 1e-7, "gtol": 1e-2, "maxiter": MOST_STEPS},
         )
-        return _sizes(np.asarray(optimum.x, dtype=np.float64))
+        return np.asarray(np.exp(optimum.x), dtype=np.float64)
 
-    def _fit(self, sizes: VarianceComponents) -> tuple[Array, Array, float]:
-        """Return θ (p,), its covariance (p, p) and the log-likelihood."""
-        lower, projection, likelihood = self._factorise(sizes)
-        inverse = np.linalg.inv(lower)
-        return inverse.T @ projection, inverse.T @ inverse, likelihood
+    def causes(self, std: Array, fit: MixedFit) -> list[Array]:
+        """Return the parts (p, p) of θ's covariance by C₀, each component, and the prior of θ."""
+        from scipy.linalg import cho_factor, cho_solve
 
-    def _factorise(self, sizes: VarianceComponents) -> tuple[Array, Array, float]:
-        """Return L (p, p) of the information L Lᵀ, L⁻¹ Xᵀ y (p,), both of whitened rows, and the log-likelihood."""
+        factor = cho_factor(self.covariance(std), lower=True)
+        weights = cho_solve(factor, self.mixed.design) @ fit.covariance
+        parts = [self.mixed.fixed, *(np.square(std)[:, None, None] * self.mixed.components)]
+        return [
+            *(weights.T @ part @ weights for part in parts),
+            fit.covariance * self.mixed.precision @ fit.covariance,
+        ]
+
+    def expand(self, std: Array, wanted: Array) -> Array:
+        """Return the half-widths (q,) of 95.45 % intervals of `wanted` (q, p) combinations of θ about their estimates.
+
+        The estimates are those for `std` (k,), the intervals those over all standard deviations.
+        """
+        top = wanted @ self.solve(std).theta
+        offsets, variances = [], []
+
+        def evaluate(logarithms: Array) -> float:
+            try:
+                fit = self.solve(np.exp(logarithms))
+            except np.linalg.LinAlgError:
+                offsets.append(np.zeros_like(top))
+                variances.append(np.ones_like(top))
+                return -np.inf
+            offsets.append(wanted @ fit.theta - top)
+            variances.append(np.einsum("qi,ij,qj->q", wanted, fit.covariance, wanted))
+            return fit.likelihood + self._log_prior(logarithms)
+
+        middle = np.log(std)
+        weights = sample_adaptively(evaluate, middle, self._curvature(middle))
+        return _find_half_width(np.array(offsets), np.array(variances), weights)
+
+    def _whiten(self, std: Array) -> tuple[Array, Array, Array, Array, float]:
+        """Return L of the covariance L Lᵀ, the whitened design and observed, the information, the log-likelihood."""
         from scipy.linalg import solve_triangular
 
-        columns = self._design.shape[2]
-        variances = sizes.scattered**2 * self._spread + sizes.walked**2
-        weights = 1 / np.sqrt(variances)[:, None]
-        design = (self._design * weights[..., None]).reshape(-1, columns)
-        observed = (self._observed * weights).reshape(-1)
-        precision = self.mixed.precision.copy()
-        log_prior = 0.0
-        for group, size in zip(self.mixed.groups, sizes.groups, strict=True):
-            precision[group] = size**-2.0
-            log_prior -= 2 * len(group) * np.log(size)
-        information = design.T @ design + np.diag(precision)
+        mixed = self.mixed
+        lower = np.asarray(np.linalg.cholesky(self.covariance(std)), dtype=np.float64)
+        both = solve_triangular(lower, np.column_stack([mixed.design, mixed.observed]), lower=True, check_finite=False)
+        design, observed = both[:, :-1], both[:, -1]
+        information = design.T @ design + np.diag(mixed.precision)
         unit = 1 / np.sqrt(np.diag(information))
-        lower = np.linalg.cholesky(information * unit[:, None] * unit) / unit[:, None]
-        projection = solve_triangular(lower, observed @ design, lower=True, check_finite=False)
+        small = np.linalg.cholesky(information * unit[:, None] * unit)
+        projection = solve_triangular(small, unit * (design.T @ observed), lower=True, check_finite=False)
+        determinant = 2 * float(np.sum(np.log(np.diag(lower)))) + 2 * float(np.sum(np.log(np.diag(small) / unit)))
         square = float(observed @ observed - projection @ projection)
-        determinant = 2 * float(np.sum(np.log(np.diag(lower))))
-        return (
-            lower,
-            projection,
-            -0.5 * (3 * float(np.sum(np.log(variances))) + determinant - log_prior + square),
-        )
+        return lower, design, observed, information, -0.5 * (determinant + square)
+
+    def _log_prior(self, logarithms: Array) -> float:
+        """Return the log-density of ln σ for half-Cauchy σ, but for a constant."""
+        relative = logarithms - np.log(self.mixed.scales)
+        return float(np.sum(relative - np.logaddexp(0, 2 * relative)))
+
+    def _evaluate(self, logarithms: Array) -> tuple[float, Array]:
+        """Return the negative log-posterior of ln σ (k,) and its gradient."""
+        from scipy.linalg import cho_solve
+
+        std = np.exp(logarithms)
+        try:
+            lower, _, _, information, likelihood = self._whiten(std)
+        except np.linalg.LinAlgError:  # ratios so large that rounding dominates
+            return 1e30, np.zeros(len(std))
+        inverse = cho_solve((lower, True), np.eye(len(lower)), check_finite=False)
+        weighted = inverse @ self.mixed.design
+        projected = inverse - weighted @ np.linalg.solve(information, weighted.T)
+        innovation = projected @ self.mixed.observed
+        change = projected - np.outer(innovation, innovation)
+        relative = logarithms - np.log(self.mixed.scales)
+        gradient = np.square(std) * (self._flat @ change.ravel()) - (1 - 2 / (1 + np.exp(-2 * relative)))
+        return -likelihood - self._log_prior(logarithms), np.asarray(gradient, dtype=np.float64)
+
+    def _curvature(self, logarithms: Array) -> Array:
+        """Return the curvature (k, k) of the negative log-posterior."""
+        steps = STEP * np.eye(len(logarithms))
+        rows = [
+            (self._evaluate(logarithms + step)[1] - self._evaluate(logarithms - step)[1]) / (2 * STEP) for step in steps
+        ]
+        return np.asarray((np.array(rows) + np.array(rows).T) / 2, dtype=np.float64)
 
 
-def inflate_to_student(covariance: Array, dof: Array) -> Array:
-    """Return a covariance (q, q) inflated to that of Student's t of `dof` (q,), so that two stds contain 95 %.
+def sample_adaptively(log_density: Callable[[Array], float], middle: Array, curvature: Array) -> Array:
+    """Return the weights (s,) of samples at which a log-density of k variables is called, in this order.
 
-    The variance of t is ν/(ν − 2), and infinite below ν = 2: there t's coverage factor is used (JCGM 100, G.3).
+    Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798): each round proposes by
+    Student's t with the mean and the covariance of all samples before, begun by those at the maximum.
     """
-    bounded = np.maximum(dof, FEWEST_FREEDOM)
-    by_coverage = coverage_factors(np.clip(dof, 1.0, FEWEST_FREEDOM)) / COVERAGE_FACTOR
-    ratio = np.where(dof >= FEWEST_FREEDOM, np.sqrt(bounded / (bounded - 2)), by_coverage)
-    inflated: Array = covariance * ratio[:, None] * ratio
-    return inflated
+    rng = np.random.default_rng(0)
+    values, directions = np.linalg.eigh(curvature)
+    root, size = directions / np.sqrt(np.maximum(values, LEAST_CURVATURE)), len(middle)
+    proposals: list[tuple[Array, Array]] = []
+    points, logs = np.zeros((0, size)), np.zeros(0)
+    for _ in range(ROUNDS):
+        proposals.append((middle, root))
+        normal = rng.standard_normal((DRAWS // 2, size)) * np.sqrt(TAILS / rng.chisquare(TAILS, size=(DRAWS // 2, 1)))
+        drawn = middle + np.concatenate([normal, -normal]) @ root.T
+        points = np.concatenate([points, drawn])
+        logs = np.concatenate([logs, [log_density(point) for point in drawn]])
+        weights = _find_weights(points, logs, proposals)
+        tempered = _temper(weights, 2 * size)
+        middle = tempered @ points
+        deviations = points - middle
+        spread = (deviations * tempered[:, None]).T @ deviations + FLOOR * np.eye(size)
+        root = np.linalg.cholesky(spread)
+    return _temper(weights, size)
 
 
-def _sizes(logarithms: Sequence[float] | Array) -> VarianceComponents:
-    """Return the variance components by their logarithms."""
-    first, second, *groups = np.exp(np.clip(logarithms, -60, 30)).tolist()
-    return VarianceComponents(first, second, tuple(groups))
+def _find_weights(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]]) -> Array:
+    """Return the normalised weights (s,) of samples (s, k), each drawn by one of the proposals."""
+    densities = []
+    for middle, root in proposals:
+        standard = np.linalg.solve(root, (points - middle).T)
+        squares = np.sum(standard**2, axis=0)
+        tail = (TAILS + len(middle)) / 2
+        densities.append(-np.linalg.slogdet(root)[1] - tail * np.log1p(squares / TAILS))
+    weights = logs - np.logaddexp.reduce(densities, axis=0)
+    weights = np.exp(weights - weights.max())
+    return np.asarray(weights / weights.sum(), dtype=np.float64)
+
+
+def _temper(weights: Array, fewest: float) -> Array:
+    """Return weights (s,) to a power of at most one, so that as many samples count as `fewest`."""
+    power = 1.0
+    tempered = weights
+    while 1 / float(np.sum(tempered**2)) < fewest and power > LEAST_POWER:
+        power *= 0.8
+        tempered = weights**power / np.sum(weights**power)
+    return tempered
+
+
+def _find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
+    """Return h (q,) so that a mixture of normals (s, q) with `weights` (s,) is within ± h with 95.45 % probability."""
+    from scipy.special import ndtr
+
+    std = np.sqrt(variances)
+
+    def is_too_small(half: Array) -> NDArray[np.bool_]:
+        within = ndtr((half - offsets) / std) - ndtr((-half - offsets) / std)
+        return np.asarray(weights @ within < PROBABILITY)
+
+    return bisect(is_too_small, COVERAGE_FACTOR * 20 * (std + np.abs(offsets)).max(axis=0))

@@ -32,22 +32,21 @@ from rig.observation.external.csv_windows import (
     MIN_SAMPLES,
     check_complete,
     check_overlap,
-    check_scattered,
     clocks_apart,
     find_overlap,
     is_complete,
     scatter_of,
 )
-from rig.observation.external.fixes import Turning
 from rig.observation.external.omission import Omitted
 from rig.observation.external.placement_account import AttitudeRows
 from rig.observation.external.placements import MOSTLY, Placements, find_placements
-from rig.observation.external.table_motion import TableMotion
+from rig.observation.external.reference_clock import find_reference_clock
+from rig.observation.external.reference_rows import Turning
 from rig.observation.formats.column_selection import Mapped
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import attitudes_in, rows_around
 from rig.observation.time_stamps.sampling import find_sampling
-from rig.observation.timebase import TimeBase, estimate_time_base
+from rig.observation.timebase import TimeBase
 from rig.observation.windows import Window, inside
 
 RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
@@ -134,7 +133,7 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
 
     With `find_clock` each file has its own clock; rows that no sample covers are left out. Raise Refused
     `bad_quaternion`, `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`,
-    `too_few_observations`, and with `find_clock` as `TableMotion` and `estimate_time_base`.
+    `too_few_observations`, and with `find_clock` as `find_reference_clock`.
     """
     time_s, readings = samples.time_s, samples.readings
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
@@ -145,8 +144,8 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     clock = None
     if find_clock:
         _check_has_rates(readings)
-        clock = estimate_time_base(
-            time_s, readings[RATE], TableMotion(rows_found.rows_s.mean(axis=1), rows_found.attitudes, rates)
+        clock = find_reference_clock(
+            Turning(time_s, readings[RATE], rows_found.rows_s, rows_found.attitudes, rows_found.std_rad), rates
         )
         time_s = clock.controller_time_s(time_s)
         rows_found = rows_found.select(np.flatnonzero(_within(rows_found.rows_s, time_s)))
@@ -154,7 +153,6 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
         raise clocks_apart(time_s, windows)
     check_overlap(time_s, rows_found.windows)
     sampling = find_sampling(time_s)
-    check_scattered(sampling)
     expected = sampling.count_expected(time_s, rows_found.rows_s)
     counts = np.diff(np.searchsorted(time_s, rows_found.rows_s), axis=1)[:, 0]
     mostly = (counts > 0) & (counts >= MOSTLY * expected - 1)

@@ -8,7 +8,7 @@ import numpy as np
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.observation.by_hand.rests import find_rests
-from rig.observation.external.fixes import Turning
+from rig.observation.external.reference_rows import Turning
 from rig.observation.external.still_attitudes import STILL_RAD_S, still_windows
 from rig.observation.windows import Window, inside
 

@@ -4,12 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import Fault
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.cubic_spline import CubicSpline
 from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, closely_followed
 
-MAX_STEP_S = 0.05  # between rows that still show how the table turned
+MAX_STEP_S, MAX_STEP_RAD = 0.3, 2.6  # between rows that still show how the table turned: below half a turn
 MIN_ROWS = 20
+UNEVEN, EVEN_S = 0.2, 0.05  # of the median step: stamps whose errors matter in a rate; rows for which they do not
 
 
 class TableMotion:
@@ -21,16 +22,20 @@ class TableMotion:
 
     def __init__(self, middles_s: Array, attitudes: Array, rates_rad_s: Array | None) -> None:
         order = np.argsort(middles_s)
+        if rates_rad_s is None:
+            order = order[_thin(middles_s[order])]
         self.time_s = middles_s[order]
-        close = np.diff(self.time_s) <= MAX_STEP_S
+        turned = rotation_vectors(np.swapaxes(attitudes[order[:-1]], -1, -2) @ attitudes[order[1:]])
+        close = (np.diff(self.time_s) <= MAX_STEP_S) & (np.linalg.norm(turned, axis=1) < MAX_STEP_RAD)
         if close.sum() < MIN_ROWS:
             raise _not_found(
-                f"of {len(close) + 1} rows {int(close.sum())} follow another within {MAX_STEP_S:g} s: they do not show "
-                "how the table turned"
+                f"of {len(close) + 1} rows {int(close.sum())} follow another within {MAX_STEP_S:g} s and less than "
+                "half a turn: they do not show how the table turned"
             )
         self._close = close
         if rates_rad_s is None:
-            between_s, rates = _differentiate(self.time_s, attitudes[order])
+            interval_s = np.diff(self.time_s)
+            between_s, rates = self.time_s[:-1] + interval_s / 2, turned / interval_s[:, None]
             self._rate = CubicSpline(between_s, rates)
         else:
             rates = rates_rad_s[order]
@@ -48,19 +53,23 @@ class TableMotion:
         return closely_followed(self.time_s, self._close, time_s)
 
 
-def _differentiate(time_s: Array, attitudes: Array) -> tuple[Array, Array]:
-    """Return mean rates (n − 1, 3) in body coordinates from each row to the next, and the times (n − 1,) between."""
-    from scipy.spatial.transform import Rotation
-
-    rotations = Rotation.from_matrix(attitudes)
-    steps = (rotations[:-1].inv() * rotations[1:]).as_rotvec()
-    interval_s = np.diff(time_s)
-    return time_s[:-1] + interval_s / 2, steps / interval_s[:, None]
+def _thin(time_s: Array) -> NDArray[np.intp]:
+    """Return rows, by rising times (n,), far enough apart that their stamps' errors hardly change a rate."""
+    steps_s = np.diff(time_s)
+    median_s = float(np.median(steps_s)) if len(steps_s) else 0.0
+    if median_s >= EVEN_S or not len(steps_s) or np.abs(steps_s - median_s).mean() <= UNEVEN * median_s:
+        return np.arange(len(time_s))
+    kept, last_s = [], -np.inf
+    for row, row_s in enumerate(time_s.tolist()):
+        if row_s - last_s >= EVEN_S:
+            kept.append(row)
+            last_s = row_s
+    return np.array(kept)
 
 
 def _not_found(what: str) -> Fault:
     return Fault(
         "time_base_not_found",
         f"{what}, and the sensor cannot be put on its clock",
-        "Let the table write a row every twentieth of a second or more often while it turns, or use one clock",
+        "Let the table write a row every quarter of a second or more often while it turns, or use one clock",
     )

@@ -17,7 +17,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.external.increment_solution import KnownIncrements
 from rig.estimation.reference.reference_budget import scale_and_bias_covariance
-from rig.observation.external.fixes import Turning
+from rig.observation.external.reference_rows import Turning
 from support.external.followed_body import EARTH_RAD_S, Followed, World, follow, turning, write
 from support.external.real import recording
 

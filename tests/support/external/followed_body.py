@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from rig.estimation.arrays import Array
-from rig.observation.external.fixes import Turning
+from rig.observation.external.reference_rows import Turning
 from support.external.csv_tables import write_table
 
 AT_REST = 0.02

@@ -1,0 +1,67 @@
+"""The attitude on which a scale factor hangs: without it nothing tells the scale, so nothing contradicts its error.
+
+Repeated rests in one attitude agree whatever its error, which is the same each time. They show that placements repeat,
+and not that an attitude is right.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.estimation.arrays import Array
+from rig.estimation.reference.attitude_error import Placed, effects, find_whiteners
+from rig.estimation.reference.reference_model import REFERENCE, F, weighted_jacobian
+from rig.estimation.reference.reference_model import free_directions as directions
+
+NEAR_RAD = 0.2  # between the directions of the reference in the body: one attitude, for the reading
+USUAL_RAD = 0.02  # error of an attitude about each axis: of an arm or a table by hand
+UNDETERMINED = 0.1  # standard deviation of a scale factor
+SMALLEST = 1e-9  # of the information: nothing
+
+
+def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:
+    """Return the axis and the placement on which its scale hangs; None if there is none, or nothing is repeated.
+
+    `theta` (p,) is the solution, in SI units and scaled about 1.
+    """
+    size = np.linalg.norm(theta[REFERENCE])
+    verticals = np.einsum("nji,j->ni", placed.attitudes, theta[REFERENCE] / size)
+    group = _group(verticals)
+    if group.max() + 1 == len(group):
+        return None
+    whiteners = find_whiteners(placed.variances, effects(theta, placed.attitudes, placed.v_bar),
+                               np.hypot(placed.attitude_std_rad, USUAL_RAD))  # fmt: skip
+    rows = weighted_jacobian(theta, placed.attitudes, placed.v_bar, whiteners, norm_known=placed.norm_known)
+    rows = rows.reshape(len(verticals), 3, -1)
+    free = directions(theta, norm_known=placed.norm_known)
+    matrix = theta[F].reshape(3, 3)
+    slopes = np.zeros((3, len(theta)))
+    for axis in range(3):
+        slopes[axis, 3 * axis : 3 * axis + 3] = matrix[axis] / np.linalg.norm(matrix[axis]) ** 2
+    wanted = slopes @ free
+    usual = _find_std(rows, wanted)
+    for number in np.flatnonzero(np.bincount(group) == 1).tolist():
+        without = _find_std(rows[group != number], wanted)
+        hanging = np.flatnonzero((without > UNDETERMINED) & (usual <= UNDETERMINED))
+        if len(hanging):
+            return int(hanging[0]), int(np.flatnonzero(group == number)[0])
+    return None
+
+
+def _group(verticals: Array) -> NDArray[np.intp]:
+    """Return the group (N,) of each direction (N, 3) with those near the first of it."""
+    group = np.full(len(verticals), -1, dtype=np.intp)
+    for first in range(len(verticals)):
+        if group[first] < 0:
+            near = (verticals @ verticals[first] > np.cos(NEAR_RAD)) & (group < 0)
+            group[near] = group.max() + 1
+    return group
+
+
+def _find_std(rows: Array, wanted: Array) -> Array:
+    """Return the standard deviations (k,) of combinations `wanted` (k, q) by whitened rows (N, 3, q)."""
+    flat = rows.reshape(-1, rows.shape[-1])
+    scale = np.linalg.norm(flat, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh((flat / scale).T @ (flat / scale))
+    spread = (wanted / scale) @ vectors
+    return np.asarray(np.sqrt(np.sum(spread**2 / np.maximum(values, SMALLEST), axis=1)), dtype=np.float64)

@@ -1,0 +1,73 @@
+"""The offset of a reference's clock against that of the readings, from the rotation that both show.
+
+The rates of densely written, evenly stamped rows determine offset and drift to a fraction of a millisecond
+(`rig.observation.timebase`). Reports that come slowly, or are stamped on arrival, have no such rates: a drift that is
+fitted to them is that of their stamps' errors. Their offset is that of the least absolute deviations between the
+rotations from row to row (`robust_start`), without drift.
+"""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from rig.errors import Fault, or_fault
+from rig.estimation.arrays import Array
+from rig.estimation.refusals import report_inverted
+from rig.observation.external.reference_rows import Turning, select_covered
+from rig.observation.external.robust_start import COARSE_S, find_start
+from rig.observation.external.table_motion import TableMotion
+from rig.observation.timebase import TimeBase, estimate_coarse_offset, estimate_time_base
+
+CLEARER = 0.9  # of what is unexplained without drift: more than that tells no drift
+CRYSTALS = 1e-4  # standard deviation of the drift between two crystals
+DOUBTFUL = 0.1  # unexplained: the rows may be inverse rotations
+EXPLAINED = 0.3  # of the readings' variance, by the coarse offset
+
+
+def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBase:
+    """Return the clock of a reference with rows that have `rates_rad_s` (N, 3), None if only attitudes are known.
+
+    Raise Fault as `TableMotion` and `estimate_time_base`, and `inverted_attitudes`.
+    """
+    time_s, readings = turning.time_s, turning.readings_rad_s
+    motion = TableMotion(turning.rows_s.mean(axis=1), turning.attitudes, rates_rad_s)
+    estimated = or_fault(partial(estimate_time_base, time_s, readings, motion))
+    if rates_rad_s is not None:
+        return _raise_fault(estimated)
+    steady, unexplained = _find_steady_clock(turning, motion)
+    if unexplained > DOUBTFUL:
+        _check_not_inverted(turning, unexplained)
+    if not isinstance(estimated, Fault):
+        aligned = replace(turning, time_s=estimated.controller_time_s(time_s))
+        if find_start(select_covered(aligned)).unexplained <= CLEARER * unexplained:
+            return estimated
+    if unexplained < 1.0:
+        return steady
+    return _raise_fault(estimated)
+
+
+def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase, float]:
+    """Return the clock without drift, and the fraction of the rotation that it leaves unexplained; 1 if it is none."""
+    time_s = turning.time_s
+    explained, offset_s = estimate_coarse_offset(time_s, turning.readings_rad_s, motion)
+    unexplained, bias_rad_s = 1.0, np.zeros(3)
+    if explained >= EXPLAINED:
+        start = find_start(select_covered(replace(turning, time_s=time_s + offset_s)))
+        offset_s, unexplained, bias_rad_s = offset_s - start.state.clock_s, start.unexplained, start.state.bias
+    covariance = np.diag([COARSE_S**2, CRYSTALS**2])
+    return TimeBase(offset_s, 0.0, float(time_s[0] + time_s[-1]) / 2, covariance, bias_rad_s), unexplained
+
+
+def _check_not_inverted(turning: Turning, unexplained: float) -> None:
+    """Raise Fault `inverted_attitudes` if the inverse rotations leave half as much unexplained."""
+    inverse = replace(turning, attitudes=np.swapaxes(turning.attitudes, -1, -2))
+    motion = TableMotion(inverse.rows_s.mean(axis=1), inverse.attitudes, None)
+    if _find_steady_clock(inverse, motion)[1] < unexplained / 2:
+        raise report_inverted()
+
+
+def _raise_fault(estimated: TimeBase | Fault) -> TimeBase:
+    if isinstance(estimated, Fault):
+        raise estimated
+    return estimated

@@ -1,0 +1,115 @@
+"""A robust start for a gyroscope's F, bias and clock: its readings against a reference's rotations from row to row.
+
+    ∫ m dt = F φ + b Δt        from t₁ + τ to t₂ + τ, φ the rotation vector from the row at t₁ to the row at t₂
+
+holds to second order for any φ below π, however far apart the rows are. The fit minimises the sum of the residuals'
+lengths (least absolute deviations by reweighting), over a grid of τ. Only pairs between which the body moves determine
+F and τ; so a few bad rows do not, nor a body that rests most of the time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.estimation.arrays import Array, rotation_vectors
+from rig.estimation.external.attitude_drift import DriftState
+from rig.observation.external.reference_rows import Turning
+
+APART_S = 0.1  # between the rows of a pair, or one row
+MOST_RAD, LEAST_RAD = 2.6, 0.03  # rotation of a pair: below π; beyond the errors of most references
+MOVING = 0.2  # of the ninth decile of rotations: pairs that turn less count as rests
+PAIRS, FEWEST = 600, 12  # pairs used at most; at least
+REACH_S, COARSE_S, FINE_S = 0.5, 0.02, 0.004  # of the search for τ, and its steps
+REWEIGHTINGS = 4
+HARDLY = 1e-4  # of the squared rotation about all axes: F stays that of an aligned sensor about an axis with less
+EXPLAINED = 0.5  # least fraction of the readings' variance that F explains
+
+
+@dataclass(frozen=True, slots=True)
+class RobustStart:
+    """Start values, and the fraction of the readings' rotation that they leave unexplained: 1 if there are none."""
+
+    state: DriftState
+    unexplained: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Pairs:
+    """`begin_s` and `end_s` (k,) of pairs of rows, and the rotation vectors (k, 3) between them."""
+
+    begin_s: Array
+    end_s: Array
+    rotations: Array
+
+
+def find_start(turning: Turning) -> RobustStart:
+    """Return start values of F, b and τ; those of an aligned sensor on the same clock if the rows do not show them."""
+    aligned = RobustStart(DriftState(np.eye(3), np.zeros(3), 0.0), 1.0)
+    pairs = _find_pairs(turning)
+    if len(pairs.begin_s) < FEWEST:
+        return aligned
+    time_s, readings = turning.time_s, turning.readings_rad_s
+    steps = (readings[1:] + readings[:-1]) / 2 * np.diff(time_s)[:, None]
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
+    def fit(clock_s: float) -> tuple[float, Array]:
+        begin_s, end_s = pairs.begin_s + clock_s, pairs.end_s + clock_s
+        some = (begin_s >= time_s[0]) & (end_s <= time_s[-1])
+        if some.sum() < FEWEST:
+            return np.inf, np.zeros((4, 3))
+        turned = np.column_stack(
+            [np.interp(end_s[some], time_s, axis) - np.interp(begin_s[some], time_s, axis) for axis in total.T]
+        )
+        return _fit(np.column_stack([pairs.rotations[some], (end_s - begin_s)[some]]), turned)
+
+    best_s = min(np.arange(-REACH_S, REACH_S + COARSE_S / 2, COARSE_S), key=lambda clock_s: fit(clock_s)[0])
+    best_s = min(best_s + np.arange(-COARSE_S, COARSE_S + FINE_S / 2, FINE_S), key=lambda clock_s: fit(clock_s)[0])
+    unexplained, solution = fit(float(best_s))
+    if unexplained > 1 - EXPLAINED:
+        return aligned
+    return RobustStart(
+        DriftState(np.asarray(solution[:3].T, dtype=np.float64), solution[3], float(best_s)), unexplained
+    )
+
+
+def _find_pairs(turning: Turning) -> _Pairs:
+    """Return pairs of rows that follow each other closely: those between which the body moves, and as many rests."""
+    middles_s = turning.rows_s.mean(axis=1)
+    later = np.searchsorted(middles_s, middles_s + APART_S)
+    later = np.maximum(later, np.arange(len(middles_s)) + 1)
+    first = np.flatnonzero(later < len(middles_s))
+    last = later[first]
+    rotations = rotation_vectors(np.swapaxes(turning.attitudes[first], -1, -2) @ turning.attitudes[last])
+    angles = np.linalg.norm(rotations, axis=1)
+    usual_s = np.median(middles_s[last] - middles_s[first]) if len(first) else 0.0
+    near = (middles_s[last] - middles_s[first] <= 2 * usual_s) & (angles < MOST_RAD)
+    if not near.any():
+        return _Pairs(np.zeros(0), np.zeros(0), np.zeros((0, 3)))
+    moving = near & (angles >= max(MOVING * float(np.quantile(angles[near], 0.9)), LEAST_RAD))
+    chosen = np.concatenate([_spread(np.flatnonzero(part)) for part in (moving, near & ~moving)])
+    if moving.sum() < FEWEST:
+        chosen = np.zeros(0, dtype=np.intp)
+    return _Pairs(middles_s[first[chosen]], middles_s[last[chosen]], rotations[chosen])
+
+
+def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return at most `PAIRS` of the indices, spread evenly."""
+    return indices if len(indices) <= PAIRS else indices[np.linspace(0, len(indices) - 1, PAIRS).astype(np.intp)]
+
+
+def _fit(design: Array, turned: Array) -> tuple[float, Array]:
+    """Return the unexplained fraction of what was turned (k, 3), by lengths, and the solution (4, 3) for Fᵀ and b."""
+    aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
+    weight = np.ones(len(design))
+    solution = aligned
+    for _ in range(REWEIGHTINGS):
+        weighted = design * weight[:, None]
+        information = weighted.T @ design
+        ridge = np.diag([HARDLY * float(np.trace(information[:3, :3]))] * 3 + [1e-12])
+        solution = np.linalg.solve(information + ridge, weighted.T @ turned + ridge @ aligned)
+        residuals = np.linalg.norm(turned - design @ solution, axis=1)
+        weight = 1 / np.maximum(residuals, 0.1 * max(float(np.median(residuals)), 1e-9))
+        weight /= weight.max()
+    centred = np.linalg.norm(turned - design[:, 3:] @ solution[3:], axis=1).sum()
+    return float(residuals.sum() / max(centred, 1e-12)), np.asarray(solution, dtype=np.float64)

@@ -1,0 +1,108 @@
+"""A gyroscope solved by the attitudes that an arm reports: slowly, late, and off as a function of where it is."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.external.increment_calibration import InIncrements, solve_turning
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.reference.reference_budget import scale_and_bias_covariance
+from rig.observation.external.reference_clock import find_reference_clock
+from support.external.arm_log import ArmLog, Recorded, draw, record, turning
+
+pytestmark = pytest.mark.slow
+
+CLEAR = ArmLog(stops=6, visits=2, error_rad=0.01, fastest_rad_s=2.5)
+
+
+def solved(recorded: Recorded) -> InIncrements:
+    return solve_turning(turning(recorded), None, any_mounting=False)
+
+
+def errors(found: InIncrements, recorded: Recorded) -> tuple[Array, Array]:
+    """Errors of scale and bias (6,), and their standard uncertainties."""
+    matrix = found.solution.matrix
+    scale = 1 / np.linalg.norm(matrix, axis=1)
+    std = np.sqrt(np.diag(scale_and_bias_covariance(matrix, scale, found.solution.covariance)))
+    truth = 1 / np.linalg.norm(recorded.matrix, axis=1)
+    return np.concatenate([scale - truth, found.solution.bias - recorded.bias]), std
+
+
+def figures(seeds: range) -> tuple[Array, Counter[str]]:
+    """Errors over u (draws, 6) of scale and bias, and the names of what was refused."""
+    off, refused = [], Counter[str]()
+    for seed in seeds:
+        recorded = record(draw(seed), seed)
+        try:
+            error, std = errors(solved(recorded), recorded)
+        except Fault as fault:
+            refused[fault.name] += 1
+            continue
+        off.append(error / std)
+    return np.array(off), refused
+
+
+def test_uncertainties_of_a_few_arm_logs_hold() -> None:
+    off, refused = figures(range(20, 24))
+    assert not refused and np.abs(off).max() < 5
+
+
+@pytest.mark.thorough
+@pytest.mark.proof
+def test_uncertainties_are_those_of_two_hundred_arm_logs() -> None:
+    off, refused = figures(range(200))
+    assert refused.total() <= 20, refused
+    for quantity in (off[:, :3], off[:, 3:]):
+        rms, within = float(np.sqrt(np.mean(quantity**2))), float(np.mean(np.abs(quantity) < 2))
+        print(f"RMS of error / u {rms:.2f}, {100 * within:.1f} % within U, worst {np.abs(quantity).max() / 2:.2f} U")
+        assert 0.7 < rms < 1.2 and within > 0.93 and np.abs(quantity).max() < 5
+
+
+def test_rests_in_a_dense_stream_tell_the_bias() -> None:
+    recorded = record(CLEAR, 1)
+    found = solved(recorded)
+    _, std = errors(found, recorded)
+    assert (2 * std[3:] < 5e-4).all()
+
+
+def test_a_latency_of_a_tenth_of_a_second_is_found_by_the_increments() -> None:
+    recorded = record(replace(CLEAR, latency_s=-0.12, poses_hz=5), 2)
+    found = solved(recorded).solution
+    assert found.clock_s == pytest.approx(-0.12, abs=0.01)
+
+
+def test_a_clock_of_slow_reports_is_found_without_a_drift_that_is_none() -> None:
+    recorded = record(replace(CLEAR, jitter_s=0.01, latency_s=0.05), 3)
+    rows = turning(recorded)
+    clock = find_reference_clock(replace(rows, time_s=rows.time_s + 100.0), None)
+    assert clock.offset_s == pytest.approx(-100.05, abs=0.04) and abs(clock.drift) < 1e-4
+    inverse = replace(rows, time_s=rows.time_s + 100.0, attitudes=np.swapaxes(rows.attitudes, 1, 2))
+    with pytest.raises(Fault, match="inverted_attitudes"):
+        find_reference_clock(inverse, None)
+
+
+def test_a_few_wild_rows_do_not_decide_which_rows_are_kept() -> None:
+    recorded = record(CLEAR, 4)
+    attitudes = recorded.attitudes.copy()
+    attitudes[40:43] = np.eye(3)
+    spoilt = replace(recorded, attitudes=attitudes)
+    error, std = errors(solved(spoilt), spoilt)
+    assert (np.abs(error) < 5 * std).all()
+
+
+def test_turns_about_one_joint_name_the_axes_that_they_do_not_tell() -> None:
+    with pytest.raises(Fault, match=r"rank_deficient|ill_conditioned.*hardly turned about y and z.*about x reads"):
+        solved(record(replace(CLEAR, axes=(5,)), 5))
+
+
+def test_a_gap_while_the_body_rests_costs_nothing() -> None:
+    recorded = record(CLEAR, 6)
+    stops = np.linalg.norm(recorded.readings - np.median(recorded.readings, axis=0), axis=1) < 0.05
+    first = int(np.argmax(stops)) + 10
+    kept = np.ones(len(stops), dtype=bool)
+    kept[first : first + 15] = False
+    gap = replace(recorded, time_s=recorded.time_s[kept], readings=recorded.readings[kept])
+    assert not solved(gap).left_out
