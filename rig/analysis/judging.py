@@ -13,7 +13,6 @@ from rig.analysis.environment import surroundings_of
 from rig.analysis.estimator_names import Estimator, find_estimator
 from rig.analysis.gyroscope.board_averages import board_averages
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
-from rig.analysis.gyroscope.comparison import Reference, list_revolutions
 from rig.analysis.gyroscope.onboard_check import Agreement, check_arithmetic
 from rig.analysis.gyroscope.stage_mounts import observe_as_mounted
 from rig.analysis.gyroscope.vector_inputs import lever_arms_m
@@ -261,6 +260,7 @@ def _gravity_effects(
 
     The centripetal acceleration acts as gravity does. None if the calibration has no g-sensitivity.
     """
+    from rig.analysis.gyroscope.comparison import list_revolutions
 
     name, reference = pair
     corrections = {name: results[name].correction_matrix} if name in results else {}
