@@ -225,7 +225,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _first_word(words: Sequence[str]) -> str | None:
-    """Return the first word that is no option: the name of the command."""
+    """Return the name of the command: the first word that is not an option."""
     return next((word for word in words if not word.startswith("-")), None)
 
 
@@ -315,9 +315,9 @@ def _build_parser(meant: str | None) -> argparse.ArgumentParser:
 
 
 def run_script(procedure: "AnyProcedure") -> int:
-    """Run a script that is called as `python FILE.py` and defines `procedure`; its arguments are those of `rig run`.
+    """Run a script that is called as `python FILE.py` and defines `procedure`; it takes the arguments of `rig run`.
 
-    This procedure runs, whatever the configuration names.
+    The script's procedure replaces the one that the configuration names.
     """
     from rig.commands.measure.run import add, run
     from rig.plans.script_file import script_in

@@ -108,7 +108,7 @@ def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, A
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
-    """Return the degrees of freedom (…) of variances (…) from their `parts` by contributor; the rest has infinite ones.
+    """Return the degrees of freedom (…) of variances (…) by contributor (`parts`); the remainder has infinitely many.
 
     Raise KeyError if the budget has no such contributor.
     """

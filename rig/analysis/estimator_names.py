@@ -13,12 +13,12 @@ Choice = TypeVar("Choice", bound=str)
 
 
 def find_estimator(name: str) -> Estimator:
-    """Return the estimator of that name. Raise Refused `unknown_estimator`."""
+    """Return the estimator that is called `name`. Raise Refused `unknown_estimator`."""
     return choose_estimator(ESTIMATORS, name)
 
 
 def choose_estimator(choices: Sequence[Choice], name: str) -> Choice:
-    """Return the choice of that name. Raise Refused `unknown_estimator`."""
+    """Return the member of `choices` that is called `name`. Raise Refused `unknown_estimator`."""
     for choice in choices:
         if choice == name:
             return choice

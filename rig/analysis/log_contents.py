@@ -59,7 +59,7 @@ class LookedFile:
 
 
 def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
-    """Return what a file holds, by its own headings and numbers, or by a `stated` map of its columns.
+    """Return a description of a file's content, by its headings and numbers, or by a `stated` map of its columns.
 
     Raise Refused `bad_option` for a file of sweeps, and as `find_layout` does for a file that is no table.
     """
@@ -175,7 +175,7 @@ def _read_samples(looked: LookedFile, column_map: ColumnMap) -> LookedFile:
 
 
 def find_allan_obstacle(samples: Samples) -> RigError | None:
-    """Return why the readings of a log are not those of a sensor at rest; None if they are."""
+    """Return the reason why a log does not show a sensor at rest; None if it does."""
     try:
         for quantity, readings in samples.readings.items():
             check_at_rest(samples.time_s, readings, quantity)
@@ -193,7 +193,7 @@ class Trial:
 
 
 def try_turns(path: Path, column_map: ColumnMap) -> Trial:
-    """Solve a log as that of a sensor turned by hand (`--turns`)."""
+    """Solve a log as if the sensor had been turned by hand (`--turns`)."""
     options = {
         "clock_ppm": 50.0,
         "box_rad": float(np.radians(0.2)),

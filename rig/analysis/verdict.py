@@ -115,7 +115,7 @@ def verification_checks(sensor: str, verification: "Verification | None", limits
     """Return the checks of calibrated readings: the worst axis, and the worst mean over a revolution.
 
     The reference is compared with the arm too, by the limit of those means, because its own error may be the cause.
-    None stands for a verification that did not take place.
+    Pass None for a verification that did not take place.
     """
     rms = mean = verified = None
     if verification is not None:

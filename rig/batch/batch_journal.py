@@ -39,7 +39,10 @@ class Journal:
         self._path = self.folder / JOURNAL
 
     def enter(self, entry: Entry) -> None:
-        """Write an entry; it is completely on the disk on return. Raise ValueError for one that cannot follow."""
+        """Write an entry to the disk before returning.
+
+        Raise ValueError for an entry that cannot follow the last entry.
+        """
         self.batch = after(self.batch, entry)
         _append(self._path, entry)
 

@@ -108,7 +108,7 @@ class Batch:
         return self.parts[-1] if self.parts and self.parts[-1].ended is None else None
 
     def count(self, *states: str) -> int:
-        """Return the number of parts in these states."""
+        """Return the number of parts whose state is one of `states`."""
         return sum(part.state in states for part in self.parts)
 
     @property
@@ -118,11 +118,11 @@ class Batch:
         return all(part is not None and part.state == "pass" for part in newest)
 
     def done(self, serial: str) -> BatchPart | None:
-        """Return the newest run of that number with a verdict."""
+        """Return the newest run of the serial number that has a verdict."""
         return next((part for part in reversed(self.parts) if part.serial == serial and _has_verdict(part)), None)
 
     def same_chip(self, chip: Chip, serial: str) -> BatchPart | None:
-        """Return the part with a verdict and another number that had this chip."""
+        """Return the part of another serial number that had this chip and has a verdict."""
         for part in reversed(self.parts):
             earlier = part.ended.chip if part.ended is not None and _has_verdict(part) else None
             if part.serial != serial and earlier is not None and earlier.is_that(chip):

@@ -53,7 +53,7 @@ class Question:
         return CHOICES[self.kind]
 
     def meaning(self, answer: str) -> bool | None:
-        """Return whether the answer means yes; None if it does not answer this question."""
+        """Return True for yes and False for no; None if the text is not an answer to this question."""
         typed = answer.lower()
         return next((choice.yes for choice in self.choices if typed in choice.words), None)
 
@@ -106,7 +106,7 @@ class Operator:
         return self.numbers is not None
 
     def next_part(self, done: Sequence[BatchPart], why: str = "") -> str | None:
-        """Return the next number of the list, or a typed one; `why` explains the refusal of the last one."""
+        """Return the next serial number, from the list or typed; `why` explains the refusal of the last number."""
         if self.numbers is not None:
             return following(self.numbers, [part.serial for part in done])
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"
@@ -131,7 +131,7 @@ class Operator:
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Ask whether a run may do what it announces; without a voice the agreement was given in advance."""
+        """Ask whether the announced run may start; an operator who cannot answer has agreed in advance."""
         if to_do == Prompt(()).to_do:
             return self.voice is None or self._agrees("go", f"Type go to {to_do}:", *announcement)
         return self.voice is None or self._agrees("doubt", f"Type yes to {to_do}, or no:", *announcement)

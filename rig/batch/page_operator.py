@@ -88,7 +88,7 @@ class OnPage:
 
 @contextmanager
 def on_page(present: Present, address: PageAddress) -> Iterator[tuple[OnPage, str]]:
-    """Open the page of what is `present`, for the length of the `with` block; yield it and its URL.
+    """Open the page that shows `present` during the `with` block; yield the page and its URL.
 
     Its last state shows how the station ended. Raise Refused `page_address`.
     """

@@ -44,7 +44,7 @@ class Bench(Protocol):
         ...
 
     def fit(self, serial: str) -> None:
-        """Exchange the part, if a simulated operator does that."""
+        """Exchange the part in the laboratory, if the operator is simulated."""
         ...
 
     def run(self, part: BatchPart, folder: Path, desk: "Desk") -> PartEnded:
@@ -77,7 +77,10 @@ class Work:
     notify: Callable[[Batch], None] = lambda batch: None
 
     def all_parts(self) -> None:
-        """Run parts until none follows. Raise Fault if no operator can decide what follows."""
+        """Run one part after the other, until the operator or the list ends.
+
+        Raise Fault if a question stays unanswered.
+        """
         self._write_table()
         self.notify(self.journal.batch)
         while True:
@@ -163,5 +166,5 @@ class Work:
 
 
 def now_utc() -> str:
-    """Return the present time in the form of a batch."""
+    """Return the present time (UTC) as text, to seconds."""
     return datetime.now(UTC).isoformat(timespec="seconds")

@@ -85,7 +85,7 @@ def _make_polynomials(entry: OverTemperatureEntry) -> StoredPolynomials:
 
 
 def store(board: Board, index: int, calibration: Calibration) -> StoredCalibration:
-    """Write a calibration of a configured sensor and read it back. Raise BoardError, among others `not_stored`."""
+    """Write a calibration of a configured sensor and read it back. Raise BoardError, for example `not_stored`."""
     board.write_calibration(index, calibration)
     stored = board.read_calibration(index)
     if stored is None or stored.calibration != calibration.quantize():

@@ -29,7 +29,7 @@ def require_board_section(config: SensorsConfig) -> BoardSection:
 
 
 def refuse_other_firmware(identity: BoardIdentity) -> None:
-    """Raise Refused `firmware_version` unless the board runs the firmware that comes with this program."""
+    """Raise Refused `firmware_version` unless the board runs the firmware of this version of the rig."""
     if identity.firmware != FIRMWARE_VERSION:
         raise Refused(
             "firmware_version",
@@ -71,7 +71,7 @@ def _missing(name: str, section: ConfiguredSensor, finding: str) -> Refused:
 
 
 def read_stored_calibration(board: Board, name: str, section: SensorSection) -> StoredCalibration:
-    """Read the calibration by which the board corrects a configured sensor's readings.
+    """Read the calibration with which the board corrects a sensor's readings.
 
     Raise Refused `no_calibration`, and as `find_sensor` and `refuse_other_sensor` do.
     """

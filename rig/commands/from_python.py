@@ -116,7 +116,7 @@ def export(
     """Write readings or calibrations of a run in other programs' formats, as `rig export`; print the file names.
 
     `format` is one of csv, parquet, mat, ros2, imucal, px4, ardupilot, kalibr; `out` is a folder, by default one in the
-    run's. `run` may be a log of another program, and `columns` the file that says what its columns are. Return the
+    run's. `run` may be a log of another program, and `columns` is then the file that describes its columns. Return the
     files. Raise Refused `bad_option` for another format, and as `rig export` does.
     """
     from rig.commands.documents.export import add, export_files
@@ -129,7 +129,7 @@ def export(
 
 
 def _parse(command: str, add: Callable[[ArgumentParser], None], words: Sequence[str], about: str | Path) -> Namespace:
-    """Parse the arguments as the command does, so that an omitted one has the command's default."""
+    """Parse `words` as the command line does, so that every omitted argument has the command's default."""
     parser = ArgumentParser(prog=f"rig {command}")
     add(parser)
     return parser.parse_args([*words, "--", str(about)])

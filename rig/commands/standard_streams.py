@@ -52,7 +52,7 @@ def output_lost() -> OSError | None:
 
 
 def say_where_the_result_is(result: Path) -> None:
-    """If stdout has lost output, print on stderr that the complete result is in that file.
+    """If stdout has lost output, print on stderr that `path` holds the complete result.
 
     The exit status of the run thus stays the same.
     """

@@ -103,7 +103,7 @@ class TableSection(Section):
 
     @model_validator(mode="after")
     def rates_of_all_axes_or_none(self) -> Self:
-        """Refuse rates of some axes only: the item's rate needs those of all."""
+        """Refuse rates of only some axes: the item's rate needs the rates of all axes."""
         _fit("time", self.time, TIME)
         if any(column.unit is None for axis in self.axes for column in (self.time, axis.angle, axis.rate) if column):
             raise ValueError("say the unit of every column of a table")

@@ -169,5 +169,5 @@ def _limits(answers: Answers) -> Iterator[str]:
 
 
 def _text(value: str) -> str:
-    """Return a value as YAML takes it: quoted if it is a gap."""
+    """Return a value as YAML text; a placeholder for a missing value is quoted."""
     return f'"{value}"' if value == GAP else value

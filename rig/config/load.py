@@ -83,8 +83,8 @@ def load(
     """Read, override and validate a configuration file.
 
     `overrides` are `path.to.key=value` with the value in YAML. `sections` are the procedures by name, with the model of
-    each one's `procedure:` section; `turners` the kinds of turners likewise. Raise `ConfigurationRefused` listing every
-    error with its path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
+    their `procedure:` section; `turners` are the kinds of turners, with their models. Raise `ConfigurationRefused`
+    listing every error with its path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
     """
     return _validate_all(_read(path, overrides), str(path), sections, turners)
 
@@ -367,7 +367,10 @@ def _instruments_fit(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _is_loopback(host: str) -> bool:
-    """Return whether a host is this machine. Its beginning is no proof: 127.example.org is another host."""
+    """Return whether a host is this machine.
+
+    A name that begins with 127 does not suffice: 127.example.org is another host.
+    """
     try:
         return host == "localhost" or ipaddress.IPv4Address(host).is_loopback
     except ValueError:

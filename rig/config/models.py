@@ -57,11 +57,11 @@ class TurnerSection(Section):
 
     @property
     def simulated_at(self) -> str | None:
-        """The host at which a simulated one would answer; None if none can be simulated."""
+        """The host at which a simulated turner would answer; None if this kind cannot be simulated."""
         return None
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """Return the keys, with their values, that move a simulated one to another host."""
+        """Return the keys, with their values, that move a simulated turner to another host."""
         return {}
 
 
@@ -343,7 +343,7 @@ class RigConfig(SensorsConfig):
 
 
 def _bundled_names(sensors: Mapping[str, SensorSection]) -> list[str]:
-    """Return the names of further sensors at the ports of these: magnetometers, and scalars."""
+    """Return the names of the further sensors in the devices of `sensors`: magnetometers and scalars."""
     return [bundled for name, sensor in sensors.items() for bundled in sensor.brings(name)]
 
 

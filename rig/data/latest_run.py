@@ -14,7 +14,7 @@ _LIST_MAX_BYTES = 1_000_000
 
 
 def note_run(folder: Path) -> None:
-    """Note the folder of a run of this user. Failure to note it is ignored."""
+    """Remember `folder` as this user's latest run. Errors are ignored."""
     with suppress(OSError, Refused):
         path = _list()
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -104,7 +104,7 @@ class Quantity:
 
     @property
     def parameter_signs(self) -> tuple[float, ...]:
-        """The factors between scale factors and biases and those of a model whose bias is part of the reading."""
+        """The factors that convert scale factors and biases to a model whose bias is part of the reading."""
         return (1.0,) * len(self.axes) + (float(self.offset),) * len(self.axes)
 
 

@@ -59,7 +59,7 @@ def discard(folder: Path) -> None:
 
 
 def empty_folder(folder: Path, *, or_else: str = "") -> Path:
-    """Make a folder, or return an empty one of that name; `or_else` is a further remedy if it is not empty.
+    """Make the folder, or return it if it exists and is empty; `or_else` is a further remedy if it is not empty.
 
     Raise Refused `run_folder`.
     """

@@ -26,7 +26,10 @@ _adapters: dict[type[Any], TypeAdapter[Any]] = {}
 
 
 def validate(kind: type[Kind], document: Any, where: str) -> Kind:
-    """Return a value of type `kind`, without unknown keys. Raise ValueError naming the first wrong value."""
+    """Return `document` as a value of type `kind`; unknown keys are refused.
+
+    Raise ValueError naming the first wrong value.
+    """
     try:
         value: Kind = _adapter(kind).validate_python(document)
     except ValidationError as error:
@@ -75,7 +78,10 @@ def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
 
 
 def refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object of a JSON file. Raise ValueError for a duplicate key, of which readers use different values."""
+    """Return an object of a JSON file.
+
+    Raise ValueError for a duplicate key, because readers disagree on which value counts.
+    """
     document = dict(pairs)
     if len(document) < len(pairs):
         keys = [key for key, _ in pairs]

@@ -193,7 +193,7 @@ def check_axes(axes: Array, nominal: Array | None) -> None:
 
 
 def _describe_left_handed(axes: Array) -> str:
-    """Return what axes, rows of (3, 3) in the body's frame, read of the body's, if they lie along these."""
+    """Describe left-handed axes, rows of (3, 3) in the body's frame, by the body axes that they lie along."""
     cosines = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     where = np.argmax(np.abs(cosines), axis=1)
     what = "the sensor's axes form a left-handed frame: "
@@ -231,7 +231,7 @@ def check_side(reference: Array, side: Array) -> None:
 
 
 def check_handedness(matrix: Array) -> None:
-    """Raise Fault `mirrored_axis` if F (3, 3) is that of a left-handed sensor."""
+    """Raise Fault `mirrored_axis` if F (3, 3) belongs to a left-handed sensor."""
     if _is_left_handed(matrix):
         raise Fault(
             "mirrored_axis",

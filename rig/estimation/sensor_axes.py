@@ -46,7 +46,7 @@ class SensorAxes:
         return matrix
 
     def angles_covariance_rad2(self, of_matrix: Array) -> Array:
-        """Return the covariance (6, 6) of non-orthogonality and mounting, by that of F (9, 9), row by row."""
+        """Propagate the covariance (9, 9) of F, row by row, to the non-orthogonality and mounting (6, 6)."""
         to_angles = self.to_angles
         covariance: Array = to_angles @ of_matrix @ to_angles.T
         return covariance
@@ -58,7 +58,7 @@ class SensorAxes:
 
 
 def non_orthogonality(axes: Array) -> Array:
-    """Return the rad (3,) by which the angles y z, z x, x y are smaller than 90°, from unit rows (3, 3)."""
+    """Return the non-orthogonality (3,), rad: 90° minus the angles y z, z x, x y between unit rows (3, 3)."""
     angles: Array = np.arcsin(np.clip((axes @ axes.T)[FIRST, SECOND], -1, 1))
     return angles
 

@@ -248,7 +248,7 @@ class History:
             return journal.head(connection)
 
     def holds(self, earlier: journal.Head) -> bool:
-        """Return whether the journal contains an earlier end of it unchanged, as `journal.holds`."""
+        """Return whether the journal still contains unchanged all lines up to an earlier end."""
         with self.engine.connect() as connection:
             return journal.holds(connection, earlier)
 

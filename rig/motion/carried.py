@@ -20,7 +20,7 @@ class FlangeLoad:
 
 
 def read_load(arm: "ArmSection") -> FlangeLoad:
-    """Return the load of an arm by its configuration."""
+    """Return the load on the flange that the arm's configuration states."""
     return FlangeLoad(arm.payload_kg, _metres(arm.payload_centre_mm), arm.extension_m)
 
 

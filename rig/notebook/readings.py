@@ -169,7 +169,7 @@ class Readings:
 
     @cached_property
     def _time_s(self) -> Array:
-        """Times (n,) of all samples, computed once; those of a file for external readings."""
+        """Times (n,) of all samples, computed once. For external readings, the times in the file."""
         if any(run.external is not None for run in self.recordings):
             times_of_file: Array = self.samples["host_time_s"]
             return times_of_file

@@ -15,12 +15,12 @@ def built(chain: DenavitHartenberg) -> dict[str, Any]:
 
 
 def geometry(chain: DenavitHartenberg, joints: Sequence[str] = JOINT_NAMES) -> dict[str, Any]:
-    """Return a turner of which only the geometry is known."""
+    """Return the page section of a turner before it is connected: only its geometry is known."""
     return {**built(chain), "joints": list(joints), "q_rad": None, "missed": 0}
 
 
 def connected(report: Report) -> dict[str, Any]:
-    """Return a turner that has answered, with its geometry if it states it."""
+    """Return the page section of a connected turner, with its geometry if the turner reports one."""
     names = {
         "model": report.model,
         "serial_number": report.serial_number,

@@ -51,7 +51,7 @@ def step(event: HandSeen) -> Section:
 
 
 def update(before: Section, event: OfTheHand) -> Section:
-    """Return the section after an instruction, a rest or a move; each but the first instruction has its own tone."""
+    """Return the page section after an event of a session by hand; rests, moves and reminders sound a tone."""
     match event:
         case HandAsked(instruction, again, why):
             instruction_fields = {"say": instruction.say, "face": instruction.face, "turns": instruction.turns}

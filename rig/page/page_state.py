@@ -173,7 +173,7 @@ class PageState:
             self.put("parameters", look.parameters)
 
     def _take_once(self, event: RunEvent) -> None:
-        """Take an event that happens once, after all earlier ones are in the sections."""
+        """Update the sections after an event that happens once."""
         sections = self.sections
         match event:
             case ArmConnected(report):

@@ -69,9 +69,9 @@ def load_script(path: Path) -> ScriptFile:
 def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = None) -> ScriptFile:
     """Return the script `kept` in a run folder; the text in the folder is executed only if it is the user's own.
 
-    An installed script is taken from its package, and one that the user has `named` is the consent to it; the text in
-    the folder may be executed if a run of the user's own was begun with the same. Raise Refused `another_script`,
-    `foreign_script`, and as `load_script`.
+    An installed script is taken from its package. If the user has `named` the same script, that is the user's consent.
+    The text in the folder may be executed if the user has begun a run with the same text before. Raise Refused
+    `another_script`, `foreign_script`, and the errors of `load_script`.
     """
     if named is not None:
         if named.sha256 != kept.sha256:

@@ -46,7 +46,7 @@ class Verbs(Protocol):
         ...
 
     def end_temperature_range(self) -> None:
-        """Switch the heater off. A part of the range that no set has covered ends the run."""
+        """Switch the heater off. The run fails if a part of the temperature range was not covered."""
         ...
 
     def turn_by_hand(self) -> None:

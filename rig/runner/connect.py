@@ -175,7 +175,7 @@ class Connector:
         return turner, report, kind.describe_connected(section, report)
 
     def _last_seen(self, turner: Turner) -> None:
-        """Report the turner's last state again, as the page's last one shows it moving."""
+        """Report the turner's last state again, because the page still shows a moving turner."""
         self.station.event(ArmSeen(turner.latest, turner.missed_states))
 
     def _build_provenance(

@@ -384,7 +384,7 @@ class Rig:
         return self.warming
 
     def _end_set(self) -> None:
-        """End the set of the sweeps and dwells since the latest wait."""
+        """End the temperature set: all sweeps and dwells since the latest wait."""
         if self.warming is not None and self._done:
             self.warming.end_set(min(self._done), max(self._done) + 1)
         self._done.clear()

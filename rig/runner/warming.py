@@ -80,7 +80,7 @@ class Warming:
 
     @property
     def _rate_k_s(self) -> float:
-        """The rate of a ramp: below the limit, and slow enough that a set takes only a part of a gap."""
+        """The rate of a ramp: below the limit, and so slow that the temperature changes little during one set."""
         allowed_k_s = RAMP_SHARE * self.section.max_rate_k_per_min / 60
         return min(allowed_k_s, SET_SHARE * self.section.max_step_k / max(self.set_s, 1.0))
 

@@ -82,9 +82,9 @@ class OwnPort:
             self._most_silent_s, self.silence = self._patience.silent_s + more_s, PortSilence()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise the fault since the last call, also a silence of a stream.
+        """Raise the fault of the port, or of a stream that has been silent for too long.
 
-        `clock_s` is the present time of another instrument's clock, if any: a silence must also be as long by that.
+        `clock_s` is the present time on another instrument's clock: the silence must be too long by that clock as well.
         """
         if self.fault is not None:
             raise self.fault

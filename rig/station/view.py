@@ -124,7 +124,7 @@ def _readings(sensor: SensorSamples) -> list[tuple[str, str]]:
 
 @contextmanager
 def view() -> Iterator[Listener]:
-    """Yield the view that suits stderr."""
+    """Yield a live view if stderr is a terminal, else a view that prints plain lines."""
     if sys.stderr.isatty():
         with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
             yield LiveView(live)

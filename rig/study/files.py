@@ -44,7 +44,7 @@ def write(report: StudyReport, folder: Path, name: str, table_format: Format) ->
 
 @contextmanager
 def _remove_incomplete(path: Path) -> Iterator[None]:
-    """Remove the file if this block cannot write it completely. Raise Refused `study_folder`."""
+    """Remove the file at `path` if the `with` block cannot write it completely. Raise Refused `study_folder`."""
     try:
         yield
     except OSError as error:

@@ -245,7 +245,7 @@ class ControlSession:
             self._world.laboratory.board.reset()
 
     def _power_dip(self) -> None:
-        """Take the board's power away for a moment; its port stays open, as of an adapter with its own supply."""
+        """Interrupt the board's power for a moment. Its port stays open, like an adapter's with its own supply."""
         self._world.laboratory.unplug()
         self._world.laboratory.plug_in()
 

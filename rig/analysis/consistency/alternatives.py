@@ -94,7 +94,7 @@ def changes(segments: Segments, axis_rates: Array) -> Alternatives:
 
 
 def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> dict[str, Array | None]:
-    """Return the design columns (3, N, k) of differences between directions, sweeps and rests, by the check's name.
+    """Return the design columns (3, N, k) of each check for differences: directions, sweeps and rests, residuals.
 
     `whole` (3, N, k) gives each sweep its own level. With None the check `residuals` uses all residuals, including the
     scatter within sweeps.

@@ -60,7 +60,7 @@ def contradictions(
 ) -> ConsistencyChecks:
     """Return the checks of these sensors' results against contradictions.
 
-    `surroundings` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. A
+    `surroundings`: the surroundings of the recordings. `false_alarms`: the fraction of undamaged runs that may fail. A
     disturbed sweep is part of the check's name, `gyro.disturbed_sweep.3`, and of its meaning.
     """
     checks: list[Check] = []

@@ -211,7 +211,7 @@ def _count_repeated(counts: NDArray[np.int64]) -> int:
 
 
 def _count_heaped(counts: NDArray[np.int64], critical_value: float) -> int:
-    """Count the readings at the limit of an axis' range; 0 unless they exceed those of the adjacent value."""
+    """Count the readings at the limit of an axis' range; 0 unless they outnumber the readings at the adjacent value."""
     heaped = 0
     for axis in counts.T:
         values, often = np.unique(axis, return_counts=True)

@@ -140,18 +140,20 @@ def predict_detection_limits(
     bias = BiasProcess(0.0, 0.0, 0, allowance.instability_rad_s)
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
     segments_only = _Tested(segments, segments.rates_rad_s @ matrix.T, whiten_segments(segments, scatter, bias))
-    return dict(_detection_limits(segments_only, _test_transfers(matrix, allowance, bias), false_alarm_probability))
+    return dict(
+        _detection_limits(segments_only, _whiten_with_transfers(matrix, allowance, bias), false_alarm_probability)
+    )
 
 
 def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:
-    """Return `_test_transfers` with the variance of the transfers inflated until their χ² equals their number.
+    """Return `_whiten_with_transfers` with the variance of the transfers inflated until their χ² equals their number.
 
-    Their χ² is that of all segments less that of the segments without transfers. The factor is at most `MOST`.
+    Their χ² is the χ² of all segments less the χ² of the segments without transfers. The factor is at most `MOST`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     for ratio in np.geomspace(1.0, MOST, TRIED):
         variances = transfers.variances_rad2_s2 + (ratio - 1) * transfers.unexplained_rad2_s2
-        with_transfers = _test_transfers(
+        with_transfers = _whiten_with_transfers(
             matrix, replace(allowance, transfers=replace(transfers, variances_rad2_s2=variances)), bias
         )
         chi_square, dof = _residual_chi_square(with_transfers)
@@ -167,8 +169,8 @@ def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
     return chi_square_of(tested.model.readings, np.concatenate([tested.model.model, *nuisance], axis=1), None)
 
 
-def _test_transfers(matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:
-    """Return segments and transfers with their whitened model."""
+def _whiten_with_transfers(matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:
+    """Return the segments with the transfers appended, their model rates, and their whitened model."""
     transfers = allowance.transfers
     scatter = _build_scatter(transfers, allowance.transfer_patterns_rad_s, allowance)
     return _Tested(transfers, transfers.rates_rad_s @ matrix.T, whiten_segments(transfers, scatter, bias))

@@ -57,7 +57,7 @@ class WhitenedModel(Protocol):
     """Readings and their model, whitened by all modelled errors."""
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative, with the model and the `nuisance` columns fitted too."""
+        """Return the χ² that each alternative explains, after a fit of the model and the `nuisance` columns."""
 
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
@@ -71,7 +71,7 @@ class WhitenedModel(Protocol):
 def test_alternatives(
     model: WhitenedModel, alternatives: Alternatives, false_alarm_probability: float
 ) -> dict[str, Statistic]:
-    """Return the statistic of every alternative outside the model, each with that false-alarm probability."""
+    """Test every alternative that the model does not contain, each with `false_alarm_probability`."""
     test = {name: model.test(columns, (), false_alarm_probability) for name, columns in alternatives.items()}
     return {name: statistic for name, statistic in test.items() if statistic is not None}
 

@@ -337,7 +337,7 @@ def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, c
 
 
 def _temperature_patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> list[Array]:
-    """Return the rate errors of all segments by one std of the slopes of bias and scale over temperature."""
+    """Return the rate error of every segment per standard deviation of each temperature coefficient."""
     if known_errors.sensor is None:
         return []
     inside, order = segments.times_s.mean(axis=1), np.argsort(known_errors.temperature_times_s)

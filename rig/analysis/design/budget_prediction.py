@@ -55,8 +55,8 @@ STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real ti
 def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
     """Return the predicted budget of each sensor to calibrate.
 
-    It is that of the solution by which the turner's runs are judged: of the speeds alone if single readings of its
-    angle scatter. Raise Fault as the estimators do if the plan determines too little, Refused as `settings_of`.
+    The solution is the one that judges the turner's runs: it uses only the speeds if single readings of the angle
+    scatter. Raise Fault as the estimators do if the plan determines too little, Refused as `settings_of`.
     """
     run = plan_run(config, plan, turner.kinematics)
     return {name: _budget(config, run, turner, name, sensor) for name, sensor in config.to_calibrate.items()}

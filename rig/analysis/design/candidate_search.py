@@ -39,11 +39,11 @@ class Budgets:
 
     @property
     def reached(self) -> ReachedUncertainty:
-        """The worst U of them."""
+        """The worst U of the budgets."""
         return ReachedUncertainty.of_budgets(self.rates, self.accelerations)
 
     def without(self, names: Collection[str]) -> "Budgets":
-        """Return the budgets without contributors of these names."""
+        """Return the budgets without the named contributors."""
         rates, accelerations = (
             {sensor: budget.without(names) for sensor, budget in budgets.items()}
             for budgets in (self.rates, self.accelerations)
@@ -160,8 +160,8 @@ def find_shortest(
 ) -> Searched:
     """Return the shortest candidate whose predicted U meets the target.
 
-    A candidate that meets it excludes all longer ones; one that does not excludes those contained in it. `predict`
-    returns None for a candidate that cannot be run, which excludes no other.
+    A candidate that meets the target excludes all longer candidates; a candidate that fails excludes all candidates
+    that it contains. `predict` returns None for a candidate that cannot be run, which excludes no other.
     """
     remaining = sorted(
         (candidate for candidate in candidates if candidate.duration_s <= target.at_most_s),

@@ -62,7 +62,7 @@ def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> 
 
 
 def _one_set(plan: Plan) -> Plan:
-    """Return the plan until it waits for the second temperature."""
+    """Return the plan up to the wait for the second temperature."""
     waits = [index for index, step in enumerate(plan.steps) if isinstance(step, Rest) and step.for_temperature]
     return replace(plan, steps=plan.steps[: waits[1]]) if len(waits) > 1 else plan
 

@@ -56,7 +56,7 @@ class RelativeRotation:
 
 
 def collect_mean_rates(observations: Sequence[Observation], calibration: LinearCalibration | None = None) -> MeanRates:
-    """Return the mean rates of a sensor's revolutions, corrected; without a calibration, the raw ones."""
+    """Return a sensor's mean rate in each revolution, corrected by its calibration if it has one."""
     means = np.array([observation.average.mean_rad_s for observation in observations])
     variances = np.array([observation.average.variance_rad2_s2 for observation in observations])
     raw = MeanRates(means, variances[:, :, None] * np.eye(3))

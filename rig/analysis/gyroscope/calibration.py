@@ -109,10 +109,10 @@ class SensorResult:
 
 
 def observe_recordings(runs: Sequence[RunData], rotations: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
-    """Return the observations of all recordings of one calibration; those without a finished sweep add nothing.
+    """Return the observations of all recordings of one calibration; recordings without a finished sweep are skipped.
 
-    The thresholds are those of the first recording; `rotations` as in `observe_runs`. Raise Refused
-    `different_sensors`; Fault `duplicated_observation` and as `observe_run` does.
+    The first recording's thresholds are used; `rotations` as in `observe_runs`. Raise Refused `different_sensors`;
+    Fault `duplicated_observation` and as `observe_run` does.
     """
     if any(run.sensors != runs[0].sensors for run in runs):
         raise Refused(
@@ -131,12 +131,12 @@ def solve_observed(
     estimator: str = DEFAULT_ESTIMATOR,
     matrix_corrected: Collection[str] = (),
 ) -> dict[str, SensorResult]:
-    """Calibrate `sensors` from all recordings, which share these `surroundings`.
+    """Calibrate `sensors` from all recordings, which share the `surroundings`.
 
-    The sensors in `matrix_corrected` are corrected by the whole matrix if the estimator is the vector model; the others
-    as if their axes were orthogonal. Every estimator requires sweeps that suffice for the six-observation solution: a
-    plan that lacks a direction is refused. Raise Refused `unknown_estimator`; Fault `duplicated_observation` and as the
-    estimators do.
+    The sensors in `matrix_corrected` are corrected by the whole matrix if the estimator is the vector model; all other
+    sensors as if their axes were orthogonal. Every estimator requires sweeps that suffice for the six-observation
+    solution: a plan that lacks a direction is refused. Raise Refused `unknown_estimator`; Fault
+    `duplicated_observation` and as the estimators do.
     """
     chosen = find_estimator(estimator)
     return {
@@ -211,7 +211,7 @@ def _budget_of(
 
 
 def _add_earth_rate(inputs: VectorInputs, earth_rate: EarthRate | None) -> VectorInputs:
-    """Return the inputs with the estimated Earth's rate; without one, with that of the site, if it is stated."""
+    """Return the inputs with the estimated Earth's rate, else with the rate at the stated site, if any."""
     return inputs if earth_rate is None else replace(inputs, earth_rate_rad_s=earth_rate.rate_rad_s)
 
 

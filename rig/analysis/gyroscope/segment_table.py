@@ -48,7 +48,7 @@ class Segments:
 def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, site: Site) -> Segments:
     """Return the segments of a gyroscope's windows, in the order of the means of `explained`.
 
-    The Earth's rate is that of `explained`: given by the site, or estimated.
+    The Earth's rate is taken from `explained`, which states it by the site or has estimated it.
     """
     inputs = explained.inputs
     placed = list(zip(windows, inputs.windows_s[:, 0], inputs.acceleration_m_s2, strict=True))
@@ -86,8 +86,8 @@ def append_transfers(
 ) -> Segments:
     """Return the segments with the transfers appended, numbered downwards from below `REST`.
 
-    A transfer's noise is that of the other segments over its duration, or its own if that is more, plus the effect of
-    vibration, estimated in the rests at either end. `windows` are those of the segments.
+    A transfer's noise is the larger of its own and the other segments' noise over its duration, plus the effect of
+    vibration, estimated in the rests at either end. `windows`: the segments' windows.
     """
     if not transfers:
         return segments

@@ -61,7 +61,7 @@ def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings:
 
 
 def combine_recordings(parts: Sequence[RecordingPart], surroundings: Surroundings) -> VectorInputs:
-    """Return the inputs of all parts of a run, revolutions before rests, without those of the sensor."""
+    """Return the inputs from all recordings of a run, revolutions before rests, without the sensor's properties."""
     site, extension_m = surroundings.site, np.array(surroundings.extension_m)
     turns = [turn for part in parts for turn in part.turns]
     averages, offsets_s = _list_averages(parts)
@@ -211,7 +211,7 @@ def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
 def list_uncertainties(
     surroundings: Surroundings, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> Unknown:
-    """Return the uncertainties that no recording of the sensor `name` shows, with that of the estimated Earth's rate.
+    """Return the uncertainties that no recording of sensor `name` shows, including the estimated Earth's rate's.
 
     `stamp_std_s` is as in `RecordedSensor`.
     """

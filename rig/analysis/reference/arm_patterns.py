@@ -75,7 +75,7 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
 
 
 def _waves_from(angle_rad: float) -> Array:
-    """Return the matrix (4, 4) from the waves of an angle's change to those of the angle."""
+    """Return the matrix (4, 4) that shifts harmonics of an angle's change to harmonics of the angle."""
     cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
     waves: Array = np.zeros((4, 4))
     waves[:2, :2] = [[cos, -sin], [sin, cos]]

@@ -95,7 +95,7 @@ class ReferenceWindow:
 
 
 def list_windows(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[DwellReading]) -> list[ReferenceWindow]:
-    """Return the windows of the calibration of sensor `name`: these dwells, then all sweeps."""
+    """Return the windows of the calibration of sensor `name`: the given dwells, then all sweeps."""
     used = {dwell.index for dwell in dwells}
     return [
         *(
@@ -161,7 +161,7 @@ def separate_sensor_errors(
 ) -> tuple[Spread, list[Contributor]]:
     """Return the `spread` by noise and arm, and the contributors of the sensor itself in this `movement`.
 
-    The response is that of a solution which estimates all of them, so the noise of a nonlinear sensor has a larger
+    The response belongs to a solution that estimates all parameters, so the noise of a nonlinear sensor has a larger
     effect.
     """
     drift, flicker = (

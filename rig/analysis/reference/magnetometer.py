@@ -60,8 +60,8 @@ def calibrate_magnetometers(
     """Calibrate every magnetometer that was recorded; return the results, or the Fault of each that has none.
 
     The `accelerometers` bound the error of the arm's attitudes. The Fault is `no_attitudes` without dwells,
-    `field_strength_unknown`, `field_drifts`, `field_not_uniform`, one of those of `field_readings` and of
-    `solve_triaxial`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
+    `field_strength_unknown`, `field_drifts`, `field_not_uniform`, a Fault of `field_readings` or of `solve_triaxial`,
+    `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
     """
     magnetometers = recordings[0].run.measuring(FIELD)
     return attempt_each(
@@ -122,7 +122,7 @@ def _calibrate(
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
-    """Return the drift by the tests at home of all recordings; None with only one test.
+    """Return the drift of the field between the rests at the home pose; None with fewer than two rests.
 
     Raise Fault `field_drifts`.
     """

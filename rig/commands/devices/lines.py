@@ -44,7 +44,7 @@ def add_stated(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the section on stdout, or write the file; report on stderr what the lines do and do not show.
+    """Print the section on stdout, or write the file; report on stderr what the lines show, and what is missing.
 
     Return 0, or 1 if the file needs more values. Raise Refused as `look_at_device`, `ask_stated` and `write_checked`.
     """

@@ -71,7 +71,7 @@ def _explain_error(name: str) -> Iterator[str]:
 
 
 def _explain_remedies(name: str, usual: str) -> Iterator[str]:
-    """Yield the remedies, one line for each method if they differ, that of the latest run first."""
+    """Yield the remedies, a line for each method if they differ; the latest run's method comes first."""
     from rig.errors.remedies_by_method import remedies_by_method
 
     remedies = remedies_by_method(name)

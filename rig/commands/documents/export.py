@@ -83,9 +83,9 @@ def export_files(options: Namespace) -> list[Path]:
 
 
 def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
-    """Return the recordings of a run, or of a log of another program. Raise Refused `bad_option`, and as each of them.
+    """Return the recordings of a run, or of a log of another program.
 
-    A folder of `rig record` is one of several logs, and no run.
+    Raise Refused `bad_option`, and the errors of both readers. A folder of `rig record` holds logs; it is not a run.
     """
     from rig.observation.external.from_files import read_log
     from rig.observation.formats.sample_files import is_in_format

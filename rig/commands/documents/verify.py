@@ -153,7 +153,7 @@ def _judge(
 def _find_signed_holder(
     name: str, content: bytes, look: "FileInspection", looks: "Mapping[Path, FileInspection]"
 ) -> tuple[str | None, tuple[Refused, ...]]:
-    """Return the signed file that contains an unsigned one; if there is one, also the problems of its signer."""
+    """Return the signed file that contains an unsigned file, or None, and the problems of its signer."""
     from rig.report.signatures.findings import not_as_signed
 
     holders = {other: signed for other, signed in looks.items() if name in signed.attached}

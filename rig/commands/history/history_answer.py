@@ -26,10 +26,9 @@ TO_CONNECT = {
 
 
 def ask_history(address: "HistoryAddress", work: Callable[[], T], modules: Sequence[str] = ()) -> T:
-    """Return what `work` returns of the history at `address`, or raise what it raises; TimeoutError after `ANSWER_S`.
+    """Return the result of `work` on the history at `address`; raise its errors, or TimeoutError after `ANSWER_S`.
 
-    That time is the history's alone: the modules that the work needs, and those named in `modules`, are imported
-    before.
+    The time does not include the import of the needed modules and of `modules`, which happens first.
     """
     for name in (*TO_ASK, *modules):
         import_module(name)
@@ -40,7 +39,7 @@ def ask_history(address: "HistoryAddress", work: Callable[[], T], modules: Seque
 
 
 def explain_failure(error: Exception) -> str:
-    """Return in a few words why a history was of no use."""
+    """Return a short reason why the history could not be used."""
     if isinstance(error, RigError):
         return f"{error.name}: {error.what}"
     if isinstance(error, TimeoutError):

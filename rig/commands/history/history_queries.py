@@ -147,7 +147,10 @@ def import_runs(options: Namespace) -> int:
 
 
 def verify(options: Namespace) -> int:
-    """Compare rows with their journal and results, files with their hashes. Print differences; return 1 if any."""
+    """Compare rows with their journal and results, files with their hashes.
+
+    Print the differences; return 1 if there are differences.
+    """
     from rig.history.integrity import STATES, WRONG, examine_history
 
     counts = dict.fromkeys(STATES, 0)

@@ -91,7 +91,7 @@ def _load_stated(options: Namespace, selection: Selection) -> tuple[str, tuple[S
 def _solve_all(
     tasks: Sequence[Task], options: Namespace, solve: Solve, journal: RecomputeJournal, answers: dict[str, Answer]
 ) -> Fault | None:
-    """Solve all tasks and note each answer. Return the fault by which a cluster was lost, else None."""
+    """Solve all tasks and note each answer. Return the fault if the cluster was lost, else None."""
     try:
         with _solve_by_workers(tasks, options, solve) as answers_by_task:
             for task, answer in _track_progress(answers_by_task, len(tasks)):

@@ -32,7 +32,10 @@ class CalibrationComparison:
 
 
 def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
-    """Enter the run in `folder`. Return the event to report, and its calibrations compared with the earlier ones."""
+    """Enter the run in `folder`.
+
+    Return the event to report, and the comparisons of its calibrations with earlier calibrations.
+    """
     from rig.history.storage.address import choose_history_address
 
     return _enter_run(folder, lambda: choose_history_address(section))
@@ -123,7 +126,7 @@ def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str
 
 
 def describe_changes(calibrations: Sequence[CalibrationComparison]) -> tuple[str, ...]:
-    """Return in words how calibrations differ from the earlier ones: first the changed ones, then the others."""
+    """Describe in words how calibrations differ from earlier ones: changed sensors first, then unchanged sensors."""
     if not calibrations:  # with the history off its modules are not imported
         return ()
     from rig.history.terminal.change_words import change_in_short, select_changed
@@ -190,7 +193,7 @@ def _since_event(calibration: CalibrationComparison) -> Since:
 
 
 def _compare_with_earlier(history: "History", run_id: int) -> "list[CalibrationComparison]":
-    """Return the calibrations of a run that have an earlier one, as one comparison."""
+    """Compare each calibration of a run with the sensor's previous one, if there is one."""
     from rig.history.series import changes_in, subjects
     from rig.history.store import Selection
 

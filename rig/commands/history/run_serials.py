@@ -34,10 +34,10 @@ def recall_sensors(config: RigConfig, moved: frozenset[str]) -> Memory:
 def find_other_board(
     config: RigConfig, board: str, parts: Collection[str], own_serial_numbers: Collection[str], *, simulated: bool
 ) -> str | None:
-    """Return another serial number, in words, that the history has of one of these `parts` on that board.
+    """Return the serial number, in words, under which the history knows a sensor on this board.
 
-    None if it is one of `own_serial_numbers`. The newest calibration decides. A history that does not answer gives
-    None.
+    The newest calibration of one of the `parts` decides. None if its serial number is one of `own_serial_numbers`. A
+    history that does not answer gives None.
     """
     from rig.history.storage.address import choose_history_address
 
@@ -65,7 +65,7 @@ def _load_of_sensors(address: "HistoryAddress", serial_numbers: list[str]) -> tu
 
 
 def _load_calibrations(address: "HistoryAddress", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
-    """Return the valid calibrations of these selections, the newest first; a file that does not exist has none."""
+    """Return the valid calibrations of the selections, the newest first; none if the file is missing."""
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 

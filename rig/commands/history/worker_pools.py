@@ -38,7 +38,7 @@ class Workers(Protocol):
         ...
 
     def room(self) -> int:
-        """Return how many more recordings they take now. Raise Fault `cluster_lost` if no worker is left."""
+        """Return how many more recordings the workers can take now. Raise Fault `cluster_lost` if no worker is left."""
         ...
 
     def give(self, solve: Solve, task: Task) -> None:
@@ -84,15 +84,15 @@ class Processes(AbstractContextManager["Processes"]):
 
     @property
     def busy(self) -> bool:
-        """Whether one of them is solving."""
+        """Whether a worker is solving a task."""
         return bool(self._in_hand)
 
     def room(self) -> int:
-        """Return how many of them are idle."""
+        """Return the number of idle workers."""
         return len(self._idle)
 
     def give(self, solve: Solve, task: Task) -> None:
-        """Give the task to an idle one."""
+        """Give the task to an idle worker."""
         pool = self._idle.pop()
         self._in_hand[pool.submit(solve, task)] = task, pool
 
@@ -147,7 +147,7 @@ class Cluster:
         future.add_done_callback(self._done.put)
 
     def answers(self) -> Iterator[SolvedTask]:
-        """Yield the answer that arrives within a moment, if any."""
+        """Wait a moment for an answer, and yield it if it arrives."""
         try:
             future = self._done.get(timeout=LOOK_S)
         except Empty:

@@ -58,7 +58,7 @@ def find_incident(words: str) -> Incident | None:
 
 
 def practise(control: str, words: str) -> str:
-    """Let happen what `words` name in the laboratory at its control channel, and return what a person sees of it.
+    """Cause the incident that `words` name in the laboratory, and return what a person there would see.
 
     Raise Fault `world_ended` if the laboratory is gone.
     """

@@ -36,7 +36,7 @@ def run(options: Namespace) -> int:
 
 
 def _practise(control: str) -> int:
-    """Let happen what is typed, at the pace of a real laboratory, until the end of the input; return 0."""
+    """Cause each typed incident, in real time, until the end of the input; return 0."""
     from rig.commands.laboratory.practice import HELP, practise
     from rig.station.plain_text import for_file
 

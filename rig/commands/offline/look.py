@@ -37,9 +37,9 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print what the files hold and what they allow; write the map of their columns with `--write`. Return 0.
+    """Print the content of the files and the commands that can use them; with `--write` save their column map.
 
-    Raise Refused `bad_option`, `configuration_not_written`, and as the files' readers do.
+    Return 0. Raise Refused `bad_option`, `configuration_not_written`, and as the files' readers do.
     """
     from rig.analysis.log_contents import look_at
 
@@ -61,7 +61,7 @@ def run(options: Namespace) -> int:
 def _print(
     looks: "Sequence[LookedFile]", columns: dict[str, Any], stated: "ColumnMap | None", named: Path | None
 ) -> None:
-    """Print the files and what they allow; change `columns` to the convention that the gyroscope shows."""
+    """Print the files and the commands that can use them; set in `columns` the convention that the gyroscope shows."""
     from rig.analysis.log_contents import count_from
     from rig.report.terminal.look_lines import describe_convention, describe_file, describe_solutions
 

@@ -54,7 +54,7 @@ def add(solve: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Solve a recording, or samples with sweeps or attitudes, and print the result.
 
-    For a recording nothing is written. Raise Refused `bad_option`, `unknown_setting`, and as each of them.
+    For a recording nothing is written. Raise Refused `bad_option`, `unknown_setting`, and the errors of the solution.
     """
     if options.sweeps is None and options.attitudes is None and not options.turns:
         if options.out is not None:

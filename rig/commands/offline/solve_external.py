@@ -244,7 +244,7 @@ def _read_turn_options(options: Namespace) -> "Columns":
 
 
 def _keep_run(options: Namespace, recording: "RunData", outcome: "Outcome") -> "tuple[CalibrationComparison, ...]":
-    """Write the run folder and enter it in the history. Return its calibrations compared with the earlier ones."""
+    """Write the run folder and enter it in the history. Return the comparisons with earlier calibrations."""
     from rig.commands.history.remember import remember_own
     from rig.data.latest_run import note_run
     from rig.data.recording.run_file import write_elsewhere

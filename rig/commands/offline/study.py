@@ -40,7 +40,7 @@ def run(options: Namespace) -> int:
 
 
 def _list_studies() -> int:
-    """Print the names of the studies, what each shows, and how long it takes."""
+    """Print each study's name, subject and duration."""
     from rich.console import Console
     from rich.table import Table
 

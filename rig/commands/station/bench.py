@@ -197,7 +197,8 @@ class RigBench:
 def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> Iterator[RigBench]:
     """Open the bench for the length of the block; `folder` is the batch's.
 
-    Raise Refused as `claim_devices`, and `station_sensors` if the configuration has no such sensors.
+    Raise Refused as `claim_devices`, and `station_sensors` if the configuration has no sensors that a station can
+    calibrate.
     """
     config = configured.loaded.config
     refuse_other_sensors(config)

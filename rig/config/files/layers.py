@@ -119,7 +119,7 @@ def _layer(text: str, name: str) -> _Layer:
 def _override(
     document: dict[str, Any], places: dict[Location, str], written: dict[Location, str], item: str
 ) -> Iterator[str]:
-    """Apply one `a.b.c=value` in place; yields a problem instead when it cannot be applied."""
+    """Apply one `a.b.c=value` in place; yield a problem if it cannot be applied."""
     path, equals, value = item.partition("=")
     path = path.strip()
     what = f"{SET} {shorten(item)}"

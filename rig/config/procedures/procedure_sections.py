@@ -117,7 +117,7 @@ class SixSweepsSection(ProcedureSection):
 
     @property
     def arcs(self) -> bool:
-        """Whether sweeps are no whole turns."""
+        """Whether sweeps are arcs instead of whole turns."""
         return self.arc_deg % 360 != 0
 
     @property
@@ -319,7 +319,7 @@ class AttitudesSection(ProcedureSection):
         return 2 if self.second_order else 1
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield what the calibration of an accelerometer lacks."""
+        """Yield what the section lacks for the calibration of an accelerometer."""
         if not any(sensor.acceleration for sensor in config.to_calibrate.values()):
             yield "attitudes calibrate accelerometers: give a sensor with role: calibrate its section acceleration"
         lacking = config.limits.lacking("accelerometer")
@@ -349,7 +349,7 @@ class BiasDriftSection(AttitudesSection):
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield what the calibration of an accelerometer lacks, and missing limits of the drift."""
+        """Yield what the section lacks for the calibration of an accelerometer and for limits of the drift."""
         yield from AttitudesSection.problems(self, config)
         if lacking := config.limits.lacking("bias drift"):
             yield f"a bias that is watched needs {', '.join(lacking)}"

@@ -24,7 +24,7 @@ class LinkLoad:
 
     @property
     def bytes_per_sample(self) -> float:
-        """A sample's bytes and its share of the frame around it."""
+        """The bytes of a sample, with its share of the frame."""
         message = MESSAGE_BY_NAME[self._message]
         item, head = message.item_dtype.itemsize, message.head.size
         full_frame = (PAYLOAD_MAX - head) // item

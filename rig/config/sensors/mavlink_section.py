@@ -64,7 +64,7 @@ class MavlinkSection(Section):
 
     @property
     def instance(self) -> int:
-        """Which of the autopilot's IMUs it is, from 0."""
+        """The index of the IMU in the autopilot, from 0."""
         return {"SCALED_IMU2": 1, "SCALED_IMU3": 2}.get(self.imu, 0)
 
     @property

@@ -113,7 +113,7 @@ def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
 
 
 def one_of(value: float, allowed: Sequence[float]) -> float:
-    """Return `value` if it is allowed. Raise ValueError with the nearest otherwise."""
+    """Return `value` if it is allowed. Otherwise raise ValueError with the nearest allowed value."""
     if value not in allowed:
         nearest = min(allowed, key=lambda candidate: abs(candidate - value))
         raise ValueError(f"not available; the nearest is {nearest:g}; allowed: {list_numbers(allowed)}")

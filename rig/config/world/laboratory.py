@@ -264,7 +264,7 @@ class SimulatedArmSection(Section):
     @model_validator(mode="before")
     @classmethod
     def apply_kind_of_joints(cls, data: Any) -> Any:
-        """Fill in what follows from `joints`."""
+        """Fill in the defaults of the kind of `joints`."""
         return fill_in_joints(data) if isinstance(data, Mapping) else data
 
 

@@ -46,7 +46,7 @@ class Channel:
 
     @property
     def measures(self) -> Quantity | Scalar:
-        """The row of the quantity."""
+        """The quantity or scalar that the channel holds."""
         return measured()[self.quantity]
 
     @property
@@ -55,7 +55,7 @@ class Channel:
         return self.step or (0.0 if self.type == "<f8" else self.unit_per_count)
 
     def steps(self, readings: Array, *, trusts_counts: bool = False) -> Steps:
-        """Return the steps of a quantity with axes in its readings (n, 3): as stated, or larger ones that they show.
+        """Return the resolution steps of readings (n, 3): as stated, or larger if the readings show larger steps.
 
         `trusts_counts`: the recorded numbers are the converter's own counts, whatever the readings show.
         """
@@ -64,7 +64,7 @@ class Channel:
         return Steps(self.resolution if trusts_counts else np.maximum(self.resolution, find_steps(readings)))
 
     def counts(self, samples: NDArray[Any]) -> NDArray[Any]:
-        """Return the numbers (n,) or (n, 3) in samples (n,), as they were recorded."""
+        """Return the recorded numbers (n,) or (n, 3) of the channel in samples (n,), not converted to its unit."""
         counts: NDArray[Any] = samples[self.column]
         return counts
 
@@ -103,13 +103,13 @@ class Channel:
 def triad_channel(
     quantity: Quantity, unit_per_count: float, full_scale_counts: int, end_of_scale: float | None
 ) -> Channel:
-    """Return the channel of a sensor of three axes as the board and the KVH 1775 deliver it."""
+    """Return the channel of three axes in counts, the form that the board and the KVH 1775 deliver."""
     column = f"{quantity.prefix}counts"
     return Channel(quantity.name, column, "<i4", unit_per_count, 0.0, full_scale_counts, end_of_scale)
 
 
 def thermometer_channel(c_per_count: float, offset_c: float) -> Channel:
-    """Return the channel of the thermometer in such a sensor."""
+    """Return the channel of the thermometer in a sensor of three axes."""
     return Channel(TEMPERATURE.name, "temperature_counts", "<i2", c_per_count, offset_c)
 
 

@@ -64,14 +64,14 @@ def empty(
     sensors: Mapping[str, RecordedSensor],
     states_dtype: np.dtype[Any] = ARM_STATE_DTYPE,
 ) -> Contents:
-    """Return the contents of a new recording of these sensors, with states of that type."""
+    """Return the contents of a new recording of `sensors`, without samples or states."""
     described = {name: sensor.attributes() for name, sensor in sensors.items()}
     samples = {name: np.empty(0, sensor.sample_dtype) for name, sensor in sensors.items()}
     return Contents(schema, texts, described, samples, np.empty(0, states_dtype), np.empty(0, EVENTS_DTYPE))
 
 
 def parse_sensor(name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
-    """Return the sensor that the attributes of its samples describe. Raise ValueError naming what is wrong."""
+    """Return the sensor that the attributes of its samples describe. Raise ValueError naming the wrong attribute."""
     attributes = sanitize(dict(attributes))
     channels = attributes.get("channels")
     if not isinstance(channels, str):

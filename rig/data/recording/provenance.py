@@ -78,7 +78,7 @@ class Provenance:
         return ScriptIdentity(self.script or "", self.script_sha256 or "")
 
     def document(self) -> dict[str, Any]:
-        """Return the provenance as plain values of JSON, without what is unknown."""
+        """Return the provenance as plain JSON values, without unknown fields."""
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
         files = {name: value.model_dump() for name in OF_FILES if (value := getattr(self, name)) is not None}
         document = {**asdict(self), "stored_calibrations": stored, **files}

@@ -86,11 +86,11 @@ class RecordedSensor:
         return range_rad_s
 
     def measures(self, quantity: Quantity | Scalar) -> bool:
-        """Return whether its samples hold that quantity."""
+        """Return whether the sensor's samples hold the quantity."""
         return any(channel.quantity == quantity.name for channel in self.channels)
 
     def channel(self, quantity: Quantity | Scalar) -> Channel:
-        """Return the channel of a quantity that it measures. Raise KeyError for another."""
+        """Return the channel of a quantity. Raise KeyError if the sensor does not measure it."""
         for channel in self.channels:
             if channel.quantity == quantity.name:
                 return channel

@@ -57,7 +57,7 @@ class RecordedTurner:
 
 
 def parse_turner(document: Any) -> RecordedTurner:
-    """Return the turner that a document describes. Raise ValueError naming what is impossible."""
+    """Return the turner that a document describes. Raise ValueError naming the impossible value."""
     turner = validate(RecordedTurner, document, "turner")
     names = [field.name for field in turner.fields]
     if len({*turner.joints}) < len(turner.joints) or len({*names, *ALWAYS}) < len(names) + len(ALWAYS):

@@ -163,7 +163,7 @@ class RunRecorder:
         """Leave the file as the last flush left it.
 
         HDF5 repeats a failed write whenever anything is closed, and ends the process with a segmentation fault at exit;
-        from here on it writes into nothing.
+        from here on all writes are discarded.
         """
         with Path(os.devnull).open("r+b") as nothing:
             os.dup2(nothing.fileno(), self._descriptor)

@@ -250,8 +250,8 @@ class RunSettings:
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """Return the settings with other thresholds or limits: `limits.scale_std=0.001`.
 
-        The encoders of arcs can be changed, too: `uncertainty.angle_std_deg=0.02`. Raise Refused `unknown_setting` or
-        `wrong_setting`, which list the possible settings.
+        The uncertainty of the encoders can also be changed if the run has arcs: `uncertainty.angle_std_deg=0.02`. Raise
+        Refused `unknown_setting` or `wrong_setting`, which list the possible settings.
         """
         changed = self
         for item in overrides:
@@ -287,9 +287,9 @@ def settings_from_json(text: str) -> RunSettings:
 
 
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
-    """Return the settings of a new run; `plan` is that of the whole procedure.
+    """Return the settings of a new run; `plan` is the plan of the whole procedure.
 
-    Raise Refused `angle_std_not_stated` if it has arcs and the error of the encoders is not stated.
+    Raise Refused `angle_std_not_stated` if the plan has arcs and the file does not state the error of the encoders.
     """
     from rig.config.procedures.hand_sections import ByHandSection
 
@@ -396,7 +396,7 @@ def _tesla(microtesla: float | None) -> float | None:
 
 
 def uncertainty_of(config: "RigConfig") -> Uncertainty:
-    """Return the uncertainties that the file states; for a sensor without one, that of its part."""
+    """Return the stated uncertainties; a sensor without its own statement gets its part's default."""
     stated: dict[str, Any] = config.uncertainty.model_dump()
     of_sensors: dict[str, Any] = {
         what: {

@@ -41,7 +41,7 @@ def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
 
 
 def _distances_from_neighbours(times_s: Array, biases: Array, left_out: Sequence[int]) -> Array:
-    """Return the distance (n,) of each bias (n, 3) from the line between its neighbours; 0 without two used ones."""
+    """Return the distance (n,) of each bias (n, 3) from the line between its neighbours; 0 if one is unused."""
     distances = np.zeros(len(times_s))
     for row in range(1, len(times_s) - 1):
         if not {row - 1, row, row + 1} & set(left_out):

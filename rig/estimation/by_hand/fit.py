@@ -114,7 +114,7 @@ def _start(integrals: MoveIntegrals, faces: RestFaces, initial: GyroscopeModel) 
 
 
 def _align_vertical(attitude: Array, up: Array) -> Array:
-    """Return the attitude (3, 3) nearest to a given one whose vertical in the body is `up` (3,)."""
+    """Return the attitude (3, 3) nearest to a given attitude with the vertical `up` (3,) in the body's frame."""
     from scipy.spatial.transform import Rotation
 
     vertical = attitude[2]
@@ -157,9 +157,9 @@ def _leverages(design: Array, covariance: Array) -> Array:
 
 
 def estimate_stds(rows: Sequence[Factor], now: HandStds, trusted: int | None = None) -> tuple[list[Factor], HandStds]:
-    """Estimate the standard deviations of rows whose current ones are `now`, from the first `trusted` rests or all.
+    """Estimate the rows' standard deviations (currently `now`) from the residuals of the first `trusted` rests, or all.
 
-    Return the rows with the new standard deviations, and these.
+    Return the rows with the new standard deviations, and the standard deviations.
     """
     rows = list(rows)
     for _ in range(SIZED):
@@ -171,7 +171,7 @@ def estimate_stds(rows: Sequence[Factor], now: HandStds, trusted: int | None = N
 
 
 def replace_stds(rows: Sequence[Factor], now: HandStds, new: HandStds) -> list[Factor]:
-    """Return rows of standard deviations `now` with the `new` ones."""
+    """Return the rows with their standard deviations `now` replaced by `new`."""
     cause_of = {kind: (cause, getattr(new, name) / getattr(now, name)) for name, (kind, cause) in CAUSE_OF_STD.items()}
     replaced = []
     for row in rows:

@@ -68,7 +68,7 @@ class GraphState:
 
     @property
     def gyroscope(self) -> GyroscopeModel:
-        """The gyroscope's model at these values."""
+        """The gyroscope's model at the current values."""
         return GyroscopeModel(self.matrix, self.biases, self.sensitivity, self.bends)
 
     def after_step(self, step: Array) -> "GraphState":

@@ -82,7 +82,7 @@ def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
 
 
 def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
-    """Return every hypothesis with its drop of χ², beyond that of omitting as many equations at random.
+    """Return each hypothesis with the drop of χ² in excess of the drop from as many equations omitted at random.
 
     The columns are projected off the model's, so the graph is not solved for each hypothesis.
     """

@@ -146,8 +146,8 @@ class Accumulator:
     def _covariance(self, scale: Array, bias: Array, centre: Array) -> Array:
         """Return the covariance (6, 6) to first order in the errors e of the means.
 
-        δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β. `bias` (3,) is that of readings less `centre` (3,); a
-        translation of the origin does not change the covariance.
+        δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β. `bias` (3,) is the bias of the readings minus `centre`
+        (3,); a translation of the origin does not change the covariance.
         """
         translation = _translation(centre)[:6]
         powers = np.stack([(bias - centre) ** 2, 2 * (bias - centre), np.ones(3)], axis=1) * 4 * scale[:, None] ** 4
@@ -166,7 +166,7 @@ class Accumulator:
 
 
 def _translation(centre: Array) -> Array:
-    """Return the matrix (7, 7) that maps x̃ = [m² m 1] to that of m − c: (m − c)² = m² − 2 c m + c²."""
+    """Return the matrix (7, 7) that maps x̃(m) = [m² m 1] to x̃(m − c), by (m − c)² = m² − 2 c m + c²."""
     translation = np.eye(7)
     axes = np.arange(3)
     translation[axes, axes + 3] = -2 * centre

@@ -73,7 +73,7 @@ class Budget:
         return std
 
     def line(self, name: str) -> Contributor:
-        """Return the contributor of that name. Raise KeyError if there is none."""
+        """Return the contributor called `name`. Raise KeyError if there is none."""
         return {contributor.name: contributor for contributor in self.contributors}[name]
 
     def std_of(self, name: str) -> Array:
@@ -81,7 +81,7 @@ class Budget:
         return self.line(name).std
 
     def without(self, names: Collection[str]) -> "Budget":
-        """Return the budget without the contributors of these names."""
+        """Return the budget without the named contributors."""
         return replace(
             self, contributors=tuple(contributor for contributor in self.contributors if contributor.name not in names)
         )
@@ -220,7 +220,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
 
 
 def _evaluate_mounts(explained: Explained, unknown: Unknown, propagate: Propagate) -> Iterator[Contributor]:
-    """Yield the contributors of the ends of arcs and of the mountings; `propagate` is that of `_contributors`."""
+    """Yield the contributors of the ends of arcs and of the mountings; `propagate` as in `_contributors`."""
     inputs, matrix = explained.inputs, explained.solution.matrix
     if inputs.encoder_errors_rad_s is not None:
         spread = propagate(inputs.encoder_errors_rad_s @ matrix.T)

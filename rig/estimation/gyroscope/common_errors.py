@@ -53,11 +53,11 @@ def solve_with_common_errors(
     nominal_mounting: Array | None = None,
     shared_covariance_rad2_s2: Array | None = None,
 ) -> tuple[VectorSolution, CommonErrors]:
-    """Return the solution of the vector model corrected for common errors, and these errors.
+    """Return the solution of the vector model corrected for common errors, and the estimated errors.
 
-    `effects` returns B (P, N, 3), in rad/s per standard deviation, from F (3, 3); the others as in
+    `effects` returns B (P, N, 3), in rad/s per standard deviation, from F (3, 3); the other arguments are described in
     `solve_vector_model`. The solution's `covariance`, `matrix_covariance` and `response` contain the effect of the
-    readings; only `angles_covariance_rad2` contains the remaining errors, too. Raise Fault as `solve_vector_model`
+    readings; only `angles_covariance_rad2` also contains the remaining errors. Raise Fault as `solve_vector_model`
     does.
     """
     means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
@@ -95,7 +95,7 @@ def solve_with_common_errors(
 
 
 def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
-    """Return the gain (P, N, 3) from readings to the sizes of the errors, and the sizes' covariance (P, P)."""
+    """Return the gain (P, N, 3) that estimates the errors' sizes from the readings, and their covariance (P, P)."""
     weights = np.linalg.inv(noise)
     weighted = weights @ design
     # The weights without what F, c and G explain (Frisch and Waugh, Econometrica 1 (1933) 387; Lovell 1963).

@@ -91,7 +91,7 @@ class EarthRate:
 
     @property
     def latitude_std_rad(self) -> float:
-        """The standard deviation of the latitude, apart from that of `up`: a tilt of the base counts as latitude."""
+        """The standard deviation of the latitude without the effect of `up`: a tilt of the base counts as latitude."""
         latitude = self.latitude_rad
         slope = self.up - np.sin(latitude) * self.rate_rad_s / self.norm_rad_s
         return self._std(slope / (self.norm_rad_s * np.cos(latitude)))
@@ -128,7 +128,7 @@ class EarthRate:
 def find_earth_rate(inputs: VectorInputs, nominal_mounting: Array, prior: EarthRatePrior) -> EarthRate:
     """Return the Earth's rate in the base frame; `inputs.earth_rate_rad_s` is not used.
 
-    Raise Fault `earth_rate_and_g_sensitivity`, `earth_rate_not_observable`, and those of the vector model.
+    Raise Fault `earth_rate_and_g_sensitivity`, `earth_rate_not_observable`, and the Faults of the vector model.
     """
     fixed = np.zeros(3)
     directions = np.eye(3)

@@ -69,9 +69,10 @@ class Increments:
 
 
 def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Array) -> IntegratedAttitudes:
-    """Integrate readings (n, 3) in rad/s at times (n,), with F (3, 3) and b (3,), to instants `at_s` (k,).
+    """Integrate rates to attitudes at the instants `at_s` (k,).
 
-    Raise ValueError unless times increase strictly and instants increase within them.
+    Readings (n, 3) in rad/s at times (n,) are corrected by F (3, 3) and b (3,). Raise ValueError unless times increase
+    strictly and instants increase within them.
     """
     if len(at_s) and (at_s[0] < time_s[0] or at_s[-1] > time_s[-1] or (np.diff(at_s) < 0).any()):
         raise ValueError("instants must rise, and lie within the readings' times")

@@ -125,6 +125,6 @@ def squared_rate_jacobian(theta: Array, means: Array) -> Array:
 
 
 def squared_rate_variance(theta: Array, means: Array, variances: Array) -> Array:
-    """Return the variance (N,) of `squared_rate` by those (N, 3) of the mean readings, to first order."""
+    """Propagate the variances (N, 3) of the mean readings to the variance (N,) of `squared_rate`, to first order."""
     k, shifted = theta[:3], means + theta[3:]
     return np.asarray(np.sum(4 * k**4 * shifted**2 * variances, axis=-1), dtype=np.float64)

@@ -48,7 +48,7 @@ def _find_curvatures(explained: Explained, turns_rad: Array) -> Array:
 
 
 def _find_regression(explained: Explained) -> Array:
-    """Return the map (3, 4, N) from mean readings to F, row by row, and the offsets, for the given mounts."""
+    """Return the linear map (3, 4, N) from mean readings to each row of F and its offset, with the mounts fixed."""
     inputs, solution, bias = explained.inputs, explained.solution, explained.bias
     design = design_matrix(inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.apparent_gravity_m_s2)
     of_speed = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, solution.matrix)

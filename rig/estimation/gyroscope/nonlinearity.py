@@ -56,7 +56,7 @@ def bending(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_
 
 
 def nonlinearity(sizes: Array, covariance: Array) -> Nonlinearity:
-    """Return the nonlinearity by the sizes (6,) of `curvature` in its unit, and their covariance (6, 6)."""
+    """Return the nonlinearity from the estimated sizes (6,) of the `curvature` columns and their covariance (6, 6)."""
     std = FREE_PER_RAD_S * np.sqrt(np.diag(covariance))
     odd, even = np.split(FREE_PER_RAD_S * sizes, 2)
     return Nonlinearity(odd, even, std[:3], std[3:])

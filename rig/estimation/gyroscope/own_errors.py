@@ -79,7 +79,7 @@ def own_errors(
 
 
 def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variances_rad2_s2: Array) -> Iterator[OwnError]:
-    """Yield the rounding error common to means (N, 3), by its standard uncertainty (N, 3) in each.
+    """Yield the rounding errors that means (N, 3) share, as the standard uncertainty (N, 3) of each mean.
 
     Means closer than the steps, such as those of all rests, have the same error: averaging does not reduce it. So an
     axis has one error for each group of such means; the independent part is in their variance (N, 3). Negligible errors
@@ -102,7 +102,7 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
 
 
 def _warmer_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
-    """Return the temperature (2, N), K, above its weighted mean: as recorded, and the change within recorded steps."""
+    """Return temperature deviations (2, N), K, from the weighted mean: recorded ones, then unresolved ones."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])
 
@@ -117,6 +117,6 @@ def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
 
 
 def subtract_mean(values: Array, weights: Array) -> Array:
-    """Return values (N,) less their weighted mean; zero if they are NaN."""
+    """Return values (N,) minus their weighted mean; zero for values that are NaN."""
     deviation: Array = np.nan_to_num(values - np.average(values, weights=weights))
     return deviation

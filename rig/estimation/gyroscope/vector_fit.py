@@ -99,7 +99,7 @@ class VectorInputs:
     def mount_errors_rad_s(self) -> Array | None:
         """The effects (3 S, N, 3) of one standard uncertainty of each mount on the rates.
 
-        The frame of the item is that of the first stage, so an error of this mount changes all other stages.
+        The first stage defines the item's frame, so an error of the first mount changes all other stages.
         """
         if self.mount_turns_rad is None:
             return None
@@ -109,7 +109,7 @@ class VectorInputs:
 
     @property
     def arm_errors_rad_s(self) -> Array:
-        """The effects (P, N, 3) of all kinds of errors of the arm's angles on the rates, with those of mounts last."""
+        """The effects (P, N, 3) of all kinds of errors of the arm's angles on the rates; mount errors come last."""
         none = np.zeros((0, *self.means_rad_s.shape))
         kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s, self.mount_errors_rad_s)
         return np.concatenate([none, *(kind for kind in kinds if kind is not None)])
@@ -165,7 +165,7 @@ def centripetal_m_s2(turns_rad_s: Array, lever_arm_m: Array) -> Array:
 
 
 def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess | None = None) -> Explained:
-    """Return scale, bias and mounting, with the g-sensitivity if the attitudes determine it.
+    """Estimate scale, bias and mounting, and the g-sensitivity if the attitudes determine it.
 
     The bias drift is estimated from the means unless a `process` is given. Raise Fault as the vector model does.
     """
@@ -187,10 +187,9 @@ def solver(
     speed_std_rad_s: Array,
     effects: Callable[[Array], Array],
 ) -> Callable[[Array | None], tuple[VectorSolution, CommonErrors]]:
-    """Return the vector model as a function of the covariance (N, N) shared by the means, if any.
+    """Return a function that solves the vector model for a covariance (N, N) between the means, or None.
 
-    `effects` are those of `solve_with_common_errors`, `gravity_m_s2` is the apparent gravity, None without
-    g-sensitivity.
+    `effects` as in `solve_with_common_errors`; `gravity_m_s2` is the apparent gravity, None without g-sensitivity.
     """
 
     def solve(shared: Array | None) -> tuple[VectorSolution, CommonErrors]:

@@ -260,7 +260,7 @@ def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None,
 
 @cache
 def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the indices (12,) of F, row by row, and c among the coefficients, then those of G."""
+    """Return the coefficients' indices: (12,) of F, row by row, and c; then the indices of G."""
     index = np.arange(3 * columns, dtype=np.intp).reshape(3, columns)
     return np.concatenate([index[:, :3].ravel(), index[:, 3]]), index[:, 4:].ravel()
 

@@ -137,7 +137,7 @@ class Movement:
         return noise
 
     def segments(self) -> list[slice]:
-        """Return the slice of each dwell among all 3 K readings, then those of each sweep."""
+        """Return each dwell's slice of all 3 K readings, then each sweep's slice."""
         still, turning = len(self.dwells.readings_m_s2), len(self.sweeps.speeds_rad_s)
         first = [3 * dwell for dwell in range(still)] + [3 * still + 9 * sweep for sweep in range(turning + 1)]
         return [slice(*ends) for ends in pairwise(first)]
@@ -179,7 +179,7 @@ def project_reference(delay_s: float, movement: Movement) -> Array:
 
 
 def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
-    """Return the derivative (M, 3, …) of waves (M, 3, …) of the angle by the lag, without that of the mean rate."""
+    """Differentiate harmonics (M, 3, …) of the angle with respect to the lag, without the effect of the mean rate."""
     by_wave = (len(waves), 3, *(1,) * (waves.ndim - 2))
     cosine, sine = (sweeps.turning_rad2_s2[:, row] / sweeps.speeds_rad_s[:, None] for row in (4, 5))
     changed: Array = sine.reshape(by_wave) * waves[:, 1:2] - cosine.reshape(by_wave) * waves[:, 2:]
@@ -314,7 +314,7 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """Return the product (K, 3, …) by element; for sweeps that of two waves, up to the first harmonic."""
+    """Return the elementwise product (K, 3, …); for sweeps, the product of two harmonics, up to the first harmonic."""
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_waves(one, movement), 1, 0)
     others = np.moveaxis(_waves(other, movement), 1, 0)

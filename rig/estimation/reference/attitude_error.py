@@ -155,7 +155,7 @@ def _estimate_std(theta: Array, placed: Placed) -> float:
 def maximise_likelihood(
     growth: Array, residuals: Array, slopes: Array, nuisance: Array | None = None
 ) -> tuple[float, float]:
-    """Return δ in rad of restricted maximum likelihood, and the negative log-likelihood up to a constant.
+    """Return the restricted-maximum-likelihood estimate of δ, rad, and the negative log-likelihood up to a constant.
 
     Residuals (n,) are independent with variances 1 + δ² γ, of which `growth` (n,) is γ; `slopes` (n, q) are the model's
     columns, `nuisance` (n, k) further explanatory ones. The constant depends on the slopes alone. δ is the best of a

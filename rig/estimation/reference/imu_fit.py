@@ -146,7 +146,7 @@ def list_fixed(movement: Movement, *, second_order: bool) -> list[int]:
 
 
 def find_free_directions(theta: Array, fixed: list[int]) -> Array:
-    """Return the free directions (22, q) of θ: those of v_ref are perpendicular to it; the `fixed` have none."""
+    """Return the free directions (22, q) of θ: v_ref moves only across itself, `fixed` parameters do not move."""
     directions = free_directions(theta, norm_known=True)
     free: Array = np.delete(directions, [index - 1 for index in fixed], axis=1)  # v_ref has one column fewer
     return free

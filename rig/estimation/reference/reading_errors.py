@@ -27,7 +27,7 @@ ANGLES = 72  # of a revolution, over which nonlinear functions of the accelerati
 
 
 def noise(theta: Array, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of all errors of the readings but the arm's attitudes."""
+    """Return the covariance (3 K, 3 K) of the readings from all errors except the arm's attitude errors."""
     covariance = movement.noise() + _not_repeated(theta, movement) + flickering(movement) + wandering(movement)
     for patterns in (bending(theta, movement), bias_warming(movement), scale_warming(theta, movement)):
         covariance += patterns.T @ patterns
@@ -60,7 +60,7 @@ def bias_warming(movement: Movement) -> Array:
 
 
 def scale_warming(theta: Array, movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of κ of each axis, as those of β."""
+    """Return the patterns (6, 3 K) of κ of each axis, in the same form as the patterns of β."""
     sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))

@@ -81,7 +81,7 @@ def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
 
 
 def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
-    """Return the covariance (6, 6) of scale and bias by that of θ; b is in the reading, a gyroscope's is added."""
+    """Propagate the covariance of θ to scale and bias (6, 6); b is in the reading, a gyroscope's is added."""
     to_parameters = scale_and_bias(matrix, scale, len(covariance))
     propagated: Array = to_parameters @ covariance @ to_parameters.T
     return propagated
@@ -96,7 +96,7 @@ def fewest_dof(response: Array, variances: Array, dof: Array) -> float:
 
 
 def response_in_attitudes(solution: TriaxialSolution, dwells: Dwells) -> Array:
-    """Return the derivative (15, 3 N) of F, v_ref of given norm, and b by the readings, with the estimated δ."""
+    """Return the derivative (15, 3 N) of the parameters F, v_ref and b with respect to the readings."""
     theta, v_bar = solution.theta[: SECOND.start], np.zeros_like(dwells.variances_m2_s4)
     std_rad = np.full(len(v_bar), solution.attitude_std_rad)
     whiteners = find_whiteners(dwells.variances_m2_s4, effects(theta, dwells.attitudes, v_bar), std_rad)
@@ -107,7 +107,7 @@ def response_in_attitudes(solution: TriaxialSolution, dwells: Dwells) -> Array:
 
 
 def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contributor] = ()) -> Budget:
-    """Return the budget by the readings, the uncertainty of the reference's norm, and other contributors."""
+    """Return the budget: the readings, the uncertainty of the reference's norm, and other contributors."""
     noise = spread.response @ spread.noise @ spread.response.T
     contributors = [
         evaluate_a(NOISE, "scatter of the readings", noise, spread.known_noise),
@@ -130,7 +130,7 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
 
 
 def assumed(name: str, half_width: float, unit: str, source: str, covariance: Array) -> Contributor:
-    """Return a contributor of type B whose `covariance` (6, 6) is that of one half-width."""
+    """Return a contributor of type B from the `covariance` (6, 6) that one half-width causes."""
     return Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, covariance / 3)
 
 

@@ -27,7 +27,7 @@ from rig.estimation.reference.reference_model import (
 
 
 def stack(readings: Array, attitudes: Array, squares: Array | None) -> Array:
-    """Return X (…, 3 N, 15), Eq. (4), or (…, 3 N, 18) with s² (…, N, 3) given."""
+    """Return the design matrix X (…, 3 N, 15) of Eq. (4); (…, 3 N, 18) if s² (…, N, 3) is given."""
     x = np.zeros((*readings.shape, 15 if squares is None else 18))
     for i in range(3):
         x[..., i, 3 * i : 3 * i + 3] = readings

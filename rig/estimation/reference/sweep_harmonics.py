@@ -117,7 +117,7 @@ def _find_long_run_covariance(residuals: Array, scatter: Array, coloured: Callab
     """Return the long-run covariance (3, 3) of residuals (n, 3), by their autocorrelation along principal axes.
 
     A vibration is along one of these and averages out almost entirely, unlike the noise across it. Along x, y, z both
-    are mixed, and the vibration's correlation would be taken for that of the noise.
+    are mixed, and the vibration's correlation would be taken for the noise's.
     """
     variances, directions = np.linalg.eigh(scatter)
     projected = residuals @ directions

@@ -181,7 +181,7 @@ def solve_triaxial_batch(
 ) -> Array:
     """Return θ (R, 15 or 18) = [rows of F, v_ref, b, φ] of many runs (R, N, 3) in the same attitudes, unchecked.
 
-    `attitudes` (N, 3, 3), `variances` (N, 3) and `prior` are those of every run, as in `solve_triaxial`.
+    `attitudes` (N, 3, 3), `variances` (N, 3) and `prior` are the same for every run, as in `solve_triaxial`.
     """
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings, attitudes, variances))
     theta, _ = estimate_as_published(m, r, prior, second_order=second_order)

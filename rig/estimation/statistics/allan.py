@@ -109,7 +109,7 @@ def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
 
 
 def too_short(what: str, enough_s: float = ENOUGH_S) -> Fault:
-    """Return the error for a value that needs a longer recording, of about `enough_s`."""
+    """Return the error for a recording too short for a value; about `enough_s` would suffice."""
     return Fault("recording_too_short", what, f"Record at rest for {enough_s:.0f} s or more, in one stretch")
 
 
@@ -170,7 +170,7 @@ def _bounds(deviation: Array, dof: Array) -> tuple[Array, Array]:
 
 
 def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
-    """Return N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there as that of white noise does."""
+    """Return N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there like white noise, as 1/√τ."""
     index = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
     tau_s, relative_std = float(curve.tau_s[index]), float(curve.relative_std[index, axis])
     if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:

@@ -79,8 +79,8 @@ def walk_covariance(windows_s: ArrayLike) -> Array:
 def flicker_covariance(windows_s: ArrayLike) -> Array:
     """Return the covariance (N, N) of the means of flicker noise of Allan deviation 1 over windows (N, 2) [start, end].
 
-    Values a time τ apart have the covariance −ln(τ)/(2 ln 2), plus an infinite constant: this deviation is that of
-    noise of power B²/(2π f), B √(2 ln 2/π) (IEEE Std 952-1997, C.1.3). Relative to the mean over the whole time from
+    Values a time τ apart have the covariance −ln(τ)/(2 ln 2), plus an infinite constant: this Allan deviation belongs
+    to noise of power B²/(2π f), B √(2 ln 2/π) (IEEE Std 952-1997, C.1.3). Relative to the mean over the whole time from
     the first start to the last end the constant cancels.
     """
     windows = np.asarray(windows_s, dtype=np.float64)
@@ -155,9 +155,10 @@ def bias_process(
 ) -> BiasProcess:
     """Estimate the bias drift in mean readings (N, 3), which otherwise are `design` (N, p) × parameters + noise.
 
-    `variances_rad2_s2` (N, 3) are those of the noise, `windows_s` (N, 2) the averaging windows. The three axes have one
-    process, since few averages determine it. `shared_rad2_s2` (3, N, N) are covariances between the averages besides
-    their noise, `instability_rad_s` is that of the data sheet, zero if unknown. `chosen` selects walk and scatter.
+    `variances_rad2_s2` (N, 3) are the variances of the noise, `windows_s` (N, 2) the averaging windows. The three axes
+    have one process, since few averages determine it. `shared_rad2_s2` (3, N, N) are covariances between the averages
+    besides their noise, `instability_rad_s` is the data sheet's bias instability, zero if unknown. `chosen` selects
+    walk and scatter.
     """
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     dof = 3 * (len(z) - z.shape[1])

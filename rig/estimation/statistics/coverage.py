@@ -19,7 +19,7 @@ ROUNDING = 1e-9  # of ν, which may be a whole number but for rounding
 
 
 def coverage_factors(dof: ArrayLike) -> Array:
-    """Return k for degrees of freedom of any shape, infinite ones included."""
+    """Return the coverage factor k for degrees of freedom of any shape; they may be infinite."""
     whole_dof, factors = _round_down(dof), np.full(np.shape(dof), COVERAGE_FACTOR)
     if np.isfinite(whole_dof).any():
         from scipy.special import stdtrit
@@ -47,9 +47,9 @@ def beyond(distances: ArrayLike, dof: ArrayLike) -> Array:
 
 
 def false_alarm_of_each(of_all: float, tests: int) -> float:
-    """Return the false-alarm probability of each of `tests` tests for a probability `of_all` that any fails.
+    """Return the false-alarm probability of each of `tests` tests if one or more may fail with probability `of_all`.
 
-    Bonferroni's inequality: it holds for dependent tests, too.
+    By Bonferroni's inequality, which also holds for dependent tests.
     """
     return of_all / tests
 

@@ -107,7 +107,7 @@ def expected_disturbances(
 def _find_likelihoods(residuals: Array, whitener: Array, effects: Array, sizes: Array) -> Array:
     """Return log-likelihoods (k,) of residuals (n,), up to a constant, for `sizes` (k,) of δ.
 
-    `whitener` (n, n), triangular, is that of all modelled errors but the `effects` (n, P) of the arm.
+    `whitener` (n, n), triangular, whitens all modelled errors except the arm's `effects` (n, P).
     """
     scaled = whitener @ effects
     growth, directions = np.linalg.eigh(scaled @ scaled.T)

@@ -67,10 +67,10 @@ class Steps:
 
 
 def cut_steps(readings: Array, unit: float) -> Steps:
-    """Return the steps of all readings (n, 3) of a source that truncates toward zero, with that unit.
+    """Return the resolution steps of readings (n, 3) that the source has truncated toward zero to multiples of `unit`.
 
-    An offset, and a scale factor near one, may have been applied since. All numbers but zero are half-integers, which
-    shows the position of zero.
+    The source may have applied an offset and a scale factor near one afterwards. Truncated values lie half a unit off
+    the integers except at zero, which shows the position of zero.
     """
     steps = find_steps(readings)
     units = np.where(np.abs(steps / unit - 1) < NEAR, steps, unit)
@@ -135,7 +135,7 @@ def _find_unit(axis: Array) -> float:
 
 
 def _count_fractions(axis: Array, unit: float) -> Array:
-    """Return the fraction of readings (n,) at each number."""
+    """Return the fraction of readings (n,) at each distinct value."""
     values, often = np.unique(np.rint(axis / (SAME * unit)), return_counts=True)
     first = np.flatnonzero(np.diff(values, prepend=-np.inf) > 2)  # rounding of a record makes no other number
     shares: Array = np.add.reduceat(often, first) / len(axis)
@@ -143,7 +143,7 @@ def _count_fractions(axis: Array, unit: float) -> Array:
 
 
 def _bound_zero_error(steps: Steps, axis: int, readings: Array) -> float:
-    """Return the standard uncertainty, in units, of a mean of truncated readings (n,) by those that read zero.
+    """Return the standard uncertainty, in units, that readings of zero cause in a mean of truncated readings (n,).
 
     Within a unit of zero the density of readings decreases as between zero's neighbours, three units apart: if s is the
     slope of its logarithm, their mean is s · 2²/12 from zero. If no neighbour shows s, the mean may be anywhere in

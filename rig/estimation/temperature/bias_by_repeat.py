@@ -58,12 +58,12 @@ class BiasByRepeat:
 
     @property
     def largest_change_std(self) -> Array:
-        """The standard deviation (3,) of the largest change, by those of the two repeats."""
+        """The standard deviation (3,) of the largest change between two repeats."""
         return largest_change_std(self.bias, self.std)
 
 
 def largest_change_std(bias: Array, std: Array) -> Array:
-    """Return the standard deviation (3,) of the largest change of biases (R, 3), from those of its two repeats."""
+    """Return the standard deviation (3,) of the largest change between two of the biases (R, 3) with `std` (R, 3)."""
     ends = np.stack([bias.argmin(axis=0), bias.argmax(axis=0)])
     change_std: Array = np.hypot(*np.take_along_axis(std, ends, axis=0))
     return change_std
@@ -72,9 +72,9 @@ def largest_change_std(bias: Array, std: Array) -> Array:
 def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Array | None = None) -> BiasByRepeat:
     """Return the bias of R ≥ 2 repeats of N attitudes.
 
-    `readings` (R, N, 3) are mean readings, `variances` those of the means, `modelled` the model's readings without a
-    bias. `bias` (3,) is that of the first repeat if a fit has estimated it; the others are then relative to it.
-    Raise Fault  `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
+    `readings` (R, N, 3) are mean readings, `variances` their variances, `modelled` the model's readings without a bias.
+    `bias` (3,) is the bias of the first repeat if a fit has estimated it; the other biases are then relative to it.
+    Raise Fault `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
     """
     repeats, attitudes = readings.shape[:2]
     require_shape("readings", readings, (repeats, attitudes, 3))

@@ -319,7 +319,7 @@ class _ParameterFits:
         )
 
     def solve(self, orders: tuple[int, int]) -> _TemperatureFit:
-        """Fit polynomials of these orders of k and c."""
+        """Fit temperature polynomials of the given orders for k and c."""
         of_scale, of_bias = orders
         loops = 2 if self.both_ways else 0
         per_axis = of_scale + of_bias + loops
@@ -349,7 +349,7 @@ class _ParameterFits:
         return self._fit(orders, values, covariance, fixed, aicc)
 
     def _rows(self, axis: int, orders: tuple[int, int], values: Array) -> tuple[Array, Array]:
-        """Return the derivatives of an axis' whitened readings, the lag's last, and the residuals."""
+        """Return the whitened design matrix of an axis (last column: the time lag) and its whitened residuals."""
         of_scale, of_bias = orders
         per_axis = (len(values) - 1) // 3
         by_axis, lag_s = values[axis * per_axis : (axis + 1) * per_axis], values[-1]
@@ -428,7 +428,7 @@ def _constant(changes: Array, centre: Array) -> Array:
 
 
 def _centred_coefficients(fit: _TemperatureFit, centre: Array) -> Array:
-    """Return the coefficients (24,), k relative, that preserve the mean over the readings."""
+    """Return coefficients (24,), relative for k, that do not change the mean over the readings."""
     parts = [(changes, centre[i]) for i, changes in enumerate((fit.relative, fit.bias))]
     return np.concatenate([np.concatenate([_constant(*part)[None], part[0]]).ravel() for part in parts])
 

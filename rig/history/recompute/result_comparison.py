@@ -80,7 +80,7 @@ class ParameterMove:
 
     @property
     def growth(self) -> float:
-        """The growth of U in multiples of the stated one, which was too small then; negative if U became smaller."""
+        """The growth of U in multiples of the stated U; positive if the stated U was too small."""
         return (
             math.inf if self.now is None else _in_units(self.now.expanded - self.before.expanded, self.before.expanded)
         )

@@ -77,7 +77,7 @@ def has(connection: Connection, earlier: Head) -> bool:
 
 
 def holds(connection: Connection, earlier: Head) -> bool:
-    """Return whether the lines up to an `earlier` end, which may be years old, are unchanged."""
+    """Return whether all lines up to an `earlier` end of the journal, perhaps years old, are unchanged."""
     lines = select(schema.journal).where(schema.journal.c.number <= earlier.number).order_by(schema.journal.c.number)
     chain = ""
     for line in connection.execute(lines):

@@ -27,9 +27,9 @@ metadata = MetaData()
 
 
 def number_column() -> Column[int]:
-    """Return a column of numbers from 1 without gaps, which the writer of a row counts up (`numbers`).
+    """Return the id column: numbers from 1 without gaps, assigned by the program (`numbers`).
 
-    The database does not: PostgreSQL's sequences leave a gap for a transaction that ends without its rows.
+    The database does not assign the numbers, because PostgreSQL's sequences leave a gap after a rollback.
     """
     return Column("id", Integer, primary_key=True, autoincrement=False)
 

@@ -90,7 +90,7 @@ def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
 
 
 def _steady(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the blocks (count,) that agree with a neighbour, if any do; blocks of an accelerating body do not."""
+    """Return which blocks (count,) agree with a neighbouring block; all still blocks if none agrees."""
     steady = np.append(pairs, False) | np.append(False, pairs)
     return steady if steady.any() else still
 

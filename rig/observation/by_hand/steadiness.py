@@ -30,7 +30,7 @@ def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:
 
 
 def fill_missing(readings: Array, numbers: NDArray[np.intp]) -> Array:
-    """Return readings (n, 3) with `numbers` (n,) that count missing ones, and these interpolated."""
+    """Return the readings (n, 3) with missing readings interpolated; gaps in `numbers` (n,) show which are missing."""
     every = np.arange(numbers[0], numbers[-1] + 1)
     if len(every) == len(readings):
         return readings

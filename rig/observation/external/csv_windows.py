@@ -75,7 +75,7 @@ def average_of(readings: Array, window: Window) -> Average:
 
 
 def average_bridged(readings: Array, numbers: NDArray[np.intp], window: Window, hidden_rad: float) -> Average:
-    """Return the average of a window's readings (n, 3), with `numbers` (n,) that count missing ones.
+    """Return the average of a window's readings (n, 3); gaps in `numbers` (n,) show which are missing.
 
     Missing readings are interpolated for the mean; its variance includes the rotation that they may hide.
     """

@@ -47,7 +47,7 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
 
 
 def _several(windows: Sequence[Window]) -> Sequence[Window]:
-    """Return the windows; of a single one its halves."""
+    """Return the windows; a single window is divided into halves."""
     if len(windows) != 1:
         return windows
     window = windows[0]
@@ -56,10 +56,10 @@ def _several(windows: Sequence[Window]) -> Sequence[Window]:
 
 
 def _rate_rad_s(times_s: Array, attitudes: Array) -> Array:
-    """Return the body's rate (3,) by rows in the order of time; zero by a single one, which declares that it lay still.
+    """Return the body's rate (3,) from its attitudes at increasing times; zero for a single attitude.
 
-    The median of the rates from each row to the one half of them later (Theil's incomplete method, 1950): rows at an
-    end in which it moved already do not count.
+    The rate is the median over pairs of rows half of the rows apart (Theil's incomplete method, 1950), so a few rows at
+    either end in which the body moves already have no effect. A single row states that the body lay still.
     """
     half = len(times_s) // 2
     if not half:

@@ -52,7 +52,7 @@ def map_motion(columns: ColumnMap) -> Mapped | None:
 
 
 def map_table_log(table: TableSection, columns: ColumnMap) -> Mapped:
-    """Return the map of a rate table's log: `time_s`, and `angle_0`, `rate_0` and so on of its axes."""
+    """Return the column map of a rate table's log: `time_s`, and `angle_0`, `rate_0` … for its axes."""
     sections = {TIME: table.time}
     for index, axis in enumerate(table.axes):
         sections[f"angle_{index}"] = axis.angle
@@ -101,7 +101,7 @@ def _unwrap(time_s: Array, period_s: float) -> Array:
 def select_columns(
     path: Path, headings: Sequence[str], width: int, header: Header, mapped: Mapped | None
 ) -> dict[int, str]:
-    """Return the rig's names of the columns to read, by their indices, out of `width`.
+    """Return the rig's name of each column to read, by the column's index in a table of `width` columns.
 
     Raise Refused `wrong_columns`, `wrong_unit`.
     """

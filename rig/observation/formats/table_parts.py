@@ -49,12 +49,12 @@ def columns_of(parts: Iterable[Part]) -> dict[str, Array]:
 
 
 def count_omitted_rows(parts: Sequence[Part]) -> int:
-    """Return the number of rows of the file that such parts leave out."""
+    """Return the number of rows of the file that `parts` leave out."""
     return int(cast("dict[str, Any]", parts[-1]).get(LEFT_OUT, 0))
 
 
 def note_of(parts: Sequence[Part]) -> str:
-    """Return what the readings in such parts lack, "" if nothing."""
+    """Return a note on what the readings in `parts` lack; "" if nothing is missing."""
     return str(cast("dict[str, Any]", parts[-1]).get(NOTE, ""))
 
 

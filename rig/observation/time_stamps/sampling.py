@@ -250,7 +250,7 @@ def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.i
 
 
 def _slope(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
-    """Return a quantile, by default the median, of the interval over `apart` readings."""
+    """Return the median (or another quantile) of the mean intervals between readings that are `apart` apart."""
     apart = min(apart, len(time_s) - 1)
     return float(np.quantile(time_s[apart:] - time_s[:-apart], quantile) / apart)
 

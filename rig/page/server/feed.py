@@ -102,7 +102,7 @@ class Mailbox:
         self._news.set()
 
     def close(self) -> None:
-        """Close the mailbox: nothing follows its content."""
+        """Close the mailbox; frames in it can still be taken."""
         self.closed = True
         self._news.set()
 
@@ -155,7 +155,7 @@ class Broadcast:
                 self.post(frame)
 
     async def close(self, within_s: float) -> None:
-        """Send the last news; wait until all browsers have them, at most `within_s`."""
+        """Send the last changes, and wait at most `within_s` until all browsers have received them."""
         self._closing = True
         if (frame := self._feed.news()) is not None:
             self.post(frame)

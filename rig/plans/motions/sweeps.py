@@ -38,7 +38,7 @@ class Profile:
 
 
 def sweep_about(index: int, station: SweepPose, direction: Direction, axis_flange: Vector3, profile: Profile) -> Sweep:
-    """Return the sweep in that direction, in which the flange turns about that axis."""
+    """Return the sweep of the station's joint in `direction`; the flange turns about `axis_flange`."""
     speed, acceleration = profile.pace.speed_rad_s, profile.pace.acceleration_rad_s2
     half, half_travel = profile.averaged_rad / 2, profile.even_rad / 2 + speed**2 / (2 * acceleration)
     sign, centre = 1 if direction == "ccw" else -1, station.pose_q_rad[station.joint]

@@ -13,7 +13,7 @@ from rig.report.findings.finding import Finding
 
 
 def gyroscope_lines(finding: Finding[GyroscopeEntry], sensitivities: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source for a calibrated gyroscope; nothing for a reference."""
+    """Yield C source for a calibrated gyroscope, no line for a reference gyroscope."""
     if finding.entry.role != "calibrate":
         return
     prefix, sensitivity = prefix_of(finding.sensor), sensitivities.get(finding.sensor)
@@ -35,7 +35,7 @@ def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Ar
 
 
 def magnetometer_lines(finding: Finding[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source for a magnetometer, as it was mounted."""
+    """Yield C source for a magnetometer in its mounting."""
     entry = finding.entry
     return _subtracting(finding, entry.bias_t, entry.correction_matrix, "field_t", (
         f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",

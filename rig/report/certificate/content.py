@@ -199,7 +199,7 @@ class Certificate:
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """The blocks of the page, sensor by sensor; references have none."""
+        """The result blocks of the certificate, sensor by sensor; reference sensors have none."""
         printable = outlets(self.result, lambda kind: kind.block)
         blocks = [
             Block(macro_path, finding, (*terms(kind.characteristics, finding, "certificate"),))

@@ -98,7 +98,7 @@ def estimate_entry(solution: Estimate) -> EstimateEntry:
 
 
 def _estimate_or_error(solution: Estimate | None, fault: Fault | None) -> EstimateEntry | ErrorEntry:
-    """Return the entry of a solution, or of the error instead of one."""
+    """Return the entry of a solution, or the entry of the error that prevented the solution."""
     return ErrorEntry(error=str(fault)) if solution is None else estimate_entry(solution)
 
 

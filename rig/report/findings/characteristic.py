@@ -154,6 +154,6 @@ def _flat(numbers: Any) -> list[Any]:
 
 
 def always(si: str, d_si: str, shown: DisplayUnit | None = None) -> Callable[[Quantity], Units]:
-    """Return a unit for any quantity of the sensor, `shown` unchanged unless another unit is given."""
+    """Return a function that gives the same units for every quantity; `shown` is by default the SI unit."""
     units = Units(si, d_si, shown or DisplayUnit(si, 1.0))
     return lambda _: units

@@ -55,7 +55,7 @@ def _drift_range(entry: Any) -> str:
 
 
 def _slope_of(polynomial: str, part: slice) -> Callable[[Any], UncertainNumbers]:
-    """Return a reader of the slope at the reference temperature of one of the polynomials."""
+    """Return a function that reads a polynomial's slope at the reference temperature from an entry."""
 
     def read(entry: Any) -> UncertainNumbers:
         stds = np.sqrt(np.diag(np.array(entry.covariance)).clip(min=0.0))

@@ -76,7 +76,7 @@ def rows_of(
     size: float = 1.0,
     too: float | None = None,
 ) -> list[AxisRow]:
-    """Return each axis with U from `widths` of scale factors and biases; biases in units of `size`, and of `too`."""
+    """Return the certificate's row of each axis; `widths` (6,) are U of the scale factors, then of the biases."""
 
     def bias_in(unit: float, i: int) -> Pair:
         return pair(unit * bias[i], unit * widths[3 + i])

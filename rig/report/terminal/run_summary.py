@@ -154,7 +154,7 @@ def _plus_minus(three: AxisValues) -> list[str]:
 
 
 def _add_largest(three: AxisValues) -> list[str]:
-    """Return the values, and the largest of their U."""
+    """Format the values of three axes, then the largest U."""
     cells = [in_print(value, max(three.expanded)) for value in three.values]
     return [*(value for value, _ in cells), cells[0][1]]
 

@@ -131,7 +131,7 @@ def wish_words(wanted: TargetUncertainty) -> str:
 
 
 def _plans(shortest: Shortest, shown: Planned, section: ProcedureSection) -> Table:
-    """Return the plan in comparison with the file's own."""
+    """Return a table that compares the shortest plan with the file's plan."""
     table = Table(box=SIMPLE)
     for heading in ("", "as in the file", "shortest" if shortest.best else "nearest"):
         table.add_column(heading, justify="right" if heading else "left")

@@ -35,11 +35,11 @@ class HostCorrected:
         }
 
     def start(self) -> None:
-        """Start the source's samples, as of `SampleSource`."""
+        """Start the source's samples (see `SampleSource`)."""
         self.source.start()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the source, as of `SampleSource`."""
+        """Check the source (see `SampleSource`)."""
         self.source.check(clock_s)
 
 

@@ -39,20 +39,20 @@ class BoardSource:
 
     @property
     def sensors(self) -> Mapping[str, RecordedSensor]:
-        """The board's sensors by name, as of `SampleSource`."""
+        """The board's sensors by name (see `SampleSource`)."""
         return {name: sensor.described for name, sensor in self.set_up.items()}
 
     @property
     def stored(self) -> Mapping[str, StoredCalibration]:
-        """The calibrations by which readings are corrected, by sensor name."""
+        """The stored calibrations that correct the readings, by sensor name."""
         return {name: sensor.stored for name, sensor in self.set_up.items() if sensor.stored is not None}
 
     def start(self) -> None:
-        """Start the board's samples, as of `SampleSource`; what is stored corrects."""
+        """Start the board's samples; stored calibrations correct them (see `SampleSource`)."""
         self.board.start([self.set_up[name].index for name in self.stored])
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the board, as of `SampleSource`. Raises BoardError."""
+        """Check the board (see `SampleSource`). Raises BoardError."""
         self.board.check(clock_s)
 
 
@@ -118,7 +118,7 @@ def _set_up_corrected(board: Board, name: str, section: SensorSection) -> BoardS
 
 
 def describe_corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_s: float) -> RecordedSensor:
-    """Return the description of a sensor with corrected rates, in `sensitivity_rad_s`, and no accelerations."""
+    """Return the description of a sensor whose rates the board corrects; a count is `sensitivity_rad_s`."""
     raw = sensor.channel(RATE)
     assert raw.full_scale_counts is not None, "every driver states it"
     limit_rad_s = raw.full_scale_counts * raw.unit_per_count

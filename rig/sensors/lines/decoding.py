@@ -146,7 +146,7 @@ class LineReader:
     def _match_checksums(
         raw: NDArray[np.uint8], text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """Return the lines that end with `*hh`, the XOR of the bytes before; blank that end in `text`."""
+        """Return which lines end with a correct checksum `*hh` (XOR); replace it by blanks in `text`."""
         star = np.maximum(ends - 3, 0)
         high, low = _HEX[raw[ends - 2]], _HEX[raw[ends - 1]]
         body_starts = starts + np.isin(raw[starts], np.frombuffer(b"$!", np.uint8))

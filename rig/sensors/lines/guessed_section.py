@@ -24,7 +24,7 @@ class StatedProperties:
 def section(
     shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, user: StatedProperties | None = None
 ) -> str:
-    """Return the YAML of `sensors`; `?` marks values to look up, which `rig check` refuses by key."""
+    """Return the YAML of `sensors`; `rig check` refuses every value that is still `?` and names its key."""
     user = user or StatedProperties()
     lines: dict[str, object] = {"columns": _format_list(guess.columns)}
     if shape.keys:

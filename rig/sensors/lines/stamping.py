@@ -184,7 +184,7 @@ class Stamper:
 
     # -- times ---------------------------------------------------------------------------------------------------
     def _add_late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
-        """Return the steps, plus a loss that shows only as a delay of the lines."""
+        """Return the sequence steps, increased by samples whose loss shows only as a delay of the lines."""
         if "sequence" in self.section.columns or self._smoothed is None:
             return steps
         late_s = host_time_s - (self._host_began_s or 0.0) - self._smoothed.predict_s(int(steps.sum()))

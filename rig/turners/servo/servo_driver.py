@@ -38,7 +38,7 @@ NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {S
 
 
 def _nothing() -> None:
-    """Supervise nothing beyond the servo itself."""
+    """Do nothing: the default for `watch`."""
 
 
 class Servo:

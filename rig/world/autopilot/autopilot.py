@@ -89,7 +89,7 @@ class SimulatedAutopilot:
         return self._baud
 
     def misbehave(self, *, armed: bool | None = None, **faults: float) -> None:
-        """Set the given faults, and whether it is `armed`. Raise AttributeError for a fault that it does not have."""
+        """Set the simulated faults, and whether the autopilot is `armed`. Raise AttributeError for an unknown fault."""
         self.armed = self.armed if armed is None else bool(armed)
         for name, value in faults.items():
             setattr(self.faults, name, value)
@@ -101,7 +101,7 @@ class SimulatedAutopilot:
         return data
 
     def receive(self, data: bytes) -> None:
-        """Take messages to it, in fragments of any size."""
+        """Process bytes sent to the autopilot, in fragments of any size."""
         for message in self._in.parse_buffer(data) or []:
             if not self.faults.deaf and message.get_type() != "BAD_DATA":
                 self._obey(message)

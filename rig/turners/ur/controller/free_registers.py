@@ -59,7 +59,7 @@ def registers_in_use(host: str, version: tuple[int, ...]) -> Problem:
 
 
 def usable_halves(version: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the halves that the client can use with software `version`."""
+    """Return the halves of the registers, lower and upper, that a client can use with software `version`."""
     return (LOWER,) if version >= LOWER_ONLY_SINCE else (LOWER, UPPER)
 
 

@@ -155,7 +155,7 @@ class StateStream:
         return packets
 
     def _check(self, packet: StatePacket) -> Problem | None:
-        """Return the problem of a clock set since the last state. Raise `ImpossibleState` for an impossible one."""
+        """Return a problem if the controller's clock was set since the last state. Raise `ImpossibleState`."""
         before, after = self._last, packet.state
         impossible = impossible_state(after) or impossible_payload(packet.payload_kg, packet.payload_centre_m)
         step = None

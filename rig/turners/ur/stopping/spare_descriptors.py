@@ -21,7 +21,7 @@ class SpareDescriptors:
             raise
 
     def release(self) -> None:
-        """Close them, so that sockets can be opened."""
+        """Close the spare descriptors, so that sockets can be opened."""
         descriptors, self._descriptors = self._descriptors, []
         for descriptor in descriptors:
             os.close(descriptor)
