@@ -25,7 +25,7 @@ def rigs(stations: Iterable[StationState], more: int = 0) -> dict[str, Any]:
     """Return each rig's present state in a section "rig 0" to `MOST`, and in "rigs" their number and that of `more`.
 
     They are separate sections because only changed ones are sent. A section without a rig is None. A rig has its name
-    in the history; one that is silent without a last state is dead. The state of a station of another version, or a
+    in the history; a rig that is silent without a last state is dead. The state of a station of another version, or a
     foreign text, is `unread`.
     """
     cards = [_card(station) for station in stations]

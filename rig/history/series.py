@@ -171,7 +171,7 @@ Parameters = Mapping[str, Parameter]
 def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Change, ...], ...]:
     """Return the changes of the parameters common to each pair of calibrations, before and now.
 
-    All pairs belong to one comparison, as those of all sensors of a run: the number of all values counts.
+    All pairs belong to one comparison, for example all sensors of a run: the number of all values counts.
     """
     shared = [[name for name in now if name in before] for before, now in pairs]
     compared = sum(map(len, shared))
@@ -217,7 +217,7 @@ def rig_states(pasts: Sequence[Past]) -> list[RigState]:
 
 
 def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
-    """Return the differences between rigs by shared gyroscopes, by parameter; those of scale factors as fractions."""
+    """Return the differences between rigs that share gyroscopes, by parameter; scale factors as fractions."""
     by_rigs = subjects(past for past in pasts if past.rig != NO_ARM)
     series = [
         (name, past) for pasts_of_subject in by_rigs.values() for past in pasts_of_subject for name in past.parameters

@@ -56,7 +56,7 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
 def draw_changes(title: str, changes: Sequence[Change], folder: Path, name: str) -> list[Path]:
     """Draw the differences of two calibrations, each divided by its U, as `name` in PNG and SVG into a folder.
 
-    The band of a parameter is the limit beyond which it has changed; a changed one is red.
+    The band of a parameter is the limit beyond which it has changed; a changed parameter is red.
     """
     from matplotlib.figure import Figure
 

@@ -176,7 +176,7 @@ class History:
             return run_id is not None
 
     def calibrations(self, selection: Selection = Selection(), *, replaced_too: bool = False) -> list[Past]:
-        """Calibrations in the order of time, voided ones too.
+        """Calibrations in the order of time, including voided ones.
 
         One that a later calibration of its run replaced is included on request only.
         """
@@ -212,7 +212,7 @@ class History:
             journal.note(connection, schema.voided, number)
 
     def kept(self, run_id: int | None = None) -> Iterator[Kept]:
-        """Yield runs as they were entered, one or all, in the order of entry."""
+        """Yield one run or all runs, as entered, in the order of entry."""
         question = select(schema.run).order_by(schema.run.c.id)
         if run_id is not None:
             question = question.where(schema.run.c.id == run_id)
@@ -361,6 +361,6 @@ def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dic
 
 
 def _order() -> list[str]:
-    """Return the parameters in their order of display; unknown ones come last."""
+    """Return the parameters in their order of display; unknown parameters come last."""
     further = (name for characteristic in every_characteristic() for name in characteristic.parameters)
     return list(dict.fromkeys([*SCALES, *BIASES, *further]))

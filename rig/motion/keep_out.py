@@ -41,7 +41,7 @@ def find_clearance_problems(
 ) -> list[Problem]:
     """Return the problems of steps that bring flange, payload's centre or extension too near to forearm or upper arm.
 
-    Lengths are those of `arm`, or else of the model's drawing. A motion from or to an attitude keeps `dwell_room_m`
+    Lengths are taken from `arm`, else from the model's drawing. A motion from or to an attitude keeps `dwell_room_m`
     from the forearm, all others `sweep_room_m`. The motion from the arm's pose is checked if the plan begins there.
     """
     problems = []
@@ -73,7 +73,7 @@ def find_clearance_problems(
 def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: FlangeLoad, model: TurnerModel) -> bool:
     """Return whether a straight path in joint space is clear enough of the arm for sweeps and motions between them.
 
-    Lengths are those of the model's drawing, because plans are made before an arm is connected. Paths beyond the
+    Lengths are taken from the model's drawing, because plans are made before an arm is connected. Paths beyond the
     joints' limits count as clear; they are refused elsewhere.
     """
     if not _is_within(model.limits, start_q_rad, target_q_rad):

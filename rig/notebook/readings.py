@@ -110,7 +110,7 @@ class Readings:
         return self.signal(TEMPERATURE.name)
 
     def signal(self, quantity: str) -> Signal:
-        """Return the readings of the quantity of that name.
+        """Return the readings of the quantity `name`.
 
         Raise Refused `no_such_quantity`; Fault as `on_arm_clock`.
         """

@@ -24,7 +24,7 @@ def average_rests(
 ) -> tuple[Average, ...]:
     """Average all sufficiently long rests of the arm, except those next to a step in `superseded`.
 
-    An arm that oscillates at rest does so in its encoders and, by `response` (3, 3), in the sensor's readings. The
+    The encoders measure an oscillation of the resting arm; `response` (3, 3) converts it to the sensor's readings. The
     means are corrected for this oscillation.
     """
     rests = (_average_rest(stream, motion, window, response) for window in rested(run, superseded))

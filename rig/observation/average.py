@@ -53,7 +53,7 @@ class Average:
 
     @property
     def duration_s(self) -> float:
-        """Duration of what was averaged."""
+        """Duration of the average."""
         return self.end_s - self.start_s
 
     @property
@@ -85,7 +85,7 @@ class Stream:
     steps: Steps = NO_STEPS
 
     def at_reference(self, polynomials: Mapping[Quantity, "OverTemperature"]) -> "Stream":
-        """Return the stream with its rates corrected to the reference temperature of these polynomials."""
+        """Return the stream with its rates corrected to the polynomials' reference temperature."""
         stream = replace(self, polynomials=polynomials)
         return replace(stream, readings_rad_s=stream.correct_temperature(RATE, self.readings_rad_s, slice(None)))
 

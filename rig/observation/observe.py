@@ -241,7 +241,7 @@ def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: ND
 
 
 def _count_lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:
-    """Return the number of missing samples: lost ones by sequence number, and by time those that the board missed.
+    """Return the number of missing samples: lost on the link (by sequence number), or missed by the board (by time).
 
     Raise Fault `lost_samples` if there are too many.
     """

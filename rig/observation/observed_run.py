@@ -55,8 +55,8 @@ class ObservedRun:
     def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
         """Return the times (n,) of all samples of a sensor on the arm's clock.
 
-        The time base is that of `gyroscope`; by default the sensor's own, or that of the first gyroscope on the same
-        clock. Without any, the times at which samples and arm states arrived at the computer serve, to milliseconds.
+        The time base is the `gyroscope`'s; by default the sensor's own, else the first gyroscope's on the same clock.
+        Without any, the times at which samples and arm states arrived at the computer serve, to milliseconds.
         """
         bases = {name: observations.time_base for name, observations in self.sensors.items()}
         return times_s(self.run, sensor, bases, gyroscope)
@@ -107,10 +107,10 @@ def observe_run(
 
 
 def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
-    """Observe each recording of a run with a finished sweep or dwell; of repeated ones the last counts.
+    """Observe each recording of a run with a finished sweep or dwell; the last of repeated steps counts.
 
-    The thresholds are those of the first recording; `corrections` are as in `observe_run`, by the stage of the
-    procedure. Raise as `turner_of`, and Fault as `observe_run`.
+    The first recording's thresholds are used; `corrections` are as in `observe_run`, by the stage of the procedure.
+    Raise as `turner_of`, and Fault as `observe_run`.
     """
     for run in runs:
         turner_of(run)

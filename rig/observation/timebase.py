@@ -152,9 +152,9 @@ def check_readings(board_time_s: Array, readings: Array) -> None:
 
 
 def _find_first_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:
-    """Return the coarse clock by the first samples that determine one, and their number.
+    """Return the coarse clock from as many first samples as determine one, and their number.
 
-    These are all samples of a recording of ordinary length. In one of hours they are a part, from which the fine clock
+    A recording of ordinary length needs all samples. In a recording of hours they are a part, from which the fine clock
     extrapolates to twice its length, repeatedly.
     """
     span_s = LONG_RUN_S
@@ -322,7 +322,7 @@ def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion
 
 
 def _remaining_steps(ratio: float) -> float:
-    """Return the number of last steps that remain if steps shrink by that ratio (Aitken's Δ²); 0 if they do not."""
+    """Return the sum of the remaining steps, in last steps, if steps shrink by `ratio` (Aitken's Δ²); else 0."""
     return min(ratio / (1 - ratio), FARTHEST) if 0 < ratio < 1 else 0.0
 
 

@@ -78,7 +78,8 @@ class Lines:
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
     """Return the mean of readings (n, 3) in these steps, and its weights (n,), to average the arm's rate as well.
 
-    A line slower than `SLOW` is poorly determined: its effect on the mean, or that of one of its size, adds variance.
+    A line slower than `SLOW` is poorly determined: its effect on the mean, or the effect of a line of its size, adds
+    variance.
     """
     ones = whole(readings)
     steady = np.column_stack([ones, turn.passing])

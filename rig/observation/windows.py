@@ -52,7 +52,7 @@ class Dwelt:
 
 
 def swept(run: RunData) -> Iterator[FinishedSweep]:
-    """Yield the sweeps that were started and finished, in order; interrupted ones are left out."""
+    """Yield the sweeps that were started and finished, in order; interrupted sweeps are left out."""
     for event, window in _pair_events(run, SweepStarted, SweepFinished):
         yield FinishedSweep(event.sweep, window)
 

@@ -51,7 +51,7 @@ def step(event: HandSeen) -> Section:
 
 
 def update(before: Section, event: OfTheHand) -> Section:
-    """Return the page section after an event of a session by hand; rests, moves and reminders sound a tone."""
+    """Return the page section after an event of a session by hand; rests, moves and reminders set a tone."""
     match event:
         case HandAsked(instruction, again, why):
             instruction_fields = {"say": instruction.say, "face": instruction.face, "turns": instruction.turns}

@@ -26,7 +26,7 @@ def look(folder: Path) -> dict[str, object]:
 
 
 def main() -> None:
-    """Analyse the folder for each line on standard input, until it ends."""
+    """Analyse the run folder once for each line on standard input, until the input ends."""
     with suppress(OSError, AttributeError):
         os.nice(NICENESS)
     folder = Path(sys.argv[1])

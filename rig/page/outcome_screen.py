@@ -23,7 +23,7 @@ Row = dict[str, Any]
 def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Sequence[TruthRow] = ()) -> list[Row]:
     """Return a row for each result: its numbers ± U as on the certificate, and its limits.
 
-    `parts` are the sensors' parts and serial numbers; `true_rows` the truth of a simulated laboratory.
+    `parts` are the sensors' parts and serial numbers; `true_rows` the true values of a simulated laboratory.
     """
     rows = []
     true_by_name = {true.row.name: true for true in true_rows}

@@ -287,7 +287,7 @@ class PageState:
 
 
 def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, DisplayUnit]]:
-    """Yield the quantities of a sensor, and the unit in which they are shown: that of its bias."""
+    """Yield the quantities of a sensor with the unit in which they are shown, the unit of the bias."""
     by_name = measured()
     for quantity in (by_name[name] for name in select_displayed(sensor.latest)):
         yield quantity, quantity.bias if isinstance(quantity, Quantity) else quantity.reading

@@ -45,7 +45,7 @@ class PageHistory:
         self._points.clear()
 
     def since(self, number: int) -> dict[str, Any]:
-        """Return the points from `number` on in the page's form: times, and the values of each line (null: none)."""
+        """Return the points from `number` on as JSON values: times, and each line's values (null: no value)."""
         start = max(number, self.first)
         points = list(self._points)[start - self.first :]
         lines = sorted({line for _, values in points for line in values})

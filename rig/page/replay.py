@@ -121,7 +121,7 @@ def _steps(run: RunData, end_s: float) -> list[_Done]:
 
 
 def _with_duration(done: _Done) -> Step:
-    """Return the step; a rest gets its duration, which the recording does not state."""
+    """Return the step; add a rest's duration, which the recording does not state."""
     return Rest("rest", done.end_s - done.start_s) if isinstance(done.step, Rest) else done.step
 
 

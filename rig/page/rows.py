@@ -86,7 +86,7 @@ def look_of(partial: SoFar) -> Look:
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
-    """Return the rows of a run's result, kind by kind; U is that of the result, or twice its noise."""
+    """Return the rows of a run's result, kind by kind; U is the result's U, or twice its noise."""
     return [_row(row) for row in shown(result)]
 
 

@@ -88,7 +88,7 @@ class Procedure(Generic[SectionT]):
         return self.readings == "raw"
 
     def following(self, procedures: "Procedures") -> "AnyProcedure | None":
-        """Return the procedure that `then` names, or None. Raise Refused `no_such_procedure`."""
+        """Return the procedure that follows, as the key `then` names it, or None. Raise Refused `no_such_procedure`."""
         if self.then is not None and self.then not in procedures:
             raise Refused(
                 "no_such_procedure",

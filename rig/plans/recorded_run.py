@@ -111,10 +111,10 @@ def _is_corrected(run: RunData) -> bool:
 
 
 def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
-    """Return the procedure of a recording: an installed one, or that of a script of the user's own.
+    """Return the procedure of a recording: installed, or defined by the user's own script.
 
-    If neither is available, an installed one for the kind of readings: a solution needs no script. Raise Refused
-    `another_script` if the script is not the one of the recording, and as `kept_script`.
+    If neither is available, return an installed procedure for the same kind of readings: a solution needs no script.
+    Raise Refused `another_script` if the script is not the one of the recording, and as `kept_script`.
     """
     if _is_by_installed(recording):
         return installed()[recording.settings.procedure]

@@ -77,7 +77,7 @@ class Tried(Protocol):
 def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> Shortest:
     """Return the shortest run of this configuration whose predicted uncertainty meets the target.
 
-    Raise Refused `not_foretold` if the procedure's uncertainty, or that of the target's quantity, is not predicted.
+    Raise Refused `not_foretold` if the uncertainty of the procedure or of the target's quantity is not predicted.
     """
     what = find_search(config)
     _refuse_others(wanted, config)
@@ -145,18 +145,18 @@ def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
 
 
 def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
-    """Return the motions of a procedure; none by hand. Raise Refused `other_turner`."""
+    """Return the motions of a procedure; nothing if the item is turned by hand. Raise Refused `other_turner`."""
     script = installed()[procedure.name]
     return script.plan(turner_for(script, config), procedure)
 
 
 def _change(section: SectionT, **keys: object) -> SectionT:
-    """Return the section with other values of these keys. Raise ValidationError for values that a file may not have."""
+    """Return the section with changed values. Raise ValidationError for values that a file may not have."""
     return type(section).model_validate({**dict(section), **keys})
 
 
 def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:
-    """Return the run with these keys of its procedure, by which it ends at the target."""
+    """Return the run with the procedure keys that end it when the target is reached."""
     procedure = planned.candidate.procedure
     with suppress(ValidationError):  # the target is larger than a file may have
         procedure = _change(procedure, **keys)

@@ -54,7 +54,7 @@ class Verbs(Protocol):
         ...
 
     def solve_on_board(self) -> None:
-        """Let the board compute its own calibration; do nothing if it does not calibrate."""
+        """Let the board compute its own calibration; do nothing if the board does not calibrate."""
         ...
 
 

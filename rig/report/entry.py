@@ -27,7 +27,7 @@ def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
 
 
 def counted(dof: Array | None) -> list[Any] | None:
-    """Return degrees of freedom of any shape as lists, infinite ones as null; None if they are unknown."""
+    """Return degrees of freedom of any shape as lists, with infinity as null; None if they are unknown."""
     if dof is None:
         return None
     numbers = dof.astype(object)

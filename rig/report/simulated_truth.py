@@ -75,7 +75,7 @@ class TruthRow:
 
 
 def truth_rows(folder: Path, result: ResultDocument) -> list[TruthRow]:
-    """Return the rows of a result whose truth lies in its run folder; none without a file, or with an unfit one."""
+    """Return the rows of the simulated truth in a run folder; nothing without a valid file."""
     try:
         document = parse_json(read_regular_file(folder / TRUTH, SIZE_MAX_BYTES))
         truth = validate(_TruthFile, document, "truth")

@@ -150,7 +150,7 @@ class Acquisition:
     def collect_kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
         """Return the kept samples (n,) of one sensor, the kept arm states, and the number of new states among these.
 
-        New are those since the latest `keep`. Older ones extend `REACHES_BACK_S` before it at most, however long the
+        States since the latest `keep` are new. Older states reach at most `REACHES_BACK_S` before it, however long the
         run has waited.
         """
         with self._lock:

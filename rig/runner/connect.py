@@ -135,7 +135,7 @@ class Connector:
         return source
 
     def _connect_others(self, stack: ExitStack, acquisition: Acquisition) -> Iterator[SampleSource]:
-        """Connect the sensors with a port of their own; to verify them, correct their readings on this computer."""
+        """Connect the sensors with their own ports; for a verification, correct their readings on this computer."""
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
         for port, kind, sections in group_by_port(config.sensors):
             on_samples: OnSamples = acquisition.on_samples
@@ -169,12 +169,12 @@ class Connector:
         let_go = stack.enter_context(ExitStack())  # closed after the turner
         connecting = self.connecting or partial(kind.connect, section)
         turner = stack.enter_context(connecting(acquisition.on_state, log))
-        let_go.callback(self._last_seen, turner)
+        let_go.callback(self._report_last_state, turner)
         report = turner.report()
         self.station.event(ArmConnected(report, kind.words.short))
         return turner, report, kind.describe_connected(section, report)
 
-    def _last_seen(self, turner: Turner) -> None:
+    def _report_last_state(self, turner: Turner) -> None:
         """Report the turner's last state again, because the page still shows a moving turner."""
         self.station.event(ArmSeen(turner.latest, turner.missed_states))
 

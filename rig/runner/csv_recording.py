@@ -81,7 +81,7 @@ class ReadingsFile:
 
     @property
     def summary(self) -> SensorSamples:
-        """The numbers of samples and of lost ones."""
+        """The numbers of samples and of lost samples."""
         return self._count.summary
 
     def add(self, samples: NDArray[Any]) -> None:

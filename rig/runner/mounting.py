@@ -105,7 +105,7 @@ def refuse_turning_otherwise(
 
 
 def remedy(stage: Stage) -> str:
-    """Return what the operator can do if the item's mounting differs from its stage."""
+    """Return the remedy for an item whose mounting differs from its stage."""
     return f'Mount the item as the stage says ("{stage.instruction}"), or correct its mount in procedure.stages'
 
 

@@ -167,7 +167,7 @@ class Run:
             )
 
     def _settings(self, phase: Phase) -> RunSettings:
-        """Return the settings that the recording keeps, and by which the phase is judged."""
+        """Return the settings that are recorded, and that decide the verdict of the phase."""
         then = phase.follows is not None
         settings = settings_of(self.loaded.config, phase.plan())
         return replace(settings, procedure=phase.procedure.name, then_verify=then)
@@ -266,7 +266,7 @@ def _notes(error: BaseException | None) -> Iterator[str]:
 
 
 def list_observations(outcome: Outcome) -> Iterator[ObservationMade | AttitudeRead]:
-    """Yield a calibration's observations and attitudes, held-out ones too, as events for the page."""
+    """Yield a calibration's observations and attitudes, including held-out ones, as events for the page."""
     for name, result in outcome.results.items():
         for observation in result.observations:
             yield ObservationMade(name, observation)

@@ -101,7 +101,7 @@ class Recording:
     geometry: DenavitHartenberg
 
     def note(self, event: Event) -> None:
-        """Record an event and report it."""
+        """Record an event, and report it to the station."""
         self.recorder.add(event)
         self.station.event(event)
 

@@ -53,7 +53,7 @@ class Warming:
     _looked_s: float = -np.inf
 
     def prepare(self) -> None:
-        """Raise Refused `no_thermometer`, `no_heater` for such a sensor or board, before anything has moved."""
+        """Raise Refused if a sensor has `no_thermometer` or the board has `no_heater`, before anything has moved."""
         for name in self.names:
             sensor = self.acquisition.counts[name].sensor
             if sensor.temperature_stated or not sensor.measures(TEMPERATURE):
@@ -110,7 +110,7 @@ class Warming:
         return readings_c if len(readings_c) == len(self.names) else {}
 
     def find_missing(self) -> str | None:
-        """Return the remaining part of the range, in words; None if it is covered."""
+        """Return the part of the temperature range not covered yet, in words; None if all is covered."""
         return self.course.missing()
 
     def begin_waiting(self) -> None:
@@ -130,7 +130,7 @@ class Warming:
         return self.course.is_due(self.now_c())
 
     def begin_set(self) -> None:
-        """Begin to average the temperatures of the set that follows."""
+        """Begin to average the temperatures of the next set."""
         self._of_set, self._began_s = [], self._looked_s
 
     def end_set(self, first: int, end: int) -> None:
@@ -146,7 +146,7 @@ class Warming:
             self._ramp.rate_k_s = self._rate_k_s
 
     def stop_heating(self) -> None:
-        """Switch the heater off and send it no more commands."""
+        """Switch the heater off, and send no more commands to it."""
         self._ramp = None
         if self.heater is not None:
             self.heater.keep_heating(0.0)

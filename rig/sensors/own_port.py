@@ -102,7 +102,7 @@ class OwnPort:
             return done
 
     def write(self, data: bytes) -> None:
-        """Send data. Raise SensorError as for a port that closed."""
+        """Send data. Raise SensorError if the port has closed."""
         try:
             self._port.write(data)
         except OSError as error:

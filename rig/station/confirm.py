@@ -14,7 +14,7 @@ NOT_AGREED = "Run again and agree, or agree in advance: --yes, in Python yes=Tru
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
     """Show what will be done and wait for yes or y; return False without a terminal.
 
-    Input typed before that does not count.
+    Input typed before the question does not count.
     """
     forget_what_was_typed()
     for line in announcement:

@@ -89,7 +89,7 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
 
 
 def _bar(fraction: float) -> ProgressBar:
-    """Return a bar that is green from its beginning: the library's own colour for what is not done yet is red."""
+    """Return a bar that is green from its beginning: the library draws the rest in red."""
     return ProgressBar(total=1.0, completed=fraction, width=40, complete_style="green", finished_style="green")
 
 

@@ -36,7 +36,7 @@ from rig.station.events import (
 
 
 def line(event: RunEvent) -> str | None:
-    """Return an event in one line; None for those of instruments, or printed elsewhere."""
+    """Return an event in one line; None for instruments' events and for events printed elsewhere."""
     text: str | None
     match event:
         case Prompt(mounts=int(), announcement=(stage, *_)):

@@ -35,7 +35,7 @@ TABLE_POSES = 40
 
 
 def study(settings: Settings) -> StudyReport:
-    """Simulate 30 mounted gyroscopes × 500 runs at each speed; tri-axial ones with 30 × 500 runs in 40 poses."""
+    """Simulate 30 mounted gyroscopes × 500 runs at each speed; and 30 tri-axial sensors × 500 runs in 40 poses."""
     runs = settings.runs or sim.RUNS
     ratios = run_parallel(partial(_simulate_gyroscope, runs), range(sim.SETS), settings)
     rows = list(_gyroscope_rows(np.mean(ratios, axis=0)))

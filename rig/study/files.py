@@ -17,7 +17,7 @@ Format = Literal["csv", "parquet"]
 
 
 def write(report: StudyReport, folder: Path, name: str, table_format: Format) -> tuple[Path, ...]:
-    """Write `name`.csv (or .parquet), `name`-findings.csv, `name`.svg and `name`.png, replacing earlier ones.
+    """Write `name`.csv (or .parquet), `name`-findings.csv, `name`.svg and `name`.png, replacing earlier files.
 
     Raise Refused `study_folder`, `missing_extra`.
     """

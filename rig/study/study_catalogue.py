@@ -52,7 +52,7 @@ STUDIES = {
 
 
 def find(name: str) -> StudyEntry:
-    """Return the study of that name. Raise Refused `unknown_study`."""
+    """Return the study called `name`. Raise Refused `unknown_study`."""
     if name not in STUDIES:
         raise Refused("unknown_study", f"there is no study {name!r}", f"Choose one of {', '.join(STUDIES)}")
     return STUDIES[name]

@@ -17,7 +17,7 @@ def run_parallel(
     """Return `task(rng, item)` for every item, in order.
 
     Every item has its own random stream, spawned from the seed by its index in `items`, so that results do not depend
-    on the number of processes. The joblib back end is that of the surrounding `joblib.parallel_config`.
+    on the number of processes. The surrounding `joblib.parallel_config` chooses joblib's back end.
     """
     from joblib import Parallel, delayed
 

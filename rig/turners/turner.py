@@ -31,15 +31,15 @@ class Turner(Protocol):
         ...
 
     def check(self) -> None:
-        """Raise the problem that has occurred meanwhile, if any."""
+        """Raise the problem that has occurred since the last call, if any."""
         ...
 
     def take_control(self, carried: FlangeLoad) -> None:
-        """Make it ready to move its payload. Raise `Refused` by name."""
+        """Make the turner ready to move its payload. Raise `Refused` by name."""
         ...
 
     def move(self, motion: Motion, watch: Callable[[], None] = ...) -> None:
-        """Make one movement and return when it has arrived and stands still; a late one is stopped."""
+        """Make one movement, and return when the turner stands at its end; stop a movement that takes too long."""
         ...
 
     def rest(self, duration_s: float, watch: Callable[[], None] = ...) -> None:

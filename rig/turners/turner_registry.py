@@ -36,7 +36,7 @@ def sections() -> Mapping[str, type[TurnerSection]]:
 
 
 def kind_of(section: TurnerSection) -> AnyTurner:
-    """Return the kind of turner of a section. Raise Refused `turner_not_installed`."""
+    """Return the kind of turner that a section configures. Raise Refused `turner_not_installed`."""
     for kind in installed().values():
         if type(section) is kind.section:
             return kind

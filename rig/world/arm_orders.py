@@ -99,7 +99,7 @@ def _unlock(robot: Robot) -> None:
 
 
 def _free(robot: Robot) -> None:
-    """Give back what a fieldbus claims; what the rig claims stays."""
+    """Release the registers that a fieldbus has claimed, not the rig's."""
     for name in [name for name, owner in robot.claims.items() if owner is FIELDBUS]:
         del robot.claims[name]
 

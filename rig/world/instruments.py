@@ -44,7 +44,7 @@ class InstrumentMount(Protocol):
         """The instrument; None without power."""
 
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
-        """Switch it on at the virtual time `time_s`, s, unless it is on."""
+        """Switch the instrument on at the virtual time `time_s`, s, unless it is on."""
 
     def switch_off(self) -> None:
-        """Switch it off."""
+        """Switch the instrument off."""

@@ -61,7 +61,7 @@ class Laboratory:
             self.switch_on(name)
 
     def switch_on(self, name: str) -> None:
-        """Switch the instrument `name` on, unless it is on. Raise KeyError if there is none of that name."""
+        """Switch the instrument `name` on, unless it is on. Raise KeyError for an unknown name."""
         self.instruments[name].switch_on(self._build_motion, self._build_field, self._time_s)
 
     @property

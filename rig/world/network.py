@@ -28,7 +28,7 @@ class ClientSession(Protocol):
 
     @property
     def dialogue(self) -> bool:
-        """Whether the client asks questions, each of which depends on the answer before."""
+        """Whether the client asks questions that depend on the previous answer."""
 
     def greeting(self) -> bytes: ...
     def receive(self, data: bytes) -> bytes: ...
@@ -73,7 +73,7 @@ class ClientConnection:
             self.read()
 
     def read(self) -> bool:
-        """Read what the client has sent, or close if it has hung up. Return whether there may be more."""
+        """Read the client's bytes, or close if the client has hung up. Return whether more bytes may follow."""
         try:
             data = self._peer.recv(65536)
         except BlockingIOError:
@@ -232,7 +232,10 @@ class PortListener:
         connection.greet()
 
     def set_silent(self, silent: bool) -> None:
-        """Make the port silent or end that. A silent port sends and reads nothing; its connections stay open."""
+        """Make the port silent, or end its silence.
+
+        A silent port sends and reads nothing; its connections stay open.
+        """
         self.silent = silent
         for connection in self.connections:
             connection.watch()
@@ -283,7 +286,7 @@ class Network:
             key.data(events)
 
     def tick(self) -> None:
-        """Let every session make its bytes of this tick."""
+        """Let every session produce the bytes that it sends in this tick."""
         for connection in tuple(self.connections):
             connection.tick()
 

@@ -143,7 +143,7 @@ class World:
         return listeners
 
     def _listen(self, key: str, url: str, line: SerialLine, *, gathers: bool = True) -> PortListener:
-        """Open the port of a serial line. It accepts one client; a second one is hung up on."""
+        """Open the port of a serial line. It accepts one client, and hangs up on a second client."""
         return self.network.listen(
             *_parse_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=gathers
         )
@@ -156,7 +156,7 @@ class World:
             listener.set_silent(True)
 
     def close_arm(self, *, listen: bool) -> None:
-        """Close every connection of the controller; with `listen` it accepts new ones."""
+        """Close every connection of the controller; with `listen` it accepts new connections."""
         for listener in self.arm_listeners:
             listener.hang_up() if listen else listener.close()
 
@@ -193,7 +193,7 @@ class World:
             self.board_listener.open()
 
     def fit_part(self, part: str) -> None:
-        """Exchange the board for that of another part, as the simulated operator does."""
+        """Exchange the board for another part's board, as the simulated operator does."""
         self.unplug_board()
         gc.collect()  # an emulated board is a reference cycle of some megabytes; free it before the next one
         if self.laboratory.fit(part):
@@ -274,7 +274,7 @@ class World:
 
 
 def _find_host(config: RigConfig) -> str:
-    """Return the laboratory's address: that of the turner, or with a hand that of the board or of a sensor."""
+    """Return the laboratory's address: the turner's, or the board's or a sensor's if the item is turned by hand."""
     if config.turner.simulated_at is not None:
         return config.turner.simulated_at
     ports = [("board.port", config.board.port)] if config.board is not None else []

@@ -70,11 +70,11 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
         sizes[wrist, :, slice(0, 3) if distal else slice(3, TURNS)] = in_flange[wrist] if distal else in_base[wrist]
     sizes[posture.wrist, 0, :TURNS] = [*in_flange[posture.wrist, 0], 0.0, 0.0, 0.0]  # the twist is distal to its joint
     sizes[posture.wrist, STEADY:] = 0.0
-    sizes[posture.wrist, STEADY:, TURNS:] = _waves_from(float(posture.q_rad[WRIST_1 + posture.wrist]))
+    sizes[posture.wrist, STEADY:, TURNS:] = _shift_harmonics(float(posture.q_rad[WRIST_1 + posture.wrist]))
     return sizes.reshape(-1, SHARED_ERRORS) / SHARE
 
 
-def _waves_from(angle_rad: float) -> Array:
+def _shift_harmonics(angle_rad: float) -> Array:
     """Return the matrix (4, 4) that shifts harmonics of an angle's change to harmonics of the angle."""
     cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
     waves: Array = np.zeros((4, 4))

@@ -69,11 +69,11 @@ def own_errors(
         yield OwnError(NONLINEARITY, 100 * sensor.nonlinearity, "% of full scale", sizes * curved)
     duration_s = np.diff(windows_s)[:, 0]
     source = "; ".join(filter(None, (OF_THE_PART, sensor.temperature_words)))
-    warmer_k = _warmer_k(sensor, windows_s, duration_s)
+    warmer_k = _temperature_deviations_k(sensor, windows_s, duration_s)
     patterns = sensor.bias_rad_s_per_k * np.einsum("kn,ij->kinj", warmer_k, np.eye(3))
     by_k = float(np.degrees(sensor.bias_rad_s_per_k))
     yield OwnError(BIAS_OVER_TEMPERATURE, by_k, "°/s/K", patterns.reshape(6, -1, 3), source)
-    warmer_k = _warmer_k(sensor, windows_s, duration_s * turns_rad_s.any(axis=1))
+    warmer_k = _temperature_deviations_k(sensor, windows_s, duration_s * turns_rad_s.any(axis=1))
     patterns = sensor.scale_per_k * np.einsum("kn,ni,ij->kinj", warmer_k, turns_rad_s @ matrix.T, np.eye(3))
     yield OwnError(SCALE_OVER_TEMPERATURE, 1e6 * sensor.scale_per_k, "ppm/K", patterns.reshape(6, -1, 3), source)
 
@@ -101,7 +101,7 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
         yield OwnError(ROUNDING, largest, "°/s", np.array(patterns), "the steps in which the readings come")
 
 
-def _warmer_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
+def _temperature_deviations_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
     """Return temperature deviations (2, N), K, from the weighted mean: recorded ones, then unresolved ones."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])

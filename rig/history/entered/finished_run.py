@@ -112,7 +112,7 @@ def read_finished_run(folder: Path, document: "ResultDocument | None" = None) ->
 
 
 def document_sha256(folder: Path, name: str) -> str | None:
-    """Return the checksum of a file in a run folder, for result.json that of its content; None if it is missing.
+    """Return the checksum of a file in a run folder (for result.json, of its content); None if it is missing.
 
     Raise OSError, and UnfitFile for a file that does not belong to a run.
     """
@@ -172,7 +172,7 @@ def read_configuration(folder: Path) -> "Loaded | None":
 def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts") -> Issued | None:
     """Return the certificate in the folder if its content is that of this result; its number alone proves nothing.
 
-    An amended one is entered when it is made.
+    An amended certificate is entered when it is made.
     """
     try:
         page = read_regular_file(folder / PAGE, PAGE_MAX_BYTES)

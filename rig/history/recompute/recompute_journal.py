@@ -56,7 +56,7 @@ class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
         os.close(self._descriptor)
 
     def note(self, key: str, answer: Answer) -> None:
-        """Add an answer. Only solved ones are stored: all others are tried again."""
+        """Add an answer. Only solved answers are stored, so that all others are tried again."""
         if isinstance(answer, RecomputedResult):
             self._write(json.dumps({"key": key, "given": asdict(answer)}, allow_nan=False))
 

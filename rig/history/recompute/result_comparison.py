@@ -154,7 +154,7 @@ class RecomputeOutcome:
 
     @property
     def unsolved(self) -> Mapping[State, int]:
-        """The number of unsolved ones, by the kind of reason."""
+        """The number of unsolved recordings, by the kind of reason."""
         return Counter(
             comparison.answer.state for comparison in self.compared if isinstance(comparison.answer, Unsolved)
         )
@@ -166,7 +166,7 @@ class RecomputeOutcome:
 
     @property
     def moved(self) -> int:
-        """The number of calibrations that moved."""
+        """The number of calibrations whose result has changed."""
         return sum(len(comparison.moved) for comparison in self.compared)
 
     @property
@@ -203,7 +203,7 @@ def compared(stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u
 
 
 def to_solve(stated: Sequence[StatedResult], solved: Mapping[str, Answer]) -> tuple[StatedResult, ...]:
-    """Return the recordings still to be solved: all without a result, failed ones included."""
+    """Return the recordings still to be solved: those without a result, and those that failed."""
     return tuple(result for result in stated if not isinstance(solved.get(result.content_sha256), RecomputedResult))
 
 

@@ -18,10 +18,10 @@ _RUN = schema.run.c
 
 
 def list_stated_results(history: History, selection: Selection) -> tuple[StatedResult, ...]:
-    """Return all valid results in the order of time, and replaced ones on which a certificate in force relies.
+    """Return all valid results in the order of time, and replaced results on which a certificate in force relies.
 
-    Voided calibrations do not count, nor runs with no others. Runs without calibrations, such as a verification alone,
-    are included unless a serial number or part is selected.
+    Voided calibrations, and runs that have only voided calibrations, are left out. Runs without calibrations, such as a
+    verification alone, are included unless a serial number or part is selected.
     """
     pasts: dict[int, list[Past]] = defaultdict(list)
     for past in history.calibrations(selection, replaced_too=True):

@@ -13,7 +13,7 @@ _parent_pools: list[Pool] = []
 
 
 def kept_from_children(engine: Engine) -> Engine:
-    """Return the engine; in a forked process it starts with new connections."""
+    """Return the engine, changed so that a forked process opens its own connections."""
     _engines.add(engine)
     return engine
 

@@ -60,7 +60,7 @@ def note(connection: Connection, table: Table, *key: int | str) -> None:
 
 
 def head(connection: Connection) -> Head:
-    """Return the end of the journal; number 0 if it is empty."""
+    """Return the last line's number and hash; number 0 if the journal is empty."""
     lines = schema.journal.c
     newest = select(lines.number, lines.chain_sha256).order_by(lines.number.desc()).limit(1)
     last = connection.execute(newest).one_or_none()
@@ -68,7 +68,7 @@ def head(connection: Connection) -> Head:
 
 
 def has(connection: Connection, earlier: Head) -> bool:
-    """Return whether there is a line with that chain. Only this line is read: `holds` computes the chain."""
+    """Return whether the journal has a line with the given number and chain hash."""
     lines = schema.journal.c
     if earlier.number == 0:
         return True

@@ -48,7 +48,7 @@ def _is_on_this_computer(server: "URL", environment: Mapping[str, str]) -> bool:
 
 
 def _is_at_hand(host: str) -> bool:
-    """Return whether the host is a socket's folder or this computer's own address."""
+    """Return whether the host is this computer: a socket's folder or a local address."""
     if host in ("", "localhost") or host[0] in "/@":
         return True
     try:

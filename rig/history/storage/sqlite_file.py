@@ -46,7 +46,7 @@ def identities(file: Path) -> Iterator[FileIdentity]:
 
 
 def address_of(file: Path, options: str) -> str:
-    """Return the address by which SQLite opens a file; `options` as in https://sqlite.org/uri.html, 3.3."""
+    """Return the URI with which SQLite opens a file; `options` as in https://sqlite.org/uri.html, 3.3."""
     return f"{file.absolute().as_uri()}?{options}"
 
 
@@ -111,7 +111,7 @@ def _is_marked(connection: sqlite3.Connection) -> bool:
 
 
 def _is_too_old(connection: sqlite3.Connection) -> bool:
-    """Return whether it has the tables of a history before 0.1.0, not all of which were marked."""
+    """Return whether the file has the tables of a history before 0.1.0, which may lack a version mark."""
     try:
         version = connection.execute("SELECT value FROM meta WHERE key = ?", [DEVELOPMENT_KEY]).fetchone()
         return version is not None and connection.execute("SELECT count(*) FROM run").fetchone() is not None

@@ -33,7 +33,7 @@ def comparison_in_words(changes: Sequence[Change]) -> str:
 
 
 def change_in_short(change: Change) -> str:
-    """Return the change of one parameter in a short phrase; U is that of the difference."""
+    """Return the change of one parameter in a short phrase; U is the uncertainty of the difference."""
     name = name_in_words(change.name).removeprefix("the ")
     times = f"{change.normalised_error:.{1 if change.normalised_error < 10 else 0}f}"
     return f"{name} changed by {_size(change)}, {times} U"

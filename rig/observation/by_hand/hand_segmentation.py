@@ -80,7 +80,7 @@ def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Windo
 
 
 def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
-    """Return the readings (n,) at the limit of the range; for an unknown range, those of a long run of equal ones."""
+    """Return which readings (n,) are at the limit of the range; if it is unknown, a long series of equal readings."""
     if range_rad_s is not None:
         return np.asarray((np.abs(rates) >= NEAR_RANGE * range_rad_s).any(axis=1))
     size = np.abs(rates)

@@ -69,7 +69,7 @@ def find_rests(
     follows = (times[1:, 0] - times[:-1, -1] <= gap_s) & (np.abs(np.diff(means, axis=0)) <= tolerance).all(axis=1)
     pairs = still[:-1] & still[1:] & follows
     if quantity == RATE and still.any():
-        still &= _find_unturned(means, _steady(still, pairs), tolerance, _within(times, lying))
+        still &= _find_unturned(means, _find_steady_blocks(still, pairs), tolerance, _within(times, lying))
         pairs &= still[:-1] & still[1:]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], pairs, [False]]).astype(np.int8))).reshape(-1, 2)
     return tuple(Window(float(times[first, 0]), float(times[last, -1])) for first, last in edges.tolist())
@@ -89,7 +89,7 @@ def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
     return np.nanmean(masked, axis=1), np.nanstd(masked, axis=1)
 
 
-def _steady(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _find_steady_blocks(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which blocks (count,) agree with a neighbouring block; all still blocks if none agrees."""
     steady = np.append(pairs, False) | np.append(False, pairs)
     return steady if steady.any() else still

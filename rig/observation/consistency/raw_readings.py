@@ -48,7 +48,7 @@ def innovation_std(counts: NDArray[np.int64]) -> Array:
 
 
 def _innovation_std(readings: Array) -> float:
-    """Return the standard deviation of the error of predicting readings (n,) linearly from `MEMORY` earlier ones."""
+    """Return the standard deviation of the error when readings (n,) are predicted from `MEMORY` earlier readings."""
     if len(readings) < 4 * MEMORY:
         return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
     return float(NORMAL * np.median(np.abs(innovations(readings, MEMORY))))

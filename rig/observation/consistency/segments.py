@@ -33,7 +33,7 @@ AT_REST = LineSearch(stands_out=30.0, beats=0)  # of noise alone one bin in 10â
 
 
 def segment_counts(revolutions: int) -> tuple[int, int]:
-    """Return the number of segments of each revolution, of which there are `revolutions`, and of each rest."""
+    """Return the number of segments of each of the `revolutions`, then of each rest."""
     segments = max(1, min(OF_REVOLUTION, MOST // max(revolutions, 1)))
     return segments, max(1, segments // OF_REST)
 

@@ -133,7 +133,7 @@ def mean_specific_force_m_s2(interval: MotionInterval, down_m_s2: Array, extensi
 
 
 def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
-    """Return the variance (3,) of the mean of readings (n, 3) beyond the effects of the arm's rate and gravity.
+    """Return the variance (3,) of the mean of readings (n, 3) after removal of the arm's rate and gravity.
 
     A sensor's filter combines the arm's rates of adjacent samples. A ripple above half the data rate looks like noise,
     at low frequencies too.

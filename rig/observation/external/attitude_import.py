@@ -227,8 +227,8 @@ def _rows(time_s: Array, rate: Array, fixes: _ReferenceRows) -> Rows:
 def _find_complete(rows: _ReferenceRows, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
     """Return the rows whose samples are complete.
 
-    Raise Fault `lost_samples` if none is, or if more of the long ones lack samples than are complete: a short row among
-    many may fall into a gap.
+    Raise Fault `lost_samples` if no row is complete, or if most long rows lack samples. Short rows do not count, as any
+    may fall into a gap.
     """
     whole = np.array([is_complete(*pair, least=1) for pair in zip(counts.tolist(), expected.tolist(), strict=True)])
     long = expected >= MIN_SAMPLES

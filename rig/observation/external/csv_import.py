@@ -113,7 +113,7 @@ def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
 def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | None = None) -> ExternalData:
     """Average samples (n, 4) = [time_s, x, y, z] over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
 
-    `temperature_c` (n,) is that of each sample, None without a thermometer. Raise Refused `time_not_increasing`,
+    `temperature_c` (n,) is each sample's temperature, None without a thermometer. Raise Refused `time_not_increasing`,
     `overlapping_sweeps`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`, `wrong_unit`.
     """
     time_s, readings = samples[:, 0], samples[:, 1:]

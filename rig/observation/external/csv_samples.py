@@ -206,7 +206,7 @@ def samples_in(table: Columns, where: str) -> Samples:
 
 
 def _describe_stamps(ordered: OrderedStamps, total: int) -> Iterator[str]:
-    """Yield how the stamps of a `total` of samples were read; nothing of good ones."""
+    """Yield sentences on how the stamps of `total` samples were interpreted; none for good stamps."""
     for finding in ordered.findings:
         if not finding.left_out:
             yield f"{finding.count} of {total} samples, the first {finding}: {finding.reason}"

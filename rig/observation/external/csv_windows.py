@@ -128,7 +128,7 @@ def find_row_gaps(time_s: Array, readings: Array, sampling: Sampling, windows: S
 
 
 def is_losing(rows: Sequence[RowGaps]) -> bool:
-    """Return whether readings are missing all over the rows: a link that loses them, not one that stalls."""
+    """Return whether readings are missing all over the rows, as with a link that loses single readings."""
     return sum(row.gaps for row in rows) > MAX_LOST_FRACTION * sum(row.count for row in rows)
 
 
@@ -169,7 +169,7 @@ def check_overlap(time_s: Array, windows: Sequence[Window]) -> None:
 
 
 def clocks_apart(time_s: Array, windows: Sequence[Window]) -> Fault:
-    """Return the error for windows none of which holds a sample."""
+    """Return the error for windows that contain no sample at all."""
     start_s, end_s = min(window.start_s for window in windows), max(window.end_s for window in windows)
     return Fault(
         "clocks_apart",

@@ -52,7 +52,7 @@ class Files:
 def build_recording(
     files: Files, site: Site, request: Elsewhere, *, second_order: bool = False, reference_c: float | None = None
 ) -> RunData:
-    """Return the recording; with a reference temperature that of a calibration over temperature.
+    """Return the recording of a calibration, over temperature if there is a reference temperature.
 
     Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
     """

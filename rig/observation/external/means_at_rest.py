@@ -31,7 +31,7 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     rows_s = turning.rows_s.mean(axis=1) + clock_s
     lying = still_windows(turning.rows_s + clock_s, turning.attitudes)
     readings, rates, lasting_s = [], [], 0.0
-    for rest in _several(find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)):
+    for rest in _split_single(find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)):
         rows = np.flatnonzero((rows_s >= rest.start_s) & (rows_s <= rest.end_s))
         if not len(rows):
             continue
@@ -46,7 +46,7 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     return MeansAtRest(np.array(readings), np.array(rates))
 
 
-def _several(windows: Sequence[Window]) -> Sequence[Window]:
+def _split_single(windows: Sequence[Window]) -> Sequence[Window]:
     """Return the windows; a single window is divided into halves."""
     if len(windows) != 1:
         return windows

@@ -42,7 +42,7 @@ def is_bag(path: Path) -> bool:
 
 
 def bag_of(path: Path) -> Path:
-    """Return the folder of a bag, of which `path` may be a file; a file without metadata next to it is a bag itself."""
+    """Return the folder of the bag that contains the file `path`, or `path` itself if no metadata is next to it."""
     is_alone = path.is_dir() or _is_ros_1(path) or not (path.parent / METADATA).exists()
     return path if is_alone else path.parent
 
@@ -185,9 +185,9 @@ def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]
 
 
 def _check_layout(store: Any, connections: Any) -> None:
-    """Raise ValueError if the definition that comes with the messages differs from that of ROS.
+    """Raise ValueError if the definition that comes with the messages differs from ROS's own.
 
-    The definition is only compared: rosbags would write a program from it and run that.
+    The definition is only compared: rosbags would generate code from it and run the code.
     """
     from rosbags.interfaces import MessageDefinitionFormat
     from rosbags.typesys import get_types_from_idl, get_types_from_msg

@@ -61,7 +61,7 @@ def seconds_of(cell: str, factor: float) -> Decimal:
 
 
 def origin_of(times_s: Iterable[float]) -> int:
-    """Return the whole seconds from which times are to count, by the first of them: 0 for those of a young clock."""
+    """Return the origin of times, whole seconds, by the first time; 0 for a clock that has run for a short time."""
     first_s = next(iter(times_s), 0.0)
     return int(first_s) if abs(first_s) >= LONG_AGO_S else 0
 

@@ -69,7 +69,7 @@ def blank_cell(path: Path, name: str, line: int) -> Refused:
 def read_table(
     path: Path, header: Header, largest_mb: int, mapped: Mapped | None = None, origin_s: int | None = None
 ) -> CsvTable:
-    """Return the columns of a file by name, those of its header; of each group of optional columns all, or none.
+    """Return the columns of a file by the names in its header; each group of optional columns is complete or absent.
 
     The first row holds the names. If it is divided by semicolons, as in spreadsheets with a decimal comma, or by tabs,
     all rows are. Empty rows and rows of units below the heading are skipped. From a `mapped` file come the columns
@@ -106,7 +106,7 @@ def read_table(
 def csv_parts(
     path: Path, names: Sequence[Any], largest_mb: int, mapped: dict[str, Any] | None, origin_s: int | None
 ) -> Iterator[Part]:
-    """Yield the parts that `read_table` reads; `names` are fields of a header, `mapped` those of a map.
+    """Yield the parts that `read_table` reads; `names` are fields of a header, `mapped` fields of a column map.
 
     The rows come in blocks, with the line of each as an additional column; `origin_s` and whether times are of the day
     come last.
@@ -217,7 +217,7 @@ class _Wanted:
         )
 
     def origin_s(self, cells: Sequence[str]) -> int:
-        """Return the seconds from which times are to count, by the first row; 0 if it holds no time."""
+        """Return the origin of times, s, by the first row; 0 if the row holds no time."""
         timed = [index for index, name in enumerate(self.names.values()) if name in TIMES and is_value(cells[index])]
         try:
             return origin_of(float(seconds_of(cells[index], self.factors[index])) for index in timed)

@@ -61,7 +61,7 @@ class TableLayout:
         return any(self.headings)
 
     def name(self, index: int) -> str | int:
-        """Return how a map of columns names one of them: by its heading, or by its number from 1."""
+        """Return the name of a column in a column map: its heading, or its number from 1."""
         heading = self.headings[index]
         is_name = heading and self.headings.count(heading) == 1 and not self.is_shifted
         return heading if is_name else index + 1
@@ -193,7 +193,7 @@ def _find_time(
             units[index] in UNITS and UNITS[units[index]].quantity == TIME
         ):
             return index
-    unlike_counts = [index for index in rising if not _counts(columns[index])]
+    unlike_counts = [index for index in rising if not _increases_by_one(columns[index])]
     return next(iter(unlike_counts), None)
 
 
@@ -206,8 +206,8 @@ def _rises(column: Sequence[str]) -> bool:
     return len(steps) > 1 and bool((steps < 0).sum() <= 2 and (steps > 0).mean() > 0.1 and np.median(steps) >= 0)
 
 
-def _counts(column: Sequence[str]) -> bool:
-    """Return whether a column goes on by ones, as row numbers do."""
+def _increases_by_one(column: Sequence[str]) -> bool:
+    """Return whether a column increases by one from row to row, like row numbers."""
     return is_number(column[0]) and bool((np.diff([float(cell) for cell in column]) == 1).all())
 
 

@@ -63,7 +63,7 @@ def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
 def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str | None) -> bool:
     """Return whether `sensor_combined` is to be read: it was named, or the raw topic is rare or missing.
 
-    Raise Refused `ulog_topic` if the log does not hold what was named.
+    Raise Refused `ulog_topic` if the log does not hold the named topic.
     """
     rates_hz = {topic: _rate_hz(data) for topic, data in topics.items()}
     combined_hz = rates_hz.get((COMBINED, 0))

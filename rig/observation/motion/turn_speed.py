@@ -72,7 +72,8 @@ def _std_of_mean(later_s: NDArray[np.float64], time_s: NDArray[np.float64], beyo
     """Return the standard deviation of the mean of differences between interpolated and single readings.
 
     Difference i is (1 − w) e_j + w e_{j+1} − e_i of the readings' white errors e: the variance of the single reading
-    follows from the differences' scatter, and that of their mean from the number of differences each reading enters.
+    follows from the differences' scatter, and the variance of their mean from the number of differences that each
+    reading enters.
     """
     pairs, count = len(beyond_rad), len(time_s)
     after = np.searchsorted(time_s, later_s, side="right").clip(1, count - 1)

@@ -78,7 +78,7 @@ def accelerations(stream: Stream, inside: slice) -> Array:
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
     """Raise Fault `saturation` or `stuck_sensor` for the accelerometer's samples `inside`.
 
-    While the sensor is `turning`, one axis with equal readings is stuck too.
+    While the sensor is `turning`, even one axis with equal readings counts as stuck.
     """
     channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
     counts, saturated = channel.counts(samples), channel.is_saturated(samples)
@@ -128,9 +128,9 @@ def _dwell_reading(
 
 
 def gravity_difference(attitudes: Array, expected: Array, sensor: RecordedSensor, site: Site) -> Array:
-    """Return the difference (n, 3), m/s², of gravity at attitudes and at expected ones, in the sensor's nominal axes.
+    """Return gravity at actual attitudes minus gravity at expected ones (n, 3), m/s², in the sensor's nominal axes.
 
-    attitudes (n, 3, 3) are those of the arm's encoders, expected those of the readings' model.
+    attitudes (n, 3, 3): by the arm's encoders. expected (n, 3, 3): in the readings' model.
     """
     difference: Array = (attitudes - expected) @ -site.down_m_s2 @ np.array(sensor.mounting).T
     return difference

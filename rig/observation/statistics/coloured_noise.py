@@ -104,7 +104,7 @@ def innovations(residuals: Array, memory: int) -> Array:
 
 
 def _correlations(residuals: Array) -> Array | None:
-    """Return the lag correlations (LAGS,); None if they are those of white noise, or if there are too few residuals."""
+    """Return the lag correlations (LAGS,); None if the residuals are white or too few."""
     count = len(residuals)
     centred = residuals - residuals.mean()
     power = float(centred @ centred)

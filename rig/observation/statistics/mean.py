@@ -167,7 +167,7 @@ def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
 def average_tapered(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
     """Return the mean of readings (n, 3) in these steps, at times (n,), with the window's middle weighted most.
 
-    The variance is that of the noise without the vibration, which the weights cancel.
+    The variance contains the noise but not the vibration, which the weights cancel.
     """
     variance = np.maximum(np.var(readings, axis=0, ddof=1), steps.variance)
     at_zero = np.minimum(noise_at_zero(readings), variance)

@@ -142,13 +142,13 @@ def line_swing(residuals: Array, columns: Array, lines_hz: Array) -> Array:
 
 
 def _sampling_step(fraction: Array) -> float:
-    """Return the fraction of the time between neighbouring samples, some of which may be missing."""
+    """Return the interval between samples as a fraction of the whole time; samples may be missing."""
     steps = np.diff(fraction)
     return float(steps[steps < LEAST_GAP * np.median(steps)].mean())
 
 
 def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float | None:
-    """Return the cycles of the strongest line in residuals (n, axes), apart from `previous` ones; None without one."""
+    """Return the cycles of the strongest line in residuals (n, axes), except `previous` lines; None without one."""
     from scipy.ndimage import median_filter
 
     powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2

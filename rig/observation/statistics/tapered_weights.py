@@ -44,8 +44,8 @@ def weights(time_s: Array, start_s: float, end_s: float) -> Array:
 def noise_at_zero(readings: Array, low: float = LOW) -> Array:
     """Return the variance (3,) per reading for a long mean: the spectrum near zero without its lines.
 
-    It is the median over low frequencies, which lines do not shift, over that of χ² with two degrees of freedom. Low is
-    up to a fraction `low` of the data rate, but never fewer bins than `FEWEST_BINS`.
+    It is the median over low frequencies, which lines do not shift, divided by the median of χ² with two degrees of
+    freedom. Low is up to a fraction `low` of the data rate, but never fewer bins than `FEWEST_BINS`.
     """
     powers = np.abs(np.fft.rfft(apply_window(readings), axis=0)[MAIN_LOBE : _highest(len(readings), low)]) ** 2
     medians: Array = np.median(powers, axis=0) / np.log(2)

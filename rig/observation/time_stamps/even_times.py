@@ -31,7 +31,7 @@ def find_taken_times(time_s: Array, sampling: Sampling) -> Array:
 
 
 def _separate(time_s: Array) -> Array:
-    """Return times (n,) that rise strictly: equal ones, and any after a later one, are spread until the next later."""
+    """Return strictly increasing times (n,): equal or decreasing times are spread up to the next later time."""
     latest_s = np.maximum.accumulate(time_s)
     new = np.concatenate([[True], np.diff(latest_s) > 0])
     if new.all():

@@ -26,7 +26,7 @@ def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) ->
 
 
 def find_hiding_gaps(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return those of the steps `gaps` (k,) that cannot be bridged; otherwise as `hidden_angles_rad`."""
+    """Return the gaps among `gaps` (k,) that cannot be bridged; arguments as for `hidden_angles_rad`."""
     return np.asarray(gaps[hidden_angles_rad(time_s, readings, gaps) > HIDDEN_RAD], dtype=np.intp)
 
 

@@ -78,7 +78,7 @@ class Sampling:
 
     @classmethod
     def even(cls, count: int) -> "Sampling":
-        """Return the sampling of a `count` of readings, too few to show any."""
+        """Return even sampling for `count` readings, too few to show gaps."""
         return cls(0.0, np.zeros(max(count - 1, 0), dtype=np.intp), 0.0, 1, on_arrival=False)
 
     @property
@@ -130,8 +130,8 @@ def find_sampling(time_s: Array) -> Sampling:
 
 
 def find_typical_interval_s(time_s: Array) -> float:
-    """Return the interval over many readings at rising times (n ≥ 2,), of which some may be missing or late."""
-    return min(_slope(time_s, apart) for apart in LONG)
+    """Return the typical interval between readings at increasing times (n ≥ 2,); some may be missing or late."""
+    return min(_interval_quantile(time_s, apart) for apart in LONG)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +157,7 @@ class _PeriodCandidate:
 
 def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandidate:
     steps_s, numbers = np.diff(time_s), np.arange(len(time_s))
-    interval_s, last_s = _slope(time_s, max(8, 4 * width), quantile), 0.0
+    interval_s, last_s = _interval_quantile(time_s, max(8, 4 * width), quantile), 0.0
     missing, fit = np.zeros(len(steps_s), dtype=np.intp), 0.0
     for _ in range(PASSES):
         late_s = time_s - interval_s * numbers
@@ -180,8 +180,8 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
 def _is_beat(missing: NDArray[np.intp]) -> bool:
     """Return whether readings seem to be missing (n − 1,) more regularly than by chance.
 
-    Stamps that are whole multiples of a time shorter than the interval, as those of a polled port, show that. A logger
-    that loses every n-th reading shows the same, but hardly so often.
+    Stamps of a polled port, whole multiples of a time shorter than the interval, show that. A logger that loses every
+    n-th reading shows the same, but hardly so often.
     """
     missing = np.minimum(missing, 1)  # a gap is one
     lost = int(missing.sum())
@@ -249,7 +249,7 @@ def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.i
     return merged
 
 
-def _slope(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
+def _interval_quantile(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
     """Return the median (or another quantile) of the mean intervals between readings that are `apart` apart."""
     apart = min(apart, len(time_s) - 1)
     return float(np.quantile(time_s[apart:] - time_s[:-apart], quantile) / apart)

@@ -62,7 +62,7 @@ def acting(door: Door, handler: Handler) -> Handler:
 
 
 async def body_of(request: Request) -> bytes:
-    """Return a request's body; empty if it is longer than any valid one."""
+    """Return a request's body; empty if it is longer than any valid body."""
     body = b""
     async for chunk in request.stream():
         body += chunk
@@ -72,7 +72,7 @@ async def body_of(request: Request) -> bytes:
 
 
 def run_routes(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> list[Route]:
-    """Return the addresses of a run in `folder`: its certificate, and the two that act."""
+    """Return the routes of a run in `folder`: its certificate, and the two routes that control it."""
 
     async def certificate(request: Request) -> Response:
         if not door.may_open(request.headers, request.cookies):

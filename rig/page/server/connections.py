@@ -83,5 +83,5 @@ def counting_protocol(connections: Connections) -> "type[H11Protocol]":
 
 
 def client_of(peer: Any) -> Client:
-    """Return address and port of a socket's peer (an IPv6 one has more) or of ASGI's; empty if it has gone."""
+    """Return address and port of a socket's or ASGI's peer (IPv6: more fields); empty if the peer has gone."""
     return (str(peer[0]), int(peer[1])) if peer else ("", 0)

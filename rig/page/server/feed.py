@@ -107,7 +107,7 @@ class Mailbox:
         self._news.set()
 
     async def take(self, feed: Source) -> bytes | None:
-        """Return the next frame, the complete state if any was dropped; None when it is closed and empty."""
+        """Return the next frame, or the complete state after a dropped frame; None if closed and empty."""
         if not self.closed:
             await self._news.wait()
             self._news.clear()

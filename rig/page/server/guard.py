@@ -67,7 +67,7 @@ class Door:
         return self.may_look(headers) or _same(cookies.get(COOKIE, ""), self.pass_to_look)
 
     def refusal(self, path: str, headers: Mapping[bytes, bytes]) -> tuple[int, str] | None:
-        """Return status and reason for a request from elsewhere, None for a permitted one."""
+        """Return status and reason for a request from elsewhere, None for a permitted request."""
         if headers.get(b"host", b"").decode("latin-1").lower() not in self.hosts:
             return 400, "this server does not have that name"
         origin = headers.get(b"origin")

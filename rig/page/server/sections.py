@@ -17,7 +17,7 @@ class Sections:
         self._changed: dict[str, Any] = {}
 
     def put(self, **sections: Any) -> None:
-        """Replace sections; unchanged ones are not news."""
+        """Replace sections; only changed sections are sent."""
         with self._lock:
             for name, section in sections.items():
                 if name not in self._shown or self._shown[name] != section:

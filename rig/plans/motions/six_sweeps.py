@@ -173,7 +173,7 @@ def _sweeps(order: Order, procedure: SixSweepsSection, repeats: int) -> list[Swe
 
 @lru_cache(maxsize=64)
 def _axis(station: SweepPose, sign: int) -> Vector3:
-    """Return the joint's axis in the flange's frame: of a growing angle, or of a falling one with the sign -1."""
+    """Return the joint's axis in the flange's frame, reversed for the sign -1."""
     x, y, z = (sign * axis for axis in flange_axes(station.pose_q_rad)[:, station.joint].tolist())
     return x, y, z
 

@@ -33,7 +33,7 @@ def plan_static_attitudes(
 def dwells(
     arm: ArmSection, procedure: AttitudesSection, repeats: int, done: Collection[int] = (), first: int = 0
 ) -> Iterator[Step]:
-    """Yield the dwells, counted from `first`, with the transfers, from home and back; none if all are `done`.
+    """Yield the dwells, numbered from `first`, and the transfers from home and back; nothing if all are `done`.
 
     There are field tests at home before and after them.
     """

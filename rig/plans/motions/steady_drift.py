@@ -65,7 +65,7 @@ def _poses_on_arc(sweep: Sweep) -> tuple[Joints, ...]:
 
 
 def _list_averages(steps: Sequence[Step]) -> Iterator[PlannedAverage]:
-    """Yield the sweeps, the rests after them, and the dwells."""
+    """Yield the steps that are averaged: sweeps, the rests after sweeps, and dwells."""
     time_s, pose = 0.0, None
     for step in steps:
         middle_s = time_s + step.duration_s / 2

@@ -23,7 +23,7 @@ class SweepPose:
     pose_q_rad: Joints
 
     def rotate_joint(self, by_rad: float) -> Joints:
-        """Return the pose with the joint turned from it."""
+        """Return the pose with its joint turned by `by_rad`."""
         pose, joint = self.pose_q_rad, self.joint
         return (*pose[:joint], pose[joint] + by_rad, *pose[joint + 1 :])
 

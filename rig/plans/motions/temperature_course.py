@@ -32,14 +32,14 @@ class TemperatureCourse:
     warming: bool | None = None
 
     def begin(self, temperature_c: float) -> None:
-        """Choose the direction: away from the nearer end, or that of an interrupted run."""
+        """Choose the direction: away from the nearer end, or as in the interrupted run."""
         self.warming = temperature_c <= (self.from_c + self.to_c) / 2
         if self.sets:
             self.warming = self.sets[-1].warming
             self._turn_round(self.sets[-1])
 
     def add_set(self, step: SetMeasured) -> None:
-        """Count a set, and reverse if it was at the end of the range."""
+        """Count a set, and reverse the direction if the set was at the end of the range."""
         self.sets.append(step)
         self._turn_round(step)
 

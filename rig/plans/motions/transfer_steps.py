@@ -40,7 +40,7 @@ def append_steps(plan: Plan, steps: Iterable[Step]) -> Plan:
 
 
 def transfer(name: str, start: Joints, target: Joints, pace: Pace) -> Iterable[Transfer]:
-    """Yield the transfer from `start` to `target`; none if they are the same pose."""
+    """Yield the transfer from `start` to `target`; nothing if both are the same pose."""
     distance_rad = max(map(abs, travel(start, target)))
     if distance_rad > SAME_PLACE_RAD:
         speed_rad_s, acceleration_rad_s2 = pace.speed_rad_s, pace.acceleration_rad_s2

@@ -60,7 +60,7 @@ class HeldStill:
 
     @property
     def whose(self) -> str:
-        """The scale of such a sensor, in words."""
+        """The name of the sensor's scale, in words."""
         return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind}'s scale"
 
 
@@ -79,7 +79,7 @@ class Block:
 
     @property
     def macro(self) -> str:
-        """The macro in that file."""
+        """The template macro in the file."""
         return self.macro_path.partition(":")[2]
 
 

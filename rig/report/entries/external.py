@@ -90,7 +90,7 @@ def rates_in_attitudes(sensor: OfSensor) -> AttitudesEntry | None:
 
 
 def angles_entry(sensor: OfSensor) -> AnglesEntry | None:
-    """Return the stated accuracy of the turns by which a gyroscope was solved; None if it was solved by means."""
+    """Return the stated accuracy of the turning angles; None for a gyroscope calibrated from mean rates."""
     if sensor.turned is None or sensor.gyroscope is None:
         return None
     turns = sensor.turned.turns

@@ -25,7 +25,7 @@ class Imu:
 
     @property
     def name(self) -> str:
-        """The sensor of which both are parts."""
+        """The name of the sensor that contains both."""
         return self.gyroscope.sensor
 
     @property

@@ -126,7 +126,7 @@ class ReadingsAlone:
         return "the clock that stamped the readings"
 
     def time_s(self, sensor: str) -> Array:
-        """Return the times (n,) of all samples of a sensor, s; those of a file as it states them."""
+        """Return the times (n,) of all samples of a sensor, s; times from a file are unchanged."""
         samples = self.run.samples[sensor]
         if self.run.external is not None:
             times_of_file: Array = samples["host_time_s"]

@@ -17,7 +17,7 @@ from rig.report.exports.names import plain_names
 
 
 def tables_of(recordings: Sequence[Exported]) -> Iterator[ExportTable]:
-    """Yield the tables of each recording; the second and later ones have its number."""
+    """Yield the tables of each recording; tables of the second and later recordings have its number in their names."""
     for number, recording in enumerate(recordings, start=1):
         for table in recording.tables():
             yield table if number == 1 else replace(table, name=f"{table.name}-{number}")

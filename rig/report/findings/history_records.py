@@ -40,12 +40,12 @@ class Parameter:
 
     @property
     def std(self) -> float:
-        """The standard uncertainty: the combined one if available, else that of the noise."""
+        """The combined standard uncertainty if available, else the standard uncertainty by noise."""
         return self.std_statistical if self.std_combined is None else self.std_combined
 
     @property
     def expanded(self) -> float:
-        """U as the result states it."""
+        """The stated expanded uncertainty U."""
         return self.coverage_factor * self.std
 
     @property

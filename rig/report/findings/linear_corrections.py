@@ -77,9 +77,9 @@ class Corrected:
 
 
 def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float], int]]) -> ReadingNoise:
-    """Return the noise by averages, and by σ of one sample and the number of samples of each rest.
+    """Return the readings' noise from averages, and from each rest's σ of one sample and number of samples.
 
-    The density is that of the noisiest axis, σ over √rate, for noise that is white up to half the rate. It is None for
+    The density is σ over √rate of the noisiest axis, for noise that is white up to half the rate. It is None for
     readings in attitudes of a file.
     """
     duration_s = sum(mean.duration_s for mean in means)

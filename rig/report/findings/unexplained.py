@@ -41,7 +41,7 @@ class Unexplained:
 
 
 def find_sweep_residuals(finding: Finding[GyroscopeEntry]) -> Unexplained | None:
-    """Return the residuals of a gyroscope's sweeps and rests; None without those of the vector model."""
+    """Return the residuals of a gyroscope's sweeps and rests; None without a solution of the vector model."""
     sensor, vector = finding.entry, finding.entry.vector_model
     averages: list[ObservationEntry | AverageEntry] = [*sensor.observations, *sensor.rests]
     if isinstance(vector, ErrorEntry) or len(vector.residuals_rad_s) != len(averages) or not averages:

@@ -136,7 +136,7 @@ def _describe_item(finding: Finding[DriftEntry], _: object) -> CertifiedItem:
 
 
 def drift_table(name: str, quantity: Quantity, entry: DriftEntry) -> Table:
-    """Return the bias of each repeat, with scale and axes fixed, and its largest ± U; marks show its changes."""
+    """Return a table of the bias in each repeat, with scale and axes fixed, and the largest U; changes are marked."""
     unit, size = quantity.drift.name, quantity.drift.size
     expansion = expanded((1.0, 1.0, 1.0), entry.degrees_of_freedom)
     table = Table(title=plain(f"{name}, {quantity.sensor}: bias by repeat, scale and axes fixed", "table.title"))

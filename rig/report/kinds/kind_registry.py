@@ -27,7 +27,7 @@ OF_THE_RIG: Final[tuple[ResultKind[Any], ...]] = (
 
 @cache
 def kinds() -> tuple[ResultKind[Any], ...]:
-    """Return all kinds of results; those of packages (`rig.data.installed_kinds`) follow the rig's own."""
+    """Return all kinds of results: the rig's own, then the kinds of packages (`rig.data.installed_kinds`)."""
     return (*OF_THE_RIG, *(kind.result for kind in installed_kinds()))
 
 
@@ -41,14 +41,14 @@ def outlets(
 
 
 def terms_of(document: ResultDocument, outlet: Outlet | None = None) -> Iterator[Term]:
-    """Yield all characteristics in a result, kind by kind, or those that `outlet` takes."""
+    """Yield all characteristics in a result, kind by kind, or only the characteristics that `outlet` shows."""
     for kind in kinds():
         for finding in kind.find(document):
             yield from terms(kind.characteristics, finding, outlet)
 
 
 def shown(document: ResultDocument) -> Iterator[DisplayRow]:
-    """Yield the rows of page and notebook: the kinds' rows of all sensors, then those of characteristics."""
+    """Yield the rows of page and notebook: the kinds' rows of all sensors, then the characteristics' rows."""
     yield from (show(finding) for _, show, finding in outlets(document, lambda kind: kind.shown))
     yield from map(row_of, terms_of(document, "page"))
 

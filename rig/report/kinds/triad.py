@@ -82,7 +82,7 @@ def tables(title: str, quantity: Quantity, entry: Calibrated) -> Iterator[Table]
 
 
 def item_words(entry: Any) -> str:
-    """Return part and serial number, as far as they are stated."""
+    """Return the part and the serial number, if stated."""
     names = [name for name in (entry.part, entry.serial_number) if name != NOT_STATED]
     return " ".join(names) or "part and serial number not stated"
 
@@ -107,7 +107,7 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
 
 
 def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
-    """Yield the solutions of the other methods, or why they have none."""
+    """Yield the solutions of the other methods, or the reasons why a method has no solution."""
     for method, other in entry.other_methods.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}{from_what}: {other.error}"

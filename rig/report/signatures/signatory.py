@@ -33,7 +33,7 @@ class Signatory:
     certificates: "tuple[Certificate, ...]"
 
     def signature(self, data: bytes) -> bytes:
-        """Return the signature of `data` by SHA-256; that of an EC key in DER."""
+        """Return the signature of `data` with SHA-256; an EC key's signature is in DER."""
         signature: bytes = asyncio.run(self.signer.async_sign_raw(data, DIGEST))
         return signature
 

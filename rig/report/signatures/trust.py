@@ -110,7 +110,7 @@ def _other_name(certificate: "Certificate", expected: str | None) -> str:
 
 
 def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
-    """Return the certificates of a signer's `chain`, except the first, whose content is not verified.
+    """Return the certificates in a signer's `chain` whose content nothing verifies, apart from the first.
 
     The signature itself identifies the first. The others must be trusted, or issued by one of the chain or a trusted
     one.
@@ -129,7 +129,7 @@ def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certif
 
 
 def chain_of(certificates: "Sequence[Certificate]") -> list["Certificate"]:
-    """Return the first of the certificates, and those of the others that lead from it to its root."""
+    """Return the chain from the first certificate to its root, taken from the other certificates."""
     chain, rest = [certificates[0]], [other for other in certificates if other != certificates[0]]
     while issuers := [other for other in rest if any(_has_issued(other, one) for one in chain)]:
         chain += issuers

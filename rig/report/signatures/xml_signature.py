@@ -54,13 +54,13 @@ def inspect_xml(name: str, content: bytes, trust: Trust) -> FileInspection:
 
 
 def _method(certificate: Certificate) -> SignatureMethod:
-    """Return the method by which the rig signs with a key of this kind."""
+    """Return the signature method for this kind of key."""
     rsa = isinstance(certificate.public_key(), RSAPublicKey)
     return SignatureMethod.RSA_SHA256 if rsa else SignatureMethod.ECDSA_SHA256
 
 
 def _verify(root: Any, certificate: Certificate, method: SignatureMethod) -> Any:
-    """Return the content signed by the key of this certificate. Raise SignXMLException."""
+    """Return the content that the certificate's key has signed. Raise SignXMLException."""
     form = XAdESSignatureConfiguration(
         location="./",
         expect_references=3,

@@ -52,7 +52,7 @@ def scale_and_bias_table(
 
 
 def decimals(uncertainties: Sequence[float], fewest: int = FEWEST_DECIMALS) -> int:
-    """Return the decimals of values whose smallest uncertainty is printed with two digits, at least `fewest`."""
+    """Return the number of decimals that gives the smallest uncertainty two digits, at least `fewest`."""
     smallest = min(uncertainties)
     return max(fewest, 1 - math.floor(math.log10(smallest))) if smallest > 0 else fewest
 
@@ -65,7 +65,7 @@ def line_of(term: Term, lead: str, form: str, width: str = ".2g") -> str:
 
 
 def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:
-    """Yield F row by row and the angles between its axes, ± U; `covariance` (9, 9) is that of F, row by row.
+    """Yield F row by row and the angles between its axes, ± U; `covariance` (9, 9) is the covariance of F, row by row.
 
     `factor` is the coverage factor, the largest of the scale factors'.
     """

@@ -112,7 +112,7 @@ def bias_drift(entry: DriftEntry, quantity: Quantity) -> Iterator[Element]:
 
 
 def over_temperature(entry: OverTemperatureEntry, quantity: Quantity) -> Iterator[Element]:
-    """Yield scale and bias of each axis at the temperatures of the table, with U."""
+    """Yield scale and bias of each axis with U, at the table's temperatures."""
     low, high = entry.range_c
     labels = [f"{row.temperature_c:.6g}_degC" for row in entry.table]
     statement = f"At temperatures of the item's own thermometer; valid from {low!r} to {high!r} °C only"
@@ -134,7 +134,7 @@ def verification(entry: VerificationEntry) -> Iterator[Element]:
 
 
 def earth_rate(entry: EarthRateEntry) -> Iterator[Element]:
-    """Yield the rate with its covariance, and the site by that rate."""
+    """Yield the Earth's rate with its covariance, and the site that follows from it."""
     statement = "In the frame of the arm's base. The ellipsoid holds all three values with a probability of 95 %."
     rate = real_list(AXES, entry.rate_rad_s, [RATE.d_si], region=(entry.covariance_rad2_s2, JOINT_FACTOR_3))
     yield _result("Earth's rate", statement, rate)

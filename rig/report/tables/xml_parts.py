@@ -74,7 +74,7 @@ def real_list(
 ) -> Element:
     """Return values with U and its coverage, or with a covariance matrix and the factor of their joint region.
 
-    A single unit is that of all values.
+    A single unit applies to all values.
     """
     uncertainty = covered = None
     if expanded is not None:

@@ -31,7 +31,7 @@ LEAST_LAG_S = 0.004
 
 
 def describe_file(looked: LookedFile) -> Iterator[str]:
-    """Yield the file's form, its columns, and what is in it."""
+    """Yield lines on the file's format, its columns, and its content."""
     if looked.layout is not None and looked.guess is not None:
         yield from _describe_table(looked.path, looked.layout, looked.guess)
     else:
@@ -66,7 +66,7 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
 
 
 def describe_convention(convention: Convention | None) -> Iterator[str]:
-    """Yield what the gyroscope shows of the quaternions."""
+    """Yield the convention of the quaternions that the gyroscope shows."""
     if convention is None:
         yield _row("direction", "the gyroscope does not show that of the quaternions: is it one body and one clock?")
         return

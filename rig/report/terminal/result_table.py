@@ -100,7 +100,7 @@ def _term_line(term: Term) -> str:
 
 
 def print_checks(result: ResultDocument, console: Console, sensor: str | None = None) -> None:
-    """Print the checks sensor by sensor, failed ones first; of one sensor alone if one is named."""
+    """Print the checks sensor by sensor, failed checks first; only one sensor's if it is named."""
     by_sensor: dict[str | None, list[CheckEntry]] = {}
     for check in result.checks:
         by_sensor.setdefault(check.means.sensor, []).append(check)

@@ -80,7 +80,7 @@ def _values(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
 
 
 def _items(result: ResultDocument) -> Iterator[_SensorValues]:
-    """Yield the findings with values of their own; a reference has none."""
+    """Yield the findings with calibrated values; reference sensors have none."""
     for kind, show, finding in outlets(result, lambda kind: kind.shown):
         if finding.is_reference:
             continue
@@ -140,7 +140,7 @@ def _tabulate(items: Sequence[_SensorValues]) -> list[tuple[str, Sequence[str]]]
     table: list[tuple[str, Sequence[str]]] = []
     for heading, rows in blocks.items():
         table.append((heading, [*"xyz"[: len(rows[0][1].values)], "± U"]))
-        table += [(f"{INDENT}{label}", _add_largest(three)) for label, three in rows]
+        table += [(f"{INDENT}{label}", _format_axes(three)) for label, three in rows]
     return table
 
 
@@ -153,7 +153,7 @@ def _plus_minus(three: AxisValues) -> list[str]:
     return [plus_minus(value, u) for value, u in zip(three.values, three.expanded, strict=True)]
 
 
-def _add_largest(three: AxisValues) -> list[str]:
+def _format_axes(three: AxisValues) -> list[str]:
     """Format the values of three axes, then the largest U."""
     cells = [in_print(value, max(three.expanded)) for value in three.values]
     return [*(value for value, _ in cells), cells[0][1]]
@@ -192,7 +192,7 @@ def _explain_failures(result: ResultDocument, folder: Path | None) -> list[tuple
 
 
 def _first(broken: Sequence[tuple[str, str]], count: int) -> Iterator[str]:
-    """Yield the first `count` failures; the last one states the number of further ones."""
+    """Yield the first `count` failures; the last line states the number of further failures."""
     more = len(broken[count:])
     for number, (measured, words) in enumerate(broken[:count], 1):
         yield measured + (f" ({more} more failed)" if more and number == count else "") + words

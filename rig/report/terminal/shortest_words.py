@@ -67,7 +67,7 @@ def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bo
     console.print(plain(_verdict(shortest)))
     shown = shortest.best or shortest.nearest
     if shown is not None:
-        console.print(_plans(shortest, shown, section))
+        console.print(_tabulate_plans(shortest, shown, section))
         console.print(_limits("Main contributors, as fractions of the variance:", shown.budgets))
     console.print(plain(_floor(shortest)))
     if shortest.directions is not None:
@@ -76,7 +76,7 @@ def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bo
 
 
 def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str, Any]:
-    """Return the shortest run for machines; null if there is no such plan or no such target."""
+    """Return the shortest run as JSON values; null for a missing plan or target."""
     shown = shortest.best or shortest.nearest
     return {
         "schema": "rig.shortest/1",
@@ -130,7 +130,7 @@ def wish_words(wanted: TargetUncertainty) -> str:
     )
 
 
-def _plans(shortest: Shortest, shown: Planned, section: ProcedureSection) -> Table:
+def _tabulate_plans(shortest: Shortest, shown: Planned, section: ProcedureSection) -> Table:
     """Return a table that compares the shortest plan with the file's plan."""
     table = Table(box=SIMPLE)
     for heading in ("", "as in the file", "shortest" if shortest.best else "nearest"):
@@ -199,7 +199,7 @@ def _floor(shortest: Shortest) -> str:
 
 
 def _efficiencies(directions: "Array") -> dict[str, dict[str, float]]:
-    """Return the design's efficiencies and those of the six directions of SIX."""
+    """Return the efficiencies of the design, and of the six directions of SIX for comparison."""
     return {
         name: dict(_design_efficiencies(axes)) for name, axes in (("plan", directions), ("six", list_designs()["six"]))
     }

@@ -10,7 +10,7 @@ from rig.station.plain_text import plain
 
 
 def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterator[Table]:
-    """Yield a table for each row of the result with its truth, or for those of one sensor."""
+    """Yield a table for each row of the result that has a truth, of all sensors or one."""
     for row in rows:
         if sensor not in (None, row.row.sensor):
             continue

@@ -43,6 +43,9 @@ def glossary() -> tuple[Word, ...]:
 
 
 def find_words(name: str) -> Iterator[Word]:
-    """Yield the words of that name. U and u differ; capitals are ignored only if no word has exactly that name."""
+    """Yield the glossary's words that are called `name`.
+
+    U and u differ; capitals are ignored only if no word has exactly that name.
+    """
     matches = [word for word in glossary() if name in word.synonyms]
     yield from matches or [word for word in glossary() if name.casefold() in map(str.casefold, word.synonyms)]

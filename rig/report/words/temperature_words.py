@@ -16,12 +16,12 @@ def shown_rows(entry: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
 
 
 def own_contributors(entry: OverTemperatureEntry) -> Sequence[TemperatureContributorEntry]:
-    """Return the contributors of the polynomials alone, not of the calibration at the reference."""
+    """Return the contributors of the polynomials, without the contributors of the calibration at the reference."""
     return [line for line in entry.contributors if line.name in (NOISE, ORDER, LAG, HYSTERESIS, GRADIENT)]
 
 
 def about_lines(entry: OverTemperatureEntry, quantity: Quantity) -> Iterator[str]:
-    """Yield the validity of the polynomials and what their uncertainty does not include."""
+    """Yield the validity of the polynomials, and the effects that their uncertainty does not include."""
     low, high = entry.range_c
     scale, bias = entry.orders
     yield f"it is valid from {low:.1f} to {high:.1f} °C only; polynomials of order {scale} for k and {bias} for b"

@@ -66,7 +66,7 @@ class BoardCalibration:
         self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEP_LONGER_S)
 
     def revolutions(self, sweep: Sweep) -> Attempts[str, Revolution]:
-        """Return each sensor's window of the revolution, just after it; that may take seconds."""
+        """Return each sensor's window of the revolution that has just ended; this may take seconds."""
         return attempt_each({name: partial(self._revolution, name, sweep) for name in self.sensors})
 
     @contextmanager

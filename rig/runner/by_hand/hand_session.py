@@ -190,7 +190,7 @@ class HandSession:
         return None if enough else next_instruction(self._open, face)
 
     def _take(self, move: Move, now: SessionProgress, face: Face) -> None:
-        """Count a move, unless it took too long to be of use."""
+        """Count a move, unless it took too long."""
         self._refused = 0
         if now.moves[-1].kind == "omitted":
             return

@@ -74,7 +74,7 @@ class Kvh1775:
                 )
 
     def run(self) -> None:
-        """Switch to normal mode, in which it streams messages. Raise SensorError `kvh_silent`."""
+        """Switch to normal mode, in which the instrument streams messages. Raise SensorError `kvh_silent`."""
         count_before = self._message_count
         period_s = 1.0 / float(self.settings["DR"])
         for wait_s in self._patience.attempts(ATTEMPTS * period_s):
@@ -124,7 +124,7 @@ class Kvh1775:
         self.own_port.wait(lambda: False, duration_s)
 
     def close(self) -> None:
-        """Leave it in normal mode, its state after power-up, and close the port. May be called twice."""
+        """Leave the instrument in normal mode, its state after power-up, and close the port. May be called twice."""
         self.own_port.close()
 
     # -- the dialogue ----------------------------------------------------------------------------------------------

@@ -108,7 +108,7 @@ class MessageReader:
         self._rest = b""
 
     def feed(self, data: bytes) -> MessageBatch:
-        """Return the messages and tests completed by these bytes."""
+        """Take received bytes, and return the messages and tests that they complete."""
         data = self._rest + data
         backwards = memoryview(data.translate(_BITS_REVERSED))
         starts: dict[bytes, list[int]] = {header: [] for header in _HEADERS.values()}

@@ -68,7 +68,7 @@ class LineReader:
         self.byte_count = 0
 
     def feed(self, data: bytes) -> LineBatch:
-        """Return the lines completed by these bytes."""
+        """Take received bytes, and return the lines that they complete."""
         self.byte_count += len(data)
         data = (self._rest + data).replace(b"\r", b"\n")
         end = data.rfind(b"\n") + 1

@@ -72,7 +72,7 @@ class LinesSource:
 
     @property
     def sensors(self) -> Mapping[str, RecordedSensor]:
-        """The gyroscope, the magnetometer if it prints one, and its scalars, by name."""
+        """The device's sensors by name: gyroscope, magnetometer if printed, and scalars."""
         return {name: sensor for name, (sensor, _) in self._readers.items()}
 
     def start(self) -> None:
@@ -238,7 +238,7 @@ def _make_triad(
 
 
 def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[Channel, _Printed]]:
-    """Yield the channel of the printed temperature, else of the stated one, if any."""
+    """Yield the channel of the printed temperature, else of the stated temperature, else nothing."""
     printed, printed_channel = None, _Printed(())
     if provides and "temperature" in lines.columns:
         temperature = lines.temperature

@@ -81,7 +81,7 @@ def find_shape(lines: Sequence[TimedLine]) -> Shape:
 
 
 def _find_number_shape(checked: Sequence[_CheckedLine]) -> Shape:
-    """Return the shape of lines that hold numbers alone. Raise NoShape."""
+    """Return the shape of lines that hold only numbers. Raise NoShape."""
     texts = [tuple(part.strip(" ") for part in _NUMBER.split(text)) for _, text, _ in checked]
     common = _find_common(texts)
     alike = [line for line, line_texts in zip(checked, texts, strict=True) if line_texts == common]
@@ -141,7 +141,7 @@ def _find_impossible(numbers: Sequence[Sequence[str]], values: Array) -> str:
 
 
 def _find_field_shape(checked: Sequence[_CheckedLine]) -> Shape | None:
-    """Return the shape of lines with a separator between fields, of which some hold a text or nothing."""
+    """Return the shape of lines with a separator between fields; some fields hold text or nothing."""
     shapes = (_split_by(sign, name, checked) for sign, name in sorted(_SEPARATORS.items(), reverse=True))
     return next((shape for shape in shapes if shape is not None), None)
 

@@ -128,7 +128,7 @@ class Stamper:
         self._last_sequence = float(row[columns.index("sequence")]) if "sequence" in columns else None
 
     def _select_possible(self, values: Array) -> NDArray[np.bool_]:
-        """Return the rows of (n, columns) that can follow those before. Raise SensorError `lines_time_jumped`."""
+        """Return the rows of (n, columns) that can follow the previous rows. Raise SensorError `lines_time_jumped`."""
         is_sample = np.zeros(len(values), np.bool_)
         last = (self._last_time, self._last_sequence)
         try:

@@ -87,13 +87,13 @@ class AutopilotLink:
 
     @property
     def identity(self) -> Autopilot:
-        """The autopilot that answers."""
+        """The identity of the autopilot that answers."""
         assert self.autopilot is not None, "there is none without a heartbeat"
         return self.autopilot
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
     def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, AutopilotParameter]:
-        """Read the parameters of these names; `others` may be missing.
+        """Read the parameters `needed` and `others`; the `others` may be missing.
 
         Raise SensorError `autopilot_silent` if none is answered.
         """
@@ -146,7 +146,7 @@ class AutopilotLink:
             )
 
     def request(self, message: str) -> None:
-        """Request a message once, if the autopilot supports that."""
+        """Request a message once. An autopilot without such requests ignores it."""
         number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
         self._send(self._command_message(REQUEST_MESSAGE, number, 0.0))
 

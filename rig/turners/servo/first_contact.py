@@ -46,7 +46,7 @@ def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
 
 
 def _ping(bus: Bus, port: str, servo_id: int) -> None:
-    """Confirm that a ping has exactly one answer; one wrong answer in four may be a late one."""
+    """Confirm that a ping has exactly one answer; one wrong answer in four is accepted, because it may be late."""
     answers = odd = 0
     for _ in range(PINGS):
         try:

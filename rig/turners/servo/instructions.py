@@ -56,7 +56,7 @@ def go(bus: Bus, move: ProfileMove) -> None:
 
 
 def brake(bus: Bus) -> None:
-    """Stop at the present position with a short ramp, and hold it. Raise BusError."""
+    """Stop the shaft with a short ramp, and hold its position. Raise BusError."""
     _stay(bus)
 
 

@@ -37,7 +37,7 @@ NOT_CONTROLLED = StopOutcome(True, "the servo was not under control")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
 
 
-def _nothing() -> None:
+def _watch_nothing() -> None:
     """Do nothing: the default for `watch`."""
 
 
@@ -111,7 +111,7 @@ class Servo:
         return self._report
 
     def problems(self, carried: FlangeLoad, motions: Iterable[Motion] = ()) -> list[Problem]:
-        """Return every reason against this payload and these motions."""
+        """Return all problems of the payload and the motions."""
         return [
             *servo_problems(self._report, self._wanted_model, carried, self._period_s),
             *move_problems(motions, self._report.velocity_limit_rad_s),
@@ -147,7 +147,7 @@ class Servo:
             self._call(lambda bus: make_ready(bus, self._watchdog))
             self._linked.supervising = True
 
-    def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
+    def move(self, motion: Motion, watch: Callable[[], None] = _watch_nothing) -> None:
         """Make one movement and return when the shaft has arrived and stands still.
 
         `watch` is called first and then at least every 20 ms; its exception stops the shaft and goes on to the caller.
@@ -179,7 +179,7 @@ class Servo:
             finally:
                 self._moving = False
 
-    def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
+    def rest(self, duration_s: float, watch: Callable[[], None] = _watch_nothing) -> None:
         """Stand still for `duration_s` of the states' clock; `watch` as in `move`."""
         with stopping_on_error(self.stop):
             self._doing = "a rest"
@@ -251,7 +251,7 @@ class Servo:
                 return problems.watchdog_tripped()
         return problems.refuses(error)
 
-    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _nothing) -> None:
+    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _watch_nothing) -> None:
         """Block until `done`, while the servo's faults and the caller's watch are checked."""
         finished = False
         while not finished:
@@ -270,7 +270,7 @@ class Servo:
         return problems.driver_hung(silent_s)
 
     def _take_state(self, state: ServoState) -> None:
-        """Record a state as it comes, on the link's thread."""
+        """Record a received state, on the link's thread."""
         if self._states:
             self.missed_states += max(0, round((state.time_s - self.latest.time_s) / self._period_s) - 1)
         self._states.append(state)

@@ -54,5 +54,5 @@ def model_of(number: int) -> ServoModel | None:
 
 
 def find_model(name: str) -> ServoModel:
-    """Return the model of that name. Raise StopIteration if there is none."""
+    """Return the servo model called `name`. Raise StopIteration if there is none."""
     return next(model for model in MODELS if model.name == name)

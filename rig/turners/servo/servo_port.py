@@ -60,7 +60,7 @@ class Port:
         return self.serial.write(bytes(packet)) or 0
 
     def readPort(self, length: int) -> bytes:  # noqa: N802
-        """Return the next bytes, at most `length`, as soon as they are there."""
+        """Return the next bytes, at most `length`, as soon as they have arrived."""
         data: bytes = self.serial.read(length)
         return data
 

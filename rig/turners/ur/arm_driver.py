@@ -293,7 +293,7 @@ class Arm:
             return self._changed.wait_for(lambda: self.latest.runtime_state == runtime_state, timeout_s)
 
     def _await(self, kind: type[ScriptStarted] | type[ControlTaken]) -> None:
-        """Wait for the next step of the preparation, or raise what prevented it."""
+        """Wait for the next step of the preparation, or raise the problem that prevented it."""
         self._wait(lambda: isinstance(self._answer, kind | RequestFailed | ControlTaken))
         if not isinstance(self._answer, RequestFailed):
             return
@@ -356,7 +356,7 @@ class Arm:
         return self.latest.at_rest and distance_rad < ARRIVAL_RAD
 
     def _take(self, message: Message) -> None:
-        """Handle a message of the child as it comes, on the link's reader thread."""
+        """Handle a received message of the child, on the link's reader thread."""
         match message:
             case ChildHeartbeat():
                 self._silent_s = max(self._silent_s, message.silent_s)

@@ -29,7 +29,8 @@ MAX_TOOL_ROTATION_RAD = 1e-3  # above a pendant's rounding, below any intended r
 def preflight_problems(plans: Sequence[Plan], arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Return all reasons against moving: another arm, a plan beyond a limit, an arm that is not ready.
 
-    The last of the `plans` is the one to drive. For another arm nothing else is reported: the rest is about this one.
+    The last of the `plans` is the one to drive. For another arm nothing else is reported, because all other reasons
+    concern the configured arm.
     """
     if others := identity_problems(arm, report):
         return others
@@ -104,8 +105,8 @@ def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Return the problems of the controller's description of its arm, if the configuration uses it.
 
-    These are a missing description, and each wrist whose axis differs from the drawing's, in the flange's frame at
-    home.
+    These are a missing description, and each wrist whose axis differs from the drawing's, in the flange's frame at the
+    home pose.
     """
     if arm.kinematics == "nominal":
         return []

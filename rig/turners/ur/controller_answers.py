@@ -107,7 +107,7 @@ def _add_robot_api_answers(report: ArmReport, api: RobotApi) -> ArmReport:
 
 
 def _read_description(host: str) -> ArmDescription:
-    """Return the controller's description of its arm; an empty one without its primary interface."""
+    """Return the controller's description of its arm; an empty description without its primary interface."""
     try:
         return read_description(host, ANSWER_S)
     except OSError:

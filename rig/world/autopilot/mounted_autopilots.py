@@ -44,7 +44,7 @@ class AutopilotMount:
         return self.section.stolen
 
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
-        """Switch it on at the virtual time `time_s`, unless it is on."""
+        """Switch the autopilot on at the virtual time `time_s`, unless it is on."""
         if self.instrument is not None:
             return
         section = self.section
@@ -67,7 +67,7 @@ class AutopilotMount:
         self.instrument = autopilot
 
     def switch_off(self) -> None:
-        """Switch it off."""
+        """Switch the autopilot off."""
         self.instrument = None
 
     def _imu(self, index: int, motion_of: MotionOf, time_s: float) -> SimulatedImu:

@@ -51,7 +51,7 @@ class HeatedBody:
         self._parts: dict[str, HeatedPart] = {}
 
     def part(self, name: str) -> HeatedPart:
-        """Return the part of that name on the body; a new one has the starting temperature."""
+        """Return the heated part `name` of the body; a new part has the starting temperature."""
         return self._parts.setdefault(name, HeatedPart(self._section))
 
     def advance(self, time_s: float, duty: float, *, powered: bool) -> None:

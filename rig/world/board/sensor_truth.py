@@ -74,7 +74,7 @@ class SensorTruth:
         return a * u + b * v + c * w, d * u + e * v + f * w, g * u + h * v + i * w
 
     def sense(self, flange: BodyMotion) -> Sequence[float]:
-        """Return the motion that the part senses, rad/s and (with 6 components) g, from the flange's motion."""
+        """Return the motion at the sensor, rad/s and (with 6 components) g, from the flange's motion."""
         rate = self.rotate_rate(flange.rate_rad_s)
         if not self.senses_force:
             return rate
@@ -90,8 +90,8 @@ class SensorTruth:
 def build_sensor_rotation(mounting: MountingSection, mounting_error_deg: Sequence[float]) -> list[list[float]]:
     """Return the rotation (rows) from the flange's axes to the sensor's.
 
-    The sensor sits as `mounting` states, then rotated by the rotation vector `mounting_error_deg` (degrees, in its own
-    nominal axes). A vector's components therefore change by the inverse of that rotation.
+    The sensor is mounted as `mounting` states, then rotated by the rotation vector `mounting_error_deg` (degrees, in
+    its own nominal axes). A vector's components therefore change by the inverse of that rotation.
     """
     x, y, z = (radians(angle) for angle in mounting_error_deg)
     error = np.array(rotation_from_vector((x, y, z)))

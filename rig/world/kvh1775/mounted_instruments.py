@@ -34,7 +34,7 @@ class KvhMount:
         return _section(self.world, self.name).pty
 
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
-        """Switch it on at the virtual time `time_s`, unless it is on."""
+        """Switch the instrument on at the virtual time `time_s`, unless it is on."""
         if self.instrument is not None:
             return
         sensor, section = self.config.sensors[self.name], _section(self.world, self.name)
@@ -59,7 +59,7 @@ class KvhMount:
         )
 
     def switch_off(self) -> None:
-        """Switch it off."""
+        """Switch the instrument off."""
         self.instrument = None
 
 

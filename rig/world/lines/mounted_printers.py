@@ -41,11 +41,11 @@ class PrinterMount:
 
     @property
     def stolen(self) -> float:
-        """The fraction of its bytes that another program reads."""
+        """The fraction of the device's bytes that another program on the port reads."""
         return self.section.stolen
 
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
-        """Switch it on at the virtual time `time_s`, unless it is on."""
+        """Switch the printing device on at the virtual time `time_s`, unless it is on."""
         if self.instrument is not None:
             return
         sensor, simulated = self.config.sensors[self.name], self.world.sensors[self.name]
@@ -72,7 +72,7 @@ class PrinterMount:
         )
 
     def switch_off(self) -> None:
-        """Switch it off."""
+        """Switch the printing device off."""
         self.instrument = None
 
 

@@ -75,7 +75,7 @@ class ServoBench:
 
     @property
     def waiting(self) -> bool:
-        """Whether only a client can make it move: never certain, because its watchdog can too."""
+        """Whether only a client can move the servo: never certain, because its watchdog can also move it."""
         return False
 
     @property

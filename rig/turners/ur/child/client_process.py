@@ -269,7 +269,7 @@ class _Child:
     def _await_state(self) -> None:
         """Wait for another state, because a lost link may be the reason why the move did not begin.
 
-        Without a state the parent reports the link before this ends.
+        Without a state the parent reports the lost link before this wait ends.
         """
         latest, began_s = self._latest, time.monotonic()
         while self._latest is latest and time.monotonic() - began_s < ABANDON_S:

@@ -44,8 +44,8 @@ class Dashboard:
     def stop_program(self) -> None:
         """Stop the running program, and with it the arm.
 
-        In local control it refuses in a sentence. Without a running program it may fail to execute the command, which
-        is no refusal.
+        In local control the controller refuses in a sentence. Without a running program it may fail to execute the
+        command, which is not a refusal.
         """
         answer = self.ask("stop")
         self.acknowledged = answer == STOPPED
@@ -61,7 +61,7 @@ class Dashboard:
         return {"true": True, "false": False}.get(self.ask("is in remote control").lower())
 
     def polyscope(self) -> str:
-        """Return the controller's software version, as it states it."""
+        """Ask the controller for its software version, and return the answer's text."""
         return self.ask("PolyscopeVersion")
 
     def serial_number(self) -> str:

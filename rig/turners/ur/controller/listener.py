@@ -25,7 +25,7 @@ def is_loopback(host: str) -> bool:
 
 
 def find_listener(host: IPv4Address, port: int) -> int | None:
-    """Return the id of the process that listens at that address.
+    """Return the id of the process that listens at this host and port.
 
     None if proc(5) does not show it: on systems other than Linux, for another user's processes, in another container.
     """

@@ -121,7 +121,10 @@ def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
-    """Remove complete packages from the start of `buffer` and yield them. Raise `ConnectionError` for other bytes."""
+    """Remove complete packages from the start of `buffer` and yield them.
+
+    Raise `ConnectionError` for bytes that are no package.
+    """
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if not HEADER.size <= size <= SIZE_MAX:

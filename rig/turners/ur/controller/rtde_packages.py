@@ -14,7 +14,10 @@ def package(kind: str, payload: bytes) -> bytes:
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[str, bytes]]:
-    """Remove complete packages from the start of `buffer` and yield them. Raise `ConnectionError` for other bytes."""
+    """Remove complete packages from the start of `buffer` and yield them.
+
+    Raise `ConnectionError` for bytes that are no package.
+    """
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if size < HEADER.size:

@@ -114,14 +114,14 @@ class StateStream:
 
     @property
     def first(self) -> StatePacket:
-        """The first packet; `read` returns those after it."""
+        """The first packet; `read` returns the packets after it."""
         return self._first
 
     def read(self, timeout_s: float) -> list[StatePacket]:
-        """Return the packets received, oldest first; wait for one for at most `timeout_s`. Empty once `closed`.
+        """Return the packets received, oldest first; wait at most `timeout_s` for the first. Empty once `closed`.
 
         An impossible state or time is omitted and becomes the stream's `problem`. An impossible state also closes the
-        stream; after a clock step states continue, which still show whether the arm stands.
+        stream; after a step of the clock the states continue, because they still show whether the arm stands.
         """
         looked_s = time.monotonic()
         if self.closed:
