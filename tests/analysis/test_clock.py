@@ -97,7 +97,7 @@ def test_without_another_clock_nothing_is_corrected() -> None:
 
 @pytest.mark.slow
 def test_the_jitter_of_the_states_is_measured() -> None:
-    run = synthetic_run(Setup(speed_deg_s=120))
+    run = synthetic_run(Setup(speed_deg_s=120, encoder_noise_rad=0.0))  # which would count as jitter
     arm = run.states.copy()
     motion = observe_runs([run])[0].motion
     jitter = np.random.default_rng(6).normal(0, 1e-4, len(arm))

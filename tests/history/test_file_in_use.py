@@ -96,20 +96,20 @@ FORKS = """
 import os, sys
 sys.path.insert(0, sys.argv[2])
 from rig.history.store import open_history
-from support.history.past_runs import finished
+from support.history.past_runs import finish_run
 
 with open_history(sys.argv[1]) as history:
-    history.enter(finished(0))
+    history.enter(finish_run(0))
     before = history.engine.pool
     if not (child := os.fork()):
         assert history.engine.pool is not before
-        assert history.enter(finished(1)).new
+        assert history.enter(finish_run(1)).new
         with open_history(sys.argv[1]) as again:
             assert len(again.calibrations()) == 2
         os._exit(0)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
     assert history.engine.pool is before
-    history.enter(finished(2))
+    history.enter(finish_run(2))
     assert len(history.calibrations()) == 3 and list(history.broken()) == []
 """
 

@@ -49,6 +49,11 @@ INCIDENTS: Mapping[str, Incident] = MappingProxyType(
 HELP = "\n".join(["What can happen here:", *(f"  {words:18}{item.text}" for words, item in INCIDENTS.items())])
 
 
+def opening_text() -> str:
+    """Return the text with which a laboratory greets whoever practises in it."""
+    return f"The laboratory is ready. {HELP}\nAn empty line shows this again; Ctrl-D ends the laboratory."
+
+
 def find_incident(words: str) -> Incident | None:
     """Return the incident that `words` name, None if there is none. `slider` takes any whole percentage up to 100."""
     words = " ".join(words.lower().split())

@@ -37,11 +37,11 @@ def run(options: Namespace) -> int:
 
 def _practise(control: str) -> int:
     """Cause each typed incident, in real time, until the end of the input; return 0."""
-    from rig.commands.laboratory.practice import HELP, practise
+    from rig.commands.laboratory.practice import opening_text, practise
     from rig.station.plain_text import for_file
 
     send_request(control, {"do": "pace", "time_scale": 1.0})  # a servo's has no other
-    print(f"The laboratory is ready. {HELP}\nAn empty line shows this again; Ctrl-D ends the laboratory.", flush=True)
+    print(opening_text(), flush=True)
     while True:
         try:
             words = input("laboratory> ")

@@ -1,5 +1,6 @@
 """Calibrated readings beside a reference: relative rotation, errors as computed by hand, noise, refusals, plots."""
 
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -357,7 +358,8 @@ def test_the_result_names_its_statistics_and_a_person_can_read_them() -> None:
     console.print(verification_table("gyro", entry), *verification_lines(entry))
     shown = console.export_text()
     assert f"{entry.before.movement.rms_rad_s[0]:.4f}" in shown
-    assert "the reference: 4.00 ms" in shown
+    delay = re.search(r"delay\s+behind the reference: ([\d.]+) ms", shown)
+    assert delay and float(delay[1]) == pytest.approx(4.0, abs=0.06)
     alone = verification_entry(replace(verified(), before=None, after=replace(verified().after, noise_rad_s=None)))
     console.print(verification_table("gyro", alone))
     assert "–" in console.export_text()
