@@ -45,7 +45,7 @@ class SimulatedDriveSection(Section):
         description="by how much a joint is late; 0.3 to 0.7 ms were measured",
     )
     yield_s2: float = Field(
-        default=1.65e-4,
+        default=1.5e-4,
         ge=0,
         le=0.01,
         description="how far a joint stays behind per acceleration of its target. When a move ends with 1 rad/s², the "
@@ -53,7 +53,7 @@ class SimulatedDriveSection(Section):
         json_schema_extra=SECOND_SQUARED,
     )
     yield_time_s: float = Field(
-        default=5.5e-3,
+        default=3.5e-3,
         gt=0,
         le=0.1,
         description="time constant with which it comes back, critically damped; after 24 to 32 ms it had come back",

@@ -1,7 +1,7 @@
 """The simulated joints: a trajectory played with a time scaling (speed slider, pause), known at any instant."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from math import ceil, nan
 from typing import NamedTuple
@@ -15,6 +15,7 @@ from rig.world.ur10e.motion.vibration import Vibration
 
 # ROS 2 description of the UR10e, from the 5.8 manual: base and shoulder 120°/s, elbow and wrists 180°/s.
 JOINT_SPEED_LIMIT_RAD_S: Joints = (2.0943951, 2.0943951, 3.1415927, 3.1415927, 3.1415927, 3.1415927)
+JERK_TICKS = 6  # in which a joint's force takes up a change of its target's acceleration
 SCALING_RATE_PER_S = 4.0  # the speed fraction follows the slider, and pause and play, in at most a quarter second
 
 
@@ -80,6 +81,7 @@ class JointMotion:
         first = _Tick(-TICK_S, 0.0, 1.0, 0.0, self._trajectory, self._offset, self._gain)
         self._ticks = deque([first], 1 + ceil((memory_s + self._drive.lag_s) / TICK_S))
         self.smooth_qd_rad_s: Joints = ZERO  # of the smooth angles, at the last tick's end
+        self._changes = deque([ZERO] * JERK_TICKS, JERK_TICKS)  # of those, in the last ticks
         self._moving_ticks = 0  # upper bound of the ticks in memory with motion
         self._now: Instant | None = None  # computed on demand: most ticks need none
 
@@ -244,16 +246,18 @@ class JointMotion:
 
     def _yield(self, standing: bool) -> tuple[Yielding, ...]:
         """Return what the joints yield in the tick that has just been played."""
-        before, last = self.smooth_qd_rad_s, self._ticks[-1].yielding
+        before, last, changes = self.smooth_qd_rad_s, self._ticks[-1].yielding, self._changes
         if standing and before is ZERO:
-            return self._drive.advance(last, ZERO) if last else ()
+            changes.append(ZERO)
+            return self._drive.advance(last, _mean(changes)) if last else ()
         velocity = self._trajectory.state_at(self._trajectory_s)[1]
         fraction = self._fraction if self._scales else 1.0
         speed = tuple([g * v * fraction for g, v in zip(self._gain, velocity, strict=True)]) if any(velocity) else ZERO
         self.smooth_qd_rad_s = speed
-        if not last and speed == before:
+        changes.append(ZERO if speed == before else tuple([v - b for v, b in zip(speed, before, strict=True)]))
+        if not last and changes[-1] is ZERO:
             return ()
-        return self._drive.advance(last, [after - b for after, b in zip(speed, before, strict=True)])
+        return self._drive.advance(last, _mean(changes))
 
     # -- commands ------------------------------------------------------------------------------------------------
     def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
@@ -294,3 +298,8 @@ class JointMotion:
             (v - u) / (b - a) if abs(b - a) > 1e-9 else 1.0 for u, v, a, b in zip(first, last, start, end, strict=True)
         )
         return tuple(u - g * a for u, g, a in zip(first, gain, start, strict=True)), gain
+
+
+def _mean(changes: Collection[Joints]) -> list[float]:
+    """Return the mean (6,) of changes in several ticks."""
+    return [sum(values) / len(changes) for values in zip(*changes, strict=True)]
