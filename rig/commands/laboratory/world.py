@@ -38,7 +38,7 @@ def run(options: Namespace) -> int:
 def _practise(control: str) -> int:
     """Cause each typed incident, in real time, until the end of the input; return 0."""
     from rig.commands.laboratory.practice import opening_text, practise
-    from rig.station.plain_text import for_file
+    from rig.station.plain_text import say
 
     send_request(control, {"do": "pace", "time_scale": 1.0})  # a servo's has no other
     print(opening_text(), flush=True)
@@ -48,4 +48,6 @@ def _practise(control: str) -> int:
         except EOFError:
             print()
             return 0
-        print(for_file(practise(control, words), sys.stdout), flush=True)
+        for line in practise(control, words).split("\n"):
+            say(line)
+        sys.stdout.flush()
