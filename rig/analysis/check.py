@@ -39,7 +39,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether it passes: not without a number or a limit."""
+        """Whether the check passes; a check without a number or a limit does not."""
         if self.value is None or self.limit is None:
             return False
         return math.isfinite(self.value) and self.value <= self.limit - self.guard

@@ -58,7 +58,7 @@ def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeCondi
 
 
 def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """Return the times of an accelerometer's readings: in the dwells of these indices, and in its sweeps."""
+    """Return the times of an accelerometer's readings: in the dwells with the given indices, and in its sweeps."""
     wanted, read = frozenset(dwells), []
     for recording in recordings:
         part, offset_s = recording.sensors[name], recording.clock_offset_s

@@ -90,7 +90,7 @@ class BatchPart:
 
     @property
     def state(self) -> str:
-        """The outcome in a word; "open" without one."""
+        """The outcome in a word; "open" while there is no outcome."""
         return "open" if self.ended is None else self.ended.outcome
 
 

@@ -39,7 +39,7 @@ def _unfit(path: Path, why: str) -> Refused:
 
 
 def following(numbers: Sequence[str], done: Sequence[str]) -> str | None:
-    """Return the number after those that are done, None after the last. Raise Refused `another_series`."""
+    """Return the first serial number that is not done yet, None if all are done. Raise Refused `another_series`."""
     if tuple(done) != tuple(numbers[: len(done)]):
         raise Refused(
             "another_series",

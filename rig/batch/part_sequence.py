@@ -40,7 +40,7 @@ class Bench(Protocol):
         ...
 
     def known_as(self, chip: Chip, serial: str) -> str | None:
-        """Return the other number under which a history has the chip; None without one."""
+        """Return another serial number under which the history has the chip, or None."""
         ...
 
     def fit(self, serial: str) -> None:

@@ -9,7 +9,7 @@ ASK_AGAIN_S = 0.1
 
 
 def follows_crystal(board: Board) -> bool:
-    """Ask the board until its clock is locked to the crystal or the start-up time is over; return whether it is locked.
+    """Wait until the board's clock is locked to its crystal, at most the start-up time; return whether it is locked.
 
     Raise as `Board.status` does.
     """

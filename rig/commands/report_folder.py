@@ -10,7 +10,7 @@ from rig.errors.extras import requiring
 
 @contextmanager
 def refuse_unwritable(folder: Path, option: str = "--out") -> Iterator[None]:
-    """Write in the block. Raise Refused `report_folder` if the system refuses to; `option` chooses another folder."""
+    """Raise Refused `report_folder` if the `with` block cannot write; `option` chooses another folder."""
     try:
         yield
     except OSError as error:

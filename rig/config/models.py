@@ -168,7 +168,7 @@ class ProcedureSection(Section):
     @model_validator(mode="before")
     @classmethod
     def stages_only_where_they_mean_something(cls, data: Any) -> Any:
-        """Refuse `stages` for attitudes and verifications, which have one mounting, by this reason."""
+        """Refuse `stages` for attitudes and verifications, which have one mounting."""
         if isinstance(data, dict) and "stages" in data and "stages" not in cls.model_fields:
             raise ValueError(
                 "stages are of six_observation and servo_six_observation, which calibrate gyroscopes: accelerometers "

@@ -71,7 +71,7 @@ def _list_voided(connection: Connection, run_id: int) -> list[str]:
 
 
 def _runs_of(connection: Connection, content: bytes) -> list[int]:
-    """Return the runs entered with this result.json: with all its values, in its order."""
+    """Return the runs entered with the same result.json: with all its values, in its order."""
     runs = schema.run.c
     try:
         text = content.decode()

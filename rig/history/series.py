@@ -96,7 +96,7 @@ class Trend:
 
     @cached_property
     def recall(self) -> date | None:
-        """The day on which value and uncertainty may reach the limit; None without one within ten years."""
+        """The day on which value and uncertainty may reach the limit; None if not within ten years."""
         limit = self.last.max_deviation
         if self.line is None or limit is None:
             return None

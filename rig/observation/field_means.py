@@ -30,7 +30,7 @@ def find_companion(recording: ObservedRun, name: str) -> str | None:
 
 
 def find_dwelling_companion(run: RunData, name: str, sensors: Iterable[str]) -> str | None:
-    """Return the first of `sensors` that is on the clock of the magnetometer `name`; None without one."""
+    """Return the first of `sensors` that is on the clock of the magnetometer `name`; None if none is."""
     return next((sensor for sensor in sensors if one_clock(run, sensor, name)), None)
 
 

@@ -322,7 +322,7 @@ def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion
 
 
 def _remaining_steps(ratio: float) -> float:
-    """Return the sum of the remaining steps, in last steps, if steps shrink by `ratio` (Aitken's Δ²); else 0."""
+    """Return the sum of all further steps as a multiple of the last step, if steps shrink by `ratio` (Aitken's Δ²)."""
     return min(ratio / (1 - ratio), FARTHEST) if 0 < ratio < 1 else 0.0
 
 

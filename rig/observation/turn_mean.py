@@ -76,7 +76,7 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) in these steps, and its weights (n,), to average the arm's rate as well.
+    """Return the mean of readings (n, 3) with resolution `steps`, and its weights (n,), to average the arm's rate too.
 
     A line slower than `SLOW` is poorly determined: its effect on the mean, or the effect of a line of its size, adds
     variance.

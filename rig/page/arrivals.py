@@ -17,7 +17,7 @@ class Arrivals:
         self._samples: dict[str, int] = {}  # their number, by sensor
 
     def take(self, event: RunEvent, now_s: float) -> bool:
-        """Take an event at the time `now_s`, s; return whether it brought anything newer."""
+        """Take an event at the time `now_s`, s; return whether the event brought newer data."""
         match event:
             case ArmConnected(report):
                 return self._take_state(report.state.q_rad, report.state.time_s, now_s)

@@ -57,7 +57,7 @@ class _Done:
 
 
 def moments(run: RunData) -> Iterator[Moment]:
-    """Yield one recording in its order; nothing if it has no state of the turner."""
+    """Yield the events of a recording with their times, in order; nothing without a state of the turner."""
     if len(run.states) == 0:
         return
     times_s = run.states["time_s"]

@@ -42,7 +42,7 @@ class ScriptFile:
 
     @property
     def is_installed(self) -> bool:
-        """Whether it is the very script that is installed under its procedure's name."""
+        """Whether the script is identical to the one installed under its procedure's name."""
         name = self.procedure.name
         return name in installed() and installed_script(name).sha256 == self.sha256
 

@@ -29,7 +29,7 @@ class Row:
 
 
 def _row(*classes: str, same: str = "", **renamed: str) -> Row:
-    """Return the row of these classes: fields with attributes of the `same` name, and those `renamed`."""
+    """Return the correspondence of two classes: fields with attributes of the `same` name, and `renamed` fields."""
     return Row(classes, {**{name: name for name in same.split()}, **renamed})
 
 

@@ -55,7 +55,7 @@ class _Watched:
 
     @property
     def settled(self) -> bool:
-        """Whether it scatters as at rest, or slightly more without decreasing."""
+        """Whether the sensor scatters as at rest, or slightly more but no longer decreasing."""
         ratio, scatter, earlier = self.over_rest(), self.scatter_counts(), self.scatter_counts(before=1)
         if ratio is None or scatter is None:
             return False

@@ -82,7 +82,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def _build_rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: float) -> list[dict[str, Any]]:
-    """Return one row per gyroscope (n, 3)."""
+    """Return the convergence of both estimators, a row for each gyroscope."""
     means = speed_rad_s * sim.DIRECTIONS / scale[:, None] - bias_rad_s[:, None]
     published = algorithm_1_batch(means, speed_rad_s)
     newton = newton_batch(means, speed_rad_s)

@@ -30,14 +30,14 @@ FIRST: Face = "+z"
 
 
 def duration_s(moves: Sequence[Instruction], rest_s: float) -> float:
-    """Return the duration of such a session for an operator without mistakes."""
+    """Return the duration of a session by hand whose operator makes no mistakes."""
     return rest_s + sum(_move_s(move) + ASKED_S + rest_s for move in moves)
 
 
 def predict_hand_budgets(
     config: RigConfig, section: ByHandSection, moves: Sequence[Instruction], rest_s: float
 ) -> dict[str, Budget]:
-    """Return the predicted budget of a session of these moves, for each sensor to calibrate.
+    """Return the predicted budget of a session with the given moves, for each sensor to calibrate.
 
     `section` states how square the item's faces are. Raise Fault `no_fit`.
     """
@@ -62,7 +62,7 @@ def _move_s(move: Instruction) -> float:
 
 
 def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float) -> HandRecording:
-    """Simulate the readings of such a session in the sensor's axes, divided into rests and moves as a recording is."""
+    """Simulate the readings of a session in the sensor's axes, divided into rests and moves like a recording."""
     no_rotation, faces = np.zeros(3), [FIRST, *(move.face for move in moves)]
     spans = [_sample_rotation(rest_s, FIRST, no_rotation)]
     for face, move in zip(faces, moves, strict=False):

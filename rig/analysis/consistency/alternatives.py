@@ -126,7 +126,7 @@ def quarter_columns(means: Means) -> Array:
 
 
 def sweep_columns(segments: Segments, sweep: int) -> Array:
-    """Return columns (3, N, 6) of a level of this sweep, and of a difference between its halves."""
+    """Return columns (3, N, 6) for an offset of one sweep, and for a difference between its halves."""
     inside = (segments.sweep == sweep).astype(np.float64)
     return repeat_per_axis(np.column_stack([inside, inside * segments.position]))
 

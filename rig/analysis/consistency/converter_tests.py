@@ -182,7 +182,7 @@ def _is_one_bit(powers: Array) -> bool:
 
 
 def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_value: float) -> tuple[float, float]:
-    """Return the largest skewness of these axes' noise (3,) at rest, by occasional errors of a bit, and its limit.
+    """Return the largest skewness of the axes' noise (3,) at rest, which bit errors cause, and its limit.
 
     In motion the arm's vibration may be skewed.
     """

@@ -136,7 +136,7 @@ def check_gyroscope(
 def predict_detection_limits(
     segments: Segments, matrix: Array, false_alarm_probability: float, allowance: ErrorPatterns
 ) -> dict[str, float]:
-    """Return the detection limits of segments without a fault, whose bias drifts as its flicker alone makes it."""
+    """Return the detection limits of segments without a fault, whose bias drifts only by its instability (flicker)."""
     bias = BiasProcess(0.0, 0.0, 0, allowance.instability_rad_s)
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
     segments_only = _Tested(segments, segments.rates_rad_s @ matrix.T, whiten_segments(segments, scatter, bias))
@@ -253,7 +253,7 @@ def _test_bias_jump(
 
 
 def _jump_critical_value(segment_sets: int, false_alarm_probability: float) -> float:
-    """Return the critical value of a jump that may be at any of this many ends of sweeps."""
+    """Return the critical value for a jump that may occur at any of a number of sweep ends."""
     from scipy.special import fdtri
 
     return 3 * float(fdtri(3, segment_sets, 1 - false_alarm_probability / segment_sets))

@@ -95,7 +95,7 @@ class Candidate:
     rests_s: tuple[float, ...] = ()
 
     def is_contained_in(self, other: "Candidate") -> bool:
-        """Return whether it cannot have a smaller U than another."""
+        """Return whether another candidate contains this one, which then cannot have a smaller U."""
         return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
             size <= other_size for size, other_size in zip(self.sizes, other.sizes, strict=True)
         )

@@ -84,7 +84,7 @@ def _gravity_difference(gravity_rad_s: tuple[Array, Array] | None, rotation: Arr
 def fit_mounting(
     sensor: str, reference: Reference, recordings: Sequence[ObservedRun], calibration: LinearCalibration | None
 ) -> RelativeRotation:
-    """Return the rotation from reference to sensor by the revolutions of these recordings.
+    """Return the rotation from reference to sensor by the revolutions of the recordings.
 
     `calibration` is None for readings that are calibrated already. Raise Fault as `fit_rotation` does.
     """

@@ -119,7 +119,7 @@ def _announce(planned: "ParameterChange", which: str) -> Iterator[str]:
 def _read_values(
     firmware: int, result: "ResultDocument", path: Path, sections: Mapping[str, "SensorSection"]
 ) -> dict[str, float]:
-    """Return the parameters that hold the run's calibrations of these sensors.
+    """Return the parameters that store the run's calibrations of the sensors.
 
     Raise Refused `not_in_result`, and as `refuse_other_sensor`.
     """

@@ -130,7 +130,7 @@ def _run_session(
 def _fetch_session(
     config: RigConfig, among: dict[str, SensorSection]
 ) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
-    """Fetch the result of the board's last session, of one of these sensors."""
+    """Fetch the result of the board's last session, which must have calibrated one of the sensors."""
     from rig.runner.by_hand.on_board import read_kept_solution
 
     section = require_board_section(config)

@@ -123,7 +123,7 @@ def _literals(annotation: object) -> Mapping[str, str]:
 
 
 def _port(question: str, option: str, chosen_port: str | None) -> str:
-    """Return a port: one of this computer's, or another that the user types."""
+    """Return a serial port: the user chooses one of this computer's, or types another."""
     from rig.config.section import check_port
 
     if chosen_port is None:

@@ -44,7 +44,7 @@ class LinkLoad:
 
 
 def capacity_bytes_per_s(baud: int) -> float:
-    """Return the load that a link of this speed may carry, bytes/s."""
+    """Return the load that a link at `baud` may carry, bytes/s."""
     return baud / BITS_PER_BYTE * (1 - MARGIN)
 
 

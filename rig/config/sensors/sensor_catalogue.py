@@ -133,7 +133,7 @@ def list_numbers(values: Sequence[float]) -> str:
 
 
 def has_own_port(part: str) -> bool:
-    """Return whether such a part has a port and a clock of its own; unknown parts have none."""
+    """Return whether the part has its own port and clock; an unknown part has none."""
     return part in PARTS and PARTS[part].own_port
 
 

@@ -119,14 +119,17 @@ def stated_temperature_channel(stated_c: float, within_k: float) -> Channel:
 
 
 def sample_dtype(channels: Sequence[Channel]) -> np.dtype[Any]:
-    """Return the type of samples of these channels. Raise ValueError if two of them, or a stamp, share a column."""
+    """Return the NumPy type of samples with the given channels.
+
+    Raise ValueError if two of them, or a stamp, share a column.
+    """
     return np.dtype([*STAMPS, *((channel.column, channel.type, channel.measures.shape) for channel in channels)])
 
 
 def stamp_samples(
     dtype: np.dtype[Any], numbers: NDArray[Any], times_us: NDArray[Any], host_time_s: float
 ) -> NDArray[Any]:
-    """Return samples (n,) with these numbers and times (n,) on their own clock, received at once; zero in all else."""
+    """Return samples (n,) with numbers and times (n,) on their own clock, received together; other columns are zero."""
     samples = np.zeros(len(numbers), dtype)
     samples["sequence"], samples["board_time_us"], samples["host_time_s"] = numbers, times_us, host_time_s
     return samples

@@ -101,7 +101,7 @@ def table_of(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[Any]:
 
 
 def table_dtype(names: Sequence[str]) -> np.dtype[Any]:
-    """Return the type of the rows of a table with these columns."""
+    """Return the NumPy type of the rows of a table with the given columns."""
     return np.dtype([(name, "<f8") for name in names])
 
 

@@ -53,7 +53,7 @@ class RecordedSensor:
 
     @property
     def has_axes(self) -> bool:
-        """Whether it can be calibrated: a quantity without axes, as air pressure, is not."""
+        """Whether a quantity of the sensor has axes and can be calibrated, unlike air pressure."""
         return any(channel.measures.shape for channel in self.channels)
 
     @property

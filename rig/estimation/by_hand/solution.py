@@ -92,7 +92,7 @@ class HandSolution:
 
     @property
     def covariance(self) -> Array:
-        """The covariance (6, 6) of scale and bias by this session and its clock."""
+        """The covariance (6, 6) of scale and bias from the session and its clock."""
         return self.turned.covariance
 
 

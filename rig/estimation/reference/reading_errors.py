@@ -116,7 +116,7 @@ def select_sweeps(movement: Movement) -> Array:
 
 
 def repeat_by_segment(values: Array, movement: Movement) -> Array:
-    """Return values (K,) from those (N + M,) of dwells and sweeps, three times the same for a sweep's mean and wave."""
+    """Return values (K,) by reading from values (N + M,) of dwells and sweeps; a sweep's value appears three times."""
     dwells = len(movement.dwells.readings_m_s2)
     return np.concatenate([values[:dwells], np.repeat(values[dwells:], 3)])
 

@@ -181,7 +181,7 @@ def _smooth(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Unev
 
 
 def _turning(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:
-    """Return the rows (6, n) of `FirstHarmonic.turning_rad2_s2` by sample."""
+    """Return the terms (6, n) of the joint's motion in the specific force; see `FirstHarmonic.turning_rad2_s2`."""
     rate = mean_speed_rad_s + uneven.rate
     return np.stack(
         [

@@ -71,7 +71,7 @@ def joint_factors(values: int, dof: ArrayLike, probability: float) -> Array:
 
 
 def find_dof_by_factor(factor: float) -> float:
-    """Return the whole number of degrees of freedom with this coverage factor: infinite for 2."""
+    """Return the integer degrees of freedom whose coverage factor is `factor`: infinite for 2."""
     if factor <= COVERAGE_FACTOR:
         return math.inf
     from scipy.special import stdtridf

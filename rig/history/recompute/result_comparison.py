@@ -136,7 +136,7 @@ class Compared:
 
     @property
     def same(self) -> bool:
-        """Whether it was solved with the stated result."""
+        """Whether the recomputed result and verdict agree with the stated ones."""
         return isinstance(self.answer, RecomputedResult) and not (self.moved or self.verdict_changed)
 
 

@@ -47,7 +47,7 @@ def alone(connection: Connection) -> None:
 
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
-    """Add a line for the row with this primary key, for a run with all its parts. It requires `alone`."""
+    """Add a line for the row with this primary key, for a run with all its parts. The caller must hold `alone`."""
     before = head(connection)
     line = {
         "number": before.number + 1,

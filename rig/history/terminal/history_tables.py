@@ -165,7 +165,7 @@ def value_text(parameter: Parameter) -> str:
 
 
 def rig_in_words(past: Past) -> str:
-    """Return the rig's name, or the source of readings without one."""
+    """Return the rig's name, or the source of readings without a rig."""
     return "readings from files" if past.rig == NO_ARM else past.rig
 
 

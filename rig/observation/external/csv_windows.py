@@ -39,7 +39,7 @@ def check_times(time_s: Array, where: str = "the samples") -> None:
 
 
 def find_overlap(windows: Sequence[Window]) -> tuple[int, int] | None:
-    """Return the numbers, from 1, of two windows that share samples; None without such a pair."""
+    """Return the numbers, from 1, of two windows that share samples; None if no windows overlap."""
     order = np.argsort([window.start_s for window in windows]).tolist()
     for first, second in pairwise(order):
         if windows[second].start_s < windows[first].end_s:
@@ -106,7 +106,7 @@ class RowGaps:
 
     @property
     def is_usable(self) -> bool:
-        """Whether the readings tell the row's mean: of a gap that hides too much they do not."""
+        """Whether enough readings are present to determine the row's mean, and no gap hides too much rotation."""
         mostly = self.count >= max(MIN_SAMPLES, MOSTLY * self.expected)
         return is_complete(self.count, self.expected) or (mostly and bool(np.isfinite(self.hidden_rad)))
 

@@ -38,7 +38,7 @@ class Mapped:
 
 
 def map_samples(columns: ColumnMap) -> Mapped | None:
-    """Return the map of a file of readings; None without one: then an unknown column is an error."""
+    """Return the column map of a file of readings, or None; without a map an unknown column is an error."""
     return _unless_empty(
         _build_map(columns.samples, columns.samples_skip_lines, columns.samples_rate_hz, columns.samples_missing)
     )

@@ -75,7 +75,7 @@ def since(cell: str, factor: float, origin_s: int) -> float:
 
 
 def unit_of(cell: str) -> Unit | None:
-    """Return the unit that a cell names, in brackets or not; None if it names none of the table."""
+    """Return the unit that a cell names, in brackets or not; None for a unit that the table lacks."""
     name = cell.strip().strip("[](){} ")
     if name in UNITS:
         return UNITS[name]

@@ -27,7 +27,7 @@ OBJECT = ("s0", "s1", "s2", "arr")  # fields of what SciPy reads of a MATLAB obj
 
 
 def is_mat(path: Path) -> bool:
-    """Return whether a path is such a file."""
+    """Return whether a path names a MATLAB file, by its suffix."""
     return path.suffix.lower() == SUFFIX
 
 

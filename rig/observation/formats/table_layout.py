@@ -123,7 +123,10 @@ def _have_nan(columns: Any) -> bool:
 
 
 def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
-    """Return the lines to skip and the heading that follows, empty without one. Raise Refused `wrong_columns`."""
+    """Return the lines to skip and the heading that follows; it is empty if there is none.
+
+    Raise Refused `wrong_columns`.
+    """
     for skip in range(MOST_SKIPPED):
         rows = [*islice(read_rows(path, largest_mb, skip), 6)]
         if len(rows) < 3:

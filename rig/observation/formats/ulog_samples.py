@@ -36,7 +36,7 @@ MICRO = 1e-6
 
 
 def is_ulog(path: Path) -> bool:
-    """Return whether a path is such a log."""
+    """Return whether a path names a ULog file, by its suffix."""
     return path.suffix.lower() == SUFFIX
 
 

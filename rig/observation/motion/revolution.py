@@ -47,13 +47,13 @@ class Revolution:
     def beats(self) -> int:
         """The number of sidebands of each spectral line: cycles per turn at which the shaft runs ahead and behind.
 
-        An encoder with a large error errs once and twice a turn; products of these come up to four times.
+        An encoder with a large error errs once and twice a turn; products of these errors come up to four times.
         """
         return 2 if self.uneven else BEATS
 
     @property
     def closed(self) -> bool:
-        """Whether it consists of whole turns, over which an encoder's error cancels and gravity's part averages out."""
+        """Whether the sweep consists of whole turns, over which an encoder's error cancels and gravity averages out."""
         return closes(self.angle_rad)
 
     @property

@@ -131,7 +131,7 @@ def whole(readings: Array) -> Array:
 
 
 def even_mean(readings: Array, steps: Steps) -> Mean:
-    """Return the unweighted mean of readings (n, 3) in these steps, without vibration.
+    """Return the unweighted mean of readings (n, 3) with resolution `steps`, without vibration.
 
     The noise is their scatter, and at least the rounding to steps. The variance of the mean includes correlation, by
     `fit_autoregression` of each axis, and the part of the rounding that remains in a mean of any length.
@@ -150,7 +150,7 @@ def even_mean(readings: Array, steps: Steps) -> Mean:
 
 
 def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
-    """Return the mean of readings (n, 3) in these steps, at times (n,), and the window that it represents.
+    """Return the mean of readings (n, 3) with resolution `steps`, at times (n,), and the window that it represents.
 
     If the arm vibrates the weights are tapered, see `average_tapered`: 2 mg at 14 Hz leave 10 µg in an unweighted mean
     of three seconds. The window reaches from half-way up the first flank to half-way down the last: with a random walk
@@ -165,7 +165,7 @@ def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
 
 
 def average_tapered(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
-    """Return the mean of readings (n, 3) in these steps, at times (n,), with the window's middle weighted most.
+    """Return the mean of readings (n, 3) with resolution `steps`, at times (n,), weighted most in the window's middle.
 
     The variance contains the noise but not the vibration, which the weights cancel.
     """

@@ -170,7 +170,7 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
 
 
 def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float:
-    """Return the line whose centre or sideband a peak is: the one that explains most of the residuals.
+    """Return the line frequency for a peak that may be a line's centre or sideband: the one that explains most.
 
     A sensor may sense a vibration in the room only across its axis, in the sidebands and not in the line itself.
     """

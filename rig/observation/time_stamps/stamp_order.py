@@ -86,7 +86,7 @@ class _UnorderedLog:
     findings: tuple[StampFinding, ...] = ()
 
     def select(self, kept: NDArray[np.bool_], reason: str) -> "_UnorderedLog":
-        """Return the log without some rows, for a reason in words; the log itself if all are kept."""
+        """Return the log with only the rows `kept`; note the `reason` for the omission. No change if all are kept."""
         if kept.all():
             return self
         finding = self._describe(~kept, reason, left_out=True)

@@ -61,7 +61,7 @@ def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
 
 
 def ardupilot_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return `ardupilot.param`: name, value."""
+    """Return the text of `ardupilot.param`: lines of a parameter's name and value."""
     lines = [*HEADING, *OF_ARDUPILOT, *_lines(calibrations, ARDUPILOT, lambda name, value: f"{name},{value!r}")]
     if polynomials := calibrations.over_temperature:
         lines += [

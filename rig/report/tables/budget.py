@@ -13,7 +13,7 @@ from rig.station.plain_text import plain
 
 
 def heading_for(budget: BudgetEntry | None) -> str:
-    """Return the heading of a column of U by a budget, or of two standard deviations without one."""
+    """Return the heading of a column of U by a budget, or, without a budget, of two standard deviations."""
     return heading_of((COVERAGE_FACTOR,) if budget is None else budget.coverage_factors)
 
 

@@ -185,7 +185,7 @@ def _fraction(part: float, whole: float) -> float:
 
 
 def _floor(shortest: Shortest) -> str:
-    """Return the lowest uncertainties that a run of this kind can reach, and their contributors."""
+    """Return a sentence on the lowest uncertainties that this kind of run can reach, with their contributors."""
     parts = []
     for index, (size, (unit, what)) in enumerate(SHOWN.items()):
         least = shortest.least(size)

@@ -34,7 +34,7 @@ def list_limits(limits: Sequence[DetectionLimitEntry]) -> str:
 
 
 def size_words(size: float | None, unit: str) -> str:
-    """Return a size in its unit with two significant digits; "never" without one."""
+    """Return a size in its unit with two significant digits; "never" without a size."""
     if size is None:
         return "never"
     factor, shown = FACTORS.get(unit, (1.0, f" {unit}"))

@@ -120,7 +120,7 @@ class _Printed:
     zero: float = 0.0
 
     def readings(self, values: Array, channel: Channel) -> Array:
-        """Return the channel's readings (n,) or (n, 3) of `values` (n, columns); a stated value has no columns."""
+        """Return the channel's readings (n,) or (n, 3) in `values` (n, columns); a stated quantity is constant."""
         if not self.columns:
             return np.full(len(values), channel.offset)
         return values[:, self.columns].reshape(len(values), *channel.measures.shape) * self.size + self.zero

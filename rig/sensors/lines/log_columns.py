@@ -171,7 +171,7 @@ UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
 
 
 def _complete_rows(values: Array, free: Sequence[int]) -> list[tuple[NDArray[np.intp], list[int]]]:
-    """Return groups of columns whose numbers stand in the same rows, with these rows: one for each rate of a logger."""
+    """Return groups of columns with numbers in the same rows, and their rows: a group for each rate of a logger."""
     groups: dict[bytes, list[int]] = {}
     for index in free:
         groups.setdefault(np.isfinite(values[:, index]).tobytes(), []).append(index)

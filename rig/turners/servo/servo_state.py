@@ -146,7 +146,7 @@ class ServoReport:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The name of its one joint."""
+        """The name of the servo's only joint."""
         return JOINTS
 
     @property

@@ -54,8 +54,8 @@ NOT_CONTROLLED = StopOutcome(True, "the arm was not under control")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
 
-def _nothing() -> None:
-    """Supervise nothing beyond the arm itself."""
+def _watch_nothing() -> None:
+    """Do nothing: the default for `watch`."""
 
 
 class Arm:
@@ -169,7 +169,7 @@ class Arm:
             self._supervision.stage = ControlStage.CONTROLLED
         self._silent_s = 0.0  # before this there was no client to lose
 
-    def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
+    def move(self, motion: Motion, watch: Callable[[], None] = _watch_nothing) -> None:
         """Make one movement and return when the arm has arrived and stands still.
 
         `watch` is called first and then at least every 20 ms; its exception stops the arm and goes on to the caller.
@@ -207,7 +207,7 @@ class Arm:
             self._supervision.moving = False
             self._silent_s = 0.0
 
-    def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
+    def rest(self, duration_s: float, watch: Callable[[], None] = _watch_nothing) -> None:
         """Stand still for `duration_s` of the controller's clock; `watch` as in `move`."""
         with stopping_on_error(self.stop):
             self._doing = "a rest"
@@ -324,7 +324,7 @@ class Arm:
         self._answer = None
         self._link.send(request)
 
-    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _nothing) -> None:
+    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _watch_nothing) -> None:
         """Block until `done`, while the arm's faults and the caller's watch are checked."""
         finished = False
         while not finished:

@@ -35,7 +35,7 @@ def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
 
 
 def no_states(host: str, error: OSError) -> Problem:
-    """Describe a host without states: without an arm, or with an arm whose other ports answer."""
+    """Describe a host that sends no states: no arm answers, or only the arm's other ports answer."""
     for interface in (Dashboard, PrimaryStop):
         try:
             interface(host, LOOK_S).close()

@@ -71,7 +71,7 @@ class SimulatedServo:
         return float(BAUDS[self.memory["Baud Rate"]]) if self._powered else None
 
     def answers_to(self, servo_id: int) -> bool:
-        """Return whether it obeys instructions for the ID `servo_id`."""
+        """Return whether the servo obeys instructions for the ID `servo_id`."""
         return servo_id in (self.memory["ID"], BROADCAST) or servo_id == self.memory["Secondary ID"] < 253
 
     # -- life ----------------------------------------------------------------------------------------------------
