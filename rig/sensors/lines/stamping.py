@@ -90,7 +90,7 @@ class Stamper:
 
     # -- numbers -------------------------------------------------------------------------------------------------
     def _steps(self, values: Array, skipped: int) -> tuple[Array, NDArray[np.int64]]:
-        """Return seconds (n,) of the device's time, 0 without one, and samples (n,) that passed before each."""
+        """Return the device time, s (0 if not printed), and the samples (n,) from the previous line to each line."""
         columns = self.section.columns
         passed_s = np.zeros(len(values))
         steps = np.ones(len(values), np.int64)
