@@ -49,7 +49,7 @@ class Question:
 
     @property
     def choices(self) -> tuple[Choice, ...]:
-        """The answers; empty if it asks for a number."""
+        """The possible answers; empty if the question asks for a number."""
         return CHOICES[self.kind]
 
     def meaning(self, answer: str) -> bool | None:

@@ -138,7 +138,7 @@ _OF_STEPS = (SweepStarted, SweepFinished, RestStarted, RestFinished, DwellStarte
 
 
 def _until(run: RunData, time_s: float) -> RunData:
-    """Return the recording with the events until then."""
+    """Return the recording with only the events up to `time_s`."""
     return replace(run, events=tuple(e for e in run.events if (e.controller_time_s or 0.0) <= time_s))
 
 

@@ -311,7 +311,7 @@ def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:
 
 
 def _speed_patterns(segments: Segments) -> list[Array]:
-    """Return the patterns of sweeps whose ends lie between distant states of the arm."""
+    """Return a pattern for each sweep: the rate error per standard deviation of the sweep's speed."""
     errors = segments.speed_std[:, None] * segments.rates_rad_s
     return [np.where((segments.sweep == sweep)[:, None], errors, 0.0)[None] for sweep in np.unique(segments.sweep)]
 

@@ -105,7 +105,7 @@ class Budget:
 
     @property
     def shares(self) -> Array:
-        """The fractions (contributors, 6) of the variance."""
+        """Each contributor's fraction of the variance, (contributors, 6)."""
         shares: Array = np.array([contributor.std**2 for contributor in self.contributors]) / self.std**2
         return shares
 
