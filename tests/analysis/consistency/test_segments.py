@@ -14,7 +14,12 @@ from rig.observation.windows import swept
 from support.recordings.synthetic_run import BIAS_RAD_S, SCALE, SENSITIVITY, Setup, synthetic_run
 
 SHAKEN = Setup(
-    noise_rad_s=4.5e-4, vibration=0.0, mounting_error_rad=(0.0, 0.0, 0.0), state_rate_hz=500.0, sample_rate_hz=200.0
+    noise_rad_s=4.5e-4,
+    vibration=0.0,
+    mounting_error_rad=(0.0, 0.0, 0.0),
+    state_rate_hz=500.0,
+    sample_rate_hz=200.0,
+    encoder_noise_rad=0.0,  # which adds as much as the sensor's own noise in a second
 )
 UNSEEN_RAD_S, HERTZ = 0.004, 8.58
 
