@@ -20,11 +20,11 @@ from rig.observation.by_hand.steadiness import check_at_rest
 from rig.observation.external.attitude_import import read_attitudes
 from rig.observation.external.csv_samples import SAMPLES_MB, Samples, read_sample_table, samples_in
 from rig.observation.external.from_files import Files, build_recording
-from rig.observation.external.log_survey import LogSurvey, survey_log
 from rig.observation.formats.column_selection import Mapped, map_motion, map_samples
 from rig.observation.formats.csv_table import read_table
 from rig.observation.formats.sample_files import is_in_format
 from rig.observation.formats.table_layout import TableLayout, find_layout
+from rig.observation.log_survey import LogSurvey, survey_log
 from rig.sensors.lines.log_columns import OPEN, LogColumns, guess_columns
 
 

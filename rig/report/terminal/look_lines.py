@@ -12,8 +12,8 @@ from rig.analysis.log_contents import LookedFile, Trial
 from rig.data.quantity import ACCELERATION, RATE
 from rig.errors import RigError
 from rig.errors.quoting import shorten
-from rig.observation.external.log_survey import LogSurvey
 from rig.observation.formats.table_layout import TableLayout
+from rig.observation.log_survey import LogSurvey
 from rig.sensors.lines.log_columns import LogColumns
 
 WIDTH = 14

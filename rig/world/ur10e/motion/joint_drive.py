@@ -1,10 +1,10 @@
 """How a joint follows its target: late, yielding to acceleration, and with the ripple of its harmonic drive.
 
 The joint's angle is u(t − lag) + y + p, with u the target. y is what it yields: a critically damped system of second
-order follows −k times the target's mean acceleration of the last 12 ms, and no more than a bound. p is the ripple, locked
-to the angle, of an amplitude that makes its rate the same at every speed v: p = v/(v² + v₀²) Σ Rₙ/n sin(n u + φₙ), so its
-rate is Rₙ cos(n u + φₙ) for v ≫ v₀, and a joint at rest is exactly on its target. Over a whole turn at constant speed p
-adds nothing.
+order follows −k times the target's mean acceleration of the last 12 ms, and no more than a bound. p is the ripple,
+locked to the angle, of an amplitude that makes its rate the same at every speed v: p = v/(v² + v₀²) Σ Rₙ/n sin(n u +
+φₙ), so its rate is Rₙ cos(n u + φₙ) for v ≫ v₀, and a joint at rest is exactly on its target. Over a whole turn at
+constant speed p adds nothing.
 """
 
 from collections.abc import Sequence
