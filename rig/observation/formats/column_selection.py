@@ -1,6 +1,6 @@
 """The columns of another program's file that are wanted: by its heading, or by the map that `--columns` names."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -106,7 +106,7 @@ def select_columns(
     Raise Refused `wrong_columns`, `wrong_unit`.
     """
     selected = dict(enumerate(headings)) if mapped is None else _select_mapped(path, headings, width, header, mapped)
-    _check_columns(path, [*selected.values()], header.needed, header.one_of, header.optional)
+    _check_columns(path, [*selected.values()], header)
     return selected
 
 
@@ -119,7 +119,7 @@ def _select_mapped(path: Path, headings: Sequence[str], width: int, header: Head
             f"one column of {path} is to be {' and '.join(names)}",
             "Name another column for each of them",
         )
-    own_names = (*header.needed, *header.one_of, *(name for group in header.optional for name in group))
+    own_names = _list_own_names(header)
     unmapped_names = {
         index: name for index, name in enumerate(headings) if name in own_names and name not in mapped.columns
     }
@@ -164,42 +164,60 @@ def check_headings(path: Path, headings: Sequence[str]) -> None:
         )
 
 
-def _check_columns(
-    path: Path,
-    names: Sequence[str],
-    columns: Sequence[str],
-    alternatives: Sequence[str],
-    optional: Sequence[Sequence[str]],
-) -> None:
-    own_names = (*columns, *alternatives, *(name for group in optional for name in group))
+def _list_own_names(header: Header) -> tuple[str, ...]:
+    """Return the rig's names of the columns that a file may have."""
+    return (*header.needed, *header.one_of, *(name for group in header.optional for name in group))
+
+
+def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
+    """Raise Refused `wrong_unit`, `wrong_columns` for names of columns that such a file cannot have."""
     for name in names:
-        alike = [column for column in own_names if _quantity(column) == _quantity(name) and column not in names]
-        meant = [column for column in alike if column in columns] or alike
-        if name not in own_names and "_" in name and meant and not name.startswith("axis"):
-            raise Refused(
-                "wrong_unit",
-                f"{path} has a column {shorten(name)} where {' or '.join(meant)} belongs",
-                f"Convert it to the unit in the name {' or '.join(meant)}, or say its unit with --columns",
-            )
-    needed = [*columns, *(name for group in optional if set(group) & set(names) for name in group)]
-    problems = [f"lacks {name}" for name in needed if name not in names]
-    problems += [f"names {name} twice" for name in own_names if names.count(name) > 1]
-    present = [name for name in names if name in alternatives]
-    if alternatives and len(set(present)) != 1:
-        problems.append(f"has {' and '.join(present) or 'none'} of {', '.join(alternatives)}")
-    if "" in names:
-        problems.append("has a column without a name")
-    unknown = ", ".join(name for name in names if name and name not in own_names)
-    if unknown:
-        problems.append(f"has the unknown {shorten(unknown)}")
+        _check_unit(path, name, names, header)
+    problems = [*_list_missing(names, header), *_find_unexpected(names, header)]
     if problems:
-        wanted = ", ".join(columns) + (f" and one of {', '.join(alternatives)}" if alternatives else "")
-        more = "".join(f"; {', '.join(group)} may stand there too" for group in optional)
+        wanted = ", ".join(header.needed) + (f" and one of {', '.join(header.one_of)}" if header.one_of else "")
+        more = "".join(f"; {', '.join(group)} may stand there too" for group in header.optional)
         remedy = (
             f"Its first row must name {wanted}{more}; or say with --columns which of its columns is what: "
             "rig look FILE --write columns.yaml writes it"
         )
         raise Refused("wrong_columns", f"{path} {', '.join(problems)}", remedy)
+
+
+def _check_unit(path: Path, name: str, names: Sequence[str], header: Header) -> None:
+    """Raise Refused `wrong_unit` for an unknown name with the quantity of a column that is not among the names."""
+    own_names = _list_own_names(header)
+    if name in own_names or "_" not in name or name.startswith("axis"):
+        return
+    alike = [column for column in own_names if _quantity(column) == _quantity(name) and column not in names]
+    meant = " or ".join([column for column in alike if column in header.needed] or alike)
+    if meant:
+        raise Refused(
+            "wrong_unit",
+            f"{path} has a column {shorten(name)} where {meant} belongs",
+            f"Convert it to the unit in the name {meant}, or say its unit with --columns",
+        )
+
+
+def _list_missing(names: Sequence[str], header: Header) -> list[str]:
+    """Return what a file lacks."""
+    groups = [group for group in header.optional if set(group) & set(names)]
+    needed = [*header.needed, *(name for group in groups for name in group)]
+    return [f"lacks {name}" for name in needed if name not in names]
+
+
+def _find_unexpected(names: Sequence[str], header: Header) -> Iterator[str]:
+    """Yield what is wrong with a file's names, other than those that it lacks."""
+    own_names = _list_own_names(header)
+    yield from (f"names {name} twice" for name in own_names if names.count(name) > 1)
+    present = [name for name in names if name in header.one_of]
+    if header.one_of and len(set(present)) != 1:
+        yield f"has {' and '.join(present) or 'none'} of {', '.join(header.one_of)}"
+    if "" in names:
+        yield "has a column without a name"
+    unknown = ", ".join(name for name in names if name and name not in own_names)
+    if unknown:
+        yield f"has the unknown {shorten(unknown)}"
 
 
 def _quantity(name: str) -> str:

@@ -1,7 +1,7 @@
 """The layout of a text table of unknown origin: its heading, its columns of numbers, and its column of time."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -150,25 +150,34 @@ def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
 def _describe(  # noqa: PLR0917
     skip: int, headings: list[str], units: list[str], cells: list[list[str]], missing: list[str], rows: int
 ) -> dict[str, Any]:
-    columns = [
-        [cell.strip() for cell in column if cell.strip() not in {"", *missing}] for column in zip(*cells, strict=True)
-    ]
+    columns = _strip_columns(cells, missing)
     stated = [unit or unit_in(heading) for heading, unit in zip(headings, units, strict=True)]
-    numbers = [index for index, column in enumerate(columns) if column and all(map(is_number, column))]
-    times = [index for index, column in enumerate(columns) if column and all(map(is_value, column))]
-    time = _find_time(headings, stated, columns, times)
+    numbers = _select_indices(columns, is_number)
+    time = _find_time(headings, stated, columns, _select_indices(columns, is_value))
     time_unit = None if time is None or time not in numbers else _time_unit(headings[time], stated[time], columns[time])
     return {
         "skip_lines": skip,
         "headings": headings,
         "units": stated,
         "numbers": [index for index in numbers if index == time or _largest(columns[index]) < LARGEST_NUMBER],
-        "texts": [index for index, column in enumerate(columns) if column and index not in numbers and index != time],
+        "texts": [index for index, column in enumerate(columns) if column and index not in {*numbers, time}],
         "time": time,
         "time_unit": time_unit,
         "missing": missing,
         "rows": rows,
     }
+
+
+def _strip_columns(cells: Sequence[Sequence[str]], missing: Sequence[str]) -> list[list[str]]:
+    """Return the columns of rows of cells, without blanks and missing values."""
+    return [
+        [cell.strip() for cell in column if cell.strip() not in {"", *missing}] for column in zip(*cells, strict=True)
+    ]
+
+
+def _select_indices(columns: Sequence[Sequence[str]], accept: Callable[[str], bool]) -> list[int]:
+    """Return the indices of the columns that have cells, all of which are accepted."""
+    return [index for index, column in enumerate(columns) if column and all(map(accept, column))]
 
 
 def unit_in(heading: str) -> str:

@@ -14,6 +14,7 @@ Random losses of readings whose stamps are worse cannot be counted one by one. T
 whose Allan variance (IEEE 952, annex C) gives the number of missing readings.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
@@ -93,47 +94,6 @@ class Sampling:
         return np.asarray(numbers[:, 1] - numbers[:, 0], dtype=np.float64)
 
 
-def find_sampling(time_s: Array) -> Sampling:
-    """Return the sampling of readings at rising times (n ≥ 2,)."""
-    steps_s = np.diff(time_s)
-    mean_s = find_typical_interval_s(time_s)
-    # Equal steps are as coarse as their resolution, and good.
-    rounded_s = find_resolution_s(time_s)
-    coarse = rounded_s > COARSE * mean_s and float(np.ptp(steps_s)) > SETTLED * mean_s
-    uneven = float(np.quantile(steps_s, SOME_SHORT)) < SHORT * mean_s
-    single = _count_missing(time_s, 1, MEDIAN)
-    beats = _is_beat(single.missing)
-    # After a late reading the next step is short; after a lost one it is not.
-    late = np.count_nonzero(steps_s < SHORT * single.interval_s) > LATE * single.gap_count
-    # Every step is a whole multiple of the resolution, so of another interval than the true one too.
-    misleading = coarse and abs(mean_s / rounded_s - round(mean_s / rounded_s)) > WHOLE
-    good = single.fit >= MOSTLY and not misleading and not beats and not late
-    if good and (not uneven or single.median_run_s(time_s) > PACKET_S):
-        return Sampling(single.interval_s, single.missing, 0.0, 1, on_arrival=False)
-    widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
-    wider = (_count_missing(time_s, width, begun) for width in widths for begun in (MEDIAN, UNDISTURBED))
-    candidates = [candidate for candidate in wider if not _is_beat(candidate.missing)]
-    candidates = candidates if misleading or beats else [single, *candidates]
-    fitting = [candidate for candidate in candidates if candidate.fit >= MOSTLY]
-    # The steps inside a burst would make the time between bursts look like a gap.
-    fitting = [candidate for candidate in fitting if candidate.interval_s > mean_s / 2]
-    if not fitting:
-        return _estimate_unlocated_losses(time_s)
-    fewest = min(candidate.gap_count for candidate in fitting)
-    # A wider one also explains true losses.
-    best = next(candidate for candidate in fitting if candidate.gap_count <= 2 * fewest + 1)
-    sampling = Sampling(best.interval_s, best.missing, 0.0, best.width, on_arrival=False)
-    late_s = time_s - best.interval_s * sampling.numbers
-    allowed_s = max(rounded_s, NEAR * best.interval_s)
-    too_late = float(np.max(late_s - find_least_around(late_s, best.width))) > MORE * allowed_s
-    return replace(sampling, on_arrival=uneven and too_late)
-
-
-def find_typical_interval_s(time_s: Array) -> float:
-    """Return the typical interval between readings at increasing times (n ≥ 2,); some may be missing or late."""
-    return min(_interval_quantile(time_s, apart) for apart in LONG)
-
-
 @dataclass(frozen=True, slots=True)
 class _PeriodCandidate:
     """The interval and the missing readings (n − 1,) for a `width`; `fit` is the fraction of differences that agree."""
@@ -153,6 +113,63 @@ class _PeriodCandidate:
         gaps = np.flatnonzero(self.missing)
         starts, ends = np.append(0, gaps + 1), np.append(gaps, len(time_s) - 1)
         return float(np.median(time_s[ends] - time_s[starts]))
+
+
+def find_sampling(time_s: Array) -> Sampling:
+    """Return the sampling of readings at rising times (n ≥ 2,)."""
+    typical_s, rounded_s = find_typical_interval_s(time_s), find_resolution_s(time_s)
+    is_uneven = float(np.quantile(np.diff(time_s), SOME_SHORT)) < SHORT * typical_s
+    single = _count_missing(time_s, 1, MEDIAN)
+    is_credible = not (_is_misleading(time_s, typical_s, rounded_s) or _is_beat(single.missing))
+    is_good = is_credible and single.fit >= MOSTLY and not _has_late(time_s, single)
+    if is_good and (not is_uneven or single.median_run_s(time_s) > PACKET_S):
+        return Sampling(single.interval_s, single.missing, 0.0, 1, on_arrival=False)
+    best = _select_candidate([*([single] if is_credible else []), *_list_wider(time_s)], typical_s)
+    if best is None:
+        return _estimate_unlocated_losses(time_s)
+    sampling = Sampling(best.interval_s, best.missing, 0.0, best.width, on_arrival=False)
+    return replace(sampling, on_arrival=is_uneven and _exceeds_rounding(time_s, sampling, rounded_s))
+
+
+def _is_misleading(time_s: Array, interval_s: float, resolution_s: float) -> bool:
+    """Return whether a coarse resolution makes every step a whole multiple of another interval than the true one."""
+    # Equal steps are as coarse as their resolution, and good.
+    is_coarse = resolution_s > COARSE * interval_s and float(np.ptp(np.diff(time_s))) > SETTLED * interval_s
+    return is_coarse and abs(interval_s / resolution_s - round(interval_s / resolution_s)) > WHOLE
+
+
+def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
+    """Return whether readings were late and not lost: the step after a late one is short."""
+    return bool(np.count_nonzero(np.diff(time_s) < SHORT * single.interval_s) > LATE * single.gap_count)
+
+
+def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
+    """Return the candidates of more than one reading whose losses are not a beat, the narrowest first."""
+    widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
+    wider = (_count_missing(time_s, width, quantile) for width in widths for quantile in (MEDIAN, UNDISTURBED))
+    return [candidate for candidate in wider if not _is_beat(candidate.missing)]
+
+
+def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) -> _PeriodCandidate | None:
+    """Return the first candidate that fits with few gaps, None if none fits: a wider one also explains true losses."""
+    # The steps inside a burst would make the time between bursts look like a gap.
+    fitting = [
+        candidate for candidate in candidates if candidate.fit >= MOSTLY and candidate.interval_s > typical_s / 2
+    ]
+    fewest = min((candidate.gap_count for candidate in fitting), default=0)
+    return next((candidate for candidate in fitting if candidate.gap_count <= 2 * fewest + 1), None)
+
+
+def _exceeds_rounding(time_s: Array, sampling: Sampling, resolution_s: float) -> bool:
+    """Return whether stamps (n,) are later than rounding to their resolution makes them."""
+    late_s = time_s - sampling.interval_s * sampling.numbers
+    allowed_s = max(resolution_s, NEAR * sampling.interval_s)
+    return float(np.max(late_s - find_least_around(late_s, sampling.width))) > MORE * allowed_s
+
+
+def find_typical_interval_s(time_s: Array) -> float:
+    """Return the typical interval between readings at increasing times (n ≥ 2,); some may be missing or late."""
+    return min(_interval_quantile(time_s, apart) for apart in LONG)
 
 
 def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandidate:

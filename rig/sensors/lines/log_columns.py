@@ -1,8 +1,8 @@
 """A map of the columns of an unknown log, as `--columns` takes it: by headings, and by what the numbers can be."""
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from rig.data.recording.motion_file import MOTIONS
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.observation.formats.table_layout import TableLayout
-from rig.sensors.lines.guessing import guess_triads
+from rig.sensors.lines.guessing import Guess, guess_triads
 
 NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
 SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
@@ -32,19 +32,30 @@ DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
 GRAVITY = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
 ROUND_STEPS = (131.0, 65.5, 32.8, 16.4)  # steps per °/s, as data sheets state them
 
+ColumnEntry = Mapping[str, Any]  # of a column: its name or number, and its unit
+
 
 @dataclass(frozen=True, slots=True)
 class LogColumns:
     """The columns of a log: maps of `samples` and `motion` as in the file of `--columns`, and sentences on them.
 
-    `reasons` say what decided, `gaps` what nothing shows; `others` are the columns that are not read.
+    `gaps` say what nothing shows; `others` are the columns that are not read.
     """
 
-    samples: Mapping[str, Mapping[str, Any]]
-    motion: Mapping[str, Mapping[str, Any]]
-    reasons: Sequence[str] = ()
+    samples: Mapping[str, ColumnEntry]
+    motion: Mapping[str, ColumnEntry]
     gaps: Sequence[str] = ()
-    others: Sequence[str] = field(default_factory=tuple)
+    others: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _ColumnGroup:
+    """Columns with numbers in the same rows: their indices and names (k,), values (m, k), and the rows at rest (m,)."""
+
+    indices: Sequence[int]
+    names: tuple[str, ...]
+    values: Array
+    still: NDArray[np.bool_]
 
 
 def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> LogColumns:
@@ -55,51 +66,68 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
     rate_hz = LIKELY_HZ if time is None else _mean_rate_hz(unit_s * time)
     quaternion = _find_quaternion(layout, values)
-    names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
-    used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
-    free = [index for index in layout.numbers if index not in used and np.nanstd(values[:, index]) > 0]
-    groups = _complete_rows(values, free)
-    samples: dict[str, dict[str, Any]] = {}
-    reasons: list[str] = []
+    samples, gaps = _guess_samples(layout, values, quaternion, rate_hz)
+    if layout.time is None:
+        gaps.append("no column of time: state samples_rate_hz")
+    timed = {} if layout.time is None else {"time_s": _time_entry(layout, time)}
+    motion = {name: {"column": layout.name(index), "unit": "1"} for name, index in quaternion.items()}
+    others = _list_others(layout, [*samples.values(), *motion.values(), *timed.values()])
+    return LogColumns({**timed, **samples} if samples else {}, {**timed, **motion} if motion else {}, gaps, others)
+
+
+def _guess_samples(
+    layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
+) -> tuple[dict[str, ColumnEntry], list[str]]:
+    """Return the map of the columns of readings, of two sensors the first, and what nothing shows about them."""
+    samples: dict[str, ColumnEntry] = {}
     gaps: list[str] = []
-    for rows, indices in groups:
-        part = values[rows][:, indices]
-        still = find_still(part, rate_hz * len(part) / max(len(values), 1))
-        guessed = guess_triads(tuple(names[index] for index in indices), part, still, rate_hz)
-        if quaternion and not any(names[index] for index in indices):
+    for group in _group_columns(layout, values, quaternion, rate_hz):
+        if quaternion and not any(group.names):
             continue  # a reference's positions look like readings
-        is_nameless = not any(names[index] for index in indices) or not guessed.units
-        if is_nameless and len(indices) == 3 and "x_rad_s" not in samples and set(guessed.units) <= {"m"}:
-            guessed = guess_triads(("gx", "gy", "gz"), part, still, rate_hz)
+        guessed = guess_triads(group.names, group.values, group.still, rate_hz)
+        if "x_rad_s" not in samples and _may_be_gyroscope(group.names, guessed):
+            guessed = guess_triads(("gx", "gy", "gz"), group.values, group.still, rate_hz)
             gaps.append("whether the three columns are a gyroscope: nothing contradicts it")
-        for kind, suffix in NAMES.items():
-            if kind not in guessed.units or f"x{suffix}" in samples:
-                continue
-            positions = [guessed.columns.index(kind + axis) for axis in "xyz"]
-            stated = layout.units[indices[positions[0]]]
-            unit, reason = _unit_of(kind, dict(guessed.units[kind]), part[:, positions], still)
-            if stated in UNITS and UNITS[stated].quantity == UNITS[SI_UNITS[kind]].quantity:
-                unit, reason = _compare_stated(kind, stated, part[:, positions], still)
-            for axis, position in zip("xyz", positions, strict=True):
-                samples[axis + suffix] = {"column": layout.name(indices[position]), **unit}
+        for kind in [kind for kind in NAMES if kind in guessed.units and f"x{NAMES[kind]}" not in samples]:
+            triad, reason = _map_triad(layout, group, guessed, kind)
+            samples |= triad
             if reason:
                 gaps.append(f"the unit of the {SENSORS[kind]}: {reason}")
         if "temperature" in guessed.columns and "temperature_c" not in samples:
-            index = indices[guessed.columns.index("temperature")]
+            index = group.indices[guessed.columns.index("temperature")]
             samples["temperature_c"] = {"column": layout.name(index), "unit": "C"}
-    timed = {} if layout.time is None else {"time_s": _time_entry(layout, time)}
-    if layout.time is None:
-        gaps.append("no column of time: state samples_rate_hz")
-    motion = {name: {"column": layout.name(index), "unit": "1"} for name, index in quaternion.items()}
-    read = {entry["column"] for entry in (*samples.values(), *motion.values(), *timed.values())}
-    others = [
-        layout.headings[index] or f"column {index + 1}"
-        for index in range(len(layout.headings))
-        if layout.name(index) not in read and (layout.headings[index] or index in layout.numbers)
+    return samples, gaps
+
+
+def _may_be_gyroscope(names: Sequence[str], guessed: Guess) -> bool:
+    """Return whether three columns without names, or without units, are no accelerometer."""
+    is_nameless = not any(names) or not guessed.units
+    return is_nameless and len(names) == 3 and set(guessed.units) <= {"m"}
+
+
+def _map_triad(
+    layout: TableLayout, group: _ColumnGroup, guessed: Guess, kind: str
+) -> tuple[dict[str, ColumnEntry], str]:
+    """Return the map of a triad's three columns, and why its unit is not sure."""
+    positions = [guessed.columns.index(kind + axis) for axis in AXES]
+    indices = [group.indices[position] for position in positions]
+    values, stated = group.values[:, positions], layout.units[indices[0]]
+    if stated in UNITS and UNITS[stated].quantity == UNITS[SI_UNITS[kind]].quantity:
+        unit, reason = _compare_stated(kind, stated, values, group.still)
+    else:
+        unit, reason = _unit_of(kind, dict(guessed.units[kind]), values, group.still)
+    columns = zip(AXES, indices, strict=True)
+    return {axis + NAMES[kind]: {"column": layout.name(index), **unit} for axis, index in columns}, reason
+
+
+def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[str]:
+    """Return the columns with a heading or numbers that no entry reads."""
+    read = {entry["column"] for entry in entries}
+    return [
+        heading or f"column {index + 1}"
+        for index, heading in enumerate(layout.headings)
+        if layout.name(index) not in read and (heading or index in layout.numbers)
     ]
-    return LogColumns(
-        {**timed, **samples} if samples else {}, {**timed, **motion} if motion else {}, reasons, gaps, others
-    )
 
 
 def _name_once(names: list[str]) -> list[str]:
@@ -170,12 +198,20 @@ def _strip_units(words: list[str]) -> list[str]:
 UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
 
 
-def _complete_rows(values: Array, free: Sequence[int]) -> list[tuple[NDArray[np.intp], list[int]]]:
-    """Return groups of columns with numbers in the same rows, and their rows: a group for each rate of a logger."""
+def _group_columns(
+    layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
+) -> Iterator[_ColumnGroup]:
+    """Yield the columns that vary, other than a reference's, by the rows they fill: a group for each logger's rate."""
+    names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
+    used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
     groups: dict[bytes, list[int]] = {}
-    for index in free:
-        groups.setdefault(np.isfinite(values[:, index]).tobytes(), []).append(index)
-    return [(np.flatnonzero(np.isfinite(values[:, indices[0]])), indices) for indices in groups.values()]
+    for index in layout.numbers:
+        if index not in used and np.nanstd(values[:, index]) > 0:
+            groups.setdefault(np.isfinite(values[:, index]).tobytes(), []).append(index)
+    for indices in groups.values():
+        part = values[np.isfinite(values[:, indices[0]])][:, indices]
+        still = find_still(part, rate_hz * len(part) / max(len(values), 1))
+        yield _ColumnGroup(indices, tuple(names[index] for index in indices), part, still)
 
 
 def _find_quaternion(layout: TableLayout, values: Array) -> dict[str, int]:
