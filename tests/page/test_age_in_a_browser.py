@@ -91,7 +91,7 @@ def test_readings_that_arrive_are_of_now_and_those_told_again_are_not(
 
 def by_hand(folder: Path) -> Path:
     """configs/by_hand.yaml at an address of its own, without haste."""
-    return written(folder, "by_hand.yaml", {"board": {"port": f"socket://{fresh_host()}:7321"}}, 4)
+    return written(folder, "by_hand.yaml", {"board": {"port": f"socket://{fresh_host()}:7321"}}, 2)
 
 
 def of_lines(folder: Path) -> Path:

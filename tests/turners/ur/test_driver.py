@@ -157,10 +157,10 @@ def test_moves_arrive_in_time_and_states_come_without_gaps(world: World) -> None
         arm.rest(0.2)
         arm.move(turn(out.target_q_rad, -angle_rad))
         took_s = arm.latest.time_s - began_s
-        np.testing.assert_allclose(laboratory.state()["q_rad"], out.start_q_rad, atol=1e-4)
         outcome = arm.stop()
         assert outcome.at_rest
         assert arm.stop() == outcome
+        np.testing.assert_allclose(laboratory.state()["q_rad"], out.start_q_rad, atol=2e-4)
     assert took_s >= 2 * out.duration_s + 0.2 - 0.02  # and as much more as this computer takes from one to the next
     assert arm.missed_states == 0
     times_s = [state.time_s for state in states]
