@@ -292,19 +292,29 @@ def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kn
     """Return the clock with the best fit of readings and motion, first by their slow parts.
 
     A ripple shifted by a period looks the same, and a fast ripple differs between readings and states, which have
-    different filters.
+    different filters. If it leaves the finest fit without an optimum, the clock is that of the slow parts, with its own
+    uncertainty. Raise Fault `time_base_not_found`.
     """
     start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
     step_s = float(np.median(np.diff(board_time_s)))
-    for over_s in (SLOW_S, FINE_S):
+    slow_clock: TimeBase | None = None
+    for over_s in (SLOW_S, FINE_S, 0.0):
         count = round(over_s / step_s)
-        if count < 2 or len(board_time_s) < MIN_SAMPLES * count:
+        if over_s and (count < 2 or len(board_time_s) < MIN_SAMPLES * count):
             continue
-        slow = _SlowMotion(motion, count * step_s, start_s - 1.0, end_s + 1.0)
-        clock = _iterate_clock(clock, *_average_samples(board_time_s, readings, count), slow)
+        try:
+            if not over_s:
+                return _iterate_clock(clock, board_time_s, readings, motion)
+            slow = _SlowMotion(motion, count * step_s, start_s - 1.0, end_s + 1.0)
+            clock = _iterate_clock(clock, *_average_samples(board_time_s, readings, count), slow)
+        except Fault:
+            if slow_clock is None:
+                raise
+            return slow_clock
         if over_s == FINE_S:
-            return clock
-    return _iterate_clock(clock, board_time_s, readings, motion)
+            break
+        slow_clock = clock
+    return clock
 
 
 def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:

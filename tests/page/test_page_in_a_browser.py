@@ -74,7 +74,7 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     driver.find_element(By.ID, "halt").click()
     assert process.wait(PATIENCE_S) == 130
     assert (out / "log.txt").read_text(encoding="utf-8").count("done: sweep") <= swept + 1
-    assert max(map(abs, laboratory.state()["qd_rad_s"])) < REST_SPEED_RAD_S
+    wait_for(lambda: max(map(abs, laboratory.state()["qd_rad_s"])) < REST_SPEED_RAD_S, "an arm at rest")
     laboratory.control({"do": "pace", "time_scale": 2.0})
     wait_for(lambda: kind(driver) == "stopped", "that it was stopped")
     assert "stopped from the page" in text(driver, "state-text") and "rig resume" in text(driver, "state-text")
