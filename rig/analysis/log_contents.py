@@ -14,7 +14,7 @@ from rig.data.quantity import RATE, Quantity
 from rig.data.recording.motion_file import MOTIONS, TIME, Columns, Header, Item
 from rig.data.recording.settings import Elsewhere, Site
 from rig.errors import Refused, RigError
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, axis_of
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.observation.by_hand.steadiness import check_at_rest
 from rig.observation.external.attitude_import import read_attitudes
@@ -219,7 +219,7 @@ def try_attitudes(
 
 
 def _find_obstacle(files: Files, request: Elsewhere, up: str) -> str | None:
-    x, y, z = ((1.0 if up[0] == "+" else -1.0) * np.eye(3)["xyz".index(up[1])]).tolist()
+    x, y, z = axis_of(up).tolist()
     site = Site(up=(x, y, z), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None)
     try:
         outcome = calibrate([build_recording(files, site, request)])

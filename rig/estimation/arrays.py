@@ -30,6 +30,22 @@ def rotation_vectors(matrices: Array) -> Array:
     return np.asarray(Rotation.from_matrix(matrices).as_rotvec(), dtype=np.float64)
 
 
+def axis_of(name: str) -> Array:
+    """Return the unit vector (3,) of an axis or face by its name, such as "+x" or "-z"."""
+    return np.asarray((1.0 if name[0] == "+" else -1.0) * np.eye(3)["xyz".index(name[1])], dtype=np.float64)
+
+
+def integrate_rates(time_s: Array, rates: Array) -> Array:
+    """Return the integral (n, c) of rates (n, c) from the first of times (n,), by the trapezoidal rule."""
+    steps = (rates[1:] + rates[:-1]) / 2 * np.diff(time_s)[:, None]
+    return np.concatenate([np.zeros((1, rates.shape[1])), np.cumsum(steps, axis=0)])
+
+
+def interpolate(instants: Array | NDArray[np.intp], points: Array | NDArray[np.intp], values: Array) -> Array:
+    """Return the values (m, c) at `instants` (m,), interpolated linearly between values (n, c) at `points` (n,)."""
+    return np.column_stack([np.interp(instants, points, column) for column in values.T])
+
+
 def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
     """Return values over sizes ≥ 0 of one shape; infinite for a nonzero value over a negligible size."""
     value, size = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)

@@ -5,7 +5,7 @@ The gyroscope and the arm measure the same rotation. A coarse search correlates 
 rate then finds the offset to a fraction of a millisecond. The delay of the sensor's own filter is part of the offset.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -295,26 +295,33 @@ def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kn
     different filters. If it leaves the finest fit without an optimum, the clock is that of the slow parts, with its own
     uncertainty. Raise Fault `time_base_not_found`.
     """
+    is_first = True
+    for stage in _list_stages(clock, board_time_s, readings, motion):
+        try:
+            clock = _iterate_clock(clock, *stage)
+        except Fault:
+            if is_first:
+                raise
+            break
+        is_first = False
+    return clock
+
+
+def _list_stages(
+    clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion
+) -> Iterator[tuple[Array, Array, KnownMotion]]:
+    """Yield times, readings and motion for each fit: averaged over long, then over short times, else as they are."""
     start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
     step_s = float(np.median(np.diff(board_time_s)))
-    slow_clock: TimeBase | None = None
-    for over_s in (SLOW_S, FINE_S, 0.0):
+    for over_s in (SLOW_S, FINE_S):
         count = round(over_s / step_s)
-        if over_s and (count < 2 or len(board_time_s) < MIN_SAMPLES * count):
+        if count < 2 or len(board_time_s) < MIN_SAMPLES * count:
             continue
-        try:
-            if not over_s:
-                return _iterate_clock(clock, board_time_s, readings, motion)
-            slow = _SlowMotion(motion, count * step_s, start_s - 1.0, end_s + 1.0)
-            clock = _iterate_clock(clock, *_average_samples(board_time_s, readings, count), slow)
-        except Fault:
-            if slow_clock is None:
-                raise
-            return slow_clock
+        slow = _SlowMotion(motion, count * step_s, start_s - 1.0, end_s + 1.0)
+        yield *_average_samples(board_time_s, readings, count), slow
         if over_s == FINE_S:
-            break
-        slow_clock = clock
-    return clock
+            return
+    yield board_time_s, readings, motion
 
 
 def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:

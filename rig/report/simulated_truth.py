@@ -16,7 +16,7 @@ from rig.data.run_folder import TRUTH
 from rig.data.validation import Finite, parse_json, validate
 from rig.report.findings.result_kind import AxisValues, DisplayRow
 from rig.report.kinds.kind_registry import shown
-from rig.report.words.printed_values import in_print
+from rig.report.words.printed_values import format_signed, in_print
 
 SIZE_MAX_BYTES = 1_000_000
 Vector3 = tuple[Finite, Finite, Finite]
@@ -110,5 +110,5 @@ def truth_lines(rows: Sequence[TruthRow]) -> Iterator[str]:
     if values:
         within = sum(abs(deviation) <= 1 for deviation, _ in values)
         farthest, name = max(values, key=lambda value: abs(value[0]))
-        distance = f"{farthest:+.2f} U".replace("-", "−")
-        yield f"simulated truth: {within} of {len(values)} values within U of it; farthest {name}, {distance}"
+        distance = format_signed(farthest, 2)
+        yield f"simulated truth: {within} of {len(values)} values within U of it; farthest {name}, {distance} U"

@@ -13,9 +13,9 @@ from rig.config.procedures.stage_section import rotation_by
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.config.sensors.sensor_sections import SensorSection, mounting_matrix
 from rig.data.recording.settings import HandSettings, Uncertainty, hand_settings, uncertainty_of
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, axis_of
 from rig.estimation.by_hand.fit import fit_session
-from rig.estimation.by_hand.session_parts import HandRecording, SessionConditions, axis_of
+from rig.estimation.by_hand.session_parts import HandRecording, SessionConditions
 from rig.estimation.by_hand.solution import summarise_fit
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.budget import Budget

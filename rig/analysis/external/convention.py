@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.recording.motion_file import Columns
-from rig.estimation.arrays import Array
+from rig.data.recording.motion_file import QUATERNION, Columns
+from rig.estimation.arrays import Array, integrate_rates, interpolate
+from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.external.csv_samples import Samples
 
-QUATERNION = ("qw", "qx", "qy", "qz")
 COARSE_S, FINE_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.0201, 0.002)  # lags to try
 FEWEST, MOST = 30, 3000  # pairs of rows
 LONGEST_S = 1.0  # between two rows of a pair
@@ -77,8 +77,7 @@ def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bo
     if len(rates) < FEWEST or np.sqrt(np.mean(rates**2)) < LEAST_RAD_S:
         return Convention(scalar_last, inverse, 0.0, 0.0)
     readings = samples.readings[RATE]
-    steps = (readings[1:] + readings[:-1]) / 2 * np.diff(samples.time_s)[:, None]
-    total = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    total = integrate_rates(samples.time_s, readings)
 
     def fit_at(lag_s: float) -> float:
         return _explain(rates, _mean_rates(samples.time_s, total, time_s + lag_s, close))[0]
@@ -88,15 +87,13 @@ def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bo
     fraction, matrix = _explain(rates, _mean_rates(samples.time_s, total, time_s + lag_s, close))
     up = ""
     if ACCELERATION in samples.readings:
-        forces = np.column_stack(
-            [np.interp(time_s + lag_s, samples.time_s, axis) for axis in samples.readings[ACCELERATION].T]
-        )
-        up = _find_up(rotations.apply(forces @ _nearest_orthogonal(matrix).T))
+        forces = interpolate(time_s + lag_s, samples.time_s, samples.readings[ACCELERATION])
+        up = _find_up(rotations.apply(forces @ nearest_rotation(matrix).T))
     return Convention(scalar_last, inverse, lag_s, fraction, up)
 
 
 def _mean_rates(time_s: Array, total: Array, edges_s: Array, close: NDArray[np.bool_]) -> Array:
-    angles = np.column_stack([np.interp(edges_s, time_s, axis) for axis in total.T])
+    angles = interpolate(edges_s, time_s, total)
     means: Array = np.diff(angles, axis=0)[close] / np.diff(edges_s)[close, None]
     return means
 
@@ -109,11 +106,6 @@ def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
     return 1 - float(np.mean(residuals**2) / np.mean((rates - rates.mean(axis=0)) ** 2)), np.asarray(
         fit[:3].T, dtype=np.float64
     )
-
-
-def _nearest_orthogonal(matrix: Array) -> Array:
-    outputs, _, inputs = np.linalg.svd(matrix)
-    return np.asarray(outputs @ inputs, dtype=np.float64)
 
 
 def _find_up(forces: Array) -> str:

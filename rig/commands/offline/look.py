@@ -88,7 +88,8 @@ def _print(
 
 
 def _find_convention(log: "LookedFile", reference: "LookedFile") -> "Convention | None":
-    from rig.analysis.external.convention import QUATERNION, find_convention
+    from rig.analysis.external.convention import find_convention
+    from rig.data.recording.motion_file import QUATERNION
 
     assert log.samples is not None and reference.attitudes is not None, "both were read"
     headings = () if reference.layout is None else reference.layout.headings
@@ -127,11 +128,13 @@ def _try_solutions(
 
 def _adopt(columns: dict[str, Any], *, inverse: bool, scalar_last: bool) -> None:
     """Change the map of a reference's columns to the convention of its quaternions."""
+    from rig.data.recording.motion_file import QUATERNION
+
     if inverse:
         columns["motion_inverse"] = True
     if scalar_last:
         motion = dict(columns.get("motion", {}))
-        read = [motion.get(name, {"column": name}) for name in ("qw", "qx", "qy", "qz")]
+        read = [motion.get(name, {"column": name}) for name in QUATERNION]
         columns["motion"] = {**motion, **dict(zip(("qx", "qy", "qz", "qw"), read, strict=True))}
 
 

@@ -22,6 +22,7 @@ LARGEST_NUMBER = 1e12  # either sign, in any SI unit: a larger one is a mistake,
 NOT_STATED: Final = "not stated"
 ItemWord = Annotated[str, Field(pattern="^[ -~]{1,40}$")]  # plain ASCII, as of sensors on a board
 TIME = "time_s"
+QUATERNION = ("qw", "qx", "qy", "qz")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,11 @@ class Header:
     optional: tuple[tuple[str, ...], ...] = ()
     one_row: bool = False
     between: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All columns that such a file may have."""
+        return (*self.needed, *self.one_of, *(name for group in self.optional for name in group))
 
     def check(self, columns: Columns) -> None:
         """Raise ValueError for columns, or numbers, that such a file cannot have."""
@@ -70,7 +76,7 @@ MOTIONS: Final[Mapping[MotionKind, Header]] = MappingProxyType(
             (("angle_std_rad",), ("axis_std_rad",)),
         ),
         "attitudes": Header(
-            ("start_s", "end_s", "qw", "qx", "qy", "qz"),
+            ("start_s", "end_s", *QUATERNION),
             (),
             (("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"), ("attitude_std_rad",)),
         ),

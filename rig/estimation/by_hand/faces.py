@@ -3,9 +3,9 @@
 import numpy as np
 
 from rig.errors import Refused
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, axis_of
 from rig.estimation.by_hand.move_rotations import MoveIntegrals
-from rig.estimation.by_hand.session_parts import FACES, HandRecording, RestFaces, SessionConditions, axis_of
+from rig.estimation.by_hand.session_parts import FACES, HandRecording, RestFaces, SessionConditions
 
 ON_FACE = float(np.cos(np.radians(10.0)))  # by accelerometer: its offset makes up to 4°
 RECKONED = float(np.cos(np.radians(30.0)))  # by dead reckoning: a scale error of 10 % makes 18° in half a turn

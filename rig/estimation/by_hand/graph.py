@@ -17,9 +17,9 @@ from functools import cached_property
 
 import numpy as np
 
-from rig.estimation.arrays import Array, rotation_vectors
+from rig.estimation.arrays import Array, axis_of, rotation_vectors
 from rig.estimation.by_hand.move_rotations import GyroscopeModel, MoveIntegrals
-from rig.estimation.by_hand.session_parts import FACES, HandRecording, HandStds, RestFaces, SessionConditions, axis_of
+from rig.estimation.by_hand.session_parts import FACES, HandRecording, HandStds, RestFaces, SessionConditions
 
 MATRIX, GRAVITY, LEVEL, OFFSET, TABLE, BOX, BENDS = (
     slice(0, 9), slice(9, 18), slice(18, 27), slice(27, 30), slice(30, 32), slice(32, 44), slice(44, 50),

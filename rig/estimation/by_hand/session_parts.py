@@ -141,11 +141,6 @@ def merge_moves(moves: Sequence[Move]) -> Move:
     )
 
 
-def axis_of(face: str) -> Array:
-    """Return the unit vector (3,) of a face's name."""
-    return np.asarray((1.0 if face[0] == "+" else -1.0) * np.eye(3)["xyz".index(face[1])], dtype=np.float64)
-
-
 def nearest_face(direction: Array) -> str:
     """Return the name of the face whose axis is nearest to a direction (3,)."""
     axis = int(np.argmax(np.abs(direction)))

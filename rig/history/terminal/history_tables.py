@@ -12,7 +12,7 @@ from rig.history.terminal.change_words import add_sign
 from rig.history.terminal.fitting_table import FittingTable, TableColumn
 from rig.history.terminal.spark import picture
 from rig.report.findings.history_records import BIASES, SCALES, Parameter, is_scale
-from rig.report.words.printed_values import figures, plus_minus
+from rig.report.words.printed_values import figures, format_signed, plus_minus
 
 PPM = 1e6
 
@@ -67,8 +67,9 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
     for trend in trends.values():
         if trend.chart is not None and trend.chart.out_of_control:
             chart = trend.chart
-            ewma = f"EWMA {_add_sign(chart.ewma[-1], 2)} of ±{chart.limit[-1]:.2f}"
-            yield f"{trend.name}: the newest is out of control, {ewma}, newest {_add_sign(chart.deviation[-1], 1)} σ"
+            ewma = f"EWMA {format_signed(chart.ewma[-1], 2)} of ±{chart.limit[-1]:.2f}"
+            newest = f"newest {format_signed(chart.deviation[-1], 1)} σ"
+            yield f"{trend.name}: the newest is out of control, {ewma}, {newest}"
 
 
 def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
@@ -202,10 +203,6 @@ def _chart_words(chart: Chart | None) -> str:
         return "OUT OF CONTROL"
     alarms = int(chart.alarm.sum())
     return f"in control; {alarms} alarm{'s' * (alarms > 1)} before" if alarms else "in control"
-
-
-def _add_sign(value: float, decimals: int) -> str:
-    return f"{value:+.{decimals}f}".replace("-", "−")
 
 
 def _effect(name: str, effect: RigEffect) -> str:

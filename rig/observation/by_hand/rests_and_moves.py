@@ -15,13 +15,12 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import Refused
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, axis_of
 from rig.estimation.by_hand.session_parts import (
     HandRecording,
     HandRest,
     Move,
     SessionConditions,
-    axis_of,
     merge_moves,
     nearest_face,
 )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
 from rig.errors import Fault
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, interpolate
 from rig.observation.time_stamps.sampling import Sampling
 
 BLOCK_S = 1.0
@@ -34,7 +34,7 @@ def fill_missing(readings: Array, numbers: NDArray[np.intp]) -> Array:
     every = np.arange(numbers[0], numbers[-1] + 1)
     if len(every) == len(readings):
         return readings
-    return np.column_stack([np.interp(every, numbers, axis) for axis in readings.T])
+    return interpolate(every, numbers, readings)
 
 
 def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import RATE, Quantity
-from rig.data.recording.motion_file import MOTIONS, TIME, Header
+from rig.data.recording.motion_file import MOTIONS, QUATERNION, TIME, Header
 from rig.errors import Fault, Refused, or_fault
 from rig.estimation.arrays import Array
 from rig.observation.external.csv_samples import Samples
@@ -54,7 +54,7 @@ STD_COLUMN = "attitude_std_rad"
 ATTITUDES_MB = 32  # an hour's table at 50 Hz
 NORM_TOLERANCE = 1e-3
 MOMENTS = Header(  # as a file may have them: rows that last, or a moment in each
-    ("qw", "qx", "qy", "qz"), (TIME, "start_s"), (("start_s", "end_s"), *MOTIONS["attitudes"].optional)
+    QUATERNION, (TIME, "start_s"), (("start_s", "end_s"), *MOTIONS["attitudes"].optional)
 )
 
 
@@ -121,7 +121,7 @@ def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
 
     Raise Refused `not_a_number` for another blank cell.
     """
-    kept = ~np.isnan([table.columns[name] for name in ("qw", "qx", "qy", "qz")]).all(axis=0)
+    kept = ~np.isnan([table.columns[name] for name in QUATERNION]).all(axis=0)
     for name, column in table.columns.items():
         if len(blank := np.flatnonzero(np.isnan(column) & kept)):
             raise blank_cell(path, name, int(table.lines[blank[0]]))
@@ -271,7 +271,7 @@ def _windows(rows: Mapping[str, Array]) -> list[Window]:
 def _rotations(rows: Mapping[str, Array]) -> Array:
     from scipy.spatial.transform import Rotation
 
-    quaternions = np.column_stack([rows[name] for name in ("qw", "qx", "qy", "qz")])
+    quaternions = np.column_stack([rows[name] for name in QUATERNION])
     norms = np.linalg.norm(quaternions, axis=1)
     worst = int(np.argmax(np.abs(norms - 1)))
     if abs(norms[worst] - 1) > NORM_TOLERANCE:

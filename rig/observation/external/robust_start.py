@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.estimation.arrays import Array, rotation_vectors
+from rig.estimation.arrays import Array, integrate_rates, interpolate, rotation_vectors
 from rig.estimation.external.attitude_drift import DriftState
 from rig.observation.external.reference_rows import Turning
 
@@ -50,17 +50,14 @@ def find_start(turning: Turning) -> RobustStart:
     if len(pairs.begin_s) < FEWEST:
         return aligned
     time_s, readings = turning.time_s, turning.readings_rad_s
-    steps = (readings[1:] + readings[:-1]) / 2 * np.diff(time_s)[:, None]
-    total = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    total = integrate_rates(time_s, readings)
 
     def fit(clock_s: float) -> tuple[float, Array]:
         begin_s, end_s = pairs.begin_s + clock_s, pairs.end_s + clock_s
         some = (begin_s >= time_s[0]) & (end_s <= time_s[-1])
         if some.sum() < FEWEST:
             return np.inf, np.zeros((4, 3))
-        turned = np.column_stack(
-            [np.interp(end_s[some], time_s, axis) - np.interp(begin_s[some], time_s, axis) for axis in total.T]
-        )
+        turned = interpolate(end_s[some], time_s, total) - interpolate(begin_s[some], time_s, total)
         return _fit(np.column_stack([pairs.rotations[some], (end_s - begin_s)[some]]), turned)
 
     best_s = min(np.arange(-REACH_S, REACH_S + COARSE_S / 2, COARSE_S), key=lambda clock_s: fit(clock_s)[0])

@@ -7,7 +7,7 @@ import numpy as np
 from rig.config.column_map import AS_NAMED, AxisSection, ColumnMap, TableSection
 from rig.data.recording.motion_file import TIME, Columns, Header
 from rig.errors import Refused
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, axis_of
 from rig.observation.external.attitude_import import ATTITUDES_MB, RATE_COLUMNS, STD_COLUMN
 from rig.observation.formats.column_selection import map_table_log
 from rig.observation.formats.csv_table import read_columns
@@ -55,5 +55,4 @@ def _attitudes(log: Columns, table: TableSection) -> dict[str, Array]:
 
 def _unit_vector(axis: AxisSection) -> Array:
     """Return the unit vector (3,) of an axis in the item's frame, with all angles at zero."""
-    unit: Array = (1.0 if axis.along[0] == "+" else -1.0) * np.eye(3)["xyz".index(axis.along[1])]
-    return unit
+    return axis_of(axis.along)

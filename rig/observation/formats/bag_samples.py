@@ -13,7 +13,7 @@ from typing import Any
 
 from rig.data.processes.reading_process import Part
 from rig.data.quantity import ACCELERATION, FIELD, RATE
-from rig.data.recording.motion_file import TIME
+from rig.data.recording.motion_file import QUATERNION, TIME
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.errors.quoting import listing, quote, shorten
@@ -25,7 +25,6 @@ POSES = (
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     "geometry_msgs/msg/TransformStamped",
 )
-QUATERNION = ("qw", "qx", "qy", "qz")
 NOT_PROVIDED = -1.0  # sensor_msgs/Imu: first element of the covariance of a quantity that a message does not hold
 SUFFIXES = (".mcap", ".db3")
 ROS_1 = ".bag"

@@ -119,7 +119,7 @@ def _select_mapped(path: Path, headings: Sequence[str], width: int, header: Head
             f"one column of {path} is to be {' and '.join(names)}",
             "Name another column for each of them",
         )
-    own_names = _list_own_names(header)
+    own_names = header.names
     unmapped_names = {
         index: name for index, name in enumerate(headings) if name in own_names and name not in mapped.columns
     }
@@ -164,11 +164,6 @@ def check_headings(path: Path, headings: Sequence[str]) -> None:
         )
 
 
-def _list_own_names(header: Header) -> tuple[str, ...]:
-    """Return the rig's names of the columns that a file may have."""
-    return (*header.needed, *header.one_of, *(name for group in header.optional for name in group))
-
-
 def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
     """Raise Refused `wrong_unit`, `wrong_columns` for names of columns that such a file cannot have."""
     for name in names:
@@ -186,7 +181,7 @@ def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
 
 def _check_unit(path: Path, name: str, names: Sequence[str], header: Header) -> None:
     """Raise Refused `wrong_unit` for an unknown name with the quantity of a column that is not among the names."""
-    own_names = _list_own_names(header)
+    own_names = header.names
     if name in own_names or "_" not in name or name.startswith("axis"):
         return
     alike = [column for column in own_names if _quantity(column) == _quantity(name) and column not in names]
@@ -208,7 +203,7 @@ def _list_missing(names: Sequence[str], header: Header) -> list[str]:
 
 def _find_unexpected(names: Sequence[str], header: Header) -> Iterator[str]:
     """Yield what is wrong with a file's names, other than those that it lacks."""
-    own_names = _list_own_names(header)
+    own_names = header.names
     yield from (f"names {name} twice" for name in own_names if names.count(name) > 1)
     present = [name for name in names if name in header.one_of]
     if header.one_of and len(set(present)) != 1:

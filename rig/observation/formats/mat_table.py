@@ -40,7 +40,7 @@ def read_mat_rows(path: Path, header: Header, mapped: Mapped | None) -> Iterator
     columns = read_mat_columns(path)
     names = [*columns]
     yield names
-    usual = {*header.needed, *header.one_of, *(name for group in header.optional for name in group)}
+    usual = {*header.names}
     if mapped is not None:
         in_map = [column for column, _ in mapped.columns.values()]
         usual |= {*in_map, *(names[int(column) - 1] for column in in_map if _is_number_of(column, names))}

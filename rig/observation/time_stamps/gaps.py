@@ -8,7 +8,7 @@ same gap is made in the readings on either side, and bridged, and compared with 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, integrate_rates
 
 HIDDEN_RAD = 2e-3  # as references of attitude err: a gap that may hide more is not bridged
 LONGEST_S = 1.0  # of a gap: in a longer one a body may be taken up and laid back
@@ -21,18 +21,13 @@ def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) ->
     readings (n, 3) are rates at rising times (n,); a step is numbered by its first reading. It is infinite for a gap
     that is too long, or without enough readings next to it.
     """
-    turned = _integrate(time_s, readings)
+    turned = integrate_rates(time_s, readings)
     return np.array([_hidden_rad(time_s, readings, turned, int(gap)) for gap in gaps])
 
 
 def find_hiding_gaps(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the gaps among `gaps` (k,) that cannot be bridged; arguments as for `hidden_angles_rad`."""
     return np.asarray(gaps[hidden_angles_rad(time_s, readings, gaps) > HIDDEN_RAD], dtype=np.intp)
-
-
-def _integrate(time_s: Array, readings: Array) -> Array:
-    steps = np.diff(time_s)[:, None] * (readings[1:] + readings[:-1]) / 2
-    return np.vstack([np.zeros((1, readings.shape[1])), np.cumsum(steps, axis=0)])
 
 
 def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> float:

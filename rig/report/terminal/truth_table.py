@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from rich.table import Table
 
 from rig.report.simulated_truth import TrueValues, TruthRow
-from rig.report.words.printed_values import in_print
+from rig.report.words.printed_values import format_signed, in_print
 from rig.station.plain_text import plain
 
 
@@ -32,4 +32,4 @@ def _cells(values: TrueValues) -> Iterator[list[str]]:
     numbers = values.result
     yield [in_print(value, u)[0] for value, u in zip(numbers.values, numbers.expanded, strict=True)]
     yield values.truth_texts
-    yield [f"{deviation:+.2f}".replace("-", "−") for deviation in values.deviations]
+    yield [format_signed(deviation, 2) for deviation in values.deviations]

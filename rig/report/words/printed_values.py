@@ -41,6 +41,11 @@ def rounded(value: float, uncertainty: float) -> Rounded:
     return Rounded(_quantize(exact, last), _quantize(wide, last))
 
 
+def format_signed(value: float, decimals: int) -> str:
+    """Return a value with its sign, a typographic minus if negative, and `decimals` digits behind the point."""
+    return f"{value:+.{decimals}f}".replace("-", "−")
+
+
 def in_print(value: float, uncertainty: float) -> tuple[str, str]:
     """Return the texts of a value and its U; six digits and a dash if U is not a positive number."""
     try:

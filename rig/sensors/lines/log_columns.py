@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.units import UNITS
-from rig.data.recording.motion_file import MOTIONS
+from rig.data.recording.motion_file import MOTIONS, QUATERNION
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.observation.formats.table_layout import TableLayout
@@ -26,7 +26,6 @@ LARGEST_RAD_S, NOISIEST_RAD_S = 40.0, 0.02  # more than a gyroscope reads in rad
 NORM_TOLERANCE = 2e-3
 AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
-QUATERNION = ("qw", "qx", "qy", "qz")
 QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")
 DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
 GRAVITY = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
