@@ -40,13 +40,13 @@ class ColumnSection(Section):
 
     @field_validator("column", mode="before")
     @classmethod
-    def number_as_text(cls, value: object) -> object:
+    def convert_number_to_text(cls, value: object) -> object:
         """Return a column's number as the text that a file has."""
         return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
     @field_validator("unit")
     @classmethod
-    def unit_exists(cls, value: str | None) -> str | None:
+    def refuse_unknown_unit(cls, value: str | None) -> str | None:
         """Refuse a unit that is not in the table, as nothing can be converted from it."""
         if value is not None and value not in ALLOWED:
             raise ValueError(f"this unit is not known; allowed: {', '.join(ALLOWED)}")
@@ -54,14 +54,14 @@ class ColumnSection(Section):
 
     @field_validator("factor", "lsb_per_unit")
     @classmethod
-    def not_nothing(cls, value: float | None) -> float | None:
+    def refuse_zero(cls, value: float | None) -> float | None:
         """Refuse zero, and numbers that no unit of a sensor can have."""
         if value is not None and not LEAST_FACTOR < abs(value) < 1 / LEAST_FACTOR:
             raise ValueError(f"must be between {LEAST_FACTOR:g} and {1 / LEAST_FACTOR:g}, of either sign")
         return value
 
     @model_validator(mode="after")
-    def one_factor(self) -> Self:
+    def require_one_factor(self) -> Self:
         """Refuse both ways to state the size of a step."""
         if self.factor is not None and self.lsb_per_unit is not None:
             raise ValueError("give factor or lsb_per_unit, not both")
@@ -84,7 +84,7 @@ class AxisSection(Section):
     rate: ColumnSection | None = None
 
     @model_validator(mode="after")
-    def units_fit(self) -> Self:
+    def match_units(self) -> Self:
         """Refuse units of another quantity than angle and rate."""
         _fit("angle", self.angle, ANGLE)
         if self.rate is not None:
@@ -102,7 +102,7 @@ class TableSection(Section):
     )
 
     @model_validator(mode="after")
-    def rates_of_all_axes_or_none(self) -> Self:
+    def require_rates_of_all_axes(self) -> Self:
         """Refuse rates of only some axes: the item's rate needs the rates of all axes."""
         _fit("time", self.time, TIME)
         if any(column.unit is None for axis in self.axes for column in (self.time, axis.angle, axis.rate) if column):
@@ -136,7 +136,7 @@ class ColumnMap(Section):
     motion_inverse: bool = False
 
     @model_validator(mode="after")
-    def fits_together(self) -> Self:
+    def check_combination(self) -> Self:
         """Refuse a column if its unit and the unit in its name are of different quantities."""
         for section, rate_hz in ((self.samples, self.samples_rate_hz), (self.motion, self.motion_rate_hz)):
             for name, column in section.items():

@@ -117,7 +117,7 @@ class ArmSection(TurnerSection):
 
     @field_validator("host")
     @classmethod
-    def can_be_looked_up(cls, value: str) -> str:
+    def check_looked_up_name(cls, value: str) -> str:
         """Refuse a name that no name server can resolve."""
         return check_host(value)
 
@@ -167,7 +167,7 @@ class ProcedureSection(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def stages_only_where_they_mean_something(cls, data: Any) -> Any:
+    def refuse_meaningless_stages(cls, data: Any) -> Any:
         """Refuse `stages` for attitudes and verifications, which have one mounting."""
         if isinstance(data, dict) and "stages" in data and "stages" not in cls.model_fields:
             raise ValueError(
@@ -242,7 +242,7 @@ class SensorsConfig(Section):
 
     @field_validator("sensors")
     @classmethod
-    def sensors_fit_together(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
+    def match_sensors(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
         """Refuse sensors that share a select line, port, IMU or name, and more than one reference."""
         sensor_at: dict[str, str] = {}
         for name, sensor in sensors.items():
@@ -271,7 +271,7 @@ class SensorsConfig(Section):
 
     @field_validator("sensors")
     @classmethod
-    def the_link_carries_them(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
+    def check_link_rate(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
         """Refuse data rates that exceed the link's capacity. Of a sensor's two message sizes, the larger must fit."""
         streams = _streams(sensors)
         if "board" not in info.data or not streams:
@@ -283,7 +283,7 @@ class SensorsConfig(Section):
 
     @field_validator("magnetometers")
     @classmethod
-    def magnetometers_fit_beside_them(
+    def match_magnetometers(
         cls, magnetometers: dict[str, MagnetometerSection], info: ValidationInfo
     ) -> dict[str, MagnetometerSection]:
         """Refuse a magnetometer with a sensor's name, and rates that exceed the link's capacity."""

@@ -99,14 +99,14 @@ class SiteSection(Section):
 
     @field_validator("base_up")
     @classmethod
-    def a_direction(cls, value: Vector3) -> Vector3:
+    def check_direction(cls, value: Vector3) -> Vector3:
         """Refuse a vector of length zero, which has no direction."""
         if not np.linalg.norm(value) > 1e-6:
             raise ValueError("must be a direction, such as [0, 0, 1]")
         return value
 
     @model_validator(mode="after")
-    def a_heading_has_a_latitude(self) -> Self:
+    def require_latitude_of_heading(self) -> Self:
         """Refuse a heading without a latitude, as the Earth's rate needs both."""
         if self.heading_deg is not None and self.latitude_deg is None:
             raise ValueError("needs latitude_deg and heading_deg, or neither")
@@ -171,7 +171,7 @@ class HistorySection(Section):
 
     @field_validator("url")
     @classmethod
-    def url_without_a_password(cls, value: str | None) -> str | None:
+    def refuse_password_in_url(cls, value: str | None) -> str | None:
         """Refuse a password, which every recording would keep with its configuration."""
         if value is not None and "://" in value and history_url(value).password is not None:
             raise ValueError("contains a password, and every recording would keep it; put it into ~/.pgpass")

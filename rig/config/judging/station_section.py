@@ -42,7 +42,7 @@ class StationSection(Section):
 
     @field_validator("serial_pattern")
     @classmethod
-    def is_a_pattern(cls, value: str) -> str:
+    def check_pattern(cls, value: str) -> str:
         """Refuse a text that is no regular expression."""
         try:
             re.compile(value, re.ASCII)

@@ -94,7 +94,7 @@ class SixSweepsSection(ProcedureSection):
     )
 
     @model_validator(mode="after")
-    def every_direction_is_swept(self) -> Self:
+    def require_every_direction(self) -> Self:
         """Refuse an order that lacks one of the six directions, which six parameters need (SIX, section II-B)."""
         order, directions = self.order or get_args(Wrist), self.directions or ("cw", "ccw")
         if len(set(order)) < 3 or len(order) > 3 or set(directions) != {"cw", "ccw"}:
@@ -303,7 +303,7 @@ class AttitudesSection(ProcedureSection):
 
     @field_validator("attitudes")
     @classmethod
-    def no_attitude_twice(cls, value: tuple[Vector3, ...]) -> tuple[Vector3, ...]:
+    def refuse_repeated_attitudes(cls, value: tuple[Vector3, ...]) -> tuple[Vector3, ...]:
         """Refuse an attitude that is listed twice: the arm makes the same error again, which adds no information."""
         listed: set[tuple[float, ...]] = set()
         for attitude in value:
@@ -442,7 +442,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
     )
 
     @model_validator(mode="after")
-    def a_range_with_several_temperatures(self) -> Self:
+    def check_temperature_range(self) -> Self:
         """Refuse a range with too few sets for polynomials, whose order is chosen only after the run."""
         gaps, other = (2, "") if self.both_directions else (3, " with both_directions: false")
         if self.to_c - self.from_c < gaps * self.max_step_k:

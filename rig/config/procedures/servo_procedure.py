@@ -85,7 +85,7 @@ class ServoSixObservationSection(ProcedureSection):
     )
 
     @model_validator(mode="after")
-    def six_directions(self) -> Self:
+    def require_six_directions(self) -> Self:
         """Refuse fewer than six independent turns: six parameters need both directions about three independent axes."""
         if set(self.directions) != {"cw", "ccw"}:
             raise ValueError("directions must name both cw and ccw")

@@ -37,7 +37,7 @@ class TargetUncertaintySection(Section):
     )
 
     @model_validator(mode="after")
-    def has_a_target(self) -> Self:
+    def require_target(self) -> Self:
         """Refuse a section without a target of either kind: nothing would end the run early."""
         if self.scale is None and self.bias is None:
             raise ValueError("say the expanded uncertainty at which the run ends, as {scale: 1e-3, bias: 1e-4}")

@@ -36,7 +36,7 @@ class StageSection(Section):
 
     @field_validator("sweeps")
     @classmethod
-    def no_wrist_twice(cls, value: tuple[Wrist, ...] | None) -> tuple[Wrist, ...] | None:
+    def refuse_repeated_wrists(cls, value: tuple[Wrist, ...] | None) -> tuple[Wrist, ...] | None:
         """Refuse a wrist that is listed twice."""
         if value is not None and len(set(value)) < len(value):
             raise ValueError("must name each wrist once; procedure.repeats says how often everything is done")

@@ -202,7 +202,7 @@ class LinesSection(Section):
 
     @field_validator("columns")
     @classmethod
-    def columns_are_complete(cls, columns: tuple[str, ...]) -> tuple[str, ...]:
+    def require_complete_columns(cls, columns: tuple[str, ...]) -> tuple[str, ...]:
         """Refuse repeated columns, incomplete triads, and lines without a gyroscope."""
         twice = [name for name, count in Counter(columns).items() if count > 1 and name != "-"]
         if twice:
@@ -216,7 +216,7 @@ class LinesSection(Section):
         return columns
 
     @model_validator(mode="after")
-    def columns_and_sections_agree(self) -> Self:
+    def match_columns_and_sections(self) -> Self:
         """Refuse a column without its section, and a section without its column."""
         if self.keys and len(self.keys) != len(self.columns):
             raise ValueError(f"there are {len(self.keys)} keys for {len(self.columns)} columns; give one for each")
@@ -238,7 +238,7 @@ class LinesSection(Section):
         return self
 
     @model_validator(mode="after")
-    def the_clock_has_its_column(self) -> Self:
+    def require_clock_column(self) -> Self:
         """Refuse a clock without the column that it needs, and a checksum over text that is unknown."""
         if self.clock == "device" and self.time is None:
             raise ValueError(

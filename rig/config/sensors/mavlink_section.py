@@ -54,7 +54,7 @@ class MavlinkSection(Section):
 
     @field_validator("port")
     @classmethod
-    def an_address_has_host_and_port(cls, value: str) -> str:
+    def check_host_and_port(cls, value: str) -> str:
         """Refuse a port that cannot be one; `udp:` and `tcp:` are followed by an address."""
         kind, _, rest = value.partition(":")
         if kind in NETWORKS:

@@ -85,7 +85,7 @@ class MountingSection(Section):
     z: AxisName = Field(default="+z", description="the flange axis along which the sensor's z axis points")
 
     @model_validator(mode="after")
-    def right_handed(self) -> Self:
+    def refuse_left_handed_axes(self) -> Self:
         """Refuse a mirrored or repeated axis, which no mounting has."""
         if not np.isclose(np.linalg.det(mounting_matrix(self)), 1.0):
             raise ValueError("must name three different axes that form a right-handed frame, for example +x, +y, +z")
@@ -206,7 +206,7 @@ class SensorSection(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def usual_of_the_part(cls, data: Any) -> Any:
+    def set_defaults_of_part(cls, data: Any) -> Any:
         """Fill in the part's usual data rate and ranges if they are left out."""
         if not isinstance(data, Mapping):
             return data
@@ -224,7 +224,7 @@ class SensorSection(Section):
 
     @field_validator("acceleration")
     @classmethod
-    def a_range_of_its_accelerometer(
+    def check_accelerometer_range(
         cls, value: AccelerationSection | None, info: ValidationInfo
     ) -> AccelerationSection | None:
         """Refuse a range that the part's accelerometer does not have."""
@@ -240,7 +240,7 @@ class SensorSection(Section):
         return value
 
     @model_validator(mode="after")
-    def its_own_port_carries_it(self) -> Self:
+    def check_own_port(self) -> Self:
         """Refuse a port of its own for a part on the board, and a part that needs one without it."""
         if self.part == "mavlink" or self.mavlink is not None:
             return self._is_in_autopilot()
@@ -272,7 +272,7 @@ class SensorSection(Section):
 
     @field_validator("turntable")
     @classmethod
-    def only_of_a_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
+    def require_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
         """Refuse a stored calibration for a sensor that is to be calibrated."""
         if info.data.get("role") == "calibrate":
             raise ValueError("only a sensor with role: reference has one; a sensor to calibrate gets its own here")

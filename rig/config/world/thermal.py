@@ -69,7 +69,7 @@ class SimulatedThermalSection(Section):
 
     @field_validator("air_c")
     @classmethod
-    def times_rise(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    def require_rising_times(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
         """Refuse pairs whose times do not increase."""
         times = [time_s for time_s, _ in value]
         if any(after <= before for before, after in pairwise(times)):
