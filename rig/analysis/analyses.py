@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
     """Solve and judge the recordings of a calibration.
 
-    There is at least one, from a run that just ended or from files. If `drifting`, a bias drift is no contradiction.
-    Raise Fault or Refused if the recordings lack something.
+    At least one recording is needed, from a run that just ended or from files. If `drifting`, a bias drift is no
+    contradiction. Raise Fault or Refused if the recordings lack something.
     """
     from rig.analysis import judging
     from rig.analysis.external import external_outcome as external_judging
@@ -45,7 +45,7 @@ def estimate_bias_drift(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTI
 def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
     """Solve and judge the recordings of a session by hand, at least one.
 
-    Raise Fault as `rig.estimation.by_hand.solve_by_hand` does, `no_crystal` if the board's clock has none.
+    Raise Fault as `rig.estimation.by_hand.solve_by_hand` does, and `no_crystal` if no crystal drives the board's clock.
     """
     from rig.analysis.by_hand import hand_outcome as hand_judging
 
@@ -65,9 +65,9 @@ def verify_calibration(outcome: Outcome, repeated: "Sequence[RunData]") -> Outco
 
 @solvable()
 def verify_stored_calibrations(repeated: "Sequence[RunData]") -> Outcome:
-    """Verify the calibrations stored on the board, by recordings of readings that it corrected.
+    """Verify the calibrations stored on the board, by at least one recording of readings that it corrected.
 
-    There is at least one recording. Raise Fault as `verify_calibration` does.
+    Raise Fault as `verify_calibration` does.
     """
     from rig.analysis import judging
 

@@ -46,7 +46,7 @@ class Check:
 
     @property
     def false_acceptance(self) -> float | None:
-        """The probability that a value which passed is beyond the limit; None if it did not pass."""
+        """The probability that the true value of a passed check is beyond the limit; None if it did not pass."""
         if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
             return None
         return float(beyond((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.dof))
@@ -66,7 +66,7 @@ def fitness(
 ) -> Check:
     """Return a check of a sensor's quantity with a `limit` of its own.
 
-    The name includes the index of the plan's `sweep` or `dwell` that the check is about.
+    The plan's `sweep` or `dwell` that the check is about adds its index to the name.
     """
     means, index = Meaning("fitness", sensor, quantity, parameter, sweep, what), dwell if sweep is None else sweep
     name = name_check(sensor, quantity, what)
@@ -76,7 +76,7 @@ def fitness(
 def list_unsolved(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
     """Yield a failing check for each sensor without a solution, from name, quantity and Fault.
 
-    Sensors that are only recorded have none, as a magnetometer in sweeps.
+    A sensor that is only recorded, such as a magnetometer in sweeps, has none.
     """
     for sensor, quantity, fault in faults:
         if fault.name not in ONLY_RECORDED:
@@ -84,6 +84,6 @@ def list_unsolved(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
 
 
 def name_check(sensor: str, quantity: str, what: str) -> str:
-    """Return the name of a check of a sensor, without the quantity if that is a gyroscope's rate."""
+    """Return the name of a check of a sensor; it contains the quantity, unless that is a gyroscope's rate."""
     described = quantities().get(quantity)
     return f"{sensor}.{f'{quantity}_' if described is None else described.prefix}{what}"

@@ -109,7 +109,7 @@ def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
 
 
 def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
-    """Return the difference of each pair of clocks, from the recording in which they agree least."""
+    """Return the difference of each pair of clocks, from the recording with the largest difference."""
     worst: dict[tuple[str, str], ClockDifference] = {}
     for one in (difference for check in clocks for difference in check.differences()):
         worst[one.clocks] = max(worst.get(one.clocks, one), one, key=lambda difference: difference.limit_fraction)
@@ -123,7 +123,7 @@ def _compare_to_computer(recording: ObservedRun, uncertainty: Uncertainty) -> Cl
 
 
 def _compare_to_crystal(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison | None:
-    """Compare the controller's clock with the board's counter; None without a board, or if no crystal drives it."""
+    """Compare the controller's clock with the board's counter; None without a board or without a crystal."""
     bases = [sensor.time_base for name, sensor in recording.sensors.items() if recording.run.sensors[name].on_board]
     if not bases or recording.run.provenance.board_follows_crystal is False:
         return None

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def of_angles(result: "SensorResult") -> Array | None:
-    """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then mounting; None without budget."""
+    """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then of its mounting, or None."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
         return None
@@ -35,7 +35,7 @@ def of_angles(result: "SensorResult") -> Array | None:
 
 
 def of_sensitivity(result: "SensorResult") -> Array | None:
-    """Return the degrees of freedom (3, 3) of a gyroscope's sensitivity to gravity; None without it or a budget."""
+    """Return the degrees of freedom (3, 3) of a gyroscope's g-sensitivity; None without it or without a budget."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
         return None
@@ -73,7 +73,7 @@ def of_field_angles(result: "MagnetometerResult") -> Array:
 def of_reversal(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
-    The latter are the fewest of any run's bias, a lower bound for a sum of independent parts.
+    The latter are the fewest of any run's bias: a lower bound for a sum of independent parts.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # (Σ u_i²)² / ν of each run is Σ u_i⁴ / ν_i: what the runs share is known, and adds nothing to it.
@@ -100,15 +100,15 @@ def _in_attitudes(budget: Budget, response: Array, noise: Array, std: Array) -> 
 
 
 def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
-    """Return the parts of a gyroscope's variances, by the contributor that determines their degrees of freedom.
+    """Return the parts of a gyroscope's variances, by the contributor that has their degrees of freedom.
 
-    If the readings show no bias drift, it is the flicker of the data sheet, whose degrees of freedom are infinite.
+    If the readings show no bias drift, the drift is the data sheet's flicker, with infinite degrees of freedom.
     """
     return {NOISE: noise, **({WANDERING: walk} if explained.bias.is_drifting else {})}
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
-    """Return the degrees of freedom (…) of variances (…) by contributor (`parts`); the remainder has infinitely many.
+    """Return the degrees of freedom (…) of variances (…) by contributor (`parts`); the remainder is exact.
 
     Raise KeyError if the budget has no such contributor.
     """
@@ -120,12 +120,12 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
 
 
 def _to_angles(matrix: Array) -> Array:
-    """Return the derivative (6, 3, 3) of angles between the axes and of their mounting with respect to F."""
+    """Return the derivative (6, 3, 3) by F of the angles between the axes and of their mounting."""
     return SensorAxes.from_matrix(matrix).to_angles.reshape(6, 3, 3)
 
 
 def _of_matrix(solution: VectorSolution) -> Array:
-    """Return the covariance (3, 3, 3, 3) of F by the readings."""
+    """Return the covariance (3, 3, 3, 3) of F due to the readings."""
     return solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)
 
 

@@ -35,8 +35,8 @@ class Surroundings:
 def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings:
     """Return the site and the clock comparison of a run.
 
-    The clock is compared over the longest motion, which determines it best: all recordings share the controller's
-    quartz. `clocks` shows if they do not, or if the computer's time is wrong.
+    The recording with the longest motion determines the clock best, and all recordings share the controller's quartz.
+    `clocks` shows if they do not, or if the computer's time is wrong.
     """
     uncertainty = settings.stated_uncertainty
     longest = max(recordings, key=lambda run: float(run.motion.time_s[-1] - run.motion.time_s[0]))

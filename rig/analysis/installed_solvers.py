@@ -41,7 +41,7 @@ class KindFound:
 
 
 def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[KindFound, ...]:
-    """Return every sensor of an installed kind that was recorded, in the order of the kinds."""
+    """Return every recorded sensor of an installed kind, in the order of the kinds."""
     return tuple(_solve_kinds(recordings, settings))
 
 

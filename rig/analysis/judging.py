@@ -95,7 +95,7 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
 def _check_unsolved(
     magnetometers: "Attempts[str, MagnetometerResult]", installed_kinds: Sequence[KindFound]
 ) -> Iterator[Check]:
-    """Yield the checks of sensors that were to be calibrated and have no solution."""
+    """Yield the failing checks of sensors that were to be calibrated and have no solution."""
     yield from list_unsolved((name, FIELD.name, fault) for name, fault in magnetometers.faults.items())
     yield from list_unsolved((kind.name, kind.quantity.name, kind.fault) for kind in installed_kinds if kind.fault)
 
@@ -186,7 +186,7 @@ def _add_polynomials(
     add: Callable[[ResultT, "OverTemperature"], tuple[ResultT, "OverTemperature"]],
     polynomials: "Polynomials",
 ) -> tuple[dict[str, ResultT], "Polynomials"]:
-    """Return a quantity's results with the polynomials over temperature in their uncertainty, and these."""
+    """Return a quantity's results, their uncertainty including that of the polynomials, and the polynomials."""
     settled = {name: add(results[name], fits[quantity]) for name, fits in polynomials.items() if quantity in fits}
     added = {name: result for name, (result, _) in settled.items()}
     combined = {name: {**polynomials[name], quantity: fit} for name, (_, fit) in settled.items()}
@@ -258,7 +258,7 @@ def _gravity_effects(
 ) -> tuple[Array, Array] | None:
     """Return gravity's effect (N, 3) on the corrected readings of sensor and reference, whose corrections omit it.
 
-    The centripetal acceleration acts as gravity does. None if the calibration has no g-sensitivity.
+    The centripetal acceleration acts as gravity does. Return None if the calibration has no g-sensitivity.
     """
     from rig.analysis.gyroscope.comparison import list_revolutions
 

@@ -91,7 +91,7 @@ def count_from(looked: LookedFile, origin_s: int) -> LookedFile:
 
 
 def is_incomplete(columns: Mapping[str, Any]) -> bool:
-    """Return whether a map has "?" where a number is still to be stated."""
+    """Return whether a map contains a "?" in place of a number."""
     return OPEN in columns.values() or any(
         OPEN in entry.values()
         for section in columns.values()
@@ -101,7 +101,10 @@ def is_incomplete(columns: Mapping[str, Any]) -> bool:
 
 
 def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]:
-    """Return all numbers (n, k) of a table, NaN in columns without any, and its times (n,) in their unit, or None."""
+    """Return all numbers (n, k) of a table, NaN in columns without any, and its times (n,) or None.
+
+    Times are in the unit of their column.
+    """
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
     columns = {f"column_{index}": (str(index + 1), 1.0) for index in layout.numbers if index != layout.time}
     if layout.time is not None:
@@ -175,7 +178,7 @@ def _read_samples(looked: LookedFile, column_map: ColumnMap) -> LookedFile:
 
 
 def find_allan_obstacle(samples: Samples) -> RigError | None:
-    """Return the reason why a log does not show a sensor at rest; None if it does."""
+    """Return the reason why a log does not show a sensor at rest, or None."""
     try:
         for quantity, readings in samples.readings.items():
             check_at_rest(samples.time_s, readings, quantity)
@@ -193,7 +196,7 @@ class Trial:
 
 
 def try_turns(path: Path, column_map: ColumnMap) -> Trial:
-    """Solve a log as if the sensor had been turned by hand (`--turns`)."""
+    """Try to solve a log as one of a sensor turned by hand (`--turns`)."""
     options = {
         "clock_ppm": 50.0,
         "box_rad": float(np.radians(0.2)),
@@ -208,7 +211,7 @@ def try_turns(path: Path, column_map: ColumnMap) -> Trial:
 def try_attitudes(
     path: Path, reference: Path, column_map: ColumnMap, up: str, *, find_clock: bool, sensors: Sequence[str]
 ) -> Trial:
-    """Solve a log in the attitudes of a reference, all its sensors, or else the gyroscope alone."""
+    """Try to solve all sensors of a log in the attitudes of a reference, or else the gyroscope alone."""
     files = Files(path, reference, "attitudes", Item("imu"), None, column_map)
     trial = Trial()
     for only in ((), (RATE.sensor,)) if len(sensors) > 1 and RATE.sensor in sensors else ((),):

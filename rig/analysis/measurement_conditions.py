@@ -48,7 +48,7 @@ class _WeightedReadings:
 
 
 def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeConditions:
-    """Return the times of a gyroscope's readings: for the scale in sweeps, for the bias in sweeps and rests."""
+    """Return the conditions of a gyroscope's readings: for the scale in sweeps, for the bias in sweeps and rests."""
     parts = [(recording.sensors[name], recording.clock_offset_s) for recording in recordings]
     turns = [_read_average(turn.average, offset_s) for part, offset_s in parts for turn in part.revolutions]
     rests = [_read_average(rest, offset_s) for part, offset_s in parts for rest in part.rests]
@@ -58,7 +58,7 @@ def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> GyroscopeCondi
 
 
 def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """Return the times of an accelerometer's readings: in the dwells with the given indices, and in its sweeps."""
+    """Return the conditions of an accelerometer's readings: in the dwells with these indices, and in sweeps."""
     wanted, read = frozenset(dwells), []
     for recording in recordings:
         part, offset_s = recording.sensors[name], recording.clock_offset_s
@@ -77,7 +77,7 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
 
 
 def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """Return the times of a magnetometer's readings in the last dwells of these indices; it has no thermometer."""
+    """Return the conditions of a magnetometer's readings in the last dwells of these indices; it has no thermometer."""
     wanted = frozenset(dwells)
     times_s = {
         index: (start_s + recording.clock_offset_s, end_s + recording.clock_offset_s)
@@ -96,7 +96,7 @@ def _read_average(average: Average, offset_s: float) -> _WeightedReadings:
 
 
 def _average_conditions(recordings: Sequence[ObservedRun], name: str, read: Sequence[_WeightedReadings]) -> When:
-    """Return the times of weighted windows; a recording's clock starts with its first state."""
+    """Return the conditions of weighted windows; a recording's clock starts with its first state."""
     began = datetime.fromisoformat(recordings[0].run.provenance.started_utc)
     first_s, weights = float(recordings[0].motion.time_s[0]), [window.weight for window in read]
 

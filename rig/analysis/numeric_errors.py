@@ -10,7 +10,7 @@ LIBRARIES = ("numpy.", "scipy.")
 
 @contextmanager
 def solvable() -> Iterator[None]:
-    """Raise Fault `not_solvable` if NumPy or SciPy raises ValueError; an error of our own code passes through."""
+    """Raise Fault `not_solvable` if NumPy or SciPy raises ValueError in the block; let errors of our own code pass."""
     try:
         yield
     except ValueError as error:  # of which NumPy's LinAlgError is one
@@ -25,7 +25,7 @@ def solvable() -> Iterator[None]:
 
 
 def _is_of_library(error: ValueError) -> bool:
-    """Return whether the error comes from one of the libraries."""
+    """Return whether NumPy or SciPy raised the error."""
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

@@ -43,7 +43,7 @@ class Origin:
 def origin_of(runs: "Sequence[RunData]") -> Origin:
     """Return the origin of a run's recordings, at least one, with the present time of solution.
 
-    A recording of another stage does not resume the previous one: the item was mounted anew between them.
+    A recording of another stage does not resume the previous one, because the item was mounted anew.
     """
     return Origin(
         recorded=runs[0].provenance,

@@ -63,7 +63,7 @@ class _RecordedPart:
 
 
 def so_far(runs: Sequence[RunData]) -> SoFar:
-    """Return the partial results of raw readings; of a repeated sweep or dwell the last one counts."""
+    """Return the partial results of raw readings. Of a repeated sweep or dwell, the last one counts."""
     sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
     at_rest: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
@@ -158,7 +158,7 @@ def _observe_sweeps(
 
 
 def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:
-    """Return the mean reading at rest, with the sign of g = K (m + b), weighted by inverse variance."""
+    """Return the mean reading at rest, weighted by inverse variance, with the sign of b in g = K (m + b)."""
     if not rests:
         return None
     weights = 1 / np.array([rest.variance_rad2_s2 for rest in rests])

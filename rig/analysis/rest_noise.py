@@ -53,7 +53,7 @@ class SensorAtRest:
 
 
 def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
-    """Return every sensor with rates, by name, over all recordings of a run, without readings that the board corrected.
+    """Return every sensor with rates, by name, over all recordings of a run, without readings corrected by the board.
 
     Raise Fault as `motion_of` and `synchronize_stream` do.
     """
@@ -107,7 +107,7 @@ def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quan
 
 
 def _summarise(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
-    """Return the noise by intervals at rest, (nᵢ,) times and (nᵢ, 3) readings."""
+    """Return the noise of readings at rest, by intervals of times (nᵢ,) and readings (nᵢ, 3)."""
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")
     if any(not np.ptp(reading, axis=0).all() for reading in readings if len(reading) > FEWEST_TO_JUDGE):

@@ -51,7 +51,7 @@ class _LimitSet:
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of that value, of three axes, which is nearest to its limit by the decision rule."""
+        """Return the check of the one of three axes whose value is nearest to its limit, by the decision rule."""
         check = self.check(what, _largest(values))
         if uncertainty is None or check.value is None:
             return check
@@ -82,7 +82,7 @@ class _LimitSet:
         )
 
     def check_expanded(self, **expanded: Array) -> Iterator[Check]:
-        """Yield the checks of expanded uncertainties (3,) by their names, if a limit is set."""
+        """Yield the checks of expanded uncertainties (3,) that have a limit, by their names."""
         for what, uncertainty in expanded.items():
             if limit_of(self.limits, self.quantity, what)[1] is not None:
                 yield self.check(what, _largest(uncertainty))
@@ -96,8 +96,7 @@ def judge(
 ) -> tuple[Check, ...]:
     """Return the checks of every gyroscope by name.
 
-    If a sensor has a budget, its combined uncertainties are judged, and values by the decision rule; otherwise the
-    noise alone.
+    With a budget, combined uncertainties are judged, and values by the decision rule; without one, the noise alone.
     """
     checks: list[Check] = []
     for name, solution in solutions.items():
@@ -114,8 +113,8 @@ def judge(
 def verification_checks(sensor: str, verification: "Verification | None", limits: Limits | None) -> tuple[Check, ...]:
     """Return the checks of calibrated readings: the worst axis, and the worst mean over a revolution.
 
-    The reference is compared with the arm too, by the limit of those means, because its own error may be the cause.
-    Pass None for a verification that did not take place.
+    The same limit applies to the reference's error against the arm, because that may be the cause. None stands for a
+    verification that did not take place.
     """
     rms = mean = verified = None
     if verification is not None:
@@ -131,7 +130,7 @@ def verification_checks(sensor: str, verification: "Verification | None", limits
 
 
 def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
-    """Return the checks that the clocks of a run agree within their stated and measured uncertainty.
+    """Return the checks that a run's clocks agree within their stated and measured uncertainty.
 
     For each pair, the recording with the largest difference counts.
     """
@@ -185,5 +184,5 @@ def _expand(std: Array, dof: Array) -> ExpandedUncertainty:
 
 
 def _largest(values: np.ndarray) -> float | None:
-    """Return the largest magnitude; None if one is not a number."""
+    """Return the largest magnitude; None if any of the values is not a number."""
     return float(np.abs(values).max()) if np.isfinite(values).all() else None

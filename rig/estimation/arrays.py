@@ -11,7 +11,7 @@ BISECTIONS = 30
 
 
 def scale_of(matrix: Array) -> Array:
-    """Return the scale factors k (3,) of a sensor that reads F g + o: one over the length of each row of F (3, 3)."""
+    """Return the scale factors k (3,) of a sensor that reads F g + o: the inverse length of each row of F (3, 3)."""
     scale: Array = 1 / np.linalg.norm(matrix, axis=1)
     return scale
 
@@ -47,7 +47,7 @@ def interpolate(instants: Array | NDArray[np.intp], points: Array | NDArray[np.i
 
 
 def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
-    """Return values over sizes ≥ 0 of one shape; infinite for a nonzero value over a negligible size."""
+    """Return values divided by sizes ≥ 0 of the same shape; infinite for a nonzero value over a negligible size."""
     value, size = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
     none = np.where(value == 0, 0.0, np.copysign(np.inf, value))
     ratio: Array = np.divide(value, size, out=none, where=size > SMALLEST_SIZE)
@@ -55,7 +55,7 @@ def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
 
 
 def bisect(is_too_small: Callable[[Array], Array | NDArray[np.bool_]], highest: Array) -> Array:
-    """Return the values (q,) from 0 to `highest` (q,) above which `is_too_small` is false, by bisection."""
+    """Return by bisection the values (q,), 0 to `highest` (q,), up to which `is_too_small` is true."""
     low, high = np.zeros_like(highest), highest
     for _ in range(BISECTIONS):
         middle = (low + high) / 2

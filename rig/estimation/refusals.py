@@ -40,7 +40,7 @@ def require_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
 
 
 def check_finite(**arrays: Array) -> None:
-    """Raise Fault `not_finite` with the first array, and row, that holds a NaN or an infinity."""
+    """Raise Fault `not_finite` naming the first array and row with a NaN or an infinity."""
     for name, array in arrays.items():
         finite = np.isfinite(array)
         if not finite.all():
@@ -142,7 +142,7 @@ def check_unit(scale: Array) -> None:
 
 
 def check_reading_ratio(ratio: float, where: str) -> None:
-    """Raise Fault `wrong_unit` if readings are `ratio` times the turn rate, beyond 4 or 1/4, as `check_unit`."""
+    """Raise Fault `wrong_unit` if readings are more than 4 times, or less than a quarter of, the turn rate."""
     if not _is_plausible(ratio):
         raise _wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio)
 
@@ -221,7 +221,7 @@ def check_rotations(attitudes: Array) -> None:
 
 
 def check_side(reference: Array, side: Array) -> None:
-    """Raise Fault `sign_unknown` if a direction (3,) is too far from v_ref (3,) to determine its sign."""
+    """Raise Fault `sign_unknown` if a direction (3,) is nearly perpendicular to v_ref (3,): its sign is then open."""
     if abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
         raise Fault(
             "sign_unknown",
@@ -252,7 +252,7 @@ def untrustworthy_attitudes(what: str) -> Fault:
 
 
 def report_inverted() -> Fault:
-    """Return the error for attitudes whose inverses the readings agree with."""
+    """Return the error for attitudes that are inverted: the readings agree with their inverses."""
     return Fault(
         "inverted_attitudes",
         "the readings contradict the attitudes and agree with their inverses",
@@ -262,7 +262,7 @@ def report_inverted() -> Fault:
 
 @contextmanager
 def convergence_required() -> Iterator[None]:
-    """Raise Fault `attitude_untrustworthy` if the linear algebra of a fit in attitudes does not converge."""
+    """Raise Fault `attitude_untrustworthy` if a fit in attitudes fails numerically."""
     try:
         yield
     except np.linalg.LinAlgError:
@@ -291,7 +291,7 @@ def condition_of(design: Array, needed: int, noise: float = 0.0) -> Conditioning
 
 
 def check_conditioning(conditioned: Conditioning, needed: int, limit: float, what: str, remedy: str) -> None:
-    """Raise Fault `rank_deficient` below the `needed` rank, `ill_conditioned` above the `limit` of the condition."""
+    """Raise Fault `rank_deficient` below the `needed` rank, `ill_conditioned` above the condition number `limit`."""
     if conditioned.rank < needed:
         undetermined = f"the observations leave {what} undetermined ({conditioned.rank} of {needed})"
         raise Fault("rank_deficient", undetermined, remedy)

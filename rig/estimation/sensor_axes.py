@@ -41,7 +41,7 @@ class SensorAxes:
 
     @property
     def correction_matrix(self) -> Array:
-        """The matrix (3, 3) from offset-corrected readings to the orthogonal frame closest to the sensitive axes."""
+        """The matrix (3, 3) that maps offset-corrected readings to the right-angled frame nearest to the axes."""
         matrix: Array = self.mounting @ np.linalg.inv(self.axes / self.scale[:, None])
         return matrix
 

@@ -110,10 +110,7 @@ class Readings:
         return self.signal(TEMPERATURE.name)
 
     def signal(self, quantity: str) -> Signal:
-        """Return the readings of the quantity `name`.
-
-        Raise Refused `no_such_quantity`; Fault as `on_arm_clock`.
-        """
+        """Return the readings of the quantity `name`. Raise Refused `no_such_quantity`; Fault as `on_arm_clock`."""
         channel = next((channel for channel in self.sensor.channels if channel.quantity == quantity), None)
         if channel is None:
             raise Refused(

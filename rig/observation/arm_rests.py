@@ -32,7 +32,7 @@ def average_rests(
 
 
 def trim_rest(motion: ArmMotion, rest: Window) -> Window | None:
-    """Return a rest without its beginning and end; None if the arm moved in it or too few states cover it."""
+    """Return a rest without its beginning and end; None if the arm moved in it or it has too few states."""
     still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
     moved_rad = motion.travel_rad(still)
     return still if moved_rad is not None and moved_rad <= MAX_TRAVEL_AT_REST_RAD else None
@@ -57,10 +57,9 @@ def add_attitude(average: Average, motion: ArmMotion) -> Average:
 
 
 def estimate_bias_drift(rests: Sequence[Average]) -> Array:
-    """Return the variance (3,) of the bias from rest to rest, (rad/s)², beyond the noise of a rest.
+    """Return the variance (3,) of the bias from rest to rest, (rad/s)², in excess of the noise of a rest.
 
-    Zero unless it is significant over all axes together (χ² at 0.999), so that a steady sensor's variance is not
-    raised.
+    It is zero unless χ² over all axes is significant at 0.999, so noise does not inflate a steady sensor's variance.
     """
     from scipy.special import chdtri
 

@@ -23,22 +23,22 @@ SETTLING_S = 0.2  # cut off at either end of a rest
 
 
 def find_companion(recording: ObservedRun, name: str) -> str | None:
-    """Return the sensor on the clock of the magnetometer `name` whose accelerometer was read in dwells, or None."""
+    """Return the sensor on the magnetometer's clock whose accelerometer was read in dwells, or None."""
     return find_dwelling_companion(
         recording.run, name, (sensor for sensor, observations in recording.sensors.items() if observations.dwells)
     )
 
 
 def find_dwelling_companion(run: RunData, name: str, sensors: Iterable[str]) -> str | None:
-    """Return the first of `sensors` that is on the clock of the magnetometer `name`; None if none is."""
+    """Return the first of `sensors` that shares the clock of the magnetometer `name`, or None."""
     return next((sensor for sensor in sensors if one_clock(run, sensor, name)), None)
 
 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[StaticReading, ...]:
     """Average a magnetometer's readings in the dwells in which an accelerometer on its clock was read.
 
-    The gyroscope's time base serves both. The magnetometer's delay against that gyroscope does not matter for a mean at
-    rest. Raise Fault `lost_samples` or `saturation`.
+    The gyroscope's time base serves both, as a delay of the magnetometer does not affect a mean at rest. Raise Fault
+    `lost_samples` or `saturation`.
     """
     other = find_companion(recording, name)
     if other is None:
@@ -78,9 +78,10 @@ def read_field_in_dwells(recording: ObservedRun, name: str) -> Iterator[tuple[Dw
 def field_tests(
     recording: ObservedRun, name: str, thresholds: ObservationThresholds, home_q_rad: Sequence[float]
 ) -> tuple[Mean, ...]:
-    """Average the magnetometer's readings, in tesla, in the rests at home, in order. Raise as `field_readings` does.
+    """Average the magnetometer's readings, in tesla, in the rests at home, in order.
 
-    A rest with fewer samples than a dwell needs is skipped: a run's last samples may not have arrived when it ends.
+    Raise Fault as `field_readings` does. Rests with fewer samples than a dwell needs are skipped, as the last samples
+    of a run may arrive after its end.
     """
     other = find_companion(recording, name)
     if other is None:

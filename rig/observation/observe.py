@@ -132,7 +132,10 @@ def observe_sensor(
 def observe_each_sweep(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> Attempts[int, Observation]:
-    """Observe every finished sweep by itself; return the observations, and the faults, by the sweep's index."""
+    """Return the observations of finished sweeps, and the faults of others, both by the sweep's index.
+
+    A fault of one sweep does not affect the others.
+    """
     observe = partial(_observe_revolution, run, stream, motion, settings=settings)
     return attempt_each({finished.sweep.index: partial(observe, finished) for finished in swept(run)})
 
@@ -222,7 +225,7 @@ def _average_revolution(
 
 
 def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
-    """Return a turn at the sample times (n,), for those samples whose arm motion is recorded: `covered` (n,)."""
+    """Return a turn at those of the times (n,) with a record of the arm's motion, and their mask (n,), `covered`."""
     fraction = (time_s - turn.start_s) / turn.duration_s
     waves = harmonics(turn.angle_rad * fraction, 2 * turn.beats)[covered]
     if not turn.closed:
@@ -271,7 +274,7 @@ def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
 
 
 def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
-    """Raise Fault `stuck_sensor` if no reading of any axis changes although the noise exceeds one count."""
+    """Raise Fault `stuck_sensor` if no reading changes on any axis although the noise exceeds one count."""
     counts = stream.sensor.channel(RATE).counts(stream.raw)
     if np.median(np.abs(np.diff(counts, axis=0)), axis=0).min() < 1:
         return
@@ -288,7 +291,7 @@ def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
 def _check_frozen(readings: Array, rate_read: Array, expected_rad_s: Array, where: str) -> None:
     """Raise Fault `stuck_axis` if all readings of an axis are equal and differ from its expected rate.
 
-    Coarse steps alone do not raise it.
+    Coarse resolution alone does not raise it.
     """
     still = np.ptp(readings, axis=0) == 0
     misread = np.abs(rate_read - expected_rad_s) > FROZEN * np.linalg.norm(expected_rad_s)
@@ -302,7 +305,7 @@ def _check_frozen(readings: Array, rate_read: Array, expected_rad_s: Array, wher
 
 
 def _check_direction(rate_read: Array, expected: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `wrong_sign` or `wrong_axis` if the reading less its value at rest is not along the nominal axis."""
+    """Raise Fault `wrong_sign` or `wrong_axis` if the reading minus that at rest is not along the nominal axis."""
     cosine = float(rate_read @ expected / (np.linalg.norm(rate_read) * np.linalg.norm(expected)))
     angle = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
     limit = settings.max_axis_deviation_deg

@@ -55,16 +55,17 @@ class ObservedRun:
     def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
         """Return the times (n,) of all samples of a sensor on the arm's clock.
 
-        The time base is the `gyroscope`'s; by default the sensor's own, else the first gyroscope's on the same clock.
-        Without any, the times at which samples and arm states arrived at the computer serve, to milliseconds.
+        They use the time base of `gyroscope`, by default the sensor's own, else the first gyroscope's on the same
+        clock. Without any, they are the arrival times of samples and arm states at the computer, accurate to
+        milliseconds.
         """
         bases = {name: observations.time_base for name, observations in self.sensors.items()}
         return times_s(self.run, sensor, bases, gyroscope)
 
     def delay(self, sensor: str, behind: str) -> Delay | None:
-        """Return the delay of `sensor` against the sensor `behind`; None if no single clock stamps the samples of both.
+        """Return the delay of `sensor` against the sensor `behind`; None unless one clock stamps the samples of both.
 
-        Both must be on the board: then their time bases differ only by their filters.
+        Then their time bases differ only by the delays of their filters.
         """
         if not all(self.run.sensors[name].on_board for name in (sensor, behind)):
             return None
@@ -97,9 +98,10 @@ def times_s(run: RunData, sensor: str, bases: Mapping[str, TimeBase], gyroscope:
 def observe_run(
     run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = (), correction: Array | None = None
 ) -> ObservedRun:
-    """Observe every gyroscope of a recording. Raise Fault as `motion_of` and `observe_sensor` do.
+    """Observe every gyroscope of a recording.
 
-    `correction` (3, 3): rotation of the item from its nominal mount, if it was determined.
+    Raise Fault as `motion_of` and `observe_sensor` do. `correction` (3, 3): rotation of the item from its nominal
+    mount, if determined.
     """
     motion = motion_of(run, correction)
     sensors = {name: observe_sensor(run, name, motion, thresholds, superseded) for name in run.measuring(RATE)}
@@ -107,10 +109,10 @@ def observe_run(
 
 
 def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
-    """Observe each recording of a run with a finished sweep or dwell; the last of repeated steps counts.
+    """Observe each recording of a run with a finished sweep or dwell; of repeated steps the last counts.
 
-    The first recording's thresholds are used; `corrections` are as in `observe_run`, by the stage of the procedure.
-    Raise as `turner_of`, and Fault as `observe_run`.
+    The first recording's thresholds are used. `corrections` by the procedure's stage, as in `observe_run`. Raise as
+    `turner_of` does, and Fault as `observe_run` does.
     """
     for run in runs:
         turner_of(run)
@@ -128,10 +130,10 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_
 
 
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """Return the offset of each recording's clock against the first's; the controller may restart in between.
+    """Return the offset of each recording's clock from the first's; the controller may restart in between.
 
-    No recording begins before the last one has ended, whatever the computer's clock says: it may have been set, and an
-    accelerated laboratory's time passes faster.
+    A recording begins after the previous one has ended, whatever the computer's clock says: somebody may have set it,
+    and the time of an accelerated laboratory passes faster.
     """
     offsets_s = [0.0] * bool(recordings)
     for last, recording in pairwise(recordings):

@@ -30,9 +30,9 @@ def revolution_on_the_board(
 ) -> tuple[int, int, float]:
     """Return a revolution's start and end on the board's clock, µs, and its speed by the arm's joints, rad/s.
 
-    `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) should begin before the sweep, which began after the
-    state `first`: a slow sweep alone may have too few samples or too little signal, but the fast motion to its start
-    determines the time base. Raise Fault as `estimate_time_base` and `ArmMotion.turn` do.
+    The sweep began after the state `first`. `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) should begin
+    earlier, because the fast motion to its start determines the time base; a slow sweep alone may not. Raise Fault as
+    `estimate_time_base` and `ArmMotion.turn` do.
     """
     names = [f"joint {number}" for number in range(kinematics.joints)]
     motion = ArmMotion(states, kinematics, names, reading_std_rad=reading_std_rad)

@@ -18,12 +18,12 @@ SPIKE = 8.0  # standard deviations of the readings: normal noise exceeds it once
 
 
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
-    """Return the finished sweeps that `observe_sensor` accepts for every sensor and that hold no spike."""
+    """Return the finished sweeps that `observe_sensor` accepts for every sensor and that contain no spike."""
     return finished_sweeps(run) & _find_sound_steps(run, settings)
 
 
 def sound_dwells(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
-    """Return the finished dwells that are accepted for every sensor and that hold no spike."""
+    """Return the finished dwells that are accepted for every sensor and that contain no spike."""
     return finished_dwells(run) & _find_sound_steps(run, settings)
 
 
@@ -41,7 +41,7 @@ def _find_sound_steps_of(
 ) -> frozenset[int]:
     """Return one sensor's sound sweeps and dwells.
 
-    None if the sensor once did not follow the arm, because the onset of that fault is unknown.
+    Return None if the sensor ever failed to follow the arm, because the onset of that fault is unknown.
     """
     try:
         stream = synchronize_stream(run.samples[sensor], run.sensors[sensor], motion)

@@ -21,7 +21,7 @@ REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
 def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
-    """Raise Fault `stuck_sensor` if readings at rest show rotation; `stuck_axis` if only one axis has no noise."""
+    """Raise Fault `stuck_sensor` if readings at rest show rotation; `stuck_axis` if one axis alone has no noise."""
     if len(rests) < 2:
         return
     apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0)
@@ -39,13 +39,13 @@ def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
 
 
 def check_other_direction(sweep: Sweep, valid_joints: Collection[str | None], fault: Fault) -> None:
-    """Raise Fault `stuck_sensor` if an earlier sweep of the joint read correctly, which excludes a wrong mounting."""
+    """Raise Fault `stuck_sensor` if an earlier sweep of the joint read correctly, so the mounting is right."""
     if sweep.joint_name in valid_joints:
         raise Fault("stuck_sensor", f"{fault.what}; in the other direction it read correctly", REMEDY) from fault
 
 
 def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:
-    """Raise Fault `stuck_sensor` if the readings in two attitudes do not differ as gravity does."""
+    """Raise Fault `stuck_sensor` if the readings in two attitudes differ less than gravity does."""
     for one, other in pairwise(dwells):
         differ = float(np.linalg.norm((one.attitude - other.attitude) @ site.up))
         sensed_m_s2 = float(np.linalg.norm(one.reading.mean - other.reading.mean))
@@ -54,7 +54,7 @@ def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:
 
 
 def check_reads(readings: Array, quantity: Quantity) -> None:
-    """Raise Fault `stuck_sensor` if an axis of readings (n, 3) has one and the same value in all of them."""
+    """Raise Fault `stuck_sensor` if an axis has the same value in all readings (n, 3)."""
     still = np.ptp(readings, axis=0) == 0 if len(readings) else np.zeros(3, bool)
     stuck = [int(axis) for axis in np.flatnonzero(still)]
     if stuck:

@@ -68,7 +68,7 @@ class TimeBase:
         return board_time_s + self.offset_s + self.drift * (board_time_s - self.reference_s)
 
     def correct(self, by_s: float, std_s: float) -> "TimeBase":
-        """Return the time base with its offset changed by `by_s`, then known to `std_s`."""
+        """Return the time base with `by_s` added to its offset, whose standard deviation is then `std_s`."""
         covariance = np.diag([std_s**2, self.covariance[1, 1]])
         return replace(self, offset_s=self.offset_s + by_s, covariance=covariance)
 
@@ -124,7 +124,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
 
 
 def _turns_every_axis(motion: KnownMotion) -> bool:
-    """Return whether every axis of a sensor turned, however mounted; one that did not may repeat its reading."""
+    """Return whether the motion turned every possible axis; one that does not turn may repeat its reading."""
     rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
     return bool(np.linalg.eigvalsh(rates.T @ rates).min() > TURNED_RAD_S**2 * len(rates))
 
@@ -152,10 +152,10 @@ def check_readings(board_time_s: Array, readings: Array) -> None:
 
 
 def _find_first_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:
-    """Return the coarse clock from as many first samples as determine one, and their number.
+    """Return the coarse clock of the first samples that suffice to find one, and their number.
 
-    A recording of ordinary length needs all samples. In a recording of hours they are a part, from which the fine clock
-    extrapolates to twice its length, repeatedly.
+    A recording of ordinary length needs all samples. In one of hours they are a part; the fine clock is then extended
+    to twice its length, repeatedly.
     """
     span_s = LONG_RUN_S
     while True:
@@ -180,7 +180,7 @@ def _count_until(board_time_s: Array, span_s: float) -> int:
 
 
 def _search_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Return the clock within the fine fit's range of convergence: the offset and drift that explain most."""
+    """Return the clock, offset and drift, that explains most, close enough for the fine fit to converge."""
     reference, half_s = (board_time_s[0] + board_time_s[-1]) / 2, (board_time_s[-1] - board_time_s[0]) / 2
     spacing = 2 * COARSE_REACH_S / half_s
     count = round(max(min(MAX_DRIFT, MAX_DRIFT_STEPS * spacing), MAX_DRIFT_LONG_RUN) / spacing)
@@ -203,7 +203,7 @@ def estimate_coarse_offset(board_time_s: Array, readings_rad_s: Array, motion: K
 
 
 def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
-    """Return the start of the motion, and from there in steps its rate (3, n) less its mean."""
+    """Return the time at which the motion starts, and from then its rate (3, n) at even steps, less its mean."""
     grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
     rate = motion.rate(grid).T
     return float(grid[0]), rate - rate.mean(axis=1, keepdims=True)
@@ -310,7 +310,7 @@ def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kn
 def _list_stages(
     clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion
 ) -> Iterator[tuple[Array, Array, KnownMotion]]:
-    """Yield times, readings and motion for each fit: averaged over long, then over short times, else as they are."""
+    """Yield times, readings and motion for each fit: averaged over long times, over short ones, and not averaged."""
     start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
     step_s = float(np.median(np.diff(board_time_s)))
     for over_s in (SLOW_S, FINE_S):

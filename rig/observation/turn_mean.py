@@ -104,9 +104,9 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
 
 
 def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
-    """Return the variance (3,) that slow columns (n, k) fitted to residuals (n, 3) cause in a mean by weights (n,).
+    """Return the variance (3,) of a mean by weights (n,) due to slow columns (n, k) fitted to residuals (n, 3).
 
-    Only their amplitude is used: the phase is arbitrary, and a large line may by chance of phase change this mean
+    Only their amplitude is used: the phase is arbitrary, and by chance of phase even a large line may change this mean
     little.
     """
     powers = (fit_columns(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
@@ -123,9 +123,9 @@ def _fit_residuals(columns: Array, values: Array) -> Array:
 
 
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
-    """Find the vibrations in readings (n, 3), apart from steady columns (n, k) and the rates by the encoders.
+    """Find the vibrations in readings (n, 3), besides steady columns (n, k) and the rates by the encoders.
 
-    Fast lines of the arm's rate are in the readings too, at the same frequency. The residuals show the others.
+    Fast lines of the arm's rate appear in the readings at the same frequency. The residuals show the others.
     """
     uneven = turn.uneven_rad_s[:, None]
     none = uneven[:, :0]
@@ -163,7 +163,7 @@ def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
 
 
 def _changes(slow: Array) -> Array:
-    """Return the first and second differences (n, 2) of a rate (n, 1): the effects of a lag, and of a filter."""
+    """Return the first and second differences (n, 2) of a rate (n, 1): the effects of a lag and of a filter."""
     change = np.gradient(slow, axis=0)
     return np.column_stack([change, np.gradient(change, axis=0)])
 
@@ -171,7 +171,7 @@ def _changes(slow: Array) -> Array:
 def slow_part(rates: Array, share: Array) -> Array:
     """Return the part of rates (n, m) with less than `SLOW` cycles per turn; `share` (n,) is elapsed time.
 
-    Waves of half a turn describe it, because a vibration is not periodic in the turn.
+    It is described by waves of half a turn, because a vibration is not periodic in the turn.
     """
     halves = harmonics(np.pi * share, int(2 * SLOW))
     slow: Array = halves @ fit_columns(halves, rates)

@@ -79,7 +79,7 @@ def dwelt(run: RunData) -> Iterator[Dwelt]:
 
 
 def _is_superseded(run: RunData, rest: Window, superseded: Collection[int]) -> bool:
-    """Return whether the step before the rest, or the one due after it, is in `superseded`."""
+    """Return whether the step before the rest, or the next one after it, is in `superseded`."""
     before, after = -1, None
     for recorded in run.events if superseded else ():
         match recorded.event:

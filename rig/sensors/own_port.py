@@ -77,7 +77,7 @@ class OwnPort:
         return self._most_silent_s is not None
 
     def stream(self, more_s: float = 0.0) -> None:
-        """Treat a silence longer than `Patience.silent_s` plus `more_s` as a fault from now on."""
+        """From now on, treat a silence longer than `Patience.silent_s` plus `more_s` as a fault."""
         with self.news:
             self._most_silent_s, self.silence = self._patience.silent_s + more_s, PortSilence()
 
@@ -94,7 +94,7 @@ class OwnPort:
             raise _complete_error(self._faults.silent, f" for {silent_s:.1f} s")
 
     def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until a condition is true; return whether it was in time. Raise a fault that occurs meanwhile."""
+        """Wait until a condition is true; return whether that was in time. Raise a fault that occurs meanwhile."""
         with self.news:
             done = self.news.wait_for(lambda: until() or self.fault is not None, timeout_s)
             if self.fault is not None:

@@ -15,7 +15,7 @@ class Patience:
     silent_s: float = 2.0
 
     def attempts(self, more_s: float = 0.0) -> list[float]:
-        """Return the time-outs, s, of repeated requests, each twice the previous, `first_s` plus `more_s` in sum."""
+        """Return the time-outs, s, of repeated requests, each twice the last, in sum `first_s` plus `more_s`."""
         return [(self.first_s + more_s) * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
 
 

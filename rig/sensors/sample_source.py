@@ -20,7 +20,7 @@ class SampleSource(Protocol):
         ...
 
     def start(self) -> None:
-        """Start to pass on every sample, numbered from 0 for each sensor."""
+        """Pass on every sample from now on, numbered from 0 for each sensor."""
         ...
 
     def check(self, clock_s: float | None = None) -> None:

@@ -68,7 +68,7 @@ OWN_PORT: Mapping[str, PartKind] = MappingProxyType(
 
 
 def group_by_port(sensors: Sections) -> Iterator[tuple[str, PartKind, Sections]]:
-    """Yield the sensors with a port of their own, grouped by port: the port, their kind, their sections."""
+    """Yield the sensors with a port of their own, grouped by port: the port, its kind of part, the sections."""
     sections_by_port: dict[str, dict[str, SensorSection]] = {}
     for name, section in sensors.items():
         if section.own_port is not None:

@@ -41,10 +41,10 @@ class StopOnce:
                 self._thread.start()
 
     def outcome(self) -> StopOutcome:
-        """Stop, unless that has begun; wait for the outcome, less than 1 s.
+        """Stop, unless the stop has begun; wait for the outcome, less than 1 s.
 
-        Raise an interrupt of the meantime once the outcome is there. (An event, because after an interrupt `join` takes
-        the thread for ended in Python 3.11.)
+        Raise an interrupt of the meantime once the outcome is known. (By an event: in Python 3.11 an interrupted `join`
+        takes the thread for ended.)
         """
         self.begin()
         interrupt = None
@@ -66,7 +66,7 @@ class StopOnce:
 
 @contextmanager
 def stopping_on_error(stop: Callable[[], StopOutcome]) -> Iterator[None]:
-    """Stop before an exception of the block goes on to the caller."""
+    """Stop the turner if the block raises an exception, before the caller receives it."""
     try:
         yield
     except BaseException:

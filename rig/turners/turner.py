@@ -27,11 +27,11 @@ class Turner(Protocol):
         ...
 
     def report(self) -> Report:
-        """Return the turner's report of itself, for pre-flight; nothing moves."""
+        """Read the turner's report of itself, for pre-flight; nothing moves."""
         ...
 
     def check(self) -> None:
-        """Raise the problem that has occurred since the last call, if any."""
+        """Raise the problem that has occurred since the last call, if there is one."""
         ...
 
     def take_control(self, carried: FlangeLoad) -> None:

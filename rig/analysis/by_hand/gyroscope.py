@@ -18,7 +18,7 @@ NO_SWEEPS = Fault("too_few_observations", "moves by hand are no sweeps", "Give s
 def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> SensorResult:
     """Solve the gyroscope of readings, with the stated conditions of the session (`read_conditions`).
 
-    Raise Fault and Refused as `rig.estimation.by_hand.solve_by_hand`, and `stuck_sensor`.
+    Raise Fault and Refused as `rig.estimation.by_hand.solve_by_hand` does, and `stuck_sensor`.
     """
     check_reads(samples.readings[RATE], RATE)
     session = segment_session(samples.time_s, samples.readings[RATE], samples.readings.get(ACCELERATION))
@@ -27,7 +27,7 @@ def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> Sensor
 
 
 def build_hand_result(sensor: RecordedSensor | Item, solution: HandSolution, corrected_by: Correction) -> SensorResult:
-    """Return the result in the form of a gyroscope with sweeps."""
+    """Return a session's result in the same form as that of a gyroscope with sweeps."""
     return SensorResult(
         sensor=sensor,
         solution=solution.turned,

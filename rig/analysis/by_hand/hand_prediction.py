@@ -30,7 +30,7 @@ FIRST: Face = "+z"
 
 
 def duration_s(moves: Sequence[Instruction], rest_s: float) -> float:
-    """Return the duration of a session by hand whose operator makes no mistakes."""
+    """Return the duration of a session by hand if the operator makes no mistakes."""
     return rest_s + sum(_move_s(move) + ASKED_S + rest_s for move in moves)
 
 
@@ -39,7 +39,7 @@ def predict_hand_budgets(
 ) -> dict[str, Budget]:
     """Return the predicted budget of a session with the given moves, for each sensor to calibrate.
 
-    `section` states how square the item's faces are. Raise Fault `no_fit`.
+    `section` states the squareness of the item's faces. Raise Fault `no_fit`.
     """
     uncertainty, section_values = uncertainty_of(config), hand_settings(section)
     budgets = {}
@@ -84,7 +84,7 @@ def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float)
 
 
 def _sample_rotation(lasting_s: float, face: Face, rotation: Array) -> tuple[Array, Array]:
-    """Return rates (n, 3) of the item and the vertical (n, 3), in its axes, during a rotation from a face."""
+    """Return rates (n, 3) and the vertical (n, 3), both in the item's axes, during a rotation from a face."""
     count = round(lasting_s * SAMPLED_HZ)
     fraction, up = (np.arange(count) + 0.5) / count, np.tile(axis_of(face), (count, 1))
     if rotation.any():

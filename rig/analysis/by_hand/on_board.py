@@ -46,9 +46,9 @@ class HandAgreement:
 def compare_with_board(
     readings: BoardReadings, reports: Sequence[HandReport], solved: BoardHandSolution
 ) -> HandAgreement:
-    """Compare the board's solution with double precision on the same readings.
+    """Compare the board's solution with one in double precision on the same readings.
 
-    Raise Fault `board_unverified` if readings or reports are missing, `board_disagrees` beyond the limits.
+    Raise Fault `board_unverified` if readings or reports are missing, `board_disagrees` if the limits are exceeded.
     """
     host = solve_like_board(tuple(_moves(readings, reports)))
     if (used := sum(report.outcome == "taken" for report in reports)) != solved.taken:

@@ -42,7 +42,7 @@ class Means:
 
 
 def _axis_patterns(columns: Array) -> Array:
-    """Return patterns (3, N, 3) of a change (N, 3) on one axis only."""
+    """Return patterns (3, N, 3): the change (N, 3) on one axis only."""
     return np.moveaxis(split_per_axis(columns), -1, 0).swapaxes(1, 2)
 
 
@@ -82,7 +82,7 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 
 
 def changes(segments: Segments, axis_rates: Array) -> Alternatives:
-    """Return columns (3, N, k) of a scale factor, or a mounting, that changes with time, by the check's name."""
+    """Return columns (3, N, k) of a scale factor, or a mounting, that changes with time, by the name of the check."""
     time = normalised_time(segments)
     for sweep in np.unique(segments.sweep):  # a change within a sweep is tested for that sweep
         time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()
@@ -94,10 +94,10 @@ def changes(segments: Segments, axis_rates: Array) -> Alternatives:
 
 
 def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> dict[str, Array | None]:
-    """Return the design columns (3, N, k) of each check for differences: directions, sweeps and rests, residuals.
+    """Return columns (3, N, k) of each check for differences: between directions, sweeps and rests, and residuals.
 
-    `whole` (3, N, k) gives each sweep its own level. With None the check `residuals` uses all residuals, including the
-    scatter within sweeps.
+    `whole` (3, N, k) gives each sweep its own level. Its value None makes the check `residuals` use all residuals,
+    including the scatter within sweeps.
     """
     columns_by_name: dict[str, Array | None] = {
         "cw_against_ccw": split_per_axis(np.abs(axis_rates)),
@@ -110,7 +110,7 @@ def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> d
 
 
 def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
-    """Return columns (3, N, k) of a scale factor of one axis that changes at the start of a sweep or transfer."""
+    """Return columns (3, N, k): the scale factor of one axis changes at the start of a sweep or transfer."""
     starts = np.unique(
         [segments.times_s[segments.sweep == sweep].min() for sweep in np.unique(segments.sweep[segments.sweep != REST])]
     )
@@ -119,7 +119,7 @@ def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
 
 
 def quarter_columns(means: Means) -> Array:
-    """Return columns (3, N, 9) of a scale factor of each axis that changes at each quarter of the recording."""
+    """Return columns (3, N, 9): the scale factor of an axis changes at a quarter of the recording."""
     middle, (begin, end) = means.times_s.mean(axis=1), (means.times_s.min(), means.times_s.max())
     edges = np.linspace(begin, end, 5)[1:-1]
     return np.concatenate([split_per_axis(means.felt_rad_s * (middle > edge)[:, None]) for edge in edges], axis=2)
@@ -132,7 +132,7 @@ def sweep_columns(segments: Segments, sweep: int) -> Array:
 
 
 def step_columns(segments: Segments) -> list[Array]:
-    """Return a column (N, 1) for each end of a sweep with rests on both sides: 0 before it, 1 after it."""
+    """Return for each end of a sweep with rests on both sides a column (N, 1): 0 before it, 1 after it."""
     middle = segments.times_s.mean(axis=1)
     ends = [segments.times_s[segments.sweep == sweep].max() for sweep in np.unique(segments.sweep[segments.sweep >= 0])]
     steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]
@@ -147,12 +147,12 @@ def normalised_time(segments: Segments) -> Array:
 
 
 def repeat_per_axis(columns: Array) -> Array:
-    """Return columns (3, N, 3 k): columns (N, k) for each axis, with a coefficient of its own."""
+    """Return columns (3, N, 3 k): for each axis, the columns (N, k) with coefficients of its own."""
     count, wide = columns.shape
     return np.asarray(np.einsum("ij,nk->injk", np.eye(3), columns).reshape(3, count, 3 * wide), dtype=np.float64)
 
 
 def split_per_axis(columns: Array) -> Array:
-    """Return columns (3, N, 3) from (N, 3): each axis' own column, with a coefficient of its own."""
+    """Return columns (3, N, 3) from (N, 3): a separate column for each axis."""
     stacked: Array = np.einsum("ij,ni->inj", np.eye(3), columns)
     return stacked

@@ -60,8 +60,8 @@ def contradictions(
 ) -> ConsistencyChecks:
     """Return the checks of these sensors' results against contradictions.
 
-    `surroundings`: the surroundings of the recordings. `false_alarms`: the fraction of undamaged runs that may fail. A
-    disturbed sweep is part of the check's name, `gyro.disturbed_sweep.3`, and of its meaning.
+    `surroundings` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The
+    check of a disturbed sweep has its index in its name, `gyro.disturbed_sweep.3`, and in its meaning.
     """
     checks: list[Check] = []
     detection_limits: dict[str, tuple[DetectionLimit, ...]] = {}
@@ -110,9 +110,9 @@ def contradictions(
 def _non_orthogonality_deg(solution: VectorSolution, stated_deg: float, false_alarm_probability: float) -> Statistic:
     """Return the largest non-orthogonality relative to the stated one, and its limit, in degrees.
 
-    `stated_deg` is a half-width. The limit adds the uncertainty of the angle, at this false-alarm probability. Sweeps
-    about three axes do not separate a wrist's zero error from a tilted sensor axis: no residual shows it, and it makes
-    errors of the scale factors of a sensor that is mounted askew.
+    `stated_deg` is a half-width. The limit adds the uncertainty of the angle at this false-alarm probability. Sweeps
+    about three axes cannot separate a wrist's zero error from a tilted sensor axis. No residual shows it, and if the
+    sensor is mounted askew, its scale factors are wrong.
     """
     from scipy.special import ndtri
 
@@ -133,8 +133,8 @@ def check_references(
 ) -> ConsistencyChecks:
     """Return the checks of readings of gravity and field against contradictions.
 
-    Dwells and sweeps are named as a gyroscope's sweeps are: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the
-    bias may change steadily.
+    Dwells and sweeps are named as those of gyroscopes: `gyro.acceleration_disturbed_dwell.13`. If `drifting`, the bias
+    may change steadily.
     """
     from rig.analysis.consistency.reference_contradictions import (
         ReferenceReadings,
@@ -164,15 +164,15 @@ def check_references(
 
 
 def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
-    """Return the false-alarm probability of each statistic of a run, which all kinds of its readings share."""
+    """Return the false-alarm probability of each statistic of a run; all kinds of readings share the run's."""
     accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
     return false_alarm_per_check(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
-    """Return the sweeps of a run so far that contradict the others, by any sensor, as the verdict would name them.
+    """Return the sweeps of an unfinished run that contradict the others, by any sensor, as the verdict would.
 
-    Gyroscopes or accelerometers that cannot be solved yet contribute none.
+    Gyroscopes and accelerometers that cannot be solved yet contribute none.
     """
     settings = runs[0].settings if runs else None
     if settings is None or not settings.planned_sweeps:

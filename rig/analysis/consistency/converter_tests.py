@@ -78,8 +78,8 @@ def judge_readings(
 ) -> Statistics:
     """Return statistic and limit by the check's name, from all readings (n, 3) and the windows of each recording.
 
-    Each has at most that false-alarm probability. The noise is the median of the windows': a window with a stuck axis
-    does not make a sensor without noise. `frozen`: the longest run of equal readings of an axis that moved meanwhile.
+    Each statistic has at most that false-alarm probability. The noise is the median of all windows, so a stuck axis in
+    some of them does not make it zero. `frozen`: the longest run of equal readings of an axis that moved meanwhile.
     """
     from scipy.special import ndtri
 
@@ -116,7 +116,7 @@ def judge_readings(
 
 
 def _count_constant_bits(counts: NDArray[np.int64]) -> int:
-    """Count the bits, over the axes, that never change although the range of readings includes both values."""
+    """Count the bits, over the axes, that never change although the readings range over both values."""
     constant = 0
     for axis in counts.T:
         if len(np.unique(axis)) < FEWEST_VALUES:
@@ -143,8 +143,8 @@ def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_va
 def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[float, int]:
     """Return the largest deviation over the noise, and the number of axes whose spikes are one power of two.
 
-    Such spikes come from one bit. The noise includes vibration and is half a step at least. The first readings are
-    omitted, as the filter of a quiet sensor has not settled.
+    Such spikes come from a faulty bit. The noise includes vibration and is at least half a step. The first readings are
+    omitted, because the filter of a quiet sensor has not settled.
     """
     half = step_counts / 2
     farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]
@@ -173,7 +173,7 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
 
 
 def _is_one_bit(powers: Array) -> bool:
-    """Return whether most spikes have the same power of two; `powers` holds −1 for other sizes."""
+    """Return whether most spikes equal the same power of two; `powers` contains −1 for spikes of other sizes."""
     if len(powers) < FEWEST_SPIKES:
         return False
     which, often = np.unique(powers, return_counts=True)
@@ -182,9 +182,9 @@ def _is_one_bit(powers: Array) -> bool:
 
 
 def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_value: float) -> tuple[float, float]:
-    """Return the largest skewness of the axes' noise (3,) at rest, which bit errors cause, and its limit.
+    """Return the largest skewness of the noise (3,) at rest, which bit errors cause, and its limit.
 
-    In motion the arm's vibration may be skewed.
+    Readings in motion are not used, because the arm's vibration may be skewed.
     """
     parts = [window.residual_counts / np.maximum(window.residual_counts.std(axis=0), 0.5) for window in windows]
     noise = np.concatenate(parts)

@@ -54,7 +54,7 @@ def find_gyroscope_limits(
 
 
 def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tuple[DetectionLimit, ...]:
-    """Return the detection limits of a calibration by gravity or field; its checks bear the quantity's name."""
+    """Return the detection limits of a calibration by gravity or field; the names of checks contain the quantity."""
     from rig.analysis.consistency.reference_alternatives import FAULT_MODES as REFERENCE_FAULT_MODES
 
     return tuple(
@@ -74,9 +74,9 @@ def _means_of_solve(explained: Explained) -> Means:
 
 
 def _error_over_expanded(patterns: Array, explained: Explained, mounting: Array, inputs: Unknown) -> float | None:
-    """Return the error of a result, in U, by the most influential of the patterns (k, N, 3); None without a solution.
+    """Return the error, in U, of a result by the worst of the patterns (k, N, 3); None without a solution.
 
-    The means are solved again, as a bias that seems to drift because of the fault has a larger U, too.
+    The means are solved again with the fault, which may look like bias drift and increase U.
     """
     solution, inputs_of_solve = explained.solution, explained.inputs
     response = np.einsum("qni,kni->kq", solution.response, patterns) / np.sqrt(np.diag(solution.covariance))

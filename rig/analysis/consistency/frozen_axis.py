@@ -38,7 +38,7 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
 def _rate_change(recording: ObservedRun, time_s: Array, axis: Array) -> float:
     """Return the change of the rate along an axis (3,) of the flange over times (n,), rad/s.
 
-    Rates are averaged over `SMOOTHED_S`, because the rate between two states has the noise of their times.
+    Rates are averaged over `SMOOTHED_S`: between two states, the noise of their times would dominate.
     """
     covered_s = time_s[recording.motion.covered(time_s)] if len(time_s) else time_s
     if len(covered_s) < FEWEST:

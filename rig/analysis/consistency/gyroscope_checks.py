@@ -146,9 +146,9 @@ def predict_detection_limits(
 
 
 def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:
-    """Return `_whiten_with_transfers` with the variance of the transfers inflated until their χ² equals their number.
+    """Return `_whiten_with_transfers` with the transfers' variance inflated until their χ² equals their number.
 
-    Their χ² is the χ² of all segments less the χ² of the segments without transfers. The factor is at most `MOST`.
+    Their χ² is that of all segments minus that of the segments without transfers. The factor is at most `MOST`.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     for ratio in np.geomspace(1.0, MOST, TRIED):
@@ -223,9 +223,9 @@ def _test_bias_jump(
 ) -> Statistic | None:
     """Return the χ² of the bias' largest jump between two rests, drift included; None with fewer than three rests.
 
-    The process is re-estimated with the best jump in the model, which would otherwise count as drift. Few rests
-    determine the process poorly, most of all beside the jump that fits best: simulated random walks exceed the critical
-    value about as often as F with one degree of freedom for each possible jump.
+    The drift is re-estimated with the best jump in the model; otherwise it would contain the jump. Few rests determine
+    the drift poorly. Simulated random walks exceed the critical value about as often as F with one degree of freedom
+    for each possible jump.
     """
     steady_columns, steps = _steady_columns(segments), step_columns(segments)
     if len(steps) < 2:
@@ -278,7 +278,7 @@ def _estimate_bias_process(
 
 
 def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPatterns) -> Scatter:
-    """Return the errors of the means by noise and the known errors of arm and sensor."""
+    """Return the errors of the means due to noise and to the known errors of arm and sensor."""
     return Scatter(segments.variances_rad2_s2, patterns_rad_s, allowance.instability_rad_s)
 
 

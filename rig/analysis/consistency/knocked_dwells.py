@@ -19,9 +19,9 @@ def compare_dwell_halves(
     """Return the largest difference between a dwell's halves, as χ² of three axes, and its limit; skip short dwells.
 
     The limit is that of F, as the noise is estimated from the dwells' readings. Flicker with the Allan deviation
-    `flicker_counts` makes the halves differ by √2 times as much. A slow swing that no encoder sees is in every dwell, a
-    knock in one: so a dwell's halves may differ as those of the other dwells do. The degrees of freedom of both are
-    combined by Welch–Satterthwaite. `steps` are those of the counts.
+    `flicker_counts` makes the halves differ by √2 times as much. A slow oscillation that no encoder measures is in
+    every dwell, a knock in one; so the differences in the other dwells are added to the variance. The degrees of
+    freedom of both are combined by Welch–Satterthwaite. `steps` are those of the counts.
     """
     from scipy.special import fdtri
 
@@ -43,7 +43,7 @@ def compare_dwell_halves(
 
 
 def _swing_variances(differences: Array, noise: Array) -> Array:
-    """Return the mean square (N,) of the differences between halves of the other dwells, less their noise (3,)."""
+    """Return the mean square (N,) of the halves' differences in the other dwells, minus the noise (3,) of these."""
     beyond = (differences**2 - noise).mean(axis=1)
     others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)
     return others

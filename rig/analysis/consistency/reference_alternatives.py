@@ -58,7 +58,7 @@ def alternatives(model: ReferenceModel) -> Alternatives:
 
 
 def segment_columns(model: ReferenceModel, segment: int) -> Array:
-    """Return columns (3 K, 3 or 9) of free readings in one dwell or sweep."""
+    """Return columns (3 K, 3 or 9) that leave the readings of one dwell or sweep free."""
     first, wide = (3 * segment, 3) if segment < model.dwells else (3 * model.dwells + 9 * (segment - model.dwells), 9)
     columns = np.zeros((model.movement.readings().size, wide))
     columns[first : first + wide] = np.eye(wide)
@@ -84,7 +84,7 @@ def _half_step(model: ReferenceModel) -> Array:
 
 
 def _dwell_columns(model: ReferenceModel) -> Array:
-    """Return columns (3 K, 3 N) of a free reading of each axis in each dwell."""
+    """Return columns (3 K, 3 N) that leave the reading of every axis in every dwell free."""
     count = 3 * model.dwells
     return np.eye(model.movement.readings().size)[:, :count]
 
@@ -96,7 +96,7 @@ def _axis_components(model: ReferenceModel) -> Array:
 
 
 def _bend_pattern(change: Callable[[Array], Array]) -> Callable[[ReferenceModel], Array]:
-    """Return the patterns of a nonlinear `change` of the specific force, which is relative to the reference."""
+    """Return the patterns of a nonlinear `change` of the specific force, given relative to the reference."""
 
     def patterns(model: ReferenceModel) -> Array:
         size = float(np.linalg.norm(model.theta[REFERENCE]))

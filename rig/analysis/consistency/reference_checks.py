@@ -48,7 +48,7 @@ class WhitenedReference:
     growth: Array
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative, with the δ estimated together with the largest: see `WhitenedModel`."""
+        """Return the χ² of each alternative, with δ estimated together with the largest one: see `WhitenedModel`."""
         model = self._extend_model(nuisance)
         rotated = [self.rotation @ columns for columns in alternatives]
         delta_rad = self._estimate_delta(model)
@@ -65,7 +65,8 @@ class WhitenedReference:
 
         It is twice the logarithm of the ratio, χ² if δ is given. Both likelihoods have their restricted
         maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B 59 (1997) 701). If δ is estimated, the limit is
-        that of F, in proportion to δ's part in the variance. For None as columns it is the χ² of all residuals.
+        that of F in proportion to δ's part in the variance. Columns None stand for all residuals, and the statistic is
+        their χ².
         """
         from scipy.special import chdtri
 
@@ -101,7 +102,7 @@ class WhitenedReference:
         )
 
     def _limit(self, model: Array, new: Array, delta_rad: float, false_alarm_probability: float) -> float:
-        """Return the critical value of orthonormal columns beside the model."""
+        """Return the critical value of orthonormal columns that the model does not contain."""
         from scipy.special import chdtri, fdtri
 
         count = new.shape[1]
@@ -140,7 +141,7 @@ class WhitenedReference:
         return 2 * information(self.growth, delta_rad, model) * delta_rad**4
 
     def _delta_fraction(self, model: Array, columns: Array, delta_rad: float) -> float:
-        """Return the fraction (0 to 1) of the variance along columns that δ causes."""
+        """Return the fraction (0 to 1) of the variance along columns that is due to δ."""
         variance = 1 + delta_rad**2 * self.growth
         model_basis, _ = self._whiten_residuals(model, delta_rad)
         projections = remaining_directions(model_basis, columns / np.sqrt(variance)[:, None])

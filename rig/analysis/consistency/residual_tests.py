@@ -64,7 +64,7 @@ class WhitenedModel(Protocol):
     ) -> Statistic | None:
         """Return the χ² that columns explain, and its critical value for this false-alarm probability.
 
-        None if the model and the nuisance columns span them.
+        Return None if model and nuisance columns span the columns.
         """
 
 
@@ -79,9 +79,9 @@ def test_alternatives(
 def find_outliers(
     model: WhitenedModel, segments: Iterable[int], columns: Callable[[int], Array], false_alarm_probability: float
 ) -> list[tuple[int, Statistic]]:
-    """Return the outlier segments: the worst one, then the worst without it, until the rest agree or half are out.
+    """Return the outlier segments, removed one by one until the rest agree or half are removed.
 
-    If only two segments determine a parameter, either may be the outlier: then both are returned.
+    If only two segments determine a parameter, either may be the outlier, and both are returned.
     """
     remaining, nuisance = list(segments), list[Array]()
     per_segment, most, outliers = (
@@ -111,7 +111,7 @@ def orthonormal_basis(columns: Array) -> Array:
 
 
 def remaining_directions(model_basis: Array, columns: Array) -> Array:
-    """Return orthonormal columns (n, k) of the part of whitened columns outside an orthonormal `model_basis` (n, p)."""
+    """Return an orthonormal basis (n, k) of the part of columns outside an orthonormal `model_basis` (n, p)."""
     sizes = np.linalg.norm(columns, axis=0)
     new = columns / np.where(sizes > 0, sizes, 1.0)
     new = new - model_basis @ (model_basis.T @ new)
@@ -123,8 +123,8 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
 def chi_square_of(readings: Array, base: Array, columns: Array | None) -> tuple[float, int]:
     """Return the χ² that columns explain of the residuals of `base`, and its degrees of freedom.
 
-    None as columns explains all residuals. (A decomposition of so many columns is slow, and LAPACK's fast driver does
-    not always converge.)
+    Columns None explain all residuals. (A decomposition of so many columns is slow, and LAPACK's fast driver does not
+    always converge.)
     """
     model_basis = orthonormal_basis(base)
     unexplained = readings - model_basis @ (model_basis.T @ readings)

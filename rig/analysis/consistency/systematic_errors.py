@@ -138,7 +138,8 @@ def build_error_patterns(
 ) -> ErrorPatterns:
     """Return the patterns of known errors in the means of a sensor of F (3, 3).
 
-    The even part of its nonlinearity is free in transfers, which are faster than sweeps: it is no change with time.
+    The even part of its nonlinearity is free in transfers, which are faster than sweeps: there it is no sign of a
+    change.
     """
     on_transfers = replace(known_errors, curve=replace(known_errors.curve, square=1.0))
     instability_rad_s = 0.0 if known_errors.sensor is None else known_errors.sensor.instability_rad_s
@@ -187,7 +188,7 @@ def patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> Ar
 
 
 def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
-    """Return the patterns of the arm's angles, and for each sweep and transfer those that do not repeat."""
+    """Return the patterns of the arm's angle errors: shared ones, and independent ones of each sweep and transfer."""
     by_angle = np.zeros((len(ANGLES), *segments.means_rad_s.shape))
     repeats = []
     for row, (sweep, interval) in enumerate(zip(segments.sweep, segments.intervals, strict=True)):
@@ -213,7 +214,7 @@ def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
 def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
     """Return the patterns of encoder errors at each angle where arcs begin or end.
 
-    Angles within a quarter of an arc count as one mark, because a sweep back passes the same marks.
+    Angles within a quarter of an arc are one mark, because a sweep back passes the same marks.
     """
     marks: list[tuple[int, float]] = []
     patterns_by_mark: list[Array] = []
@@ -237,8 +238,8 @@ def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
 def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
     """Return the sweeps and transfers between successive moves of a joint; one with a move belongs to the later part.
 
-    The joint is counted from the end of the chain. A changed angle, or another recording, shows the move of a missing
-    transfer.
+    The joint is counted from the end of the chain. If a transfer is missing, a changed angle or another recording shows
+    that the joint moved.
     """
     sweeps, firsts = np.unique(segments.sweep, return_index=True)
     patterns_by_mark: list[list[int]] = []
@@ -271,13 +272,13 @@ def rate_errors(interval: MotionInterval, steps: int) -> Array:
 
 
 def _wave_indices(motion: ArmMotion) -> dict[int, int]:
-    """Return the first index in `ANGLES` of each joint's waves: of an arm the wrists, else the last three joints."""
+    """Return the first index in `ANGLES` of each joint's waves: of an arm's wrists, else of the last three joints."""
     beyond = motion.kinematics.joints - 1 - WRIST_3
     return {joint + beyond: first for joint, first in WAVES_OF.items() if joint + beyond >= 0}
 
 
 def _end_patterns(interval: MotionInterval) -> list[Array]:
-    """Return a transfer's rate error (3,), rad/s per radian of one moved joint's error before or after it."""
+    """Return a transfer's rate error (3,), rad/s per radian of error of one joint, moved before or after it."""
     q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
     moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]
@@ -300,7 +301,7 @@ def _time_patterns(segments: Segments, jitter_s: float) -> Array:
 
 
 def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:
-    """Return the patterns of each transfer's duration by its first and last sample; steady sweeps have none."""
+    """Return the patterns by the stamps of each transfer's first and last sample; steady sweeps are not affected."""
     transfers = np.flatnonzero((segments.sweep < REST) & (stamp_s > 0))
     patterns_by_mark = np.zeros((len(transfers), *segments.means_rad_s.shape))
     lasting_s = np.diff(segments.times_s[transfers])
@@ -317,7 +318,7 @@ def _speed_patterns(segments: Segments) -> list[Array]:
 
 
 def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
-    """Return the patterns of an item that is mounted slightly differently in every stage but the first."""
+    """Return the patterns of a slightly different mount of the item in every stage but the first."""
     mounts = [interval.motion.mount.tobytes() for interval in segments.intervals]
     errors = mount_rad * np.cross(np.eye(3)[:, None, :], segments.rates_rad_s)
     _, *others = dict.fromkeys(mounts)

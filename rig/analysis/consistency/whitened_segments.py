@@ -59,7 +59,7 @@ class WhitenedSegments:
         return (value, critical_value(false_alarm_probability)(dof)) if dof else None
 
     def test_single_columns(self, columns: Array, false_alarm_probability: float) -> Statistic | None:
-        """Return the largest χ² of a single column (3, N, k), with its critical value; None if the model spans all."""
+        """Return the largest χ² of a single column (3, N, k) and its critical value; None if all lie in the model."""
         columns = self._independent_columns(columns)
         if not columns.shape[1]:
             return None
@@ -82,7 +82,7 @@ class WhitenedSegments:
         yield from ((column[..., None], limit) for column in np.moveaxis(columns, -1, 0))
 
     def _independent_columns(self, columns: Array) -> Array:
-        """Return unit columns (3 N, k), each orthogonal to the model; columns that the model spans are left out."""
+        """Return unit columns (3 N, k), orthogonal to the model, without columns that lie in the model."""
         model_basis, new = orthonormal_basis(self.model), apply_whitener(self.whitener, columns)
         sizes = np.linalg.norm(new, axis=0)
         new = new - model_basis @ (model_basis.T @ new)
@@ -118,10 +118,10 @@ def _model_columns(segments: Segments) -> Array:
 def build_whitener(segments: Segments, scatter: Scatter, bias: BiasProcess) -> Array:
     """Return the whitener W (3 N, 3 N): with it the means' errors are independent with variance 1.
 
-    Noise and bias drift of each axis are whitened first, then the shared errors. These may be 10⁵ times the noise (a
-    nonlinearity that is free in transfers), and one decomposition of both would lose the noise to rounding. No variance
-    of the first part is below the smallest noise: if a computer's clock was set back between two recordings, windows
-    overlap, and the computed matrix is no covariance.
+    Noise and bias drift of each axis are whitened first, then the shared errors. Shared errors may be 10⁵ times the
+    noise (a nonlinearity that is free in transfers), so one decomposition of both would lose the noise to rounding. No
+    variance of the first part is below the smallest noise: if a computer's clock was set back between two recordings,
+    windows overlap, and the computed matrix is no covariance.
     """
     count, bias_covariance = len(segments.sweep), bias.covariance(segments.times_s)
     noise_whitener, least = np.zeros((3, count, 3, count)), segments.variances_rad2_s2.min()

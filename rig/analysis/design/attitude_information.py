@@ -50,8 +50,8 @@ class AttitudeAccount:
 def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
     """Return the expected accuracy of a plan's attitudes, by nominal arm and noise; None for other procedures.
 
-    A repeated attitude has the same error of the arm every time, so only its noise is averaged. Raise Refused
-    `rank_deficient`, `ill_conditioned`.
+    A repeated attitude repeats the arm's error, so only noise is averaged. Raise Refused `rank_deficient`,
+    `ill_conditioned`.
     """
     order = config.procedure.accelerometer_order
     if order == 0:

@@ -53,10 +53,10 @@ STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real ti
 
 
 def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
-    """Return the predicted budget of each sensor to calibrate.
+    """Return the predicted budget of each sensor to calibrate, by the solution that judges runs of this turner.
 
-    The solution is the one that judges the turner's runs: it uses only the speeds if single readings of the angle
-    scatter. Raise Fault as the estimators do if the plan determines too little, Refused as `settings_of`.
+    If single readings of the turner's angle scatter, that solution uses only the speeds. Raise Fault as the estimators
+    do if the plan determines too little, Refused as `settings_of` does.
     """
     run = plan_run(config, plan, turner.kinematics)
     return {name: _budget(config, run, turner, name, sensor) for name, sensor in config.to_calibrate.items()}
@@ -92,12 +92,12 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
 
 
 def _mounting_rotation(angle_deg: float) -> Array:
-    """Return the rotation (3, 3) by an angle about an axis equally far from x, y and z."""
+    """Return the rotation (3, 3) by an angle about the axis (1, −1, 1)/√3."""
     return rotation_by(np.radians(angle_deg) / np.sqrt(3) * np.array([1.0, -1.0, 1.0]))
 
 
 def _simulate_readings(inputs: VectorInputs, matrix: Array) -> Array:
-    """Return simulated readings (N, 3) of a sensor of F (3, 3), by a fixed draw of noise, so that no two are equal."""
+    """Return simulated readings (N, 3) of a sensor of F (3, 3); noise of a fixed seed makes all different."""
     noise = np.random.default_rng(len(inputs.windows_s)).standard_normal((len(inputs.windows_s), 3))
     readings: Array = inputs.rates_rad_s @ matrix.T + np.sqrt(inputs.variances_rad2_s2) * noise
     return readings
@@ -116,7 +116,7 @@ def _clock(uncertainty: Uncertainty, *, on_board: bool) -> ClockCheck:
 
 
 def _stages(run: PlannedRun) -> Iterator[PlannedRun]:
-    """Yield the recordings of a run, one of each stage of its plan; the run itself without stages."""
+    """Yield one recording for each stage of the plan; the run itself if it has no stages."""
     begins, clock_offset_s = [stage.begins for stage in run.plan.stages] or [0], 0.0
     for number, (first, last) in enumerate(zip(begins, [*begins[1:], len(run.plan.steps)], strict=True)):
         stage_plan = replace(run.plan, steps=run.plan.steps[first:last], stages=())
@@ -184,7 +184,7 @@ def _turn(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std
 def _scatter(config: RigConfig, sweep: Sweep, turner: TurnerIdentity) -> float:
     """Return the relative standard deviation of the mean speed of a shaft whose single readings scatter.
 
-    Angles that repeat one revolution later are pairs of readings; see `rig.observation.motion.turn_speed`.
+    It comes from pairs of readings one revolution apart, see `rig.observation.motion.turn_speed`.
     """
     if not turner.reading_std_rad or not isinstance(config.turner, ServoSection):
         return 0.0

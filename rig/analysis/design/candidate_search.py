@@ -72,7 +72,7 @@ class TargetUncertainty:
 
 
 def target_of(section: SixObservationSection) -> TargetUncertainty | None:
-    """Return the target at which a run of several repeats ends; None if it makes all of them."""
+    """Return the target at which a run of several repeats ends; None if it always makes all of them."""
     scale, bias_rad_s = section.target_scale_u, section.target_bias_u_rad_s
     return None if scale is bias_rad_s is None else TargetUncertainty(scale or inf, bias_rad_s or inf)
 
@@ -95,7 +95,7 @@ class Candidate:
     rests_s: tuple[float, ...] = ()
 
     def is_contained_in(self, other: "Candidate") -> bool:
-        """Return whether another candidate contains this one, which then cannot have a smaller U."""
+        """Return whether another candidate contains this one, so that this one's U cannot be smaller."""
         return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
             size <= other_size for size, other_size in zip(self.sizes, other.sizes, strict=True)
         )
@@ -146,7 +146,7 @@ class Shortest:
     directions: Array | None
 
     def least(self, size: str) -> Budgets:
-        """Return the budgets of the run with the smallest U of this name in `ReachedUncertainty`."""
+        """Return the budgets of the run whose U of this name (of `ReachedUncertainty`) is smallest."""
         return min(self.endless, key=lambda candidate: float(getattr(candidate.reached, size)))
 
     @property
@@ -160,8 +160,8 @@ def find_shortest(
 ) -> Searched:
     """Return the shortest candidate whose predicted U meets the target.
 
-    A candidate that meets the target excludes all longer candidates; a candidate that fails excludes all candidates
-    that it contains. `predict` returns None for a candidate that cannot be run, which excludes no other.
+    A candidate that meets it excludes all longer ones. A candidate that fails excludes all that it contains. `predict`
+    returns None for a candidate that cannot be run, which excludes no other.
     """
     remaining = sorted(
         (candidate for candidate in candidates if candidate.duration_s <= target.at_most_s),

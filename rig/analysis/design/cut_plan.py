@@ -24,9 +24,9 @@ class PlannedSegments:
     with_transfers: Segments
 
     def read_with(self, matrix: Array, angle_random_walk_rad_sqrt_s: float, rate_hz: float) -> "PlannedSegments":
-        """Return the segments as a sensor of F (3, 3) with that angle random walk reads them.
+        """Return the segments as read by a sensor of F (3, 3) with that angle random walk.
 
-        Samples that are too far apart do not resolve transfers.
+        Transfers are omitted if samples are too far apart to resolve them.
         """
 
         def read(segments: Segments) -> Segments:
@@ -92,7 +92,7 @@ def _cut_window(motion: ArmMotion, window_s: tuple[float, float], sweep: int, pa
 
 
 def _find_transfers(plan: Plan, motion: ArmMotion) -> list[MotionInterval]:
-    """Return the wrists' transfers between all measurements, before and after them."""
+    """Return the wrists' transfers before, between and after all measurements."""
     measured_s = [
         time_s for measuring_step in measuring_steps(plan) for time_s in (measuring_step.start_s, measuring_step.end_s)
     ]

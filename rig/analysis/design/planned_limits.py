@@ -33,8 +33,8 @@ class DetectionLimits:
 def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> DetectionLimits:
     """Predict the detection limits of the gyroscopes to calibrate and, on an arm, of the accelerometers.
 
-    The `turner` is nominal, the noise is the data sheet's, and flicker is the only bias drift. For a plan over
-    temperature one set is evaluated.
+    The `turner` is nominal, the noise is the data sheet's, and flicker is the only bias drift. Of a plan over
+    temperature, one set of sweeps is used.
     """
     if turner.joints == 0:
         return DetectionLimits({}, {})
@@ -62,7 +62,7 @@ def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> 
 
 
 def _one_set(plan: Plan) -> Plan:
-    """Return the plan up to the wait for the second temperature."""
+    """Return the plan up to the wait for its second temperature."""
     waits = [index for index, step in enumerate(plan.steps) if isinstance(step, Rest) and step.for_temperature]
     return replace(plan, steps=plan.steps[: waits[1]]) if len(waits) > 1 else plan
 

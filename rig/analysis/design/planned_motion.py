@@ -38,7 +38,7 @@ class PlannedRun:
 
 
 def plan_run(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> PlannedRun:
-    """Return a new run of the plan. Raise Refused as `settings_of`."""
+    """Return a new run of the plan. Raise Refused as `settings_of` does."""
     return PlannedRun(plan, arm, settings_of(config, plan), site_of(config.site), uncertainty_of(config))
 
 
@@ -61,7 +61,7 @@ class Timed(Generic[StepT_co]):
 
 
 def time_steps(plan: Plan) -> Iterator[Timed[Step]]:
-    """Yield every step in order with its times; no sensor needs long to settle before a dwell."""
+    """Yield every step in order with its times; sensors are assumed to settle at once before a dwell."""
     time_s, q_rad = STANDING_S, plan.start_q_rad
     for step in plan.steps:
         yield Timed(step, time_s, time_s + step.duration_s, q_rad)

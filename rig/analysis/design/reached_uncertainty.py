@@ -12,7 +12,7 @@ from rig.errors import Fault
 
 
 def assess_reached(runs: Sequence[RunData], estimator: str) -> ReachedUncertainty | None:
-    """Return the worst U of all sensors to calibrate from the recordings so far; None without an uncertainty."""
+    """Return the worst U of all sensors to calibrate by the recordings so far; None if one has no uncertainty yet."""
     settings = runs[0].settings
     try:
         with solvable():

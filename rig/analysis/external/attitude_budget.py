@@ -29,7 +29,7 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
 
 
 def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
-    """Return the noise's degrees of freedom, the fewest of scale and bias, by the weights of the readings."""
+    """Return the degrees of freedom of the noise, the smallest of scale and bias, by the weights of the readings."""
     response = response_in_attitudes(solution, equations.measurements)
     rows = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
     return fewest_dof(rows, equations.variances.ravel(), equations.dof.ravel())
@@ -38,9 +38,9 @@ def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
 def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: float | None = None) -> Budget:
     """Return the budget by the contribution of each cause to a reference model's covariance (p, p), F (3, 3) first.
 
-    Estimated variance components are uncertain themselves. If their likelihood was integrated over, or the covariance
-    inflated as Student's t is, u contains that (JCGM 101, 6.4.9) and no degrees of freedom remain to be counted: so for
-    the noise too, without a `noise_dof`.
+    Estimated variance components are uncertain themselves. If the solution integrates over their likelihood, or
+    inflates the covariance as Student's t, u contains this (JCGM 101, 6.4.9), and the degrees of freedom are infinite:
+    also those of the noise, unless `noise_dof` is given.
     """
     scale = scale_of(matrix)
     lines = []

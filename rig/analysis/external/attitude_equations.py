@@ -74,7 +74,7 @@ class Equations:
 
     @property
     def placed(self) -> Placed:
-        """The readings as placed, of a sensor of a constant reference of known size."""
+        """The readings in their attitudes, of a sensor of a constant reference of known size."""
         std_rad = np.zeros(len(self.means)) if self.std_rad is None else self.std_rad
         nothing = np.zeros_like(self.means)
         return Placed(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)
@@ -95,14 +95,14 @@ class Equations:
         )
 
     def solve_others(self, method: Method, *others: Method) -> Attempts[Method, TriaxialSolution]:
-        """Return the solutions by all other methods, or why there is none."""
+        """Return the solutions by all other methods, or the Fault of a method that has none."""
         return attempt_each({other: partial(self.solve, other) for other in others if other != method})
 
 
 def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Array]:
-    """Return the variances (N, 3) of the means from the residuals, each axis' noise alike in all rows, and their dof.
+    """Return the variances (N, 3) of the means, equal in all rows, from the residuals, and their dof.
 
-    Equal weights: the model that weighs attitude errors would take them for noise here.
+    Rows are weighted equally here, because the model that weighs attitude errors would take noise for such errors.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts

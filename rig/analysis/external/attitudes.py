@@ -69,10 +69,10 @@ Result = InAttitudes | InIncrements
 def solve_placed(
     name: str, placed: PlacedReadings, site: Site, options: Elsewhere, method: Chosen | None, *, second_order: bool
 ) -> Attempts[Quantity, Result | OfKind]:
-    """Calibrate every quantity that was recorded of a sensor, by `method`; None chooses one.
+    """Calibrate every quantity of a sensor that was recorded, by `method`; None chooses one.
 
-    The choice is "attitude_weighted", for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
-    "maximum_likelihood".
+    The choice is "attitude_weighted". For a gyroscope it is "increments" (over windows of `window_s`), or
+    "maximum_likelihood" with `exact_rates`.
     """
     any_mounting, exact_rates = options.any_mounting, options.exact_rates
 
@@ -108,7 +108,7 @@ def solve_placed(
 
 
 def _check_noisy(placements: Placements, quantity: Quantity) -> None:
-    """Raise Fault `stuck_sensor` if a placement's readings of an axis are all the same."""
+    """Raise Fault `stuck_sensor` if an axis reads the same value throughout a placement."""
     read = placements.read
     nothing = read.variances[quantity] <= (ROUNDING * read.means[quantity]) ** 2
     for row, axis in np.argwhere(nothing)[:1]:
@@ -179,7 +179,7 @@ def _solve_placements(
 def _check_not_sole(
     solution: TriaxialSolution, equations: Equations, placements: Placements, quantity: Quantity
 ) -> None:
-    """Raise Fault `too_few_observations` if a scale factor hangs on one attitude."""
+    """Raise Fault `too_few_observations` if a scale factor depends on a single attitude."""
     sole = find_sole_attitude(solution.theta, equations.placed)
     if sole is None:
         return
@@ -200,7 +200,7 @@ def _dwells(placements: Placements, quantity: Quantity) -> Iterator[StaticReadin
 
 
 def _solve(equations: Equations, method: Method, placements: Placements) -> TriaxialSolution:
-    """Return the solution; if the rests are too few, the Fault says that rows were left out."""
+    """Return the solution. If too few rests are left for it, the Fault says that rows were left out."""
     try:
         return equations.solve(method)
     except Fault as fault:
@@ -227,5 +227,5 @@ def _replace_parameters(solution: TriaxialSolution, laid: LaidDown) -> TriaxialS
 
 
 def _check_earth_rate(solution: TriaxialSolution) -> Fault | None:
-    """Return why a gyroscope's estimated reference is not the Earth's rate: it needs a tenth of it, as in a run."""
+    """Return why the estimated reference is not the Earth's rate: it must be determined to a tenth, as in a run."""
     return or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE]))

@@ -43,7 +43,7 @@ class Convention:
 def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: bool) -> Convention | None:
     """Return the convention of attitudes (N,) on the clock of the samples; None if the motion does not show one.
 
-    `is_order_named`: the file says which number is the scalar part.
+    `is_order_named`: the file states which number is the scalar part.
     """
     if RATE not in samples.readings:
         return None
@@ -109,7 +109,7 @@ def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
 
 
 def _find_up(forces: Array) -> str:
-    """Return the axis of the room along which forces (n, 3) point in the mean, or ""."""
+    """Return the axis of the room along which the mean of forces (n, 3) points; "" if none."""
     mean = forces.mean(axis=0)
     mean /= max(float(np.linalg.norm(forces, axis=1).mean()), 1e-9)
     axis = int(np.argmax(np.abs(mean)))

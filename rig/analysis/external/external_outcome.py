@@ -11,7 +11,7 @@ from rig.data.recording.run_file import RunData
 
 
 def calibrate_external(runs: Sequence[RunData], external: ReadElsewhere, estimator: str) -> Outcome:
-    """Solve and judge readings whose motion a file describes; the default estimator means the configured one.
+    """Solve and judge readings whose motion a file describes; by default with the configured estimator.
 
     Raise as `solve_external` does.
     """

@@ -88,8 +88,8 @@ class OfSensor:
 def solve_external(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
     """Return the solution of readings whose motion a file describes; `estimator` None chooses one.
 
-    Raise Refused `unknown_estimator`; Fault as the observers do, and if no quantity has a solution, as the estimator
-    does, or for several `nothing_solved` with every reason.
+    Raise Refused `unknown_estimator`, Fault as the observers do. If no quantity has a solution, raise the estimator's
+    Fault, or `nothing_solved` with every reason if there are several.
     """
     samples = samples_in(read.readings, "the recording")
     if read.tells == "turns":
@@ -113,9 +113,10 @@ def _add_notes(sensor: OfSensor, read: ReadElsewhere, samples: Samples) -> OfSen
 
 
 def check_external(name: str, sensor: OfSensor) -> Iterator[Check]:
-    """Yield the checks beyond the solvers' own: the condition of the equations, the error of attitudes.
+    """Yield the checks besides the solvers' own: the condition of the equations, the error of attitudes.
 
-    Every quantity without a solution has a failing check. No configuration states limits of anything else.
+    Every quantity without a solution has a failing check. Nothing else is checked, because there is no configuration
+    with limits.
     """
     yield from list_unsolved((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
     if (gyroscope := sensor.gyroscope) is not None:
@@ -202,7 +203,7 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
 
 
 def budget_of(solution: Estimate, data: ExternalData) -> Budget:
-    """Return the budget of its covariance: the scatter of means, and the errors of the stated motion."""
+    """Return the budget of a sensor's covariance: the scatter of means, and the errors of the stated motion."""
     if data.turned is None or not isinstance(solution, TurnedSolution):
         vector = solution if isinstance(solution, VectorSolution) else _vector(data)
         more, covariance = sweep_errors(vector, data), solution.covariance
@@ -255,7 +256,7 @@ def _solve_attitudes(read: ReadElsewhere, samples: Samples, settings: RunSetting
 
 
 def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:
-    """Return the calibration of a gyroscope in attitudes, described as one of sweeps."""
+    """Return the calibration of a gyroscope from attitudes, in the form of one from sweeps."""
     solution = _describe_as_swept(result)
     if clock is not None and isinstance(result, InIncrements):
         clock = clock.correct(-result.solution.clock_s, result.solution.clock_std_s)
@@ -313,7 +314,7 @@ def _describe_as_swept(result: Result) -> TurnedSolution:
 
 
 def _nothing_solved(unsolved: Mapping[Quantity, Fault]) -> Fault | Refused:
-    """Return all reasons, each with its own remedy; a single one as it is."""
+    """Return one error with all reasons and their remedies; a single reason is returned unchanged."""
     faults: Sequence[Fault] = list(unsolved.values())
     if len(faults) == 1:
         return faults[0]

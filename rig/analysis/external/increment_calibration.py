@@ -40,7 +40,7 @@ class InIncrements:
 
     @property
     def omitted(self) -> Iterator[Omitted]:
-        """The increments that could not be formed, and those that contradict all others."""
+        """The increments that could not be formed, and those that contradict the others."""
         for gap in self.left_out:
             longest = f", for up to {gap.longest_s:.2g} s" if gap.name == "lost_samples" else ""
             yield Omitted("increments", gap.count, self.increments, f"{gap.name}{longest}", _spell_time(gap.first_s))
@@ -54,7 +54,7 @@ def _spell_time(time_s: float) -> str:
 
 
 def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> InIncrements:
-    """Return the gyroscope's matrix and bias, from windows of a given or a suitable length.
+    """Return the gyroscope's matrix and bias, from windows of a given or an automatically chosen length.
 
     Raise Fault as `gather`, `solve_known_increments`, `check_rests_agree` and `check_axes` do, and
     `inverted_attitudes`.
@@ -70,7 +70,7 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
 
 
 def _solve(turning: Turning, window_s: float | None) -> InIncrements:
-    """Return the solution; its clock offset determines which readings are missing, so it is iterated."""
+    """Return the solution. Its clock offset determines which readings are missing, so it is found by iteration."""
     start = find_start(select_covered(turning)).state
     check_unit(scale_of(start.matrix))
     gathered = gather(turning, window_s, start.clock_s)

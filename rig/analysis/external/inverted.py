@@ -15,7 +15,8 @@ Solved = TypeVar("Solved")
 def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], contradicting: Collection[str]) -> Solved:
     """Return `solve` of attitudes (N, 3, 3).
 
-    Raise Fault as it does, and `inverted_attitudes` if it raises one of `contradicting` and their inverses agree.
+    Raise its Faults, but `inverted_attitudes` instead of one of `contradicting` if the inverse attitudes agree with the
+    readings.
     """
     try:
         return solve(attitudes)

@@ -19,7 +19,7 @@ from rig.observation.external.placements import Placements
 def list_omitted(
     placed: PlacedReadings, results: Mapping[Quantity, Result | OfKind]
 ) -> Iterator[tuple[Quantity | None, Omitted]]:
-    """Yield what was left out of readings in attitudes, by the quantity that it is missing from, None of all."""
+    """Yield the readings left out of a solution in attitudes, by the quantity that lacks them, None for all."""
     yield from ((None, omitted) for omitted in placed.omitted)
     rates = results.get(RATE)
     if isinstance(rates, InIncrements | InAttitudes):
@@ -41,7 +41,7 @@ def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
 
 
 def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:
-    """Yield that rows with an angle were solved by their mean speed, if they were."""
+    """Yield a note if rows with an angle were solved by their mean speed."""
     if not data.by_mean:
         return
     why = "the body moves before or after them"

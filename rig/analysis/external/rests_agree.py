@@ -25,7 +25,7 @@ TAIL = 0.1  # of the rests, at either end, that may be none
 def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
     """Raise Fault `bias_contradicts_rests` if the bias is not what the gyroscope reads at rest.
 
-    A rest is one by its readings and by the attitudes of the rows in it. Rests may differ by their own scatter, by
+    A rest must be one by the readings, and by the attitudes of its rows. Rests may differ by their own scatter, by
     motion that the reference does not show, and by the effect of gravity on a gyroscope.
     """
     at_rest = means_at_rest(turning, solution.clock_s)
@@ -59,7 +59,7 @@ def _critical_value(dof: float) -> float:
 def _undetected_std_rad_s(turned_rad_s: Array) -> float:
     """Return the standard deviation of the body's undetected rate in the mean of all rests, about any axis.
 
-    From the scatter of the reference's rates (k, 3), inflated as Student's t.
+    It comes from the scatter of the reference's rates (k, 3), inflated as Student's t.
     """
     count = len(turned_rad_s)
     scatter = float(np.sqrt(np.var(turned_rad_s, axis=0, ddof=1).mean()))

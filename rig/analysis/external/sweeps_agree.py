@@ -25,8 +25,8 @@ FEWEST_FREEDOM = 3  # with fewer, the next coarser whole number alone would make
 def check_agree(solution: VectorSolution, data: ExternalData) -> None:
     """Check that every sweep agrees with the solution of all others (leave-one-out residuals).
 
-    Raise Refused `bad_sweep` for the one that is farthest off: half a turn given as a whole one, a wrong axis. Of two
-    about an axis, both: their difference does not tell which is wrong.
+    Raise Refused `bad_sweep` for the sweep that disagrees most, for example half a turn stated as a whole one, or a
+    wrong axis. If an axis has two sweeps, either may be wrong, and both are named.
     """
     means, variances, design = _equations(data)
     redundancy = _redundancy_numbers(design)
@@ -71,7 +71,7 @@ class SweepErrors:
 def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | None:
     """Return the effect of the stated motion's errors on the vector model's `solution`.
 
-    None for means that polynomials have corrected to one temperature: they include the contradictions of repeats.
+    Return None for means corrected to one temperature: the polynomials include the contradictions of repeats.
     """
     if data.at_reference:
         return None
@@ -88,7 +88,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     rate_variance, axis_variance = sizes.median_variances
 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
-        """Return the covariance (q, q) of values with derivatives (q, 12), by U over all sizes of errors."""
+        """Return the covariance (q, q) of values with derivatives (q, 12), by U over all possible sizes of errors."""
         on_noise, on_rate, on_axis, on_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)
         )
@@ -108,15 +108,15 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
 
 
 def count_redundant_rows(data: ExternalData) -> int:
-    """Return the number of rows beyond those that the solution needs: the degrees of freedom of contradictions.
+    """Return the number of rows beyond those that a solution needs: the degrees of freedom of contradictions.
 
-    A row with a wrong rate or end counts once, though it gives three equations.
+    A row has three equations but counts once, because its rate or end is wrong in all three.
     """
     return len(data.sweeps) + len(data.rests) - 4
 
 
 def noise_dof(solution: VectorSolution, data: ExternalData) -> float:
-    """Return the noise's fewest degrees of freedom, by how the vector model weighs the means."""
+    """Return the smallest degrees of freedom of the noise, by the weights of the means in the vector model."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     variances = np.array([average.variance_rad2_s2 for average in averages])
     dof = by_axis(average.dof for average in averages)
@@ -149,7 +149,7 @@ def _derivatives(design: Array, means: Array, variances: Array) -> Array:
 def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:
     """Return the contradiction (N, 3) of each sweep with the others, beyond errors of these sizes.
 
-    One wrong row among many makes the sizes little larger, and is all that two sweeps about an axis tell.
+    One wrong row among many hardly increases the sizes, but two sweeps about an axis show nothing else.
     """
     rate_variance, axis_variance = sizes.median_variances
     spread = rate_variance * stated.rate_patterns**2 + axis_variance * np.sum(stated.axis_patterns**2, axis=0)
@@ -160,13 +160,13 @@ def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) ->
 
 
 def _redundancy_numbers(design: Array) -> Array:
-    """Return the redundancy number (N, 1) of each row: its part of a residual that the other rows do not explain."""
+    """Return the redundancy number (N, 1) of each row: the fraction of its error that its residual shows."""
     redundancy: Array = np.maximum(1 - np.einsum("ij,ji->i", design, np.linalg.pinv(design)), LEAST_REDUNDANCY)
     return redundancy[:, None]
 
 
 def _additional_std(noise_std: Array, expanded: Array, known_dof: float, dof: float) -> Array:
-    """Return standard uncertainties (q,) that with those of the noise (q,) give U = k u of `expanded` (q,)."""
+    """Return the standard uncertainties (q,) to add to the noise (q,), so that k u equals `expanded` (q,)."""
 
     def is_too_small(std: Array) -> Array:
         variances = np.array([noise_std**2, std**2])

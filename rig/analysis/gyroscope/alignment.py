@@ -68,9 +68,9 @@ def collect_mean_rates(observations: Sequence[Observation], calibration: LinearC
 def fit_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -> RelativeRotation:
     """Return the rotation R that minimises Σ ‖sensor − R reference‖²; `nominal` (3, 3) is R by the nominal mountings.
 
-    Solution of Wahba's problem (Kabsch 1976) by SciPy. To first order the sensor reads R r + δθ × R r, so δθ is a
-    linear least-squares estimate with the noise of both sensors. Errors of scale are parallel to the axes of rotation
-    and biases cancel between the two directions, so neither changes R. Raise Fault `rank_deficient`.
+    Wahba's problem, solved by SciPy (Kabsch 1976). To first order the sensor reads R r + δθ × R r, so δθ is a linear
+    least-squares estimate with the noise of both sensors. Errors of scale are parallel to the axes of rotation and
+    biases cancel between the two directions, so neither changes R. Raise Fault `rank_deficient`.
     """
     from scipy.spatial.transform import Rotation
 

@@ -14,9 +14,9 @@ LIMIT = 6.0  # standard deviations of the mean; both have its noise in common, a
 
 
 def board_averages(sensor: str, recordings: Sequence[ObservedRun]) -> tuple[Check, ...]:
-    """Return a check for each sweep whose averages contradict each other, or else one for all sweeps.
+    """Return a check for each sweep whose averages contradict each other, or else one check for all sweeps.
 
-    None if the board averaged nothing. The value is the largest difference of the three axes over the standard
+    Return None if the board averaged nothing. The value is the largest difference of the three axes over the standard
     deviation of the computer's mean.
     """
     deviations = compare_board_means(sensor, recordings)

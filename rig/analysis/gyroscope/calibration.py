@@ -109,10 +109,10 @@ class SensorResult:
 
 
 def observe_recordings(runs: Sequence[RunData], rotations: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
-    """Return the observations of all recordings of one calibration; recordings without a finished sweep are skipped.
+    """Return the observations of all recordings of one calibration, without those that have no finished sweep.
 
     The first recording's thresholds are used; `rotations` as in `observe_runs`. Raise Refused `different_sensors`;
-    Fault `duplicated_observation` and as `observe_run` does.
+    Fault `duplicated_observation` and those of `observe_run`.
     """
     if any(run.sensors != runs[0].sensors for run in runs):
         raise Refused(
@@ -133,10 +133,10 @@ def solve_observed(
 ) -> dict[str, SensorResult]:
     """Calibrate `sensors` from all recordings, which share the `surroundings`.
 
-    The sensors in `matrix_corrected` are corrected by the whole matrix if the estimator is the vector model; all other
-    sensors as if their axes were orthogonal. Every estimator requires sweeps that suffice for the six-observation
-    solution: a plan that lacks a direction is refused. Raise Refused `unknown_estimator`; Fault
-    `duplicated_observation` and as the estimators do.
+    If the estimator is the vector model, sensors in `matrix_corrected` are corrected by the whole matrix. All other
+    corrections assume orthogonal axes. Every estimator needs sweeps that suffice for the six-observation solution, so a
+    plan that lacks a direction is refused. Raise Refused `unknown_estimator`; Fault `duplicated_observation` and as the
+    estimators do.
     """
     chosen = find_estimator(estimator)
     return {
@@ -201,7 +201,7 @@ def _solve_sensor(
 def _budget_of(
     solution: Estimate, explained: Explained, surroundings: Surroundings, unknown: Unknown, name: str
 ) -> Budget | None:
-    """Return the budget of the chosen solution of the sensor `name`; None by an estimator without budget."""
+    """Return the budget of the chosen solution of the sensor `name`; None if its estimator has no budget."""
     if isinstance(solution, VectorSolution):
         return budget(explained, unknown)
     if isinstance(solution, Solution) and solution.estimator == "newton":

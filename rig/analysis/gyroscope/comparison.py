@@ -113,7 +113,7 @@ def compare(
     """Return the comparison of a sensor's recorded readings with the reference's.
 
     `rotation` (3, 3) takes the latter into the sensor's frame. `gravity_rad_s` (N, 3): the effect of gravity on the
-    readings of each revolution, if it is known. Raise Fault `no_overlap`, `different_clocks`.
+    readings of each revolution, if given. Raise Fault `no_overlap`, `different_clocks`.
     """
     parts = [_align_recording(recording, sensor, reference, rotation) for recording in recordings]
     return Comparison(
@@ -183,7 +183,7 @@ def _find_delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | 
 
 
 def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
-    """Return which times (n,) have one of `by_s` (m,) closely before and after them."""
+    """Return which times (n,) have one of the times `by_s` (m,) shortly before and one shortly after."""
     after = np.searchsorted(by_s, time_s)
     gaps = np.diff(by_s, prepend=-np.inf, append=np.inf)
     close: NDArray[np.bool_] = gaps[after] <= MAX_GAP * np.median(gaps)
@@ -191,7 +191,7 @@ def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
 
 
 def _interpolate(stream: Stream, reference: Reference, time_s: Array) -> Array:
-    """Return the reference's corrected rate (n, 3) at other times, by a cubic spline: chords would clip vibrations."""
+    """Return the reference's corrected rate (n, 3) at other times, by a cubic spline, which keeps vibrations."""
     rate = reference.scale * (stream.readings_rad_s + reference.bias_rad_s)
     return CubicSpline(stream.time_s, rate)(time_s)
 
@@ -207,7 +207,7 @@ def _summarise(errors: Sequence[Array]) -> Deviation:
 
 
 def _estimate_noise(rests: Sequence[Array]) -> Array | None:
-    """Return the standard deviation (3,) within the rests about their own means."""
+    """Return the standard deviation (3,) within the rests, about the mean of each."""
     long_enough = [rest for rest in rests if len(rest) >= MIN_SAMPLES_AT_REST]
     if not long_enough:
         return None

@@ -30,7 +30,7 @@ class Correction:
 
 
 def diagonal_correction(scale: Array) -> Correction:
-    """Return M = K of scale factors (3,), as if the axes were orthogonal."""
+    """Return the matrix M = K of scale factors (3,), for axes taken as orthogonal."""
     return Correction("diagonal", np.diag(scale))
 
 

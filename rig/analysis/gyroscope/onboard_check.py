@@ -43,7 +43,7 @@ class Agreement:
     bias_difference_rad_s: float | None
 
     def checks(self, sensor: str) -> tuple[Check, ...]:
-        """Return the two checks of the verdict; a board whose arithmetic is unconfirmed does not pass."""
+        """Return the two checks of the verdict, which fail if the board's arithmetic is unconfirmed."""
         scale, bias = self.scale_difference, self.bias_difference_rad_s
         return (
             fitness(sensor, "rate", "board_scale", scale, SCALE_LIMIT, parameter="scale"),
@@ -72,7 +72,7 @@ def check_arithmetic(runs: Sequence[RunData], sensor: str) -> Agreement:
 
 
 def check_observed(run: RunData, sensors: Iterable[str]) -> None:
-    """Raise Fault `board_missed_sweep` if the board has no observation of a sweep: a resumed run repeats it."""
+    """Raise Fault `board_missed_sweep` if the board missed a sweep, which a resumed run repeats."""
     for sensor in sensors:
         if missed := _list_unobserved(run, sensor):
             raise Fault(
@@ -98,7 +98,7 @@ class _BoardObservation:
 
 
 def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObservation]:
-    """Return every observation of the board's solution, by the recorded samples."""
+    """Return every observation of the board's solution, computed from the recorded samples."""
     observations: list[_BoardObservation] = []
     for event in _events(runs[-1], sensor):
         if isinstance(event, BoardObserved):
@@ -109,7 +109,7 @@ def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObser
 
 
 def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _BoardObservation:
-    """Return a recalled observation from the newest recording that has it; NaN if none has."""
+    """Return the observation from the newest recording that has it; NaN if none has."""
     for run in reversed(earlier):
         if earlier_observations := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
             return _average_observation(run, earlier_observations[recalled.sweep])
@@ -144,7 +144,7 @@ def _count_missing(sequence: NDArray[np.uint32]) -> int:
 def _solve(observations: Sequence[_BoardObservation]) -> tuple[Array, Array] | None:
     """Return scale and bias by the board's method, with equal weights.
 
-    None with too few observations, with other samples than the board reports, or if the host could check no mean.
+    Return None with too few observations, with other samples than the board reports, or if no mean could be checked.
     """
     accumulated = Accumulator.empty()
     if not any(observation.averaged for observation in observations):

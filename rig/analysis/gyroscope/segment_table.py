@@ -48,7 +48,7 @@ class Segments:
 def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, site: Site) -> Segments:
     """Return the segments of a gyroscope's windows, in the order of the means of `explained`.
 
-    The Earth's rate is taken from `explained`, which states it by the site or has estimated it.
+    The Earth's rate is that of `explained`: the site's, or the estimated one.
     """
     inputs = explained.inputs
     placed = list(zip(windows, inputs.windows_s[:, 0], inputs.acceleration_m_s2, strict=True))
@@ -86,8 +86,8 @@ def append_transfers(
 ) -> Segments:
     """Return the segments with the transfers appended, numbered downwards from below `REST`.
 
-    A transfer's noise is the larger of its own and the other segments' noise over its duration, plus the effect of
-    vibration, estimated in the rests at either end. `windows`: the segments' windows.
+    A transfer's noise is the larger of its own and that of the other segments over the same duration. The effect of
+    vibration, estimated in the rests before and after, is added. `windows`: the segments' windows.
     """
     if not transfers:
         return segments
@@ -125,7 +125,7 @@ def append_transfers(
 def _vibration_changes(windows: Sequence[SegmentedAverage], explained: Explained, times_s: Array) -> Array:
     """Return the variances (M, 3), rad², of the vibration's change in M transfers, by the nearest rests.
 
-    times_s (M, 2): start and end of the transfers on the clock of the first recording.
+    `times_s` (M, 2): start and end of the transfers on the clock of the first recording.
     """
     rests = [
         (time_s, window.readings.swing_rad2)

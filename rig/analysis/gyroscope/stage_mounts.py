@@ -43,9 +43,9 @@ class EstimatedMount:
 def observe_as_mounted(
     runs: Sequence[RunData], settings: RunSettings
 ) -> tuple[tuple[ObservedRun, ...], tuple[EstimatedMount, ...]]:
-    """Return the observations of one calibration with the item's estimated mounts, and these mounts.
+    """Return the observations of one calibration by the item's estimated mounts, and these mounts.
 
-    The solution of each sensor estimates the rest of a mount's error, which is of second order. Raise as
+    The solution of each sensor estimates the remaining mount errors, which are of second order. Raise as
     `observe_recordings` does.
     """
     recordings = observe_recordings(runs)
@@ -57,7 +57,7 @@ def observe_as_mounted(
 
 
 def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[EstimatedMount, ...]:
-    """Return the mounts of all stages but the first, by the sensor that determines them best; none if none does."""
+    """Return the mounts of all stages but the first, by the sensor that determines them best, if any does."""
     stages = list(dict.fromkeys(recording.run.settings.stage for recording in recordings))
     if len(stages) < 2:
         return ()

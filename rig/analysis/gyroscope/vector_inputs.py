@@ -43,7 +43,7 @@ class RecordingPart:
 def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> VectorInputs:
     """Return the arm's motion and the readings in each average of a sensor, from all recordings of a run.
 
-    Speeds are corrected for the controller's clock: if it runs too fast, they are too small.
+    Speeds are corrected for the controller's clock: if it runs too fast, recorded speeds are too small.
     """
     run = recordings[0].run
     parts = [
@@ -126,7 +126,8 @@ def describe_sensor(
 def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array | None = None) -> Array:
     """Return the lever arms (M, 3) from the axis of rotation to the sensors, in the item's frame; zero without an arm.
 
-    The `mount` (3, 3) takes the flange's frame, which the extension refers to, into the item's; None: they are one.
+    `mount` (3, 3) takes vectors from the flange's frame, in which the extension is given, into the item's; None if they
+    agree.
     """
     mounted_m = extension_m if mount is None else mount @ extension_m
     lever_arms = [turn.arm_m + mounted_m if turn.arm_m is not None else np.zeros(3) for turn in turns]
@@ -154,8 +155,8 @@ def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncert
 def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array | None:
     """Return the errors (P, N, 3) of `VectorInputs` by a joint's encoder at each angle where arcs begin or end.
 
-    Sweeps in both directions share these angles, so repeats do not average the errors out. None if all sweeps are whole
-    revolutions, which end where they began.
+    Sweeps in both directions share these angles, so repeats do not average the errors out. Return None if all sweeps
+    are whole revolutions, which end where they began.
     """
     arcs = [None if turn.arc_rad is None else (turn.joint_name, *turn.arc_rad) for turn in turns]
     marks = list(dict.fromkeys((arc[0], end) for arc in arcs if arc is not None for end in arc[1:]))
@@ -174,7 +175,7 @@ def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncer
 def list_mount_rotations(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
     """Return the rotations (3 S, N, 3) of `VectorInputs`: mounts that are wrong by `mount_deg` about any axis.
 
-    None with one stage.
+    Return None with one stage.
     """
     first, *others = dict.fromkeys(stages)
     if not others:
@@ -197,7 +198,7 @@ def _group_by_axis(turns: Sequence[Observation]) -> list[list[int]]:
 
 
 def list_given(surroundings: Surroundings, name: str) -> EarthRatePrior:
-    """Return the stated values of surroundings and sensor, before the Earth's rate is estimated."""
+    """Return the given values of surroundings and sensor, before the Earth's rate is estimated."""
     site, uncertainty = surroundings.site, surroundings.uncertainty
     return EarthRatePrior(
         up=np.array(site.up),

@@ -46,8 +46,8 @@ def verify(
 ) -> Verification:
     """Compare the readings that the board has calibrated (`after`) with those of the reference.
 
-    - `before`: recordings of raw readings that the `calibration` was made from; they determine the rotation between the
-      sensors. Without them `after` does.
+    - `before`: recordings of raw readings, from which the `calibration` was made; they determine the rotation between
+      the sensors. Without them `after` does.
     - `gravity_rad_s`, two of (N, 3): gravity's effect on the corrected readings of sensor and reference in the
       revolutions of `after`, if the calibration estimated it.
 
@@ -73,7 +73,7 @@ def verify(
 
 
 def _gravity_difference(gravity_rad_s: tuple[Array, Array] | None, rotation: Array) -> Array | None:
-    """Return the difference (N, 3) of sensor's and reference's readings by gravity."""
+    """Return gravity's effect (N, 3) on the sensor's readings minus that on the reference's."""
     if gravity_rad_s is None:
         return None
     on_sensor, on_reference = gravity_rad_s
@@ -86,7 +86,7 @@ def fit_mounting(
 ) -> RelativeRotation:
     """Return the rotation from reference to sensor by the revolutions of the recordings.
 
-    `calibration` is None for readings that are calibrated already. Raise Fault as `fit_rotation` does.
+    `calibration` is None if the readings are calibrated. Raise Fault as `fit_rotation` does.
     """
     described = recordings[0].run.sensors
     return fit_rotation(
@@ -109,7 +109,7 @@ def _check_complete(runs: Sequence[RunData]) -> None:
 
 
 def _reference_error(recordings: Sequence[ObservedRun], reference: Reference) -> float:
-    """Return the reference's largest error against the arm; magnitudes, as its mounting does not matter here."""
+    """Return the reference's largest error against the arm; of magnitudes, so its mounting does not matter."""
     turns = list_revolutions(reference.name, recordings)
     rates_rad_s = np.linalg.norm(collect_mean_rates(turns, reference).rate_rad_s, axis=1)
     in_sweeps = rates_rad_s - [turn.speed_rad_s for turn in turns]

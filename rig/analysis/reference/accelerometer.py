@@ -204,7 +204,7 @@ def _calibrate(
 
 
 def _select_planned(dwells: Sequence[DwellReading], settings: RunSettings) -> tuple[PlannedDwell, ...]:
-    """Return the planned dwells; over temperature only those that the run reached."""
+    """Return the planned dwells; in a calibration over temperature only those that the run reached."""
     if settings.reference_c is None:
         return settings.planned_dwells
     last = max((dwell.index for dwell in dwells), default=-1)
@@ -217,7 +217,7 @@ def _select_planned(dwells: Sequence[DwellReading], settings: RunSettings) -> tu
 def _split_dwells(
     dwells: Sequence[DwellReading], planned: Sequence[PlannedDwell]
 ) -> tuple[tuple[DwellReading, ...], tuple[DwellReading, ...]]:
-    """Return the dwells that the calibration uses, and the last repeat if there are several."""
+    """Return the dwells that the calibration uses, and those of the last repeat if there are several repeats."""
     if missing := {dwell.index for dwell in planned} - {dwell.index for dwell in dwells}:
         raise Fault(
             "not_all_attitudes",
@@ -230,7 +230,7 @@ def _split_dwells(
 
 
 def select_held_out(planned: Sequence[PlannedDwell]) -> frozenset[int]:
-    """Return the indices of the last repeat's dwells; none if the attitudes are visited once."""
+    """Return the indices of the last repeat's dwells; none if each attitude is visited once."""
     last = max(dwell.repeat for dwell in planned)
     return frozenset(dwell.index for dwell in planned if dwell.repeat == last > 0)
 

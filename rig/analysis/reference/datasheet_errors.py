@@ -114,7 +114,7 @@ def list_windows(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[
 
 
 def mean_temperature_c(windows: Sequence[ReferenceWindow]) -> float:
-    """Return the mean temperature of the readings, at which scale and bias hold."""
+    """Return the mean temperature of the readings, to which scale and bias refer."""
     samples = [window.samples for window in windows]
     return float(np.average([window.temperature_c for window in windows], weights=samples))
 
@@ -122,7 +122,7 @@ def mean_temperature_c(windows: Sequence[ReferenceWindow]) -> float:
 def list_sensor_errors(
     datasheet: Datasheet, windows: Sequence[ReferenceWindow], temperature_step_k: float, *, second_order: bool
 ) -> AccelerometerErrors:
-    """Return the errors of a sensor in these windows; without an even part if `second_order` is estimated.
+    """Return the errors of a sensor in these windows; without the even part if `second_order` is estimated.
 
     `temperature_step_k` is the thermometer's resolution.
     """
@@ -161,7 +161,7 @@ def separate_sensor_errors(
 ) -> tuple[Spread, list[Contributor]]:
     """Return the `spread` by noise and arm, and the contributors of the sensor itself in this `movement`.
 
-    The response belongs to a solution that estimates all parameters, so the noise of a nonlinear sensor has a larger
+    The response is that of a solution that estimates all parameters, so the noise of a nonlinear sensor has a larger
     effect.
     """
     drift, flicker = (

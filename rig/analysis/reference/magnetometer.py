@@ -57,7 +57,7 @@ class MagnetometerResult:
 def calibrate_magnetometers(
     recordings: Sequence[ObservedRun], settings: RunSettings, accelerometers: Mapping[str, AccelerometerResult]
 ) -> Attempts[str, MagnetometerResult]:
-    """Calibrate every magnetometer that was recorded; return the results, or the Fault of each that has none.
+    """Calibrate every recorded magnetometer; return the results, or the Fault of each that has none.
 
     The `accelerometers` bound the error of the arm's attitudes. The Fault is `no_attitudes` without dwells,
     `field_strength_unknown`, `field_drifts`, `field_not_uniform`, a Fault of `field_readings` or of `solve_triaxial`,
@@ -145,7 +145,7 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
 def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
     """Return the solution.
 
-    Raise Fault `field_not_uniform` for large residuals, because the accelerometer confirms the attitudes.
+    Raise Fault `field_not_uniform` for large residuals: the accelerometer confirms the attitudes.
     """
     try:
         return solve(method=ESTIMATOR)
@@ -159,7 +159,7 @@ def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
 def _attitude_error_rad(
     name: str, recordings: Sequence[ObservedRun], accelerometers: Mapping[str, AccelerometerResult]
 ) -> float:
-    """Return the bound of the arm's attitude error, with 2σ, by the accelerometer on the same clock."""
+    """Return an upper bound (2σ) of the arm's attitude error, by the accelerometer on the same clock."""
     by = next((other for run in recordings if (other := find_companion(run, name)) in accelerometers), None)
     accelerometer = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
     error = accelerometer.solution.attitude_error

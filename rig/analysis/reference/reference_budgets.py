@@ -131,7 +131,7 @@ def _field(site: Site, field_t: float) -> KnownSize:
 
 
 def lag_pattern(movement: Movement, lag_s: float) -> Array:
-    """Return the pattern (1, 3 K) of the sensor's filter: it reduces a sweep's wave by (ω τ)²/2, outside the model."""
+    """Return the pattern (1, 3 K) of the sensor's filter, outside the model: it reduces a sweep's wave by (ω τ)²/2."""
     dwells, sweeps = movement.dwells, movement.sweeps
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean is not reduced

@@ -50,12 +50,15 @@ class Triad:
 
 
 def gravity_reference(site: Site) -> KnownNorm:
-    """Return the reference of an accelerometer at rest: the specific force, which opposes gravity and points up."""
+    """Return the reference of an accelerometer at rest: the specific force, which points upwards, against gravity."""
     return KnownNorm(site.gravity_m_s2, np.array(site.up))
 
 
 def field_reference(site: Site, key: str) -> KnownNorm:
-    """Return the field at the site. Raise Fault `field_strength_unknown`; `key` is the option that states its size."""
+    """Return the field at the site.
+
+    Raise Fault `field_strength_unknown`, which names the option `key` that states it.
+    """
     if site.magnetic_field_t is None:
         raise Fault(
             "field_strength_unknown",
@@ -67,7 +70,7 @@ def field_reference(site: Site, key: str) -> KnownNorm:
 
 
 def stack_dwells(dwells: Sequence[DwellReading | StaticReading], mounting: Array) -> Dwells:
-    """Return the dwells in the nominal mounting's axes; attitudes are means of rotations, so nearly orthogonal."""
+    """Return the dwells in the axes of the nominal mounting; mean attitudes are made orthogonal."""
     return Dwells(
         np.array([dwell.reading.mean for dwell in dwells]),
         np.array([dwell.reading.variance for dwell in dwells]),

@@ -84,7 +84,8 @@ class DwellMean:
 def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
     """Return the drift of every sensor to calibrate, over all recordings of a run, by its finished repeats.
 
-    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and as `solve_triaxial` for the first one.
+    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and as `solve_triaxial` does for the first
+    one.
     """
     site = settings.site
     repeats: defaultdict[int, dict[tuple[float, ...], int]] = defaultdict(dict)
@@ -103,7 +104,7 @@ def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSetting
 
 
 def _select_complete(means: Mapping[int, DwellMean], table: Sequence[Sequence[int]]) -> list[list[DwellMean]]:
-    """Return the complete repeats, attitudes in the same order."""
+    """Return the complete repeats, each with its attitudes in the same order."""
     complete = [[means[index] for index in repeat] for repeat in table if means.keys() >= set(repeat)]
     if len(complete) < FEWEST_REPEATS:
         raise Fault(

@@ -18,10 +18,10 @@ MOST = 0.125  # of the rests: if more stand out, the bias itself jumps
 
 
 def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
-    """Return the fewest rests whose omission greatly reduces the bias' random walk; none if that needs too many.
+    """Return the smallest set of rests without which the bias' random walk is much smaller; none if the set is large.
 
-    Each has a used rest on either side: at the first or last rest, or at two in a row, a creep looks like a jump of the
-    bias.
+    A creeping rest needs a used rest before and after it. Otherwise the creep cannot be distinguished from a jump of
+    the bias.
     """
     if fit.stds.walk_rad_s_sqrt_s <= RATIO * STATED.walk_rad_s_sqrt_s:
         return ()
@@ -41,7 +41,7 @@ def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
 
 
 def _distances_from_neighbours(times_s: Array, biases: Array, left_out: Sequence[int]) -> Array:
-    """Return the distance (n,) of each bias (n, 3) from the line between its neighbours; 0 if one is unused."""
+    """Return the distance (n,) of each bias (n, 3) from the line between its neighbours; 0 next to an unused rest."""
     distances = np.zeros(len(times_s))
     for row in range(1, len(times_s) - 1):
         if not {row - 1, row, row + 1} & set(left_out):

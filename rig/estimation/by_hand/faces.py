@@ -30,13 +30,13 @@ def find_faces(session: HandRecording, conditions: SessionConditions, integrals:
 
 
 def _read_verticals(session: HandRecording) -> Array:
-    """Return the verticals in the body (N, 3) as the accelerometer reads them, its offset included."""
+    """Return the verticals in the body (N, 3) as the accelerometer reads them, without correcting its offset."""
     readings = np.array([rest.acceleration_m_s2 for rest in session.rests])
     return np.asarray(readings / np.linalg.norm(readings, axis=1)[:, None], dtype=np.float64)
 
 
 def _track_verticals(conditions: SessionConditions, integrals: MoveIntegrals) -> Array:
-    """Return the verticals (N, 3) by dead reckoning; each face that is reached is set to its nominal direction."""
+    """Return the verticals (N, 3) by dead reckoning, reset at every rest to the nominal direction of its face."""
     if conditions.first_face is None:
         raise Refused(
             "first_face_not_told",
@@ -54,7 +54,7 @@ def _track_verticals(conditions: SessionConditions, integrals: MoveIntegrals) ->
 def _count_turns(
     session: HandRecording, integrals: MoveIntegrals, faces: tuple[str | None, ...], up: Array, row: int
 ) -> int:
-    """Return the signed number of whole turns of a move about its face's axis; 0 if it is no turn."""
+    """Return the signed number of whole turns of a move about its face's axis; 0 if the move is no turn."""
     if faces[row] is None or faces[row] != faces[row + 1] or not session.moves[row].is_usable:
         return 0
     angle = float(up[row] @ integrals.swept_rad[row])

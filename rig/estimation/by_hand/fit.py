@@ -64,9 +64,10 @@ class GraphFit:
 
 
 def fit_session(session: HandRecording, conditions: SessionConditions, trusted: int | None = None) -> GraphFit:
-    """Fit a session of one rest at least, with variance components from its first `trusted` rests, or from all.
+    """Fit a session of one rest at least.
 
-    Raise Fault `no_fit`, Refused `first_face_not_told`.
+    The variance components are estimated from its first `trusted` rests, or from all. Raise Fault `no_fit`, Refused
+    `first_face_not_told`.
     """
     biases = np.array([rest.mean_rad_s for rest in session.rests])
     stds = STATED
@@ -157,9 +158,9 @@ def _leverages(design: Array, covariance: Array) -> Array:
 
 
 def estimate_stds(rows: Sequence[Factor], now: HandStds, trusted: int | None = None) -> tuple[list[Factor], HandStds]:
-    """Estimate the rows' standard deviations (currently `now`) from the residuals of the first `trusted` rests, or all.
+    """Return the rows with re-estimated standard deviations, and these standard deviations.
 
-    Return the rows with the new standard deviations, and the standard deviations.
+    They are estimated from the residuals of the first `trusted` rests, or of all; `now` are the current ones.
     """
     rows = list(rows)
     for _ in range(SIZED):

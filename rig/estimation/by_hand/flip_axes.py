@@ -13,7 +13,7 @@ FASTEST_RAD_S = 150.0  # no gyroscope of this kind reads so much: it is degrees
 
 
 def check_axes(session: HandRecording) -> None:
-    """Raise Fault `wrong_unit`, `mirrored_axis` or `swapped_axes` if quarter-turn flips show it."""
+    """Raise Fault `wrong_unit`, `mirrored_axis` or `swapped_axes` if the flips by a quarter turn show such an error."""
     if max((move.peak_rad_s for move in session.moves), default=0.0) > FASTEST_RAD_S:
         raise Fault("wrong_unit", "the readings look like degrees per second given as rad/s", "Give them in rad/s")
     if session.acceleration is None:

@@ -153,9 +153,10 @@ class Graph:
 
     @cached_property
     def stamp_std_s(self) -> float:
-        """The standard deviation of time stamps, by their second differences without the largest, which gaps cause.
+        """The standard deviation of time stamps, by their second differences.
 
-        Correct but uneven stamps look the same as even but wrong ones.
+        The largest differences are omitted, because gaps cause them. True irregular sampling cannot be distinguished
+        from wrong stamps.
         """
         differences = np.sort(np.abs(np.diff(self.session.time_s, 2)))
         return float(np.sqrt(np.mean(np.square(differences[: round(BUT_GAPS * len(differences))])) / 6))
@@ -202,7 +203,7 @@ def reading_noise(session: HandRecording) -> float:
 
 
 def _hand_held_std(scatter: Array, quiet: float, lasting_s: float) -> float:
-    """Return the standard deviation of a rest's mean while a hand holds the body, by its scatter at low frequency."""
+    """Return the standard deviation of the mean of a rest in the hand, by the low-frequency part of its readings."""
     beyond = float(np.mean(scatter**2)) - (AS_QUIET * quiet) ** 2
     return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_HZ * lasting_s, 1.0)))
 

@@ -82,7 +82,7 @@ def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
 
 
 def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
-    """Return each hypothesis with the drop of χ² in excess of the drop from as many equations omitted at random.
+    """Return each hypothesis with the drop of χ² beyond that by leaving out as many equations at random.
 
     The columns are projected off the model's, so the graph is not solved for each hypothesis.
     """
@@ -103,7 +103,7 @@ def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
 
 
 def _drop_with_new_stds(fit: GraphFit, name: str, index: int) -> float:
-    """Return the drop of χ² with standard deviations re-estimated without the fault; 0 if none shrinks much."""
+    """Return the drop of χ² with standard deviations re-estimated without the fault; 0 if all stay about as large."""
     columns = _fault_columns(fit, name, index)
     ends = np.cumsum([len(row.residual) for row in fit.factors])[:-1]
     parts = zip(fit.factors, np.split(columns, ends), strict=True)
@@ -133,7 +133,7 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
 def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
     """Return the columns (r, 2) of a factor for a table that tilts at rest `index`, and for the move before it.
 
-    The last rest has none: there a body that does not lie flat has the same effect.
+    At the last rest a tilted table looks like a body that does not lie flat, so there are none.
     """
     other = np.zeros((len(row.design), 2))
     if row.kind == ACCELERATION and row.index >= index:

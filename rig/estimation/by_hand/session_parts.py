@@ -118,7 +118,7 @@ class RestFaces:
 
 
 def drop_rests(session: HandRecording, rows: Collection[int]) -> HandRecording:
-    """Return the session without the rests `rows`, in which the body crept: they become pauses of merged moves."""
+    """Return the session without the rests `rows`, in which the body crept; the moves around each are merged."""
     kept = [row for row in range(len(session.rests)) if row not in rows]
     return replace(
         session,
@@ -129,7 +129,10 @@ def drop_rests(session: HandRecording, rows: Collection[int]) -> HandRecording:
 
 
 def merge_moves(moves: Sequence[Move]) -> Move:
-    """Return consecutive moves as one, pauses included. A long one is left out: its pauses are unknown."""
+    """Return consecutive moves as one, including the pauses between them.
+
+    A long merged move is marked as left out, because the rotation during its pauses is unknown.
+    """
     long = len(moves) > 1 and moves[-1].end_s - moves[0].start_s > LONGEST_S
     return Move(
         moves[0].start_s,

@@ -192,7 +192,7 @@ def parameter_columns(fit: GraphFit) -> NDArray[np.intp]:
 
 
 def insufficient_session(session: HandRecording, expanded: Array | None) -> Fault:
-    """Return the Fault of a session without a result: unusable moves, else too few of them."""
+    """Return the Fault that explains why a session has no result: unusable moves, else too few moves."""
     clipped = sum(move.clipped for move in session.moves)
     lost = sum(move.lost for move in session.moves)
     if clipped:
@@ -233,7 +233,7 @@ def _check_precision(fit: GraphFit) -> Fault | None:
 
 
 def _looseness(fit: GraphFit) -> float:
-    """Return the larger ratio of estimated to stated standard deviation, for faces and for moves."""
+    """Return the larger ratio of estimated to stated standard deviation: of faces, or of moves."""
     stds = fit.stds
     return max(stds.repeat_rad / STATED.repeat_rad, stds.of_angle / STATED.of_angle)
 

@@ -79,8 +79,9 @@ def assess_identifiability(attitudes: Array, up: Array, order: Order = 1) -> Ide
 def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
     """Return the G-efficiency: the number of parameters over the worst prediction variance; 1 at best, 0 if singular.
 
-    For exact attitudes, equal noise and any orientation. The variance is the trace over the three axes, times N, in
-    units of one reading's; its mean over the design's own attitudes is the number of parameters (Kiefer and Wolfowitz).
+    The attitudes are exact and all readings have the same noise. The prediction variance of any orientation is the
+    trace over three axes, times N, in units of one reading's variance. Its mean over the design's own attitudes is the
+    number of parameters (Kiefer and Wolfowitz).
     """
     from scipy.optimize import minimize
     from scipy.spatial.transform import Rotation

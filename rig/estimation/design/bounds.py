@@ -55,10 +55,10 @@ def triaxial_bound(
     known_references: ArrayLike | None = None,
     second_order: ArrayLike | None = None,
 ) -> Array:
-    """Return the bound (15, 15), with `second_order` φ (3,) (18, 18), for the rows of F, v_ref, b, φ: TRIAX (3), (10).
+    """Return the Cramér–Rao bound (15, 15) of F by rows, v_ref and b; (18, 18) if `second_order` φ (3,) is given.
 
-    Shapes as in `solve_triaxial`, true values. `known_references` (N, 3) are v̄; without them the norm of `reference` is
-    known.
+    TRIAX (3), (10). Arguments have the shapes of `solve_triaxial` and true values. `known_references` (N, 3) are v̄;
+    without them the norm of `reference` is given.
     """
     parts = [np.ravel(matrix), np.asarray(reference), np.asarray(bias)]
     if second_order is not None:
@@ -70,7 +70,7 @@ def triaxial_bound(
 
 
 def efficiency(errors: ArrayLike, bound: Array) -> Array:
-    """Return the mean squared error (p,) of R runs (R, p) over the bound's diagonal: 1 for an efficient estimator."""
+    """Return the mean squared error (p,) of R runs (R, p) divided by the bound's diagonal: 1 if efficient."""
     return np.asarray(np.mean(np.asarray(errors) ** 2, axis=0) / np.diag(bound), dtype=np.float64)
 
 

@@ -142,7 +142,7 @@ def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitude
 
 
 def _relative(fixes: Fixes) -> Array:
-    """Return the stated standard deviation (k,) of each sample over the median one."""
+    """Return each sample's stated standard deviation (k,) divided by the median of all."""
     if fixes.std_rad is None or not fixes.std_rad.any():
         return np.ones(len(fixes.at_s))
     usual = float(np.median(fixes.std_rad[fixes.std_rad > 0]))
@@ -169,7 +169,7 @@ class DriftModel:
     causes: tuple[str, ...]
 
     def std_of(self, cause: str, std: Array) -> float:
-        """Return the standard deviation of a cause by those of all (k,); 0 if the recording has none of it."""
+        """Return the standard deviation of a cause from those of all causes (k,); 0 if the model has no such cause."""
         return float(std[self.causes.index(cause)]) if cause in self.causes else 0.0
 
 
@@ -215,7 +215,7 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
 
 
 def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, step: Array) -> dict[str, Array]:
-    """Return the covariances (3n, 3n) of the increments by unit errors of the reference, by cause."""
+    """Return the covariance (3n, 3n) of the increments by a unit error of each cause in the reference."""
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
     ratio = _relative(fixes)[first]
@@ -236,7 +236,7 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
 
 
 def _correlate(fixes: Fixes) -> Array:
-    """Return the correlation (N, N) of an error that is a smooth function of attitude, as its mean over each fix.
+    """Return the correlation (N, N) between the fixes' means of an error that varies smoothly with attitude.
 
     Matérn's function, ν = 3/2, of the chordal distance ‖R − R′‖/√2, which for small angles is the angle: positive
     definite on SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
@@ -253,17 +253,17 @@ def _correlate(fixes: Fixes) -> Array:
 
 
 def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
-    """Return the covariance (3n, 3n) of the increments by unit changes of F's elements with attitude.
+    """Return the covariance (3n, 3n) of the increments if F's elements vary with attitude by one unit.
 
-    `nearby` (n, n) is the correlation between the increments. Readings and reference may differ by a factor that
-    depends on where the body is: the sensor's nonlinearity, its sensitivity to gravity, gears.
+    `nearby` (n, n) is the correlation between the increments. Causes of such a variation are the sensor's nonlinearity,
+    its sensitivity to gravity, and gears in the reference.
     """
     flat = sensitivities[..., MATRIX].reshape(-1, 9)
     return np.asarray((flat @ flat.T) * np.kron(nearby, np.ones((3, 3))), dtype=np.float64)
 
 
 def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array) -> Array:
-    """Return the covariance (3n, 3n) of the increments by unit changes of b with attitude and time.
+    """Return the covariance (3n, 3n) of the increments if the bias b varies with attitude and time by one unit.
 
     `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times.
     """
@@ -278,6 +278,9 @@ def _expand_axes(covariance: Array) -> Array:
 
 
 def _combine_blocks(step: Array, blocks: Array) -> Array:
-    """Return the covariance (3n, 3n) of increments by `step` (n, N) of vectors with covariances `blocks` (N, 3, 3)."""
+    """Return the covariance (3n, 3n) of increments from the covariances `blocks` (N, 3, 3) of N vectors.
+
+    `step` (n, N) maps the vectors to the increments.
+    """
     spread = np.einsum("ik,kab,jk->iajb", step, blocks, step, optimize=True)
     return np.asarray(spread.reshape(3 * len(step), -1), dtype=np.float64)

@@ -220,7 +220,7 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _Settled) -> None:
 
 
 def _check_identified(matrix: Array, covariance: Array) -> None:
-    """Raise Fault `ill_conditioned` if the body hardly turned about an axis, with what its turns about others tell."""
+    """Raise Fault `ill_conditioned` if the body hardly turned about an axis. The message names this axis."""
     std = np.sqrt(np.diag(covariance)[MATRIX]).reshape(3, 3).max(axis=0)
     unknown = std > UNIDENTIFIED
     if not unknown.any():
@@ -236,7 +236,7 @@ def _check_identified(matrix: Array, covariance: Array) -> None:
 
 
 def _times_s(fixes: Fixes, increments: NDArray[np.bool_]) -> Array:
-    """Return the start (k,) of some of the increments (N − 1,)."""
+    """Return the start times (k,) of the selected increments (N − 1,)."""
     first = np.searchsorted(fixes.fix, np.flatnonzero(increments))
     return np.asarray(fixes.at_s[first], dtype=np.float64)
 
@@ -277,7 +277,7 @@ OF_CAUSES = {
 
 
 def _causes(settled: _Settled) -> dict[str, Array]:
-    """Return the parts of θ's covariance by the estimated errors and by the priors of θ itself."""
+    """Return the parts of θ's covariance: one for each estimated error, and one for θ's priors."""
     covariance = settled.solved.covariance
     blind, *parts, _ = settled.model.causes(settled.std, settled.solved)
     by_cause = dict(zip(settled.causes.causes, parts, strict=True))
@@ -293,7 +293,10 @@ def _causes(settled: _Settled) -> dict[str, Array]:
 
 
 def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:
-    """Return the Earth's rate by the increments without the prior of its norm, or the Fault if it is not detected."""
+    """Return the Earth's rate by the increments alone, or the Fault if it is not detected.
+
+    The prior of its norm is not used.
+    """
     information = np.linalg.inv(covariance)
     data_information: Array = information - EARTH_PRECISION * np.eye(3)
     data_information = data_information + 1e-9 * EARTH_PRECISION * np.eye(3)

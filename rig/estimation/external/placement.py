@@ -92,7 +92,10 @@ class _PlacementFits:
 
 
 def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances: Array) -> LaidDown:
-    """Return θ with placement errors from a solution θ (p,), and the means (k, 3) of rests without attitude."""
+    """Return θ (p,) re-estimated with placement errors, beginning at a solution.
+
+    Rests without an attitude add their means (k, 3).
+    """
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _Linear(
@@ -139,7 +142,7 @@ def _find_log_prior(grid: Array, size: float) -> Array:
 
 
 def _add_unplaced(theta: Array, placed: Placed, unplaced: Array, variances: Array) -> Placed:
-    """Return all rests; those without an attitude get the one nearest to their reading."""
+    """Return all rests; a rest without an attitude gets the attitude that fits its reading best."""
     if not len(unplaced) or not placed.norm_known:
         return placed
     forces = (unplaced - theta[BIAS]) @ np.linalg.inv(theta[F].reshape(3, 3)).T

@@ -19,9 +19,9 @@ SMALLEST = 1e-9  # of the information: nothing
 
 
 def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:
-    """Return the axis and the placement on which its scale hangs; None if there is none, or nothing is repeated.
+    """Return the axis whose scale depends on one placement alone, and this placement; else None.
 
-    `theta` (p,) is the solution, in SI units and scaled about 1.
+    None too if no attitude was repeated. `theta` (p,) is the solution, in SI units and scaled about 1.
     """
     size = np.linalg.norm(theta[REFERENCE])
     verticals = np.einsum("nji,j->ni", placed.attitudes, theta[REFERENCE] / size)
@@ -48,7 +48,7 @@ def find_sole_attitude(theta: Array, placed: Placed) -> tuple[int, int] | None:
 
 
 def _group(verticals: Array) -> NDArray[np.intp]:
-    """Return the group (N,) of each direction (N, 3) with those near the first of it."""
+    """Return the number (N,) of each direction's group; directions (N, 3) near a group's first one belong to it."""
     group = np.full(len(verticals), -1, dtype=np.intp)
     for first in range(len(verticals)):
         if group[first] < 0:

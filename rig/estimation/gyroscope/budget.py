@@ -249,7 +249,7 @@ def _evaluate_times(
 
 
 def _find_noise_dof(explained: Explained) -> float:
-    """Return the fewest degrees of freedom of scale and bias by the noise of the readings (JCGM 100, G.4.1)."""
+    """Return the smallest degrees of freedom of the noise in scale and bias (JCGM 100, G.4.1)."""
     variances = explained.solution.response**2 * explained.inputs.variances_rad2_s2
     dof = np.broadcast_to(explained.inputs.noise_dof, variances.shape)
     parts, dofs = (array.reshape(len(variances), -1).T for array in (variances, dof))

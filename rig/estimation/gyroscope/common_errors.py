@@ -95,7 +95,7 @@ def solve_with_common_errors(
 
 
 def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
-    """Return the gain (P, N, 3) that estimates the errors' sizes from the readings, and their covariance (P, P)."""
+    """Return the gain (P, N, 3) from readings to the estimated errors, and the posterior covariance (P, P) of these."""
     weights = np.linalg.inv(noise)
     weighted = weights @ design
     # The weights without what F, c and G explain (Frisch and Waugh, Econometrica 1 (1933) 387; Lovell 1963).

@@ -86,12 +86,15 @@ class EarthRate:
 
     @property
     def latitude_rad(self) -> float:
-        """The latitude by the angle of the rate to the vertical, or by its level part if the vertical part is fixed."""
+        """The latitude by the angle between the rate and the vertical.
+
+        By the rate's level part alone if the vertical part is fixed.
+        """
         return float(np.arcsin(self.up @ self.rate_rad_s / self.norm_rad_s))
 
     @property
     def latitude_std_rad(self) -> float:
-        """The standard deviation of the latitude without the effect of `up`: a tilt of the base counts as latitude."""
+        """The standard deviation of the latitude, for an exact `up`: a tilted base appears as another latitude."""
         latitude = self.latitude_rad
         slope = self.up - np.sin(latitude) * self.rate_rad_s / self.norm_rad_s
         return self._std(slope / (self.norm_rad_s * np.cos(latitude)))
@@ -116,7 +119,7 @@ class EarthRate:
         return self._std((forward * to_left - sideways * ahead) / (forward**2 + sideways**2))
 
     def _level(self) -> tuple[Array, Array] | None:
-        """Return level unit vectors below the base's x axis and to its left; None if that axis is vertical."""
+        """Return two level unit vectors: below the base's x axis, and to its left; None if that axis is vertical."""
         ahead = np.array([1.0, 0.0, 0.0]) - self.up[0] * self.up
         size = float(np.linalg.norm(ahead))
         return None if size < MIN_LEVEL else (ahead / size, np.cross(self.up, ahead / size))
@@ -202,13 +205,13 @@ def _extract_earth_rate(fit: _EarthRateFit, directions: int) -> tuple[Array, Arr
 
 
 def _find_birge_ratio(fit: _EarthRateFit, dof: int) -> float:
-    """Return the RMS of residuals over their expected stds, less the dof that the arm's errors absorb."""
+    """Return the Birge ratio of residuals, with the degrees of freedom reduced by those of the arm's errors."""
     squares = float(np.sum(fit.solution.residuals_rad_s**2 / fit.expected_rad2_s2))
     return float(np.sqrt(squares / dof)) if dof > 0 else 1.0
 
 
 def _tilt_sweeps(turns_rad_s: Array) -> Array:
-    """Return the rate effects (2 M, N, 3) of tilts by 1 rad of each of M sweeps about two directions."""
+    """Return the changes (2 M, N, 3) of the rates by a 1 rad tilt of each of M sweeps about two directions."""
     patterns: list[Array] = []
     for index in np.flatnonzero(turns_rad_s.any(axis=1)):
         rate = turns_rad_s[index]
@@ -237,7 +240,10 @@ def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array 
 
 
 def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
-    """Return the conditioning of the design (3 N, 3 p + d), column blocks scaled alike, and its number of columns."""
+    """Return the conditioning of the design (3 N, 3 p + d), and its number of columns.
+
+    Each block of columns is scaled to the same size.
+    """
     sweeps = inputs.turns_rad_s / (np.linalg.norm(inputs.turns_rad_s) / len(inputs.turns_rad_s) ** 0.5 or 1.0)
     scaled_gravity = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)
     sensor_columns = np.kron(design_matrix(sweeps, scaled_gravity), np.eye(3))

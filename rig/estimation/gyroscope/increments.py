@@ -113,7 +113,7 @@ def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windo
 
 
 def _blocks(time_s: Array, at_s: Array) -> Iterator[tuple[slice, slice]]:
-    """Yield readings and the instants between them; each block begins with the last reading of the previous one."""
+    """Yield readings in blocks, each with its instants; a block begins with the last reading of the previous one."""
     first = 0
     for start in range(0, len(time_s) - 1, BLOCK):
         stop = min(start + BLOCK + 1, len(time_s))
@@ -164,14 +164,14 @@ class _IncrementSteps:
     lasting_s: Array
 
     def middle(self, inverse: Array) -> Array:
-        """Return the rotation (k, 3, 3) of each step per rate error, in body coordinates of its start.
+        """Return the rotation (k, 3, 3) of each step per rate error, in body coordinates at the step's start.
 
-        The attitude half-way represents the whole step: that is the exponential's derivative to φ²/24.
+        The attitude half-way represents the whole step. The error of this is of the order φ²/24.
         """
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 
     def sensitivities(self, attitudes: Array, inverse: Array) -> Array:
-        """Return S (k, 3, 12) of each step from `attitudes` (k, 3, 3) on."""
+        """Return S (k, 3, 12) of each step, which starts at its element of `attitudes` (k, 3, 3)."""
         middle = (attitudes @ self.middle(inverse))[..., None]
         by_matrix = middle * self.turned[:, None, None, :]
         return np.concatenate([by_matrix.reshape(-1, 3, 9), middle[..., 0] * self.lasting_s[..., None]], axis=2)
@@ -186,7 +186,10 @@ def _whole_steps(interval: _Interval) -> _IncrementSteps:
 
 
 def _steps(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_IncrementSteps, Array]:
-    """Return steps from readings `start` (k,) for a `fraction` (k,) of an interval, and their initial rates (k, 3)."""
+    """Return steps and their initial rates (k, 3).
+
+    Each begins at a reading `start` (k,) and lasts a `fraction` (k,) of an interval.
+    """
     u = fraction[:, None]
     h = np.diff(interval.time_s)[start][:, None]
     w0, w1, d0, d1 = (values[index] for values in (interval.rates, interval.slopes) for index in (start, start + 1))
@@ -209,7 +212,7 @@ def _matrices(vectors: Array) -> Array:
 
 
 def _running_product(vectors: Array) -> Array:
-    """Return the products (n + 1, 3, 3) 1, exp(φ₁), exp(φ₁) exp(φ₂), …, computed in √n rows at once."""
+    """Return the products (n + 1, 3, 3) 1, exp(φ₁), exp(φ₁) exp(φ₂), …, computed √n rows at a time."""
     width = int(np.ceil(np.sqrt(len(vectors))))
     padded = np.zeros((width * width, 3))
     padded[: len(vectors)] = vectors

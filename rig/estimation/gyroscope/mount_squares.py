@@ -30,7 +30,7 @@ def propagate_mount_squares(explained: Explained) -> Array:
 def _find_curvatures(explained: Explained, turns_rad: Array) -> Array:
     """Return the second derivatives (6, E, E) of scale and bias by the mounts' E errors, in prior standard deviations.
 
-    The estimate of F is F + D + S if the rates are off in first and second order; k is 1 / ‖row of F‖.
+    If D and S are the first- and second-order errors of the rates in F, its estimate is F + D + S; k is 1 / ‖row of F‖.
     """
     inputs, matrix = explained.inputs, explained.solution.matrix
     inverse = _find_regression(explained)  # (3, 4, N)

@@ -27,16 +27,16 @@ class Nonlinearity:
 
 
 def distinct_speeds(speeds_rad_s: Array) -> tuple[float, ...]:
-    """Return the mean of each group of speeds (n,) that differ by the arm's timing only, slowest first."""
+    """Return the mean of each group of speeds (n,), slowest first; one group's speeds differ by the arm's timing only."""
     ordered = np.sort(speeds_rad_s)
     steps = np.flatnonzero(ordered[1:] > DISTINCT * ordered[:-1]) + 1
     return tuple(float(group.mean()) for group in np.split(ordered, steps))
 
 
 def curvature(matrix: Array, rates_rad_s: Array) -> Array:
-    """Return the effects (6, N, 3) of odd parts of x, y, z, then even parts, of `FREE_PER_RAD_S` on readings.
+    """Return the effects (6, N, 3) on readings of the odd parts of x, y, z, then of the even parts.
 
-    `rates_rad_s` (N, 3) are mean rates in the flange's frame; F (3, 3).
+    Each part has the size `FREE_PER_RAD_S`. `rates_rad_s` (N, 3) are mean rates in the flange's frame; F (3, 3).
     """
     readings = rates_rad_s @ matrix.T
     projected = readings / np.linalg.norm(matrix, axis=1)
@@ -45,7 +45,7 @@ def curvature(matrix: Array, rates_rad_s: Array) -> Array:
 
 
 def bending(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
-    """Return the effects (6, N, 3) of cubes along x, y, z, then squares, of unit size at full scale.
+    """Return the effects (6, N, 3) of cubes along x, y, z, then of squares, each of unit size at full scale.
 
     Arguments as in `curvature`; F is exact at the speed `true_at_rad_s`.
     """

@@ -81,9 +81,9 @@ def own_errors(
 def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variances_rad2_s2: Array) -> Iterator[OwnError]:
     """Yield the rounding errors that means (N, 3) share, as the standard uncertainty (N, 3) of each mean.
 
-    Means closer than the steps, such as those of all rests, have the same error: averaging does not reduce it. So an
-    axis has one error for each group of such means; the independent part is in their variance (N, 3). Negligible errors
-    are omitted.
+    Means that differ by less than a step, such as those of all rests, have the same error: averaging does not reduce
+    it. So each axis has one error for each group of such means. The independent part of rounding is in their variance
+    (N, 3). Negligible errors are omitted.
     """
     roundings = np.broadcast_to(roundings_rad_s, means_rad_s.shape)
     patterns = []
@@ -102,15 +102,15 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
 
 
 def _temperature_deviations_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
-    """Return temperature deviations (2, N), K, from the weighted mean: recorded ones, then unresolved ones."""
+    """Return deviations (2, N), K, from the weighted mean temperature: recorded ones, then those hidden by the steps."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])
 
 
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
-    """Return the possible change (N,) of temperature, K, by a linear drift within one recorded step.
+    """Return the temperature change (N,), K, that one recorded step may hide: ± half a step as a linear drift.
 
-    It is ± half a step, about the mean over the windows (N, 2) by their weights (N,).
+    It is counted from the mean over the windows (N, 2) by their weights (N,).
     """
     middle = windows_s.mean(axis=1)
     return np.asarray(step_k * subtract_mean(middle, weights) / np.ptp(middle), dtype=np.float64)

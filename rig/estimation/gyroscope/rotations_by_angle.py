@@ -266,7 +266,7 @@ def _conditioning(equations: Sequence[_NormalEquations]) -> refusals.Conditionin
 
 
 def _find_birge_ratio(turns: Sequence[_NormalEquations], covariance: Array) -> tuple[float, float]:
-    """Return the Birge ratio of the rotations and its degrees of freedom; 1 and infinity if χ² is not above these."""
+    """Return the Birge ratio of the rotations and its degrees of freedom; 1 and infinity if χ² is within these."""
     chi_square, dof = 0.0, 0.0
     for turn in turns:
         weight = np.linalg.inv(turn.covariance)

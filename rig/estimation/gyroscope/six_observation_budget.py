@@ -19,7 +19,7 @@ NOT_SQUARE = "angles between the axes"
 
 
 def six_observation_budget(explained: Explained, six: Solution, unknown: Unknown, axes_rad: float) -> Budget:
-    """Return the budget of `six`, solved from the sweeps of `explained` alone, weighted by their noise.
+    """Return the budget of the solution `six`, which uses only the sweeps of `explained`, weighted by their noise.
 
     `axes_rad` is the half-width of the angles between the sensor's axes about 90°.
     """
@@ -95,7 +95,7 @@ def _propagate_drift(bias: BiasProcess, response: Array, windows_s: Array) -> Ar
 
 
 def _tilt_axes(sensed: Array, scale: Array, angle_rad: float) -> Array:
-    """Return the effects (3, N, 3) of a tilt of y towards x, z towards x, z towards y on readings of rates (N, 3)."""
+    """Return the effects (3, N, 3) on readings of three tilted axes: y towards x, z towards x, z towards y."""
     patterns = np.zeros((3, *sensed.shape))
     for row, (tilted, towards) in enumerate(((1, 0), (2, 0), (2, 1))):
         patterns[row, :, tilted] = angle_rad * sensed[:, towards] / scale[tilted]

@@ -75,10 +75,10 @@ class MotionErrors:
         return _median(self.rate**2, self.weights), _median(self.axis_rad**2, self.weights)
 
     def expanded(self, fixed: Array, of_rate: Array, of_axis: Array) -> Array:
-        """Return the U (q,) of values whose errors are normal for given sizes of the motion errors, at 95.45 %.
+        """Return the expanded uncertainty U (q,) of values at 95.45 %.
 
-        `fixed` (q,) are the variances that do not depend on the sizes, `of_rate` and `of_axis` (q,) those per squared
-        size.
+        For given motion errors the values are normal. `fixed` (q,) are the variances that do not depend on the motion
+        errors' sizes, `of_rate` and `of_axis` (q,) those per squared size.
         """
         from scipy.special import ndtr
 
@@ -95,7 +95,7 @@ class MotionErrors:
 
 
 def motion_errors(motion: StatedMotion) -> MotionErrors:
-    """Return the posterior sizes of errors of the stated motion by the residuals of sweeps and rests."""
+    """Return the posterior sizes of the errors of the stated motion, by the residuals of sweeps and rests."""
     smallest = min(SMALLEST_OF_NOISE * motion.relative_noise, LARGEST / 10)
     sizes = np.geomspace(smallest, LARGEST, SIZES)
     prior = -np.log(np.maximum(sizes / PRIOR_KNEE, 1.0))
@@ -107,10 +107,10 @@ def motion_errors(motion: StatedMotion) -> MotionErrors:
 
 
 def _likelihoods(motion: StatedMotion, axis_rad: float, rates: Array) -> Array:
-    """Return the restricted log likelihoods (k,) of one size of axis errors and several `rates` (k,).
+    """Return the restricted log likelihoods (k,) of several `rates` (k,) of rate errors and one of axis errors.
 
-    An error of the rate changes the covariance of a sweep by one dyad, so each inverse has a rank-one update (Sherman
-    and Morrison, Ann. Math. Stat. 21 (1950) 124).
+    A rate error changes the covariance of a sweep by one dyad, so each inverse has a rank-one update (Sherman and
+    Morrison, Ann. Math. Stat. 21 (1950) 124).
     """
     tilts = np.moveaxis(motion.axis_patterns, 0, 2)  # (N, 3, 2)
     precision = np.linalg.inv(

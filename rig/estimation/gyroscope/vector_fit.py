@@ -69,7 +69,7 @@ class VectorInputs:
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:
-        """The speeds of the sweeps, the slowest first; sweeps of one speed differ by the arm's timing only."""
+        """The distinct speeds of the sweeps, slowest first; those that differ by the arm's timing only count once."""
         speeds = np.linalg.norm(self.turns_rad_s, axis=1)
         return distinct_speeds(speeds[speeds > 0])
 
@@ -109,13 +109,13 @@ class VectorInputs:
 
     @property
     def arm_errors_rad_s(self) -> Array:
-        """The effects (P, N, 3) of all kinds of errors of the arm's angles on the rates; mount errors come last."""
+        """The effects (P, N, 3) of all errors of the arm's angles on the rates, those of the mounts last."""
         none = np.zeros((0, *self.means_rad_s.shape))
         kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s, self.mount_errors_rad_s)
         return np.concatenate([none, *(kind for kind in kinds if kind is not None)])
 
     def own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
-        """Return the sensor's errors outside the model, for that F (3, 3)."""
+        """Return the sensor's errors that the model does not contain, for F (3, 3)."""
         if self.sensor is None:
             return ()
         rounded = rounding_errors(self.means_rad_s, self.roundings_rad_s, self.variances_rad2_s2)
@@ -128,7 +128,7 @@ class VectorInputs:
         return np.concatenate([none, *(own_error.patterns / np.sqrt(3) for own_error in self.own_errors(matrix))])
 
     def centripetal_m_s2(self, lever_arm_m: Array) -> Array:
-        """Return the acceleration (N, 3) at a lever arm (3,) or (N, 3) from the rotation axis, flange's frame."""
+        """Return the acceleration (N, 3), in the flange's frame, at a lever arm (3,) or (N, 3) from the rotation axis."""
         return centripetal_m_s2(self.turns_rad_s, lever_arm_m)
 
 
@@ -150,7 +150,7 @@ class Explained:
 
     @property
     def loads_rad_s(self) -> Array:
-        """The extreme rates (3, 2) along x, y, z, in either direction, of the sweeps that determine the scale."""
+        """The smallest and largest rates (3, 2) along x, y, z, without sign, of the sweeps that determine the scale."""
         sensed = np.abs(self.inputs.turns_rad_s @ (self.solution.matrix * self.solution.scale[:, None]).T)
         largest = sensed.max(axis=0)
         smallest = np.where(sensed >= LEAST_LOAD * largest, sensed, np.inf).min(axis=0)
@@ -187,7 +187,7 @@ def solver(
     speed_std_rad_s: Array,
     effects: Callable[[Array], Array],
 ) -> Callable[[Array | None], tuple[VectorSolution, CommonErrors]]:
-    """Return a function that solves the vector model for a covariance (N, N) between the means, or None.
+    """Return a function from the covariance (N, N) between the means, or None, to the solution of the vector model.
 
     `effects` as in `solve_with_common_errors`; `gravity_m_s2` is the apparent gravity, None without g-sensitivity.
     """

@@ -195,7 +195,7 @@ def check_identifiable(rates: Array, gravity: Array | None) -> None:
 
 
 def _check_identifiable(scaled: Array) -> Conditioning:
-    """Return the conditioning of a scaled design (N, p). Raise Fault as `check_identifiable` does."""
+    """Return the conditioning of a scaled design (N, p). Raise the Faults of `check_identifiable`."""
     columns = scaled.shape[1]
     conditioning = condition_of(scaled, columns)
     check_conditioning(conditioning, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
@@ -212,7 +212,7 @@ def design_matrix(rates: Array, gravity: Array | None) -> Array:
 
 
 def _unit(design: Array) -> Array:
-    """Return the size (p,) of each block of columns, which makes blocks comparable and shows a missing axis."""
+    """Return the size (p,) of each block of columns. Divided by it, blocks are comparable, and a missing axis shows."""
     unit = np.ones(design.shape[1])
     squares = np.einsum("np,np->p", design, design)
     for block in (slice(0, 3), slice(4, None)):

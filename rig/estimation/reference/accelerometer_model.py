@@ -179,7 +179,7 @@ def project_reference(delay_s: float, movement: Movement) -> Array:
 
 
 def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
-    """Differentiate harmonics (M, 3, …) of the angle with respect to the lag, without the effect of the mean rate."""
+    """Return the derivative of harmonics (M, 3, …) by the lag of the angle. The mean rate's own effect is left out."""
     by_wave = (len(waves), 3, *(1,) * (waves.ndim - 2))
     cosine, sine = (sweeps.turning_rad2_s2[:, row] / sweeps.speeds_rad_s[:, None] for row in (4, 5))
     changed: Array = sine.reshape(by_wave) * waves[:, 1:2] - cosine.reshape(by_wave) * waves[:, 2:]
@@ -187,7 +187,7 @@ def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
 
 
 def project_lever_arm(delay_s: float, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) from the lever arm to its acceleration; constant speed gives means alone."""
+    """Return the matrices (K, 3, 3) from the lever arm to its acceleration; at constant speed only means are affected."""
     sweeps, now, change = movement.sweeps, slice(0, 2), slice(2, 4)
     turning = sweeps.turning_rad2_s2
     phase = (delay_s * sweeps.speeds_rad_s)[:, None, None]
@@ -255,7 +255,7 @@ def effects(theta: Array, movement: Movement) -> Array:
 
 
 def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None]:
-    """Return the columns of `effects` in two parts: independent errors, and constant errors of the wrists, if known."""
+    """Return the columns of `effects` in two parts: independent errors, and the wrists' constant errors if known."""
     independent = turned(theta, movement)
     if movement.arm_turns is None:
         return independent, None
@@ -263,14 +263,14 @@ def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None
 
 
 def combine_effects(independent: Array, constant: Array | None, fraction: float) -> Array:
-    """Return the columns (3 K, P) of the arm's errors: a fraction of δ² is independent, the rest is constant."""
+    """Return the columns (3 K, P) of the arm's errors, with a fraction of δ² independent and the rest constant."""
     if constant is None:
         return independent
     return np.concatenate([np.sqrt(fraction) * independent, np.sqrt(1 - fraction) * constant], axis=1)
 
 
 def turned(theta: Array, movement: Movement) -> Array:
-    """Return the effect of independent small rotations of each dwell and station on the readings."""
+    """Return the effect of small rotations on the readings, independent for each dwell and each station."""
     count, sweeps = len(movement.dwells.readings_m_s2), movement.sweeps
     gravity, s = project_reference(theta[DELAY], movement), find_force(theta, movement)
     stations, indices = np.unique(sweeps.stations, return_inverse=True)
@@ -306,7 +306,7 @@ def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array
 
 
 def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
-    """Return the change (K, 3, P) of the readings by a change (K, 3, P) of s (K, 3)."""
+    """Return the changes (K, 3, P) of the readings by small changes (K, 3, P) of the specific force s (K, 3)."""
     if not theta[SECOND].any():
         return np.asarray(matrix(theta) @ changes, dtype=np.float64)
     nonlinear: Array = changes + 2 * theta[SECOND][:, None] * _product(s[..., None], changes, movement)
@@ -314,7 +314,7 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """Return the elementwise product (K, 3, …); for sweeps, the product of two harmonics, up to the first harmonic."""
+    """Return the elementwise product (K, 3, …). For sweeps it is the product of two harmonics, without higher ones."""
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_waves(one, movement), 1, 0)
     others = np.moveaxis(_waves(other, movement), 1, 0)
@@ -330,7 +330,7 @@ def _product(one: Array, other: Array, movement: Movement) -> Array:
 
 
 def _waves(vectors: Array, movement: Movement) -> Array:
-    """Return mean, cosine and sine (M, 3, …) of a list (K, …)."""
+    """Return the mean, cosine and sine (M, 3, …) of the sweeps from the rows (K, …) of dwells and sweeps."""
     return vectors[len(movement.dwells.readings_m_s2) :].reshape(-1, 3, *vectors.shape[1:])
 
 

@@ -36,7 +36,7 @@ SETTLED = 1e-3  # of δ
 class AttitudeError:
     """δ in rad about each axis, beyond the stated uncertainty of attitudes; `uncertainty_rad` is one std.
 
-    It is that upwards: the likelihood is one-sided near zero.
+    Near zero the likelihood is one-sided, and the std is that upwards.
     """
 
     std_rad: float
@@ -105,9 +105,9 @@ def solve_attitude_weighted(start: Array, placed: Placed) -> AttitudeWeighted:
 
 
 def find_worst_attitude(start: Array, placed: Placed, fit: AttitudeWeighted) -> tuple[int, float, float]:
-    """Return the attitude that fits worst, its error in rad by the others, and the expected error.
+    """Return the attitude that fits worst, its error in rad relative to the others, and the error to be expected.
 
-    The others alone are used, because a wrong attitude raises the estimated error of all.
+    Only the other attitudes determine the expected error, because a wrong attitude would inflate it.
     """
     residuals = placed.readings - predicted(fit.theta, placed.attitudes, placed.v_bar)
     worst = int(np.argmax(np.sum(whitened(fit.whiteners, residuals) ** 2, axis=1)))
@@ -158,8 +158,8 @@ def maximise_likelihood(
     """Return the restricted-maximum-likelihood estimate of δ, rad, and the negative log-likelihood up to a constant.
 
     Residuals (n,) are independent with variances 1 + δ² γ, of which `growth` (n,) is γ; `slopes` (n, q) are the model's
-    columns, `nuisance` (n, k) further explanatory ones. The constant depends on the slopes alone. δ is the best of a
-    grid, refined between its neighbours.
+    columns, `nuisance` (n, k) further explanatory ones. The constant depends on the slopes alone. The search takes the
+    best δ of a grid and refines it between its neighbours.
     """
     from scipy.optimize import minimize_scalar
 

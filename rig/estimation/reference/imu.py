@@ -164,13 +164,13 @@ def solve_imu(
 
 
 def _check_attitudes(start: Array, movement: Movement, fixed: list[int], fit: Fit) -> None:
-    """Raise Fault if all attitudes are wrong, or the worst dwell if enough others remain to show it."""
+    """Raise Fault if all attitudes are wrong, or if one is and enough others remain to identify it."""
     enough = len(movement.dwells.readings_m_s2) > 0 and movement.readings().size - 3 > fit.free.shape[1] + 3
     check_trustworthy(fit.std_rad, lambda: _find_worst_dwell(start, movement, fixed, fit), enough=enough)
 
 
 def _find_worst_dwell(start: Array, movement: Movement, fixed: list[int], fit: Fit) -> tuple[int, float, float]:
-    """Return the worst dwell, its error in rad relative to the other dwells, and the other dwells' δ."""
+    """Return the dwell that fits worst, its error in rad relative to the other dwells, and their δ."""
     count = len(movement.dwells.readings_m_s2)
     residuals = (movement.readings() - predicted(fit.theta, movement))[:count]
     rotations = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)

@@ -55,9 +55,10 @@ def uniformity(
     variances_t2: ArrayLike,
     attitude_error_rad: float,
 ) -> Uniformity:
-    """Return the test by the best fit with that attitude error, from the `solution` of these readings.
+    """Return the test of a uniform field: the fit of the readings with that error of the attitudes.
 
-    `readings_t`, `variances_t2` (N, 3), `attitudes` (N, 3, 3). Raise Fault `attitude_untrustworthy` if there is no fit.
+    `solution` is that of these `readings_t`, `variances_t2` (N, 3) in `attitudes` (N, 3, 3). Raise Fault
+    `attitude_untrustworthy` if no fit exists.
     """
     from scipy.special import chdtri
 
@@ -91,7 +92,7 @@ class FieldDrift:
 
 
 def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: float) -> FieldDrift:
-    """Return the drift of readings (N, 3), N ≥ 2, from the first.
+    """Return the largest change of readings (N, 3), N ≥ 2, in one attitude since the first reading.
 
     `variances_t2` (N, 3); attitudes repeat with a standard deviation of `repeatability_rad` about each axis.
     """

@@ -35,7 +35,7 @@ def noise(theta: Array, movement: Movement) -> Array:
 
 
 def bending(theta: Array, movement: Movement) -> Array:
-    """Return the patterns (P, 3 K) of φ and χ of each axis, by one standard uncertainty."""
+    """Return the patterns (P, 3 K) of one standard uncertainty of the nonlinearity, φ and χ, of each axis."""
     sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))
@@ -47,9 +47,9 @@ def bending(theta: Array, movement: Movement) -> Array:
 
 
 def bias_warming(movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of β of each axis, by one standard uncertainty.
+    """Return the patterns (6, 3 K) of one standard uncertainty of β, the bias's temperature coefficient, by axis.
 
-    Three are for the temperature as recorded, three for its change within the recorded steps.
+    Three are for the recorded temperature, three for changes that the recorded steps hide.
     """
     sensor = movement.sensor_errors
     if sensor is None:
@@ -60,7 +60,7 @@ def bias_warming(movement: Movement) -> Array:
 
 
 def scale_warming(theta: Array, movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of κ of each axis, in the same form as the patterns of β."""
+    """Return the patterns (6, 3 K) of κ, the scale's temperature coefficient, in the order of `bias_warming`."""
     sensor = movement.sensor_errors
     if sensor is None:
         return np.zeros((0, movement.readings().size))
@@ -71,7 +71,7 @@ def scale_warming(theta: Array, movement: Movement) -> Array:
 
 
 def _warmer_k(sensor: AccelerometerErrors, movement: Movement) -> tuple[Array, Array]:
-    """Return each segment's temperature above the mean: as recorded, and as hidden by the steps, (K,) each."""
+    """Return the temperature above the mean (K,) of each segment as recorded, and the part (K,) that steps may hide."""
     return repeat_by_segment(sensor.warmer_k, movement), repeat_by_segment(sensor.unseen_k, movement)
 
 
@@ -84,7 +84,7 @@ def flickering(movement: Movement) -> Array:
 
 
 def wandering(movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of the bias estimated from the readings: random walk, and disturbances."""
+    """Return the covariance (3 K, 3 K) of the estimated bias drift: random walk, and disturbances of segments."""
     sensor, covariance = movement.sensor_errors, np.zeros((movement.readings().size,) * 2)
     if sensor is not None and sensor.walk_m_s2_sqrt_s:
         covariance += sensor.walk_m_s2_sqrt_s**2 * walking(sensor, movement)
@@ -101,7 +101,7 @@ def walking(sensor: AccelerometerErrors, movement: Movement) -> Array:
 
 
 def _expand_bias(covariance: Array, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of biases from that (N + M, N + M) of their means, independent by axis."""
+    """Return the covariance (3 K, 3 K) of the readings from that (N + M, N + M) of biases, independent by axis."""
     steady = movement.constant() > 0
     expanded = np.zeros((len(steady),) * 2)
     expanded[np.ix_(steady, steady)] = covariance
@@ -109,25 +109,28 @@ def _expand_bias(covariance: Array, movement: Movement) -> Array:
 
 
 def select_sweeps(movement: Movement) -> Array:
-    """Return the pattern (3 K, 3) of a different bias of each axis in sweeps."""
+    """Return the pattern (3 K, 3) of a bias that is different in sweeps, by axis."""
     turning = movement.constant()
     turning[: len(movement.dwells.readings_m_s2)] = 0.0
     return per_axis(turning[:, None] * np.ones(3))
 
 
 def repeat_by_segment(values: Array, movement: Movement) -> Array:
-    """Return values (K,) by reading from values (N + M,) of dwells and sweeps; a sweep's value appears three times."""
+    """Return a value for each reading (K,) from one for each segment (N + M,); a sweep has three readings."""
     dwells = len(movement.dwells.readings_m_s2)
     return np.concatenate([values[:dwells], np.repeat(values[dwells:], 3)])
 
 
 def per_axis(columns: Array) -> Array:
-    """Return columns (3 K, 3) from (K, 3): one for each axis, with a coefficient of its own."""
+    """Return columns (3 K, 3) from (K, 3): a separate column for each axis."""
     return np.asarray((columns[:, :, None] * np.eye(3)).reshape(-1, 3), dtype=np.float64)
 
 
 def project_errors(theta: Array, movement: Movement, change: Callable[[Array], Array]) -> Array:
-    """Return the patterns (3 K, 3) of a `change` of the force along each axis; for sweeps its harmonic."""
+    """Return the patterns (3 K, 3) of a `change` of the force along each axis.
+
+    In sweeps it is the change's harmonic.
+    """
     dwells, axes = len(movement.dwells.readings_m_s2), matrix(theta)
     felt_along = find_force(theta, movement) @ (axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
     mean, cos, sin = np.moveaxis(felt_along[dwells:].reshape(-1, 3, 3), 1, 0)
@@ -138,7 +141,7 @@ def project_errors(theta: Array, movement: Movement, change: Callable[[Array], A
 
 
 def _not_repeated(theta: Array, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of small rotations of each sweep that do not repeat."""
+    """Return the covariance (3 K, 3 K) by small rotations of sweeps, independent for each sweep."""
     sweeps = movement.sweeps
     if movement.repeatability_rad == 0.0:
         return np.zeros((movement.readings().size,) * 2)

@@ -45,7 +45,7 @@ class Spread:
 
     @property
     def known_noise(self) -> float:
-        """The fewest degrees of freedom of the noise's part in scale and bias."""
+        """The smallest degrees of freedom of the noise in scale and bias."""
         return fewest_dof(self.response, np.diag(self.noise), self.noise_dof)
 
     def covariance_of(self, patterns: Array) -> Array:
@@ -73,7 +73,7 @@ class KnownSize:
 def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
     """Return the derivative (6, p) of scale and bias by θ (p,), which begins with F, the reference and b.
 
-    The bias is a part of the reading; a gyroscope's is added to it.
+    The bias changes sign: in θ it is a part of the reading, in a gyroscope's result it is added to the reading.
     """
     derivative = np.zeros((6, parameters))
     derivative[:, np.r_[F, BIAS]] = parameter_jacobian(matrix, scale) * np.repeat([1.0, -1.0], 3)[:, None]
@@ -81,14 +81,14 @@ def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
 
 
 def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
-    """Propagate the covariance of θ to scale and bias (6, 6); b is in the reading, a gyroscope's is added."""
+    """Propagate the covariance of θ to scale and bias (6, 6), with the signs of `scale_and_bias`."""
     to_parameters = scale_and_bias(matrix, scale, len(covariance))
     propagated: Array = to_parameters @ covariance @ to_parameters.T
     return propagated
 
 
 def fewest_dof(response: Array, variances: Array, dof: Array) -> float:
-    """Return the fewest degrees of freedom of the noise's part in scale and bias by their `response` (6, n).
+    """Return the smallest degrees of freedom of the noise in scale and bias by their `response` (6, n).
 
     The readings' `variances` (n,) have `dof` (n,) degrees of freedom.
     """
@@ -107,7 +107,7 @@ def response_in_attitudes(solution: TriaxialSolution, dwells: Dwells) -> Array:
 
 
 def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contributor] = ()) -> Budget:
-    """Return the budget: the readings, the uncertainty of the reference's norm, and other contributors."""
+    """Return the budget of the readings, of the reference's norm, and of other contributors."""
     noise = spread.response @ spread.noise @ spread.response.T
     contributors = [
         evaluate_a(NOISE, "scatter of the readings", noise, spread.known_noise),
@@ -130,12 +130,12 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
 
 
 def assumed(name: str, half_width: float, unit: str, source: str, covariance: Array) -> Contributor:
-    """Return a contributor of type B from the `covariance` (6, 6) that one half-width causes."""
+    """Return a contributor of type B; `covariance` (6, 6) is the effect of its half-width."""
     return Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, covariance / 3)
 
 
 def _evaluate_norm(scale: Array, size: KnownSize) -> Contributor:
-    """Return the contributor of the reference's norm: an error changes all scale factors in proportion, but no bias."""
+    """Return the contributor of the reference's norm. It changes all scale factors in proportion and no bias."""
     derivative = np.concatenate([scale, np.zeros(3)])
     distribution: Literal["normal", "rectangular"] = "normal" if size.stated else "rectangular"
     std = size.relative / (COVERAGE_FACTOR if size.stated else np.sqrt(3))

@@ -88,7 +88,7 @@ def jacobian(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def free_directions(theta: Array, *, norm_known: bool) -> Array:
-    """Return the free directions (…, p, q) of θ; with a given norm v_ref changes its direction only (q = p − 1)."""
+    """Return the free directions (…, p, q) of θ. If its norm is given, v_ref only rotates, so q = p − 1."""
     p = theta.shape[-1]
     free = np.zeros((*theta.shape[:-1], p, p))
     free[...] = np.eye(p)

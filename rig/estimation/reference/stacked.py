@@ -79,7 +79,7 @@ def estimate_as_published(
 ) -> tuple[Array, int]:
     """Return θ (…, 15 or 18) as TRIAX publishes it, and the number of linear solutions.
 
-    With second-order terms the linear solution is repeated, with s² from the last v_ref, until it converges.
+    With second-order terms the linear solution is repeated until it converges, with s² computed from the last v_ref.
     """
     x = stack(readings, attitudes, None)
     theta = to_theta(_solve(x, column_sizes(readings, None), prior))
@@ -108,10 +108,10 @@ def _solve(x: Array, sizes: Array, prior: ReferencePrior) -> Array:
 def published_covariance(
     theta: Array, readings: Array, attitudes: Array, prior: ReferencePrior, variances: Array
 ) -> Array:
-    """Return the covariance (p, p) of one published θ, to first order in the readings' errors e of `variances` (N, 3).
+    """Return the covariance (p, p) of a published θ, to first order in errors of `variances` (N, 3).
 
-    An error enters equation k as F⁻¹ e_k, because the readings are in X: δβ = −X⁺ F⁻¹ e, projected to the
-    normalisation. The iteration of the second-order terms adds the change of s² with v_ref. F and b follow from β.
+    An error e of a reading enters equation k as F⁻¹ e_k, because the readings are in X: δβ = −X⁺ F⁻¹ e, projected to
+    the normalisation. The iteration of the second-order terms adds the change of s² with v_ref. F and b follow from β.
     """
     second_order = len(theta) > 15
     norm_known = isinstance(prior, KnownNorm)

@@ -96,7 +96,7 @@ class TriaxialSolution:
 
     @property
     def attitude_std_rad(self) -> float:
-        """The estimated error of attitudes about each axis; zero by a method that fixes them."""
+        """The estimated error of attitudes about each axis; zero if the method takes them as exact."""
         return 0.0 if self.attitude_error is None else self.attitude_error.std_rad
 
 
@@ -211,13 +211,13 @@ def _check(m: Array, r: Array, v: Array, prior: ReferencePrior, parameters: int)
 
 
 def _check_size(m: Array, norm: float) -> None:
-    """Raise Fault `wrong_unit` for readings below the reference, or that differ by more than attitudes cause."""
+    """Raise Fault `wrong_unit` if readings are smaller than the reference, or differ more than attitudes explain."""
     size, spread = (float(np.sqrt(np.mean(np.sum(vectors**2, axis=1)))) for vectors in (m, m - m.mean(axis=0)))
     refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)))
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
-    """Return the conditioning of the scaled X, apart from directions dominated by noise."""
+    """Return the conditioning of the scaled X; directions dominated by noise do not count."""
     noise = np.sqrt(v.max() / np.mean(m**2)) * (np.sqrt(len(m)) + np.sqrt(3))
     return refusals.condition_of(scaled, needed, float(noise))
 
@@ -230,16 +230,16 @@ def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
 
 
 def _check_attitudes(start: Array, placed: Placed, fit: AttitudeWeighted) -> None:
-    """Raise Fault if attitudes are wrong: all, or the worst one if enough others remain to show it."""
+    """Raise Fault if all attitudes are wrong, or if one is and enough others remain to identify it."""
     enough = 3 * (len(placed.readings) - 1) > len(start) + 3
     check_trustworthy(fit.attitude_error.std_rad, lambda: find_worst_attitude(start, placed, fit), enough=enough)
 
 
 def check_trustworthy(error_rad: float, furthest: Callable[[], tuple[int, float, float]], *, enough: bool) -> None:
-    """Raise Fault `attitude_untrustworthy` if all attitudes have an error of `error_rad`, or one a far larger one.
+    """Raise Fault `attitude_untrustworthy` if `error_rad`, that of all attitudes, or of the worst one is too large.
 
-    `furthest` returns the index of that one, its error in rad by the others, and their own; it is called if `enough`
-    others remain.
+    `furthest` returns the worst one's index, its error in rad relative to the others, and the others' own. It is called
+    if `enough` others remain.
     """
     message = f"the readings say that the attitudes are off by {1e3 * error_rad:.2g} mrad each"
     if error_rad > SUSPICIOUS_RAD and enough:

@@ -77,8 +77,8 @@ class AllanAxis:
 def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
     """Return the overlapping Allan deviation of intervals (nᵢ, 3) of readings at a period of `interval_s`.
 
-    τ is approximately at the powers of two, 1 s among them. Raise Fault `not_finite`, and `recording_too_short` if no
-    interval has three readings.
+    τ takes values near powers of two, including 1 s. Raise Fault `not_finite`, and `recording_too_short` if no interval
+    has three readings.
     """
     used = [np.asarray(stretch, dtype=np.float64) for stretch in stretches if len(stretch) >= FEWEST]
     if not used:
@@ -138,7 +138,7 @@ def _average_squares(phases: Sequence[Array], factor: int) -> Array:
 
 
 def _dof(points: Sequence[int], factor: int, noise: Noise) -> float:
-    """Return the dof of all intervals together, independent and weighted by their pairs (Satterthwaite)."""
+    """Return the dof of all intervals together, independent and weighted by their numbers of pairs (Satterthwaite)."""
     reach = [n for n in points if n > 2 * factor]
     pairs = np.array([n - 2 * factor for n in reach], dtype=np.float64)
     of_interval = np.array([equivalent_dof(n, factor, noise) for n in reach])
@@ -146,7 +146,7 @@ def _dof(points: Sequence[int], factor: int, noise: Noise) -> float:
 
 
 def _slopes(tau_s: Array, deviation: Array) -> Array:
-    """Return the slopes (T, 3) of log σ over log τ between the neighbours of each τ; −1/2 if there is one τ."""
+    """Return the slopes (T, 3) of log σ over log τ between the neighbours of each τ; −1/2 if the curve has one τ."""
     if len(tau_s) < 2:
         return np.full(deviation.shape, -0.5)
     logarithm = np.log(np.maximum(deviation, np.finfo(np.float64).tiny))
@@ -155,7 +155,7 @@ def _slopes(tau_s: Array, deviation: Array) -> Array:
 
 
 def _classify_noise(slope: float) -> Noise:
-    """Return the noise whose slope, −1/2, 0 or 1/2, is nearest."""
+    """Return the type of noise whose slope, −1/2, 0 or 1/2, is nearest to a measured slope."""
     if slope < -0.25:
         return "white"
     return "flicker" if slope < 0.25 else "random_walk"
@@ -170,7 +170,7 @@ def _bounds(deviation: Array, dof: Array) -> tuple[Array, Array]:
 
 
 def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
-    """Return N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there like white noise, as 1/√τ."""
+    """Return N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there as white noise does (1/√τ)."""
     index = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
     tau_s, relative_std = float(curve.tau_s[index]), float(curve.relative_std[index, axis])
     if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:
@@ -200,7 +200,7 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
 
 
 def _instability(curve: AllanCurve, axis: int, walk: AllanReading | Fault) -> AllanReading | Fault:
-    """Return B from the least σ, if the curve has its minimum in the well-determined part."""
+    """Return B from the minimum of σ, if that lies in the well-determined part of the curve."""
     relative_std = curve.relative_std[:, axis]
     usable = np.flatnonzero(relative_std <= INSTABILITY_STD)
     if not len(usable):

@@ -61,7 +61,7 @@ class BiasProcess:
 
 
 def walk_covariance(windows_s: ArrayLike) -> Array:
-    """Return the covariance (N, N) of the means of a random walk of rate 1 over disjoint windows (N, 2) [start, end].
+    """Return the covariance (N, N) of a unit random walk's means over disjoint windows (N, 2) [start, end].
 
     The walk is counted from its mean over the whole time from the first start to the last end.
     """
@@ -106,7 +106,7 @@ def _twice_integrated_logarithm(x: Array) -> Array:
 
 
 def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
-    """Return the covariance (N, N) of flicker of that Allan deviation."""
+    """Return the covariance (N, N) of flicker noise of a given Allan deviation."""
     covariance: Array = instability_rad_s**2 * flicker_covariance(windows_s)
     return covariance
 
@@ -125,10 +125,10 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
 def average_walks(sizes: Array, likelihood: Array) -> Array:
     """Return the root-mean-square posterior sizes (2,) of (K, 2), with a uniform prior of the walk.
 
-    The scatter has the prior of `average_posterior`. It is for parameters over a long time, as slopes over temperature,
-    whose uncertainty may come mostly from a walk that the averages hardly show. So a walk is certain, with a uniform
-    prior (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean. Sizes are on a geometric
-    grid, so the prior of one is proportional to the step to the next.
+    The scatter has the prior of `average_posterior`. This is for parameters over a long time, such as slopes over
+    temperature: their uncertainty may come mostly from a walk that the averages hardly show. So the prior takes a walk
+    for certain and uniform (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean. Sizes
+    are on a geometric grid, so the prior of one is proportional to the step to the next.
     """
     log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
     weights = sizes[:, 0] * np.exp(log_posterior - log_posterior.max())
@@ -138,7 +138,7 @@ def average_walks(sizes: Array, likelihood: Array) -> Array:
 def select_by_akaike(sizes: Array, likelihood: Array) -> Array:
     """Return the sizes (2,) of maximum likelihood of (K, 2), zero unless they reduce Akaike's information criterion.
 
-    It includes no walk if noise explains the averages, so a walk that is absent cannot excuse a residual.
+    No walk is included if noise alone explains the averages. So residuals are not explained by a walk that is absent.
     """
     return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 
@@ -153,7 +153,7 @@ def bias_process(
     instability_rad_s: float = 0.0,
     chosen: Chosen = average_posterior,
 ) -> BiasProcess:
-    """Estimate the bias drift in mean readings (N, 3), which otherwise are `design` (N, p) × parameters + noise.
+    """Estimate the bias drift in mean readings (N, 3) of the model `design` (N, p) × parameters + drift + noise.
 
     `variances_rad2_s2` (N, 3) are the variances of the noise, `windows_s` (N, 2) the averaging windows. The three axes
     have one process, since few averages determine it. `shared_rad2_s2` (3, N, N) are covariances between the averages
@@ -182,7 +182,7 @@ def bias_process(
 
 
 def _likelihood(contrasts: Array, noise: Array, scatters: Array) -> Array:
-    """Return log-likelihoods (K, L), up to a constant, of noise covariances (K, n, n) with L squared scatters each.
+    """Return log-likelihoods (K, L), up to a constant, of K noise covariances (n, n) with L squared scatters each.
 
     A scatter adds to every eigenvalue, so each covariance is decomposed only once.
     """

@@ -35,7 +35,7 @@ def covered(factors: ArrayLike, dof: ArrayLike) -> Array:
 
 
 def beyond(distances: ArrayLike, dof: ArrayLike) -> Array:
-    """Return the probability that the true value is beyond this distance, in standard uncertainties, on one side."""
+    """Return the one-sided probability that the true value is farther away than this many standard uncertainties."""
     distance, whole_dof = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _round_down(dof))
     tails = np.array([math.erfc(value / math.sqrt(2)) / 2 for value in distance.ravel()]).reshape(distance.shape)
     if np.isfinite(whole_dof).any():
@@ -47,7 +47,7 @@ def beyond(distances: ArrayLike, dof: ArrayLike) -> Array:
 
 
 def false_alarm_of_each(of_all: float, tests: int) -> float:
-    """Return the false-alarm probability of each of `tests` tests if one or more may fail with probability `of_all`.
+    """Return the false-alarm probability of each of `tests` tests for the probability `of_all` that any fails.
 
     By Bonferroni's inequality, which also holds for dependent tests.
     """
@@ -57,8 +57,8 @@ def false_alarm_of_each(of_all: float, tests: int) -> float:
 def joint_factors(values: int, dof: ArrayLike, probability: float) -> Array:
     """Return the simultaneous coverage factor: k so that all of `values` intervals ± k u contain their true values.
 
-    With that `probability` at least, by Bonferroni's inequality. `dof`: degrees of freedom of any shape; for one
-    value and `PROBABILITY` it is `coverage_factors`.
+    They do so with at least that `probability`, by Bonferroni's inequality. `dof`: degrees of freedom of any shape. For
+    one value and `PROBABILITY` it equals `coverage_factors`.
     """
     whole_dof, tail = _round_down(dof), false_alarm_of_each(1 - probability, values) / 2
     factors = np.full(np.shape(dof), -NormalDist().inv_cdf(tail))

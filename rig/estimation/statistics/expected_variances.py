@@ -79,9 +79,9 @@ def expected_sizes(fit: ResidualInputs, shares: Sequence[float]) -> ErrorSizes:
 def expected_disturbances(
     fit: ResidualInputs, sizes: ErrorSizes, causes: Sequence[Array], odds: Sequence[float]
 ) -> Array:
-    """Return the variance (k,) of each of the `causes`, whose columns (n, …) are for one standard deviation.
+    """Return the expected variance (k,) of each of the `causes`; a cause's columns (n, …) are for one std.
 
-    Priors: log-uniform, with `odds` (k,) of each against none.
+    Priors: log-uniform, with `odds` (k,) that the cause exists.
     """
     effects = sizes.std_rad * fit.effects(sizes.own_share)
     whitener = np.linalg.inv(np.linalg.cholesky(fit.covariance + sizes.walk**2 * fit.walk + effects @ effects.T))

@@ -32,6 +32,6 @@ def mean_weights(groups: Array, nuisance: Array) -> Array:
 
 
 def even_groups(part: Array, parts: int) -> Array:
-    """Return the groups (n, p) for `mean_weights` by the part (n,) of each sample, −1 for none."""
+    """Return the groups (n, p) for `mean_weights` from the number (n,) of each sample's part, −1 for none."""
     groups: Array = (part[:, None] == np.arange(parts)).astype(np.float64)
     return groups

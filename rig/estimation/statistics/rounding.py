@@ -86,8 +86,8 @@ def cut_steps(readings: Array, unit: float) -> Steps:
 def find_steps(readings: Array) -> Array:
     """Return the steps (3,) of readings (n, 3), zero for an axis without visible steps.
 
-    If noise is much larger than a step, hardly any number repeats, so steps cannot be found and do not matter. A
-    constant axis with few numbers has the steps of the others.
+    If noise is much larger than a step, hardly any number repeats: steps cannot be found and do not matter. A nearly
+    constant axis shows too few numbers, and gets the steps of the others.
     """
     stride = max(len(readings) // MOST_READINGS, 1)
     units = np.array([_find_unit(axis) for axis in readings[::stride].T])
@@ -123,7 +123,7 @@ def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatte
 
 
 def _find_unit(axis: Array) -> float:
-    """Return the median distance of adjacent repeated numbers in readings (n,), by occurrences; zero if few repeat."""
+    """Return the median distance between adjacent repeated numbers of readings (n,); zero if few numbers repeat."""
     values, often = np.unique(axis, return_counts=True)
     values, often = values[often >= REPEATED], often[often >= REPEATED]
     if len(values) < FEWEST_LEVELS or often.sum() < REPEATED_FRACTION * len(axis):

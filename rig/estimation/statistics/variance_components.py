@@ -138,7 +138,7 @@ class MixedModel:
         return lower, design, observed, information, -0.5 * (determinant + square)
 
     def _log_prior(self, logarithms: Array) -> float:
-        """Return the log-density of ln σ for half-Cauchy σ, but for a constant."""
+        """Return the log-density of ln σ for half-Cauchy σ, up to a constant."""
         relative = logarithms - np.log(self.mixed.scales)
         return float(np.sum(relative - np.logaddexp(0, 2 * relative)))
 
@@ -170,10 +170,11 @@ class MixedModel:
 
 
 def sample_adaptively(log_density: Callable[[Array], float], middle: Array, curvature: Array) -> Array:
-    """Return the weights (s,) of samples at which a log-density of k variables is called, in this order.
+    """Return the weights (s,) of the samples at which a log-density of k variables is called, in the order of calls.
 
-    Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798): each round proposes by
-    Student's t with the mean and the covariance of all samples before, begun by those at the maximum.
+    Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798): each round draws from
+    Student's t with the mean and covariance of all earlier samples. The first round uses the maximum and the curvature
+    there.
     """
     rng = np.random.default_rng(0)
     values, directions = np.linalg.eigh(curvature)
@@ -209,7 +210,7 @@ def _find_weights(points: Array, logs: Array, proposals: Sequence[tuple[Array, A
 
 
 def _temper(weights: Array, fewest: float) -> Array:
-    """Return weights (s,) to a power of at most one, so that as many samples count as `fewest`."""
+    """Return the weights (s,) raised to a power ≤ 1 that makes the effective number of samples at least `fewest`."""
     power = 1.0
     tempered = weights
     while 1 / float(np.sum(tempered**2)) < fewest and power > LEAST_POWER:
@@ -219,7 +220,7 @@ def _temper(weights: Array, fewest: float) -> Array:
 
 
 def _find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
-    """Return h (q,) so that a mixture of normals (s, q) with `weights` (s,) is within ± h with 95.45 % probability."""
+    """Return h (q,) so that a mixture of normals (s, q) with `weights` (s,) lies within ± h with 95.45 % probability."""
     from scipy.special import ndtr
 
     std = np.sqrt(variances)

@@ -85,10 +85,7 @@ def _refuse_unfit(status: os.stat_result) -> None:
 
 
 def _look(file: Path) -> None:
-    """Read a file without locking or writing.
-
-    Raise UnfitFile if it is not a history, Refused `history_too_old`.
-    """
+    """Read a file without locking or writing. Raise UnfitFile if it is not a history, Refused `history_too_old`."""
     try:
         with closing(sqlite3.connect(address_of(file, "mode=ro&immutable=1"), uri=True)) as connection:
             if _is_too_old(connection):

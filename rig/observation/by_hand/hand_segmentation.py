@@ -31,7 +31,10 @@ HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25  # a body held in hand: least dur
 def segment_session(
     time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
 ) -> HandRecording:
-    """Return the session of readings (n, 3) at rising times (n,), rad/s and m/s²; `range_rad_s` if it is known."""
+    """Return the session of readings (n, 3) in rad/s and m/s² at rising times (n,).
+
+    `range_rad_s` is the gyroscope's range, None if unknown.
+    """
     windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
     rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
     top = _find_clipped(rates, range_rad_s)
@@ -46,7 +49,7 @@ def segment_session(
 
 
 def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
-    """Return the readings (n,) after which others are missing, over which the body may have turned otherwise."""
+    """Return the indices (k,) of readings before a gap in which the body may have turned unobserved."""
     mask = np.zeros(len(time_s), dtype=np.bool_)
     if len(time_s) > 1:
         steps = np.flatnonzero(find_sampling(time_s).gaps(time_s, GAP))
@@ -55,7 +58,7 @@ def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
 
 
 def _began_still(time_s: Array, rates: Array) -> bool:
-    """Return whether the body hardly moved in the first second; if a hand held it then, it may hold it later."""
+    """Return whether the body hardly moved in the first second; a hand that held it then may hold it later too."""
     first = rates[time_s < time_s[0] + FIRST_S]
     return bool(len(first) > 1 and first.std(axis=0).max() < STILL_RAD_S)
 
@@ -80,7 +83,10 @@ def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Windo
 
 
 def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
-    """Return which readings (n,) are at the limit of the range; if it is unknown, a long series of equal readings."""
+    """Return which readings (n,) are at the limit of the range.
+
+    If the range is unknown, a long series of equal readings counts as clipped.
+    """
     if range_rad_s is not None:
         return np.asarray((np.abs(rates) >= NEAR_RANGE * range_rad_s).any(axis=1))
     size = np.abs(rates)
@@ -93,7 +99,7 @@ def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
 
 
 def _find_held_intervals(time_s: Array, rates: Array, rests: tuple[HandRest, ...]) -> tuple[tuple[float, float], ...]:
-    """Return the intervals in which a hand held the body: with less rotation than a move, and more than a rest."""
+    """Return the intervals in which a hand held the body: it turned less than in a move, and more than at rest."""
     if not rests:
         return ()
     width = max(2, int(np.ceil(PAUSE_S / find_sampling(time_s).interval_s - ROUNDING)))

@@ -28,5 +28,5 @@ def mask_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:
 
 
 def smallest_steps(readings: Array) -> Array:
-    """Return the smallest step between different readings (n, 3), by axis: their resolution, if it shows."""
+    """Return the smallest difference between distinct readings (n, 3), by axis: an estimate of their resolution."""
     return np.array([np.diff(np.unique(axis)).min() if np.ptp(axis) > 0 else 0.0 for axis in readings.T])

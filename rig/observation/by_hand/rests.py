@@ -76,9 +76,9 @@ def find_rests(
 
 
 def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
-    """Return means and scatter (count, 3) of blocks (count, width, 3) without a few readings that are due to a knock.
+    """Return means and scatter (count, 3) of blocks (count, width, 3), each without the few readings of a knock.
 
-    The readings before and after it are equal. Not for a gyroscope: a knock may have turned the body.
+    A knock is a disturbance with equal readings before and after it. Not for a gyroscope, as a knock may turn the body.
     """
     before, after = np.concatenate([blocks[:1, 0], blocks[:-1, -1]]), np.concatenate([blocks[1:, 0], blocks[-1:, -1]])
     widened = np.concatenate([before[:, None], blocks, after[:, None]], axis=1)
@@ -96,7 +96,7 @@ def _find_steady_blocks(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> N
 
 
 def _within(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
-    """Return the blocks (count,), by their times (count, width), that lie in one of the windows."""
+    """Return which blocks (count,), by the times (count, width) of their readings, lie in one of the windows."""
     mask = np.zeros(len(times), dtype=np.bool_)
     for window in windows:
         first, last = np.searchsorted(times[:, 0], window.start_s), np.searchsorted(times[:, -1], window.end_s, "right")
@@ -107,7 +107,7 @@ def _within(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
 def _find_unturned(
     means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return the blocks (count,) at a gyroscope's rest reading, the most frequent one in declared rests."""
+    """Return which blocks (count,) have a gyroscope's reading at rest: the most frequent one in declared rests."""
     declared = steady & lying
     pool = means[declared if declared.any() else steady]
     candidates = pool[:: -(-len(pool) // CANDIDATES)]

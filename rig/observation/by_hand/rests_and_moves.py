@@ -36,7 +36,7 @@ Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accele
 
 
 def microsecond_of(sensor: RecordedSensor) -> float:
-    """Return the duration, s, of a microsecond of a sensor's stamps, whose board's counter runs at its own rate."""
+    """Return the duration, s, of a microsecond of a sensor's stamps by the clock of its board."""
     return MICROSECOND_S if sensor.on_board else 1e-6
 
 
@@ -48,7 +48,7 @@ def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float
 
 
 def range_of(sensor: RecordedSensor) -> float | None:
-    """Return the largest rate that a sensor reads, rad/s; None if its part does not state it."""
+    """Return the largest rate that a sensor can read, rad/s; None if its part does not state one."""
     rate = sensor.channel(RATE)
     return None if rate.full_scale_counts is None else rate.full_scale_counts * rate.unit_per_count
 
@@ -144,9 +144,9 @@ def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
 
 
 def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> SessionConditions:
-    """Return the inputs of a session's solution besides a sensor's readings. Raise Refused `clock_unknown`.
+    """Return the inputs of a session's solution besides a sensor's readings.
 
-    The clock that stamps the readings is the only measure of time, and no reading shows an error of it. Without an
+    Raise Refused `clock_unknown`. The readings do not show an error of the clock that stamps them. Without an
     accelerometer to determine the side that is up, the first face is the one requested first.
     """
     by_hand, uncertainty = settings.by_hand, settings.uncertainty

@@ -33,7 +33,7 @@ class ClockRate:
 
 
 def compare_with_computer(motion: ArmMotion) -> ClockRate:
-    """Return the rate of the controller's clock against the computer's: a line through the arrival times of states.
+    """Return the rate of the controller's clock relative to the computer's, by a line through arrival times.
 
     States arrive in bursts after delays, so only some of them count as independent.
     """

@@ -21,10 +21,10 @@ NEXT_S = 1e-7  # rounding of a sample's time
 
 
 def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[int, float]:
-    """Return the deviation of the board's average of each sweep from the computer's mean, by the sweep's index.
+    """Return the deviation of the board's average from the computer's mean, by the index of the sweep.
 
-    It is in standard deviations of the computer's mean, on the axis with the largest; only for sweeps averaged on the
-    board.
+    It is the largest of the three axes, in standard deviations of the computer's mean. Sweeps that the board did not
+    average are absent.
     """
     deviations = dict[int, float]()
     for recording in recordings:
@@ -61,7 +61,7 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
 
 
 def _passing(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
-    """Return columns (n, k) that the computer's mean excludes, at times (n,) with rates (n,) about the axis.
+    """Return columns (n, k) whose effect the computer's mean excludes, at times (n,) with rates (n,) about the axis.
 
     They are the first two harmonics of the turn, spectral lines, and the effect of a slow ripple on a sensor with a
     lag.

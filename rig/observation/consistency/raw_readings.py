@@ -40,15 +40,15 @@ def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.i
 
 
 def innovation_std(counts: NDArray[np.int64]) -> Array:
-    """Return the standard deviation (3,), in counts, of a reading's error of prediction from the previous readings.
+    """Return the standard deviation (3,), in counts, of a reading's prediction error.
 
-    Drift and vibration are excluded: they shift neighbouring readings together.
+    Previous readings predict it, so drift and vibration, which shift neighbouring readings together, are excluded.
     """
     return np.array([_innovation_std(axis - axis.mean()) for axis in counts.T])
 
 
 def _innovation_std(readings: Array) -> float:
-    """Return the standard deviation of the error when readings (n,) are predicted from `MEMORY` earlier readings."""
+    """Return the standard deviation of the error of predicting readings (n,) from `MEMORY` earlier ones."""
     if len(readings) < 4 * MEMORY:
         return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
     return float(NORMAL * np.median(np.abs(innovations(readings, MEMORY))))

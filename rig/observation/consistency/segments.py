@@ -217,7 +217,7 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
 
 
 def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> MeanNoise:
-    """Return the noise of readings from residuals (n, 3) of a fit of the segments' means and spectral lines."""
+    """Return the noise of readings by the residuals (n, 3) of a fit of segment means and spectral lines."""
     dof = max(len(residuals) - segments - columns, 1)
     scatter = np.maximum(np.sum(residuals**2, axis=0) / dof, steps.variance)
     in_a_mean = scatter * np.array([correlation_inflation(axis) for axis in residuals.T])
@@ -230,7 +230,7 @@ def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) 
 def _average(
     division: _Division, motion: ArmMotion, *, weights: Array, residuals: Array, rates: Array, noise: MeanNoise
 ) -> tuple[Segment, ...]:
-    """Return the segments with enough samples: readings and the flange's rates (m, 3) by the same weights (p, m)."""
+    """Return the segments with enough samples, averaged by weights (p, m): readings and the flange's rates (m, 3)."""
     readings = division.readings_rad_s
     groups, rows = division.groups[:, division.enough], weights[list(division.enough)]
     smooth = readings - residuals

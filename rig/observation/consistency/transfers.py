@@ -97,7 +97,7 @@ def average_transfers(
 
 
 def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInterval | None:
-    """Return the interval from before the arm moves until it stands; None if it does not move within the window."""
+    """Return the interval from before the arm moves until it has stopped; None if it does not move in the window."""
     inside = (motion.time_s >= start_s) & (motion.time_s <= end_s)
     rates, smoothed = _rate_norms(motion, motion.time_s[inside])
     moving = motion.time_s[inside][(rates > MIN_RATE_RAD_S) & (smoothed > MIN_RATE_RAD_S / 2)]
@@ -107,7 +107,7 @@ def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInte
 
 
 def _rate_norms(motion: ArmMotion, time_s: Array) -> tuple[Array, Array]:
-    """Return norms (n,) of the flange's rate at times (n,), and of its mean over `SMOOTHED_S` around them, rad/s."""
+    """Return norms (n,), rad/s, of the flange's rate at times (n,), and of its mean over `SMOOTHED_S` around each."""
     half_s = SMOOTHED_S / 2
     within_s = np.clip(time_s, motion.time_s[0] + half_s, motion.time_s[-1] - half_s)
     rates, smoothed = motion.rate(time_s), motion.mean_rates(within_s, SMOOTHED_S)
@@ -115,7 +115,7 @@ def _rate_norms(motion: ArmMotion, time_s: Array) -> tuple[Array, Array]:
 
 
 def is_by_wrists(interval: MotionInterval) -> bool:
-    """Return whether a transfer is used: of suitable duration, and by wrists only."""
+    """Return whether a transfer is of suitable duration and moves the wrists only."""
     before = max(interval.motion.kinematics.joints - WRISTS, 0)  # of any chain the last three joints are its wrists
     others = interval.motion.angles(np.linspace(interval.start_s, interval.end_s, STEPS))[:, :before]
     rotated_rad = np.ptp(others, axis=0).max(initial=0.0)
@@ -133,10 +133,10 @@ def mean_specific_force_m_s2(interval: MotionInterval, down_m_s2: Array, extensi
 
 
 def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
-    """Return the variance (3,) of the mean of readings (n, 3) after removal of the arm's rate and gravity.
+    """Return the variance (3,) of the mean of readings (n, 3), after removal of the arm's rate and gravity.
 
-    A sensor's filter combines the arm's rates of adjacent samples. A ripple above half the data rate looks like noise,
-    at low frequencies too.
+    The arm's rates of adjacent samples are removed too, as a sensor's filter combines them. A ripple above half the
+    data rate is aliased to low frequencies, where it looks like noise.
     """
     step_s = float(np.median(np.diff(time_s)))
     rates = [motion.rates_at_samples(time_s + shift * step_s) for shift in FILTERED]
@@ -148,9 +148,9 @@ def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array
 
 
 def _find_transfers(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[MotionInterval]:
-    """Yield the intervals from before the arm moves until it stands, with all samples present.
+    """Yield the intervals from before the arm moves until it has stopped, if no sample is missing.
 
-    None for a shaft whose encoder is right over whole turns only, because a transfer is a part of a turn.
+    A transfer is a part of a turn, so a shaft whose encoder is exact over whole turns only has none.
     """
     if not motion.tells_parts_of_turns:
         return

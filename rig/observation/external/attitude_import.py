@@ -117,9 +117,9 @@ def read_attitudes(
 
 
 def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
-    """Return the rows that hold a quaternion: loggers of several rates leave it blank in others.
+    """Return the rows that hold a quaternion.
 
-    Raise Refused `not_a_number` for another blank cell.
+    Loggers with several rates leave it blank in the other rows. Raise Refused `not_a_number` for another blank cell.
     """
     kept = ~np.isnan([table.columns[name] for name in QUATERNION]).all(axis=0)
     for name, column in table.columns.items():
@@ -131,9 +131,9 @@ def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
 def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
     """Average samples in attitudes, given by the columns of their file.
 
-    With `find_clock` each file has its own clock; rows that no sample covers are left out. Raise Refused
-    `bad_quaternion`, `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`,
-    `too_few_observations`, and with `find_clock` as `find_reference_clock`.
+    With `find_clock` each file has its own clock; rows without samples are left out. Raise Refused `bad_quaternion`,
+    `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`, `too_few_observations`, and with
+    `find_clock` those of `find_reference_clock`.
     """
     time_s, readings = samples.time_s, samples.readings
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
@@ -197,13 +197,13 @@ class _ReferenceRows:
 
 
 def _within(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
-    """Return which of the rows (N, 2) lie within a recording at `time_s` (n,)."""
+    """Return which of the rows (N, 2) lie within a recording with samples at `time_s` (n,)."""
     within: NDArray[np.bool_] = (rows_s[:, 0] >= time_s[0]) & (rows_s[:, 1] <= time_s[-1])
     return within
 
 
 def _list_omitted(rows: _ReferenceRows, kept: _ReferenceRows, reason: str) -> Iterator[Omitted]:
-    """Yield the rows that were given and not kept, if there are any."""
+    """Yield an entry for the rows that were given and not used, if there are any."""
     if lost := np.setdiff1d(rows.numbers, kept.numbers).tolist():
         window = rows.windows[rows.numbers.tolist().index(lost[0])]
         yield Omitted("rows", len(lost), len(rows.windows), reason, f"row {lost[0]}, from {window.start_s:.10g} s")
@@ -227,8 +227,8 @@ def _rows(time_s: Array, rate: Array, fixes: _ReferenceRows) -> Rows:
 def _find_complete(rows: _ReferenceRows, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
     """Return the rows whose samples are complete.
 
-    Raise Fault `lost_samples` if no row is complete, or if most long rows lack samples. Short rows do not count, as any
-    may fall into a gap.
+    Raise Fault `lost_samples` if no row is complete, or if most long rows lack samples. Short rows do not count,
+    because any gap may cover one.
     """
     whole = np.array([is_complete(*pair, least=1) for pair in zip(counts.tolist(), expected.tolist(), strict=True)])
     long = expected >= MIN_SAMPLES

@@ -80,9 +80,9 @@ def read_sweeps(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> 
 
 
 def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
-    """Average samples, a gyroscope's among them, over sweeps given by the columns of their file.
+    """Average samples, including a gyroscope's, over sweeps given by the columns of their file.
 
-    Raise Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault as `average` does, `stuck_sensor`.
+    Raise Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault `stuck_sensor` and those of `average`.
     """
     check_reads(samples.readings[RATE], RATE)
     data = average(
@@ -102,7 +102,7 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
 
 
 def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
-    """Yield the turns that are left out for missing readings, if there are any."""
+    """Yield an entry for the turns that are left out because readings are missing, if there are any."""
     if by_angle.hiding:
         first = next(sweep for sweep in data.sweeps if sweep.sweep in by_angle.hiding)
         where = f"row {first.sweep}, from {first.average.start_s:.10g} s"
@@ -154,7 +154,7 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
 
 
 def _list_omitted(rows: Sequence[RowGaps], windows: Sequence[Window]) -> Iterator[Omitted]:
-    """Yield the rows that are left out, and the number of readings that are missing in the others."""
+    """Yield an entry for the rows left out, and one for the readings that are missing in the other rows."""
     lost = [(number, row) for number, row in enumerate(rows, start=1) if not row.is_usable]
     if lost:
         number, row = lost[0]
@@ -170,7 +170,7 @@ def _list_omitted(rows: Sequence[RowGaps], windows: Sequence[Window]) -> Iterato
 
 
 def _speeds(sweeps: Mapping[str, Array]) -> Array:
-    """Return mean speeds (k,), from whichever of the two columns there is. Raise Refused `bad_sweep`."""
+    """Return mean speeds (k,) from the column that is present: speed, or angle. Raise Refused `bad_sweep`."""
     durations = sweeps["end_s"] - sweeps["start_s"]
     by_angle = "angle_rad" in sweeps
     motion = sweeps["angle_rad" if by_angle else "speed_rad_s"]
@@ -216,7 +216,7 @@ def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Ob
 
 
 def _check_unit(turns: Sequence[Observation]) -> None:
-    """Raise Fault `wrong_unit` if readings less their mean, which removes the bias, differ in size from the speeds."""
+    """Raise Fault `wrong_unit` if readings minus their mean, hence without bias, differ in size from the speeds."""
     if len(turns) < 2:
         return
     means = np.array([turn.average.mean_rad_s for turn in turns])

@@ -64,7 +64,7 @@ class Samples:
 
 
 def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None) -> Samples:
-    """Return the readings of a file as `samples_in`. Raise Refused as that, and as `read_sample_table`."""
+    """Return the readings of a file, as `samples_in` does. Raise Refused as `samples_in` and `read_sample_table` do."""
     only = [quantity.sensor for quantity in needed]
     return samples_in(read_sample_table(path, needed, mapped, only).columns, str(path))
 
@@ -75,8 +75,8 @@ def read_sample_table(
     """Return the columns of a file in any format: the quantities `needed` and all others it holds.
 
     `mapped` is for a table whose columns have other names. Rows with blank cells count if they hold all quantities of
-    the sensors in `only`, or all that the file has. Raise Refused as `readings_in`, `no_file`, `wrong_columns`,
-    `wrong_unit`, `not_a_number`, `blank_cells`.
+    the sensors in `only`, or all that the file has. Raise Refused as `readings_in` does, and `no_file`,
+    `wrong_columns`, `wrong_unit`, `not_a_number`, `blank_cells`.
     """
     readings = readings_in(path)
     if readings is not None:
@@ -98,9 +98,9 @@ def read_sample_table(
 
 
 def _convert(path: Path, columns: Columns, mapped: Mapped | None) -> Columns:
-    """Return the columns of a file that names them as the rig does, in the order and with the factors of a map.
+    """Return the columns named as in the rig's files, in the order and with the factors of a map.
 
-    So an axis that is mirrored, or a topic in another unit, can be stated. Raise Refused `wrong_columns`.
+    The map can state a mirrored axis, or a topic in another unit. Raise Refused `wrong_columns`.
     """
     if mapped is None:
         return columns
@@ -117,7 +117,7 @@ def _convert(path: Path, columns: Columns, mapped: Mapped | None) -> Columns:
 
 
 def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
-    """Return the rows (n,) that hold a quantity. Raise Refused `not_a_number` if some of its axes are blank."""
+    """Return which rows (n,) hold a quantity. Raise Refused `not_a_number` if only some of its axes are blank."""
     blank = np.isnan([table.columns[name] for name in quantity.columns])
     if len(partly := np.flatnonzero(blank.any(axis=0) & ~blank.all(axis=0))):
         row = int(partly[0])
@@ -130,7 +130,7 @@ def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
 def _drop_blanks(
     path: Path, table: CsvTable, read: Mapping[Quantity, NDArray[np.bool_]], wanted: Sequence[Quantity]
 ) -> SampleTable:
-    """Return the rows that hold all that is wanted. Raise Refused `blank_cells` if no row does, or only some do."""
+    """Return the rows that hold every required column. Raise Refused `blank_cells` if no row does, or only some do."""
     columns, time_s = dict(table.columns), table.columns[TIME]
     if not wanted or all(read[quantity].all() for quantity in read):
         kept = np.ones(len(time_s), dtype=np.bool_)
@@ -169,7 +169,7 @@ def _apart(
 
 
 def samples_in(table: Columns, where: str) -> Samples:
-    """Return the readings in columns (n,), called `where` in messages, as `order_stamps` puts them in order.
+    """Return the readings in columns (n,), in the order of `order_stamps`; messages call them `where`.
 
     Raise Refused `wrong_columns`, `not_a_number`, `time_not_increasing`.
     """

@@ -21,7 +21,7 @@ MOSTLY = 0.5  # of a row's readings: the least that tell its mean
 
 
 def check_times(time_s: Array, where: str = "the samples") -> None:
-    """Raise Refused `time_not_increasing`, which names `where`, if samples are too few or their times do not rise."""
+    """Raise Refused `time_not_increasing` if samples are too few or their times do not rise; it names `where`."""
     what = f"{where} has {len(time_s)} samples, {MIN_SAMPLES} are the least" if len(time_s) < MIN_SAMPLES else None
     steps_back = np.flatnonzero(~(np.diff(time_s) > 0))
     if len(steps_back):
@@ -50,7 +50,7 @@ def find_overlap(windows: Sequence[Window]) -> tuple[int, int] | None:
 def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
     """Return the variance of the mean of readings (n, 3), its degrees of freedom, and one reading's std, (3,) each.
 
-    From the scatter about the mean; a vibration counts as noise, for no arm reports it.
+    They come from the scatter about the mean. A vibration counts as noise, because no arm measures it.
     """
     variance = readings.var(axis=0, ddof=1)
     residuals = (readings - readings.mean(axis=0)).T
@@ -75,9 +75,9 @@ def average_of(readings: Array, window: Window) -> Average:
 
 
 def average_bridged(readings: Array, numbers: NDArray[np.intp], window: Window, hidden_rad: float) -> Average:
-    """Return the average of a window's readings (n, 3); gaps in `numbers` (n,) show which are missing.
+    """Return the average of a window's readings (n, 3), with missing ones interpolated.
 
-    Missing readings are interpolated for the mean; its variance includes the rotation that they may hide.
+    Gaps in `numbers` (n,) show which are missing. The variance includes the rotation that they may hide.
     """
     mean = average_of(readings, window)
     if not hidden_rad:
@@ -128,7 +128,7 @@ def find_row_gaps(time_s: Array, readings: Array, sampling: Sampling, windows: S
 
 
 def is_losing(rows: Sequence[RowGaps]) -> bool:
-    """Return whether readings are missing all over the rows, as with a link that loses single readings."""
+    """Return whether single readings are missing throughout the rows, as on a link that drops some."""
     return sum(row.gaps for row in rows) > MAX_LOST_FRACTION * sum(row.count for row in rows)
 
 
@@ -152,7 +152,7 @@ def is_complete(count: int, expected: float, least: int = MIN_SAMPLES) -> bool:
 
 
 def check_scattered(sampling: Sampling) -> None:
-    """Raise Fault `lost_samples` if many readings are missing at positions that bad stamps do not show."""
+    """Raise Fault `lost_samples` if many readings are missing, and bad stamps do not show where."""
     if sampling.scattered > MAX_LOST_FRACTION:
         raise Fault(
             "lost_samples",

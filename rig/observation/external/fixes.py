@@ -64,9 +64,9 @@ class Gathered:
 def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> Gathered:
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
-    The reference's attitude at time t is that at t + `clock_s` of the readings. Raise Fault `too_few_observations`, or
-    `lost_samples`, `saturation`, `turned_too_fast` if that is the reason: too few increments remain in which the body
-    moves, or more had to be left out.
+    The reference's attitude at time t is that at t + `clock_s` of the readings. Raise Fault `too_few_observations` if
+    too few increments remain in which the body moves. Raise `lost_samples`, `saturation` or `turned_too_fast` if that
+    is the cause, or if more increments are left out than remain.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:
@@ -88,7 +88,7 @@ def _suitable_s(span_s: float) -> float:
 def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes:
     """Group the reference's attitudes into fixes: start and end of each row at rest, and one per window between rests.
 
-    `placement` is equal for both ends of a rest; whether the gyroscope can be integrated between them is not yet known.
+    `placement` is equal at both ends of a rest. The gaps of the gyroscope are not considered yet.
     """
     rows_s = turning.rows_s
     passed = np.cumsum(still)
@@ -128,7 +128,7 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
 ) -> tuple[NDArray[np.bool_], Array, tuple[LeftOut, ...]]:
-    """Return which neighbours (N − 1,) the gyroscope connects, what gaps hide between them, and what is left out."""
+    """Return which adjacent fixes (N − 1,) the gyroscope connects, the rotation in its gaps, and what is left out."""
     count = len(fixes.placement)
     first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
     last_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count), side="right") - 1]
@@ -150,9 +150,9 @@ def _find_joined(
 
 
 def _blind(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
-    """Yield the steps from one reading to the next, by the first one's index, of unknown motion, by reason.
+    """Yield, by reason, the steps between readings in which the motion is unknown, by the first reading's index.
 
-    With each step the standard deviation of the rotation that it hides.
+    Each comes with the standard deviation of the rotation that it hides.
     """
     steps_s = np.diff(turning.time_s)
     readings = turning.readings_rad_s
@@ -168,9 +168,9 @@ def _blind(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
 
 
 def _find_clipped(readings: Array) -> NDArray[np.bool_]:
-    """Return the readings (n,) in which an axis repeats its largest or smallest value several times.
+    """Return which readings (n,) repeat the largest or smallest value of their axis several times.
 
-    A sensor at rest repeats itself as well, but then its largest and smallest values are close together.
+    A sensor at rest repeats values too, but then its largest and smallest ones are close together.
     """
     clipped = np.zeros(len(readings), dtype=np.bool_)
     for axis in readings.T:

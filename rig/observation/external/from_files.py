@@ -102,9 +102,9 @@ def build_recording(
 
 
 def read_log(path: Path, columns: ColumnMap = AS_NAMED, item: Item = UNNAMED) -> RunData:
-    """Return the readings of a file without any motion, to be shown or exported, as `rig solve` reads them.
+    """Return the readings of a file without motion, as `rig solve` reads them, to be shown or exported.
 
-    Raise Refused as `read_sample_table` and `samples_in`.
+    Raise Refused as `read_sample_table` and `samples_in` do.
     """
     table = read_sample_table(path, (), map_samples(columns))
     samples_in(table.columns, str(path))
@@ -143,9 +143,9 @@ def _recording(read: ReadElsewhere, settings: RunSettings, provenance: Provenanc
 
 
 def _motion(files: Files, origin_s: int) -> Columns:
-    """Return the motion by column, times from `origin_s` on.
+    """Return the motion by column, with times from `origin_s` on.
 
-    Raise Refused as its readers do, and `bad_option` for a table's log of sweeps.
+    Raise Refused as the readers of motion do, and `bad_option` for a table's log of sweeps.
     """
     column_map = files.columns
     if not isinstance(files.motion, Path):

@@ -24,9 +24,9 @@ class MeansAtRest:
 
 
 def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
-    """Return the means in the rests, in the body's coordinates; None if the rests are too short in all.
+    """Return the means in the rests, in the body's coordinates; None if all rests together are too short.
 
-    `clock_s` takes the times of the rows to the clock of the readings.
+    `clock_s` is added to the times of the rows to give those of the readings.
     """
     rows_s = turning.rows_s.mean(axis=1) + clock_s
     lying = still_windows(turning.rows_s + clock_s, turning.attitudes)
@@ -47,7 +47,7 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
 
 
 def _split_single(windows: Sequence[Window]) -> Sequence[Window]:
-    """Return the windows; a single window is divided into halves."""
+    """Return the windows; if there is only one, its halves."""
     if len(windows) != 1:
         return windows
     window = windows[0]
@@ -58,8 +58,8 @@ def _split_single(windows: Sequence[Window]) -> Sequence[Window]:
 def _rate_rad_s(times_s: Array, attitudes: Array) -> Array:
     """Return the body's rate (3,) from its attitudes at increasing times; zero for a single attitude.
 
-    The rate is the median over pairs of rows half of the rows apart (Theil's incomplete method, 1950), so a few rows at
-    either end in which the body moves already have no effect. A single row states that the body lay still.
+    The rate is the median over pairs of rows that are half of all rows apart (Theil's incomplete method, 1950), so a
+    few rows at either end in which the body already moves have no effect. A single row states that the body lay still.
     """
     half = len(times_s) // 2
     if not half:

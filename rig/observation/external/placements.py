@@ -88,7 +88,7 @@ class _PlacedRest:
 def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: AttitudeRows) -> Placements:
     """Return the placements in readings (n, 3) at rising times (n,) by a reference's rows.
 
-    Raise Fault `not_at_rest` if the body moves in every row, or in more of the dwells than it lies still in.
+    Raise Fault `not_at_rest` if the body moves in every row, or in more than half of the dwells.
     """
     dwells = np.array([window.end_s - window.start_s >= DWELL_S for window in rows.windows])
     windows_s = np.array([(window.start_s, window.end_s) for window in rows.windows])
@@ -156,9 +156,10 @@ def _same_rest(time_s: Array, read: Array, quantity: Quantity, before: Window, a
 
 
 def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> tuple[int, NDArray[np.intp]]:
-    """Return the number of the rest that a row lies in, −1 of none, and its samples at rest.
+    """Return the number of the rest that contains a row, −1 if none does, and the row's samples at rest.
 
-    All of a row lies in it, to a block at either end; of a dwell most, if the body lies nowhere else in it.
+    A rest contains a row to within a block at either end. Of a dwell it need contain only the most, if no other rest
+    does.
     """
     row, nothing = inside(time_s, window), np.zeros(0, dtype=np.intp)
     met: list[tuple[int, float, NDArray[np.intp]]] = []
@@ -201,7 +202,7 @@ def _apart(one: Array, other: Array) -> float:
 def _read(
     time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]
 ) -> tuple[Rested, NDArray[np.intp]]:
-    """Return the means of the rests, and the samples that were knocked; rests of few samples take the others' noise."""
+    """Return the means of the rests, and the knocked samples. Rests with few samples get the noise of the others."""
     means, variances, dof = {}, {}, {}
     knocked = np.zeros(0, dtype=np.intp)
     for quantity, values in readings.items():
@@ -220,7 +221,7 @@ def _read(
 
 
 def _fill_variances(variances: Array, counts: NDArray[np.intp], readings: Array, quantity: Quantity) -> Array:
-    """Return variances (N, 3) with missing ones taken from the others or from the jumps of readings (n, 3)."""
+    """Return variances (N, 3); missing ones come from the other rests, or from the jumps of readings (n, 3)."""
     unknown = np.isnan(variances[:, 0])
     if not unknown.any():
         return variances

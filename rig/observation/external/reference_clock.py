@@ -26,9 +26,9 @@ EXPLAINED = 0.3  # of the readings' variance, by the coarse offset
 
 
 def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBase:
-    """Return the clock of a reference with rows that have `rates_rad_s` (N, 3), None if only attitudes are known.
+    """Return the clock of a reference with rows that have `rates_rad_s` (N, 3), None if only attitudes are given.
 
-    Raise Fault as `TableMotion` and `estimate_time_base`, and `inverted_attitudes`.
+    Raise Fault `inverted_attitudes`, and those of `TableMotion` and `estimate_time_base`.
     """
     time_s, readings = turning.time_s, turning.readings_rad_s
     motion = TableMotion(turning.rows_s.mean(axis=1), turning.attitudes, rates_rad_s)
@@ -48,7 +48,7 @@ def find_reference_clock(turning: Turning, rates_rad_s: Array | None) -> TimeBas
 
 
 def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase, float]:
-    """Return the clock without drift, and the fraction of the rotation that it leaves unexplained; 1 if it is none."""
+    """Return the clock without drift, and the fraction of the rotation that it leaves unexplained: 1 if all."""
     time_s = turning.time_s
     explained, offset_s = estimate_coarse_offset(time_s, turning.readings_rad_s, motion)
     unexplained, bias_rad_s = 1.0, np.zeros(3)
@@ -60,7 +60,7 @@ def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase,
 
 
 def _check_not_inverted(turning: Turning, unexplained: float) -> None:
-    """Raise Fault `inverted_attitudes` if the inverse rotations leave half as much unexplained."""
+    """Raise Fault `inverted_attitudes` if the inverse rotations leave only half as much unexplained."""
     inverse = replace(turning, attitudes=np.swapaxes(turning.attitudes, -1, -2))
     motion = TableMotion(inverse.rows_s.mean(axis=1), inverse.attitudes, None)
     if _find_steady_clock(inverse, motion)[1] < unexplained / 2:

@@ -40,14 +40,14 @@ class Turning:
 
 
 def select_covered(turning: Turning, clock_s: float = 0.0) -> Turning:
-    """Return the rows that lie within the recording, in the order of time; a row's time is `clock_s` later."""
+    """Return the rows within the recording, in the order of time, with `clock_s` added to their times."""
     order = np.argsort(turning.rows_s[:, 0], kind="stable")
     rows_s = turning.rows_s[order] + clock_s
     return turning.select(order[(rows_s[:, 0] >= turning.time_s[0]) & (rows_s[:, 1] <= turning.time_s[-1])])
 
 
 def join_rests(turning: Turning, clock_s: float) -> tuple[Turning, NDArray[np.bool_]]:
-    """Return the rows with each rest of several rows as one, and which rows (N,) are rests."""
+    """Return the rows with the rows of each rest joined into one, and which rows (N,) are rests."""
     still = _find_still(turning, clock_s)
     middles_s = turning.rows_s.mean(axis=1) + clock_s
     kept = np.ones(len(middles_s), dtype=np.bool_)
@@ -90,7 +90,7 @@ def _find_dense_rests(turning: Turning, clock_s: float) -> list[tuple[float, flo
 
 
 def _find_rate_rad_s(attitudes: Array, times_s: Array) -> float:
-    """Return the rate of the body by rows (k, 3, 3) at times (k,): from the mean of their first half to the last's."""
+    """Return the body's rate by attitudes (k, 3, 3) at times (k,): from the mean of one half to the other's."""
     half = len(times_s) // 2
     if not half:
         return 0.0

@@ -44,7 +44,7 @@ class _Pairs:
 
 
 def find_start(turning: Turning) -> RobustStart:
-    """Return start values of F, b and τ; those of an aligned sensor on the same clock if the rows do not show them."""
+    """Return start values of F, b and τ. If the rows do not show them, those of an aligned sensor on the same clock."""
     aligned = RobustStart(DriftState(np.eye(3), np.zeros(3), 0.0), 1.0)
     pairs = _find_pairs(turning)
     if len(pairs.begin_s) < FEWEST:
@@ -71,7 +71,7 @@ def find_start(turning: Turning) -> RobustStart:
 
 
 def _find_pairs(turning: Turning) -> _Pairs:
-    """Return pairs of rows that follow each other closely: those between which the body moves, and as many rests."""
+    """Return pairs of rows in close succession: all those with motion between them, and as many at rest."""
     middles_s = turning.rows_s.mean(axis=1)
     later = np.searchsorted(middles_s, middles_s + APART_S)
     later = np.maximum(later, np.arange(len(middles_s)) + 1)
@@ -96,7 +96,10 @@ def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _fit(design: Array, turned: Array) -> tuple[float, Array]:
-    """Return the unexplained fraction of what was turned (k, 3), by lengths, and the solution (4, 3) for Fᵀ and b."""
+    """Return the fraction of the rotations (k, 3) that a fit leaves unexplained, by norms, and its solution (4, 3):
+
+    Fᵀ and b.
+    """
     aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
     weight = np.ones(len(design))
     solution = aligned

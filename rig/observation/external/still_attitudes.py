@@ -11,9 +11,9 @@ STILL_RAD_S = 0.02  # largest rate between them; a camera's errors look like hal
 
 
 def still_windows(windows_s: Array, attitudes: Array) -> list[Window]:
-    """Return the times in which rows with windows (N, 2), in any order, show that the body lay still.
+    """Return the windows in which the rows show that the body lay still.
 
-    `attitudes` (N, 3, 3) take body to table coordinates.
+    The rows have windows (N, 2), in any order, and `attitudes` (N, 3, 3), body to table coordinates.
     """
     long = windows_s[:, 1] - windows_s[:, 0] >= DWELL_S
     windows = [Window(start_s, end_s) for start_s, end_s in windows_s[long].tolist()]

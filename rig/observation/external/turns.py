@@ -57,7 +57,10 @@ class DeclaredTurns:
 def find_turns(
     time_s: Array, readings: Array, declared: DeclaredTurns, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
-    """Return the turns from rest to rest among sweeps, or None without any. `readings` (n, 3) in rad/s at `time_s`."""
+    """Return the turns from rest to rest among sweeps; None if there are none.
+
+    `readings` (n, 3) in rad/s at `time_s`.
+    """
     lying = find_rests(time_s, {RATE: readings}, lying=_find_pauses(time_s, sweeps))
     if not lying:
         return None
@@ -97,7 +100,7 @@ def find_turns(
 
 
 def _find_pauses(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:
-    """Return the time that no sweep takes, in which alone the body is declared to lie still."""
+    """Return the intervals between sweeps, in which alone the body is declared to lie still."""
     intervals = sorted((sweep.average.start_s, sweep.average.end_s) for sweep in sweeps)
     starts = [float(time_s[0]), *(end_s for _, end_s in intervals)]
     ends = [*(start_s for start_s, _ in intervals), float(time_s[-1])]
@@ -105,7 +108,7 @@ def _find_pauses(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:
 
 
 def _enclosing_window(sweep: Observation, lying: Sequence[Window]) -> Window | None:
-    """Return the window from the rest before a sweep to the rest after it, or None if either is far."""
+    """Return the window from the rest before a sweep to the rest after it; None if either is far away."""
     start_s, end_s = sweep.average.start_s, sweep.average.end_s
     before = [rest for rest in lying if rest.start_s < start_s and rest.end_s >= start_s - REACH_S]
     after = [rest for rest in lying if rest.end_s > end_s and rest.start_s <= end_s + REACH_S]
@@ -115,7 +118,7 @@ def _enclosing_window(sweep: Observation, lying: Sequence[Window]) -> Window | N
 
 
 def _starts_and_stops(time_s: Array, rates: Array, sweep: Observation) -> bool:
-    """Return whether a sweep hardly turns at either end: then it was not cut out of a longer turn."""
+    """Return whether a sweep hardly turns at either end; if not, it was cut out of a longer turn."""
     for at_s in (sweep.average.start_s, sweep.average.end_s):
         index = int(np.searchsorted(time_s, at_s))
         around = rates[max(index - EDGE_SAMPLES, 0) : index + EDGE_SAMPLES]

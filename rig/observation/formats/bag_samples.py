@@ -41,7 +41,7 @@ def is_bag(path: Path) -> bool:
 
 
 def bag_of(path: Path) -> Path:
-    """Return the folder of the bag that contains the file `path`, or `path` itself if no metadata is next to it."""
+    """Return the folder of the bag to which the file `path` belongs, or `path` if no metadata is next to it."""
     is_alone = path.is_dir() or _is_ros_1(path) or not (path.parent / METADATA).exists()
     return path if is_alone else path.parent
 
@@ -51,11 +51,11 @@ def _is_ros_1(path: Path) -> bool:
 
 
 def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
-    """Yield, in blocks, the readings of the topic `inside` a bag, or of the only topic with an Imu.
+    """Yield, in blocks, the readings of the topic `inside` a bag, or of its only topic of type Imu.
 
     The columns are those of a CSV file, times count from the beginning of the bag, and rows have the order of the bag.
-    Messages without a rate are left out and counted; accelerations are left out if some of the other messages hold
-    none. Raise Refused `missing_extra` or `bag_topic`, and for a damaged bag whatever its parser raises.
+    Messages without a rate are left out and counted. If some of the others lack an acceleration, all accelerations are
+    left out. Raise Refused `missing_extra` or `bag_topic`, and any error of the parser for a damaged bag.
     """
     with _open_bag(path) as reader:
         chosen = _select_topic(reader, (IMU,) if inside is None else (IMU, MAGNETIC), inside, "readings")
@@ -79,10 +79,10 @@ def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
 def _inertial(
     messages: Iterator[tuple[float, Any]], columns: list[str | None], counts: dict[str, Any]
 ) -> Iterator[tuple[float, ...]]:
-    """Yield the time, rate and acceleration of `sensor_msgs/Imu`; set columns that the messages do not hold to None.
+    """Yield the time, rate and acceleration of `sensor_msgs/Imu`; absent columns are set to None.
 
-    Count in `counts` the messages that are left out. Those without a rate are kept until one with a rate comes. Raise
-    Refused `bag_topic` if no message holds a rate or an acceleration.
+    Messages without a rate are kept back until a message with a rate comes, then left out and counted in `counts`.
+    Raise Refused `bag_topic` if no message holds a rate or an acceleration.
     """
     forces: list[tuple[float, ...]] = []
     has_rates, all_forces = False, True
@@ -138,7 +138,10 @@ def _check_metadata(path: Path) -> None:
 
 
 def _select_topic(reader: Any, types: Sequence[str], topic: str | None, what: str) -> Any:
-    """Return the connections of a topic; without a name, of the only one with messages of these types."""
+    """Return the connections of the named topic.
+
+    Without a name, return those of the only topic with messages of these types.
+    """
     connections = [connection for connection in reader.connections if connection.msgtype in types]
     if topic is not None:
         connections = [connection for connection in connections if connection.topic == topic]
@@ -163,7 +166,7 @@ def _list_topics(reader: Any, types: Sequence[str]) -> list[tuple[str, str]]:
 def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
     """Yield each message with the time in its header, in seconds from the beginning of the bag.
 
-    One beginning serves all topics: seconds since 1970 would leave a float without microseconds.
+    A float of the seconds since 1970 would lose the microseconds. All topics share one beginning.
     """
     from rosbags.typesys import Stores, get_typestore
 
@@ -184,9 +187,9 @@ def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]
 
 
 def _check_layout(store: Any, connections: Any) -> None:
-    """Raise ValueError if the definition that comes with the messages differs from ROS's own.
+    """Raise ValueError if the messages' own definition differs from ROS's.
 
-    The definition is only compared: rosbags would generate code from it and run the code.
+    It is only compared, because rosbags would generate code from it and execute it.
     """
     from rosbags.interfaces import MessageDefinitionFormat
     from rosbags.typesys import get_types_from_idl, get_types_from_msg

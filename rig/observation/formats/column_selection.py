@@ -79,7 +79,7 @@ def _build_map(
 
 
 def unwrap_times(columns: Mapping[str, Array], mapped: Mapped | None, *, by_day: bool) -> dict[str, Array]:
-    """Return the columns with times that go on where a counter began again at 0, or a time of day `by_day`."""
+    """Return the columns with continuous times, although a counter, or a time of day `by_day`, restarts at 0."""
     unwrapped = dict(columns)
     for name in TIMES:
         period_s: float | None = DAY_S if by_day else None
@@ -148,7 +148,7 @@ def _find_column(path: Path, headings: Sequence[str], width: int, name: str, col
 
 
 def check_headings(path: Path, headings: Sequence[str]) -> None:
-    """Raise Refused `wrong_columns` for a first row that cannot be one of names."""
+    """Raise Refused `wrong_columns` for a first row that does not consist of names."""
     what = None
     if len(headings) == 1 and len(headings[0].split()) > 1:
         what = f"divides its columns neither by commas nor by semicolons, tabs or spaces: {shorten(headings[0])}"
@@ -165,7 +165,7 @@ def check_headings(path: Path, headings: Sequence[str]) -> None:
 
 
 def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
-    """Raise Refused `wrong_unit`, `wrong_columns` for names of columns that such a file cannot have."""
+    """Raise Refused `wrong_unit`, `wrong_columns` for names that no column of such a file has."""
     for name in names:
         _check_unit(path, name, names, header)
     problems = [*_list_missing(names, header), *_find_unexpected(names, header)]
@@ -180,7 +180,7 @@ def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
 
 
 def _check_unit(path: Path, name: str, names: Sequence[str], header: Header) -> None:
-    """Raise Refused `wrong_unit` for an unknown name with the quantity of a column that is not among the names."""
+    """Raise Refused `wrong_unit` for a name that is unknown but has the quantity of a missing column."""
     own_names = header.names
     if name in own_names or "_" not in name or name.startswith("axis"):
         return
@@ -202,7 +202,7 @@ def _list_missing(names: Sequence[str], header: Header) -> list[str]:
 
 
 def _find_unexpected(names: Sequence[str], header: Header) -> Iterator[str]:
-    """Yield what is wrong with a file's names, other than those that it lacks."""
+    """Yield the faults of a file's column names, except missing ones."""
     own_names = header.names
     yield from (f"names {name} twice" for name in own_names if names.count(name) > 1)
     present = [name for name in names if name in header.one_of]

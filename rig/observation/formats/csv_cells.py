@@ -20,7 +20,7 @@ SPELLINGS = (("^", ""), ("sec", "s"), ("²", "2"))  # of units, in addition to t
 
 
 def is_number(cell: str) -> bool:
-    """Return whether a cell holds a number, "nan" and "inf" among them."""
+    """Return whether a cell holds a number; "nan" and "inf" are numbers."""
     try:
         float(cell)
     except ValueError:
@@ -34,13 +34,13 @@ def is_value(cell: str) -> bool:
 
 
 def is_time_of_day(cell: str) -> bool:
-    """Return whether a cell holds the time of day without a date: it begins again at midnight."""
+    """Return whether a cell holds a time of day without a date, which restarts at midnight."""
     match = TIME_OF_DAY.fullmatch(cell.strip())
     return match is not None and match["date"] is None
 
 
 def seconds_of(cell: str, factor: float) -> Decimal:
-    """Return the time in a cell: a number in units of `factor` s, or a text, from 1970 or from midnight.
+    """Return the time in a cell: a number in units of `factor` s, or a text, counted from 1970 or from midnight.
 
     Raise ValueError or ArithmeticError if it is neither, or if a text has a unit.
     """
@@ -61,21 +61,21 @@ def seconds_of(cell: str, factor: float) -> Decimal:
 
 
 def origin_of(times_s: Iterable[float]) -> int:
-    """Return the origin of times, whole seconds, by the first time; 0 for a clock that has run for a short time."""
+    """Return the origin of times, in whole seconds, by the first time; 0 for a clock that counts from its own start."""
     first_s = next(iter(times_s), 0.0)
     return int(first_s) if abs(first_s) >= LONG_AGO_S else 0
 
 
 def since(cell: str, factor: float, origin_s: int) -> float:
-    """Return the time in a cell, in units of `factor` s, counted from `origin_s`, without loss of a digit.
+    """Return the time in a cell, in units of `factor` s, counted from `origin_s` without loss of precision.
 
-    Raise as `seconds_of`.
+    Raise as `seconds_of` does.
     """
     return float(seconds_of(cell, factor) - origin_s)
 
 
 def unit_of(cell: str) -> Unit | None:
-    """Return the unit that a cell names, in brackets or not; None for a unit that the table lacks."""
+    """Return the unit that a cell names, with or without brackets; None for a unit that the table does not have."""
     name = cell.strip().strip("[](){} ")
     if name in UNITS:
         return UNITS[name]
@@ -85,7 +85,7 @@ def unit_of(cell: str) -> Unit | None:
 
 
 def find_wrong_unit(cells: Sequence[str], factors: Sequence[float]) -> int | None:
-    """Return the index of the first cell of a row of units whose unit is not the one its column is read in, or None."""
+    """Return the index of the first cell in a row of units that contradicts its column's unit, or None."""
     for index, (cell, factor) in enumerate(zip(cells, factors, strict=True)):
         unit = unit_of(cell)
         if unit is not None and (unit.zero or abs(unit.size - factor) > 1e-9 * factor):

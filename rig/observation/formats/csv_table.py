@@ -49,9 +49,9 @@ class CsvTable:
 def read_columns(
     path: Path, header: Header, largest_mb: int, mapped: Mapped | None = None, origin_s: int = 0
 ) -> dict[str, Array]:
-    """Return the columns of a file as `read_table`, none of whose cells is blank; times count from `origin_s`.
+    """Return the columns of a file as `read_table` does; no cell may be blank.
 
-    Raise Refused as `read_table`, and `not_a_number` for a blank cell.
+    Times count from `origin_s`. Raise Refused as `read_table` does, and `not_a_number` for a blank cell.
     """
     table = read_table(path, header, largest_mb, mapped, origin_s)
     for name, column in table.columns.items():
@@ -72,10 +72,10 @@ def read_table(
     """Return the columns of a file by the names in its header; each group of optional columns is complete or absent.
 
     The first row holds the names. If it is divided by semicolons, as in spreadsheets with a decimal comma, or by tabs,
-    all rows are. Empty rows and rows of units below the heading are skipped. From a `mapped` file come the columns
-    named in the map or as in the rig, whatever others it has. A file packed by gzip is unpacked. Times count from
-    `origin_s`; None chooses it by the first of them. A packed or long file is read by a process of its own; a short one
-    can do no harm. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`, `wrong_columns`, `wrong_unit`,
+    so are all rows. Empty rows and rows of units below the heading are skipped. Of a `mapped` file, only columns named
+    in the map, or by the rig's names, are returned. A file packed by gzip is unpacked. Times count from `origin_s`;
+    None chooses it by the first of them. A packed or long file is read in a process of its own, as it might exhaust the
+    memory. Raise Refused `no_file`, `file_too_costly`, `temporary_folder_full`, `wrong_columns`, `wrong_unit`,
     `not_a_number`.
     """
     rate_hz = None if mapped is None else mapped.rate_hz
@@ -172,7 +172,7 @@ class _Wanted:
     missing: frozenset[str] = frozenset()
 
     def plain_numbers(self, row: Sequence[str]) -> Sequence[float]:
-        """Return a row's numbers in SI units, quickly; none for a row that needs a closer look."""
+        """Return a row's numbers in SI units by a fast method; none for a row that needs the careful one."""
         if len(row) != self.width or not self.missing.isdisjoint(map(str.strip, row)):
             return ()
         try:
@@ -182,7 +182,7 @@ class _Wanted:
         return numbers if all(abs(number) < LARGEST_NUMBER for number in numbers) else ()
 
     def names_units(self, line: int, row: Sequence[str]) -> bool:
-        """Return whether a row below the heading holds units, and no number. Raise Refused `wrong_unit`."""
+        """Return whether a row below the heading holds units and no numbers. Raise Refused `wrong_unit`."""
         if any(map(is_value, row)):
             return False
         cells = [row[index] if index < len(row) else "" for index in self.names]

@@ -24,7 +24,10 @@ COMMENT_MARKS = "#%"  # before the heading of a table that NumPy or MATLAB wrote
 
 
 def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
-    """Yield the rows of a regular file that is not too large, after `skipped` lines of it. Raise Refused `no_file`."""
+    """Yield the rows of a regular file that is not too large, after the first `skipped` lines.
+
+    Raise Refused `no_file`.
+    """
     with _raise_no_file(path), open_regular_file(path, largest_mb * 1_000_000) as file, _text(file) as text:
         lines = _lines(text, largest_mb * 1_000_000)
         first = next(islice(lines, skipped, None), "")
@@ -41,7 +44,7 @@ def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[st
 
 
 def is_divided_by_spaces(line: str) -> bool:
-    """Return whether a line of readings holds values with spaces between them, and no other mark."""
+    """Return whether a line of readings holds values separated by spaces alone."""
     cells = line.split()
     return len(cells) > 1 and not any(mark in line for mark in f"{MARKS},") and all(map(is_value, cells))
 
@@ -49,7 +52,7 @@ def is_divided_by_spaces(line: str) -> bool:
 def is_harmless(path: Path, largest_mb: int) -> bool:
     """Return whether a file is short and not packed, so that it cannot grow in memory.
 
-    Raise Refused `no_file`, also for a file that is too large.
+    Raise Refused `no_file`, also if it is too large.
     """
     with _raise_no_file(path), open_regular_file(path, largest_mb * 1_000_000) as file:
         return os.fstat(file.fileno()).st_size <= HARMLESS_BYTES and not _beginning(file).startswith(GZIP)
@@ -57,7 +60,7 @@ def is_harmless(path: Path, largest_mb: int) -> bool:
 
 @contextmanager
 def _raise_no_file(path: Path) -> Iterator[None]:
-    """Raise Refused `no_file` for a file that cannot be read, whatever its reader raises."""
+    """Raise Refused `no_file` for a file that cannot be read, for any error of its reader."""
     try:
         yield
     except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
@@ -65,9 +68,10 @@ def _raise_no_file(path: Path) -> Iterator[None]:
 
 
 def _text(file: BinaryIO) -> TextIOWrapper:
-    """Return a file's text, unpacked, in the encoding that its beginning shows. Raise UnfitFile if it is not text.
+    """Return a file's text, unpacked, in the encoding that its beginning shows.
 
-    Headings of loggers that are not in UTF-8 ("°/s", "µT") are mostly in the encoding of Windows.
+    Raise UnfitFile if it is not text. Loggers' headings such as "°/s" and "µT", if not in UTF-8, are mostly in the
+    encoding of Windows.
     """
     if _beginning(file).startswith(GZIP):
         file = GzipFile(fileobj=file)  # type: ignore[assignment]
@@ -90,7 +94,7 @@ def _beginning(file: BinaryIO) -> bytes:
 
 
 def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
-    """Yield the lines; bound each of them and their sum, since a packed file may hold a thousand times its size."""
+    """Yield the lines. Limit each line and their sum, since a packed file may hold a thousand times its size."""
     while line := text.readline(LONGEST_LINE):
         most -= len(line)
         if len(line) == LONGEST_LINE:

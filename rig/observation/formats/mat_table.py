@@ -32,10 +32,10 @@ def is_mat(path: Path) -> bool:
 
 
 def read_mat_rows(path: Path, header: Header, mapped: Mapped | None) -> Iterator[list[str]]:
-    """Yield the names of all columns of a file, then its rows, whose cells are blank but for those that are wanted.
+    """Yield the names of all columns of a file, then its rows, in which cells of unneeded columns are blank.
 
-    Wanted are the columns of the map, and those with the rig's own names. Raise Refused `wrong_columns` if they differ
-    in length; for a damaged file whatever its parser raises.
+    Columns of the map are needed, and those with the rig's own names. Raise Refused `wrong_columns` if these differ in
+    length, and any error of the parser for a damaged file.
     """
     columns = read_mat_columns(path)
     names = [*columns]
@@ -100,7 +100,7 @@ def _split(name: str, values: Array) -> Iterator[tuple[str, Array]]:
 
 
 def _read_classic(path: Path, objects: list[str]) -> Iterator[tuple[str, Array]]:
-    """Yield the matrices (r, c) of a file of version 4 to 7; append the names of objects."""
+    """Yield the matrices (r, c) of a file of version 4 to 7. Append the names of all objects to a list."""
     from scipy.io import loadmat
 
     contents: dict[str, Any] = loadmat(str(path), appendmat=False)
@@ -122,7 +122,7 @@ def _walk(name: str, value: Any, objects: list[str], depth: int = 0) -> Iterator
 
 
 def _read_hdf5(path: Path, objects: list[str]) -> Iterator[tuple[str, Array]]:
-    """Yield the matrices (r, c) of a file of version 7.3; append the names of objects."""
+    """Yield the matrices (r, c) of a file of version 7.3. Append the names of all objects to a list."""
     import h5py
 
     with h5py.File(path, "r") as file:

@@ -89,8 +89,8 @@ def readings_in(path: Path) -> FormatColumns | None:
 def attitudes_in(path: Path) -> Columns | None:
     """Return the attitudes in a file, each with a short interval about its time; None for a table.
 
-    The file has a format of `FORMATS`; the intervals are those of `rows_around`. Raise Refused as `readings_in`, and
-    `no_attitudes` if the file holds none.
+    The file has a format of `FORMATS`; the intervals are those of `rows_around`. Raise Refused as `readings_in` does,
+    and `no_attitudes` if the file holds none.
     """
     form = _format(path)
     if form is None:
@@ -109,8 +109,8 @@ def attitudes_in(path: Path) -> Columns | None:
 def rows_around(time_s: Array, path: Path) -> dict[str, Array]:
     """Return intervals, `start_s` and `end_s` (n,), about the times of attitudes.
 
-    An interval reaches half-way to its neighbours, but is never so long that it would mean that the body lay still.
-    Raise Refused `no_attitudes` for a single attitude.
+    An interval reaches half-way to its neighbours, but is too short to be taken for a rest. Raise Refused
+    `no_attitudes` for a single attitude.
     """
     if len(time_s) < 2:
         raise Refused("no_attitudes", f"{path} holds one pose", "Record the poses while the sensor is turned")

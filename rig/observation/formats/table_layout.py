@@ -123,7 +123,7 @@ def _have_nan(columns: Any) -> bool:
 
 
 def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
-    """Return the lines to skip and the heading that follows; it is empty if there is none.
+    """Return the number of lines to skip, and the heading after them, which may be empty.
 
     Raise Refused `wrong_columns`.
     """
@@ -169,14 +169,14 @@ def _describe(  # noqa: PLR0917
 
 
 def _strip_columns(cells: Sequence[Sequence[str]], missing: Sequence[str]) -> list[list[str]]:
-    """Return the columns of rows of cells, without blanks and missing values."""
+    """Return the columns of rows of cells, with blanks and missing values removed."""
     return [
         [cell.strip() for cell in column if cell.strip() not in {"", *missing}] for column in zip(*cells, strict=True)
     ]
 
 
 def _select_indices(columns: Sequence[Sequence[str]], accept: Callable[[str], bool]) -> list[int]:
-    """Return the indices of the columns that have cells, all of which are accepted."""
+    """Return the indices of the columns that have cells and accept all of them."""
     return [index for index, column in enumerate(columns) if column and all(map(accept, column))]
 
 
@@ -197,7 +197,10 @@ def _largest(column: Sequence[str]) -> float:
 def _find_time(
     headings: Sequence[str], units: Sequence[str], columns: Sequence[Sequence[str]], times: Sequence[int]
 ) -> int | None:
-    """Return the column of time: by its name or unit, or the first that increases; those whose values rise alone."""
+    """Return the index of the time column: by its name or unit, else the first that increases.
+
+    Of columns named so, only one whose values rise counts.
+    """
     rising = [index for index in times if _rises(columns[index])]
     for index in rising:
         name = re.sub(r"\W+", "_", IN_BRACKETS.sub("", headings[index]).strip().lower()).strip("_")
@@ -210,7 +213,7 @@ def _find_time(
 
 
 def _rises(column: Sequence[str]) -> bool:
-    """Return whether a column never falls but where a counter begins again, and mostly rises."""
+    """Return whether a column mostly rises, and never falls except where a counter restarts."""
     try:
         steps = np.diff([float(seconds_of(cell, 1.0)) for cell in column])
     except (ValueError, ArithmeticError):
@@ -224,7 +227,7 @@ def _increases_by_one(column: Sequence[str]) -> bool:
 
 
 def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
-    """Return the unit of time that the heading states, or that fits the numbers: a date, or a likely sample rate."""
+    """Return the time unit that the heading states, else one that fits the numbers as dates or a likely sample rate."""
     if unit in ALLOWED and UNITS[unit].quantity == TIME:
         return unit
     name = heading.lower()

@@ -24,8 +24,8 @@ def in_blocks(
 ) -> Iterator[Part]:
     """Yield the rows, a number for each of the columns, in blocks (n, columns), then the names of the columns.
 
-    The names are read after the last row: None marks a column that is left out. So are `counts`, which may hold the
-    number of rows that were `LEFT_OUT`, and a `NOTE`.
+    The names are read after the last row, when a reader may have replaced some by None, which omits the column.
+    `counts` may hold the number of `LEFT_OUT` rows, and a `NOTE`.
     """
     values, width = array("d"), len(columns)
     for row in rows:
@@ -61,7 +61,8 @@ def note_of(parts: Sequence[Part]) -> str:
 def parts_read_apart(reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str) -> list[Part]:
     """Return the parts that a `reader` ("module:function") yields of a file, in a process of its own.
 
-    Raise Refused as the reader does, `temporary_folder_full`, and "`else_`: why" as `no_file` or `file_too_costly`.
+    Raise Refused as the reader does, `temporary_folder_full`, and the error that `else_` names, `no_file` or
+    `file_too_costly`.
     """
     try:
         return read_apart(reader, path, arguments, limits_for(stored_bytes(path)))

@@ -41,9 +41,9 @@ def is_ulog(path: Path) -> bool:
 
 
 def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
-    """Yield, in blocks, the readings in a log of the sensors of the instance `inside`, or of `sensor_combined`.
+    """Yield, in blocks, a log's readings by the sensors of the instance `inside`, or by `sensor_combined`.
 
-    Raise Refused `missing_extra` or `ulog_topic`, and for a damaged log whatever its parser raises.
+    Raise Refused `missing_extra` or `ulog_topic`, and any error of the parser for a damaged log.
     """
     try:
         from pyulog import ULog
@@ -61,7 +61,7 @@ def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
 
 
 def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str | None) -> bool:
-    """Return whether `sensor_combined` is to be read: it was named, or the raw topic is rare or missing.
+    """Return whether to read `sensor_combined`: if it is named, or if the raw topic is rare or missing.
 
     Raise Refused `ulog_topic` if the log does not hold the named topic.
     """

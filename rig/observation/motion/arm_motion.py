@@ -111,18 +111,18 @@ class ArmMotion:
         return errors
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return the times (n,) between states close enough together for `rate` to be valid."""
+        """Return which times (n,) lie between states that are close enough together for `rate` to be valid."""
         return closely_followed(self.time_s, self._covered, time_s)
 
     @property
     def tells_parts_of_turns(self) -> bool:
-        """Whether single angles are right, and not only the difference between equal readings a turn apart."""
+        """Whether single angles are accurate, and not only differences between equal readings a turn apart."""
         return not self._scatters
 
     def travel_rad(self, window: Window) -> float | None:
         """Return the travel of the joint that moved most in a window; None if it contains fewer than two states.
 
-        The oscillation of a standing arm about its position is excluded, because angles and means are corrected for it.
+        The oscillation of a standing arm is excluded, because angles and means are corrected for it.
         """
         q_rad = self._q_rad(window)
         if self._scatters and len(q_rad) >= PARTS:
@@ -169,8 +169,8 @@ class ArmMotion:
     def rates_at_samples(self, time_s: Array) -> Array:
         """Return the flange's rate (n, 3), rad/s, around consecutive evenly spaced samples at times (n,).
 
-        It is the mean from half-way to the previous sample to half-way to the next; for samples far apart the momentary
-        rate.
+        It is the mean from half-way to the previous sample to half-way to the next. If samples are far apart, it is the
+        rate at the sample's time.
         """
         return self.rate(time_s) if is_sparse(time_s) else self.mean_rates(time_s, float(np.median(np.diff(time_s))))
 
@@ -183,7 +183,7 @@ class ArmMotion:
         return rate
 
     def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
-        """Return the whole turn, or the arc, of a sweep that was made in a window.
+        """Return the whole turn, or the arc, of a sweep in a window.
 
         Raise Fault `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_limited`, `speed_not_constant`,
         `other_joint_moved`.
@@ -223,9 +223,10 @@ def is_sparse(time_s: Array) -> bool:
 
 
 def motion_of(run: RunData, correction: Array | None = None) -> ArmMotion:
-    """Return the turner's motion in a recording, in the item's frame; `correction` (3, 3): from its nominal mount.
+    """Return the turner's motion in a recording, in the item's frame.
 
-    Raise as `turner_of`; Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
+    `correction` (3, 3) is the rotation from the nominal mount. Raise as `turner_of` does; Fault `no_motion`,
+    `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
     turner = turner_of(run)
     mount = np.array(run.settings.mount)
@@ -234,7 +235,7 @@ def motion_of(run: RunData, correction: Array | None = None) -> ArmMotion:
 
 
 def _check_order(time_s: Array) -> None:
-    """Raise Fault `arm_clock_stepped` if a state is older than the one before it: states are in order of arrival."""
+    """Raise Fault `arm_clock_stepped` if a state has an earlier time than the one that arrived before it."""
     steps_back = np.flatnonzero(np.diff(time_s) < 0)
     if len(steps_back):
         before_s, after_s = time_s[steps_back[0] : steps_back[0] + 2]
@@ -247,7 +248,10 @@ def _check_order(time_s: Array) -> None:
 
 
 def turner_of(run: RunData) -> RecordedTurner:
-    """Return the turner of a recording. Raise Refused `recorded_elsewhere` for one from files, which has none."""
+    """Return the turner of a recording.
+
+    Raise Refused `recorded_elsewhere` for a recording from files, which has none.
+    """
     if run.turner is None:
         raise Refused(
             "recorded_elsewhere",
@@ -258,7 +262,7 @@ def turner_of(run: RunData) -> RecordedTurner:
 
 
 def check_arms_times(states: NDArray[Any]) -> None:
-    """Raise Fault `not_finite` or `impossible_times` if the times of the states cannot be used."""
+    """Raise Fault `not_finite` or `impossible_times` if times of states are not finite or too far apart."""
     time_s = np.unique(states["time_s"])
     if not np.isfinite(time_s).all():
         raise not_finite("an arm state")

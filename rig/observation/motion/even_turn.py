@@ -26,9 +26,9 @@ GUARD_RAD = float(np.radians(1.5))  # distance from the ramps: the shaft's lag, 
 
 
 def well_timed(states: NDArray[Any]) -> NDArray[Any]:
-    """Return the states without delayed requests, if the duration of requests was recorded.
+    """Return the states without those of slow requests, if the duration of requests was recorded.
 
-    The moment of the measurement lies somewhere within the request.
+    The measurement is made at an unknown moment of the request.
     """
     if "took_s" not in (states.dtype.names or ()) or not len(states):
         return states
@@ -88,7 +88,7 @@ def find_even_turn(states: NDArray[Any], sweep: Sweep, settings: ObservationThre
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: a ripple passes, a halt does not."""
+    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean, as in a halt, unlike in a ripple."""
     rates = fit_lines(time_s, travelled[:, None])[2][:, 0]
     deviation = float(np.max(np.abs(rates / rates.mean() - 1)))
     if deviation > settings.max_speed_deviation:

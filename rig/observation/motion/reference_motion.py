@@ -15,7 +15,7 @@ MAX_SPAN_S = 48 * 3600.0  # of a recording; times farther apart are damage, and 
 class KnownMotion(Protocol):
     """A body's rotation as a function of its turner's time, in axes fixed to the body.
 
-    The mounting of the sensors on the body does not matter: the clock is found in any case.
+    How the sensors are mounted on the body does not matter for finding the clock.
     """
 
     @property
@@ -24,16 +24,16 @@ class KnownMotion(Protocol):
         ...
 
     def rate(self, time_s: Array, derivative: int = 0, /) -> Array:
-        """Return rates (n, 3), rad/s, at times (n,) within `time_s`; with `derivative` 1 their change."""
+        """Return rates (n, 3), rad/s, at times (n,) within `time_s`; their derivative if `derivative` is 1."""
         ...
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return the times (n,) between states close enough together for `rate` to be valid."""
+        """Return which times (n,) lie between states that are close enough together for `rate` to be valid."""
         ...
 
 
 def closely_followed(states_s: Array, close: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
-    """Return the times (n,) between two of the states (m,) that are `close` (m − 1,) together."""
+    """Return which times (n,) lie between two states (m,) that are `close` (m − 1,) together."""
     interval = np.searchsorted(states_s, time_s, side="right") - 1
     inside = (interval >= 0) & (interval < len(close))
     covered: NDArray[np.bool_] = inside & close[np.clip(interval, 0, len(close) - 1)]
@@ -41,7 +41,7 @@ def closely_followed(states_s: Array, close: NDArray[np.bool_], time_s: Array) -
 
 
 def check_span(time_s: Array, what: str) -> None:
-    """Raise Fault `impossible_times` if rising times (n,) reach too far."""
+    """Raise Fault `impossible_times` if rising times (n,) span too long a time."""
     span_s = time_s[-1] - time_s[0]
     if span_s > MAX_SPAN_S:
         raise Fault(

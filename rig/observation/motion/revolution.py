@@ -45,7 +45,7 @@ class Revolution:
 
     @property
     def beats(self) -> int:
-        """The number of sidebands of each spectral line: cycles per turn at which the shaft runs ahead and behind.
+        """The number of sidebands of each spectral line: by so many cycles per turn the shaft runs unevenly.
 
         An encoder with a large error errs once and twice a turn; products of these errors come up to four times.
         """
@@ -63,7 +63,7 @@ class Revolution:
 
     @property
     def speed_rad_s(self) -> float:
-        """Mean speed Δθ/T, of a revolution 2π/T, whatever the vibration."""
+        """Mean speed Δθ/T, of a revolution 2π/T, which vibration does not change."""
         return float(self.angle_rad / self.duration_s)
 
     @property
@@ -118,7 +118,7 @@ def arm_states_lost(where: str, extent: str) -> Fault:
 
 
 def _inside(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
-    """Return the indices of the first and last state within the revolution, which has states before and after it."""
+    """Return the indices of the first and last state within the revolution. There are states before and after it."""
     entries = np.flatnonzero((travelled[:-1] < 0) & (travelled[1:] >= 0)) + 1
     exits = np.flatnonzero((travelled[:-1] < turn_rad) & (travelled[1:] >= turn_rad))
     if len(entries) and len(exits) and exits[0] > entries[0]:
@@ -138,8 +138,8 @@ def _extent(sweep: Sweep) -> str:
 def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
     """Return the start and end of the revolution, and the standard deviation of the time between, s.
 
-    The angle is interpolated between two neighbouring states. If states are missing, the joint might already be in a
-    ramp: there the straight line through the whole revolution gives the time, within its ripple.
+    The angle is interpolated between two neighbouring states. If states are missing there, the joint might already be
+    in a ramp, so the straight line through the whole revolution gives the time, to within its ripple.
     """
     t, angle = time_s[first : last + 1], travelled[first : last + 1]
     speed, offset = np.polyfit(t - t[0], angle, 1)
@@ -160,7 +160,7 @@ def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: floa
 
 
 def _check_slider(turning: NDArray[Any], where: str) -> None:
-    """Raise Fault `speed_slider` or `speed_limited` if the arm slowed down; other turners record neither."""
+    """Raise Fault `speed_slider` or `speed_limited` if the arm slowed down. Other turners record neither."""
     if not {"target_speed_fraction", "speed_scaling"} <= {*(turning.dtype.names or ())}:
         return
     slider, scaling = (float(turning[name].min()) for name in ("target_speed_fraction", "speed_scaling"))
@@ -180,7 +180,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: vibration passes, a halt does not."""
+    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean, as in a halt, unlike in vibration."""
     middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
     behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)

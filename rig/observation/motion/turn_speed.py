@@ -54,7 +54,7 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
     first_s, first_rad = time_s[:pairs], angle_rad[:pairs]
 
     def excess_rad(period_s: float) -> NDArray[np.float64]:
-        """Return the angles (pairs,), rad, beyond one turn after a trial value of the period."""
+        """Return the angles (pairs,), rad, in excess of one turn after a trial value of the period."""
         ahead: NDArray[np.float64] = np.interp(first_s + period_s, time_s, angle_rad) - first_rad - TURN_RAD
         return ahead
 

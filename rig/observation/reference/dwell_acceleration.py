@@ -46,7 +46,7 @@ class DwellReading:
 def dwell_readings(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> Iterator[DwellReading]:
-    """Yield the average of each finished dwell whose index is not in `superseded`, of a sensor with accelerations.
+    """Yield the average of each finished dwell of a sensor with accelerations, except those in `superseded`.
 
     Raise Fault `arm_moved_in_dwell`, `arm_states_lost`, `lost_samples`, `saturation` or `stuck_sensor`.
     """
@@ -58,9 +58,9 @@ def dwell_readings(
 def read_each_dwell(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> Attempts[int, DwellReading]:
-    """Average every finished dwell by itself; return the averages, and the faults, by the dwell's index.
+    """Return the averages of finished dwells, and the faults of others, both by the dwell's index.
 
-    Both are empty for a sensor without accelerations.
+    A fault of one dwell does not affect the others. Both are empty for a sensor without accelerations.
     """
     if not stream.sensor.measures(ACCELERATION):
         return Attempts()
@@ -78,7 +78,7 @@ def accelerations(stream: Stream, inside: slice) -> Array:
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
     """Raise Fault `saturation` or `stuck_sensor` for the accelerometer's samples `inside`.
 
-    While the sensor is `turning`, even one axis with equal readings counts as stuck.
+    In a rotation (`turning`), a single axis with equal readings is stuck.
     """
     channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
     counts, saturated = channel.counts(samples), channel.is_saturated(samples)
@@ -98,7 +98,7 @@ def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bo
 
 
 def _is_noisy(stream: Stream) -> bool:
-    """Return whether neighbouring samples mostly differ, which they need not without noise."""
+    """Return whether most neighbouring samples differ, as they do with noise."""
     steps = np.abs(np.diff(stream.sensor.channel(ACCELERATION).counts(stream.raw), axis=0))
     return bool(len(steps)) and np.median(steps, axis=0).min() >= 1
 
@@ -159,7 +159,7 @@ def _check_standstill(motion: ArmMotion, window: Window, where: str) -> None:
 
 
 def check_complete(sensor: RecordedSensor, samples: NDArray[Any], where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `lost_samples` if too few samples were recorded in a dwell, or too many of them are missing."""
+    """Raise Fault `lost_samples` if a dwell has too few samples, or too many are missing."""
     count, lost = len(samples), 0
     if count:
         sequence = samples["sequence"].astype(np.int64)

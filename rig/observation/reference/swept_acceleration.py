@@ -39,8 +39,8 @@ def swept_acceleration(
 ) -> SweptAcceleration:
     """Fit the first harmonic of one sweep's revolution, together with its vibrations.
 
-    Joints at rest may oscillate, as the encoders measure. The model has one attitude that the sweep's joint alone
-    rotates, so gravity's difference between that and the arm's attitude is subtracted. Raise Fault `saturation`,
+    Joints at rest may oscillate, as the encoders measure. The model has one attitude, which only the sweep's joint
+    changes, so gravity's difference between this and the arm's attitude is subtracted. Raise Fault `saturation`,
     `stuck_sensor`, `incomplete_revolution` or `not_finite`.
     """
     inside = between(stream, turn.start_s, turn.end_s)
@@ -71,7 +71,7 @@ def _rotations(axis: Array, angle_rad: Array) -> Array:
 
 
 def of_turn(sweep: Sweep, turn: Revolution, harmonic: FirstHarmonic) -> SweptAcceleration:
-    """Return the first harmonic of a sweep together with the arm's turn."""
+    """Return the first harmonic of a sweep together with the arm's attitude, axis and station."""
     return SweptAcceleration(
         sweep=sweep.index,
         joint=sweep.joint,

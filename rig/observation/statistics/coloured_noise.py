@@ -34,8 +34,9 @@ def correlation_inflation(residuals: Array) -> float:
 def fit_noise_factor(residuals: Array) -> float:
     """Return the factor on a mean's variance by an autoregressive model, below 1 if residuals are mostly vibration.
 
-    A vibration averages out over many periods, whatever its correlations add up to. A long mean scatters by the
-    spectrum at zero: with coefficients a and innovations e, var(e) / (1 − Σ a)². Akaike's criterion chooses the order.
+    Over many periods a vibration averages out, whatever the sum of its correlations is. The variance of a long mean is
+    the spectrum at zero: with coefficients a and innovations e, var(e) / (1 − Σ a)². Akaike's criterion chooses the
+    order.
     """
     return fit_autoregression(residuals).factor
 
@@ -67,9 +68,9 @@ def _spectrum_dof(centred: Array, memory: int) -> float:
 
 
 def _autoregression(products: Array, count: int, memory: int) -> tuple[float, float, int]:
-    """Return Akaike's criterion and the spectrum at zero, by the `_products` of `count` residuals; and `memory`.
+    """Return Akaike's criterion and the spectrum at zero by the `_products` of `count` residuals, and the `memory`.
 
-    The spectrum is 0 / 0 for residuals that only repeat, such as coarse readings of which few differ.
+    The spectrum is 0 / 0 for residuals that only repeat, such as coarse readings with few different values.
     """
     coefficients, power = _predict(products[-memory - 1 :, -memory - 1 :])
     likelihood = count * float(np.log(power / count)) if power else -np.inf

@@ -87,7 +87,7 @@ class ReadAtRest:
 
 
 def by_axis(dofs: Iterable[Array | float]) -> Array:
-    """Return degrees of freedom (N, 3) of N means' variances; some inputs have one number for all axes."""
+    """Return degrees of freedom (N, 3) of the variances of N means, from one number for all axes or one for each."""
     return np.array([np.broadcast_to(dof, 3) for dof in dofs])
 
 
@@ -126,7 +126,7 @@ def _average_group(
 
 
 def whole(readings: Array) -> Array:
-    """Return the groups (n, 1) of readings (n, 3) that all belong to one mean."""
+    """Return groups (n, 1) that take all readings (n, 3) into one mean."""
     return even_groups(np.zeros(len(readings), dtype=np.intp), 1)
 
 
@@ -134,7 +134,7 @@ def even_mean(readings: Array, steps: Steps) -> Mean:
     """Return the unweighted mean of readings (n, 3) with resolution `steps`, without vibration.
 
     The noise is their scatter, and at least the rounding to steps. The variance of the mean includes correlation, by
-    `fit_autoregression` of each axis, and the part of the rounding that remains in a mean of any length.
+    `fit_autoregression` of each axis, and the part of rounding that does not average out.
     """
     variance = np.maximum(readings.var(axis=0, ddof=1), steps.variance)
     coloured = [fit_autoregression(axis) for axis in (readings - readings.mean(axis=0)).T]
@@ -165,7 +165,7 @@ def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
 
 
 def average_tapered(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
-    """Return the mean of readings (n, 3) with resolution `steps`, at times (n,), weighted most in the window's middle.
+    """Return the mean of readings (n, 3) with resolution `steps` at times (n,), weighted most in the middle.
 
     The variance contains the noise but not the vibration, which the weights cancel.
     """

@@ -48,8 +48,9 @@ class LineSearch:
 def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fraction: Array | None = None) -> Array:
     """Return the number of cycles (k,) of each spectral line in the residuals (n, axes); k may be zero.
 
-    `fraction` (n,): elapsed fraction of the time at each reading, nearly even but for gaps; even by default. Lines are
-    at least `APART` from each other; one that merges with another is dropped. `previous` lines are returned unchanged.
+    `fraction` (n,): elapsed fraction of the time at each reading, even by default and nearly even except for gaps.
+    Lines are at least `APART` from each other; one that merges with another is dropped. `previous` lines are returned
+    unchanged.
     """
     count, merged, fixed = len(residuals), NONE, len(previous)
     cycles = previous
@@ -83,7 +84,7 @@ def _are_too_near(cycles: Array, search: LineSearch) -> bool:
 
 
 def median_power(residuals: Array) -> float:
-    """Return the median power of residuals (n, axes) under the search's window, on the quietest axis."""
+    """Return the median power of residuals (n, axes), tapered by the search's window, on the quietest axis."""
     return float(np.median(np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2, axis=1).min())
 
 
@@ -112,18 +113,18 @@ def harmonics(angle_rad: Array, most: int) -> Array:
 
 
 def unit_columns(columns: Array) -> Array:
-    """Return columns (n, k), of any units, scaled to unit length; columns of rounding alone become zero.
+    """Return columns (n, k), of any units, scaled to unit length; columns that are only rounding errors become zero.
 
-    Scaled up, rounding would make columns of noise that differ from one processor to another.
+    Otherwise rounding errors, which differ between processors, would become large columns.
     """
     sizes = np.linalg.norm(columns, axis=0)
     return columns / np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, np.inf)
 
 
 def fit_columns(columns: Array, values: Array) -> Array:
-    """Return the least-squares coefficients (k, m) of values (n, m) by columns (n, k), some of them nearly alike.
+    """Return the least-squares coefficients (k, m) of values (n, m) by columns (n, k), some nearly collinear.
 
-    The normal equations take a third of the time; their precision suffices for columns that `ALIKE` separates.
+    The normal equations take a third of the time. Their precision suffices for columns that `ALIKE` separates.
     """
     return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=ALIKE**2)[0], dtype=np.float64)
 
@@ -131,7 +132,7 @@ def fit_columns(columns: Array, values: Array) -> Array:
 def line_swing(residuals: Array, columns: Array, lines_hz: Array) -> Array:
     """Return the mean square (3,), (rad/s)² s², of the change of the lines' angle between two moments.
 
-    The lines are those of columns (n, w k) in residuals (n, 3). One of mean square P and frequency f has the angle
+    The lines are those of columns (n, w k) in residuals (n, 3). A line of mean square P and frequency f has the angle
     amplitude √(2 P) / (2π f), so its mean square change is P / (2 π² f²).
     """
     width = columns.shape[1] // max(len(lines_hz), 1)
@@ -148,7 +149,7 @@ def _sampling_step(fraction: Array) -> float:
 
 
 def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float | None:
-    """Return the cycles of the strongest line in residuals (n, axes), except `previous` lines; None without one."""
+    """Return the cycles of the strongest line in residuals (n, axes) besides `previous` lines; None without one."""
     from scipy.ndimage import median_filter
 
     powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2
@@ -170,7 +171,7 @@ def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: 
 
 
 def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float:
-    """Return the line frequency for a peak that may be a line's centre or sideband: the one that explains most.
+    """Return the frequency of the line, given a peak that may be its centre or a sideband: the one that explains most.
 
     A sensor may sense a vibration in the room only across its axis, in the sidebands and not in the line itself.
     """

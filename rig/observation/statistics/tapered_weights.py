@@ -68,7 +68,7 @@ def _window(count: int) -> Array:
 
 
 def dof_at_zero(count: int) -> float:
-    """Return the degrees of freedom of `noise_at_zero` by `count` readings: the median of m independent powers.
+    """Return the degrees of freedom of `noise_at_zero` from `count` readings: by the median of m independent powers.
 
     Its relative variance is 1 / (m ln² 2), and ν is two over that (JCGM 100, G.4.2).
     """

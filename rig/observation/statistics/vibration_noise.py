@@ -46,7 +46,7 @@ def line_columns(residuals: Array) -> Array:
 
 
 def fit_inflation(residuals: Array) -> float:
-    """Return the factor of `fit_noise_factor` for residuals (n,) with a possible remainder of a line."""
+    """Return the factor of `fit_noise_factor` for residuals (n,) that may contain the remainder of a line."""
     return fit_autoregression(residuals, BRIEF).factor
 
 
@@ -55,7 +55,7 @@ def _columns(residuals: Array, search: LineSearch) -> Array:
 
 
 def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:
-    """Return the noise of readings in these steps from residuals (n, 3) after a fit of `parameters` columns."""
+    """Return the noise of readings with resolution `steps`, by residuals (n, 3) of a fit with `parameters` columns."""
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - parameters), steps.variance)
     inflations = [fit_autoregression(axis, memories) for axis in residuals.T]
     return MeanNoise(

@@ -10,10 +10,10 @@ AVERAGED = 32  # readings whose stamps err either way
 
 
 def find_taken_times(time_s: Array, sampling: Sampling) -> Array:
-    """Return the strictly rising times (n,) at which readings were taken; good and different stamps unchanged.
+    """Return the strictly rising times (n,) at which readings were taken; good, distinct stamps are unchanged.
 
-    Stamps of arrival are never early, so the least lateness counts; coarse ones err either way, so the mean does. The
-    latency that all readings have in common stays in: no stamp shows it.
+    Arrival stamps are never early, so the least late ones determine the times; coarse stamps err either way, so their
+    mean does. Stamps do not show a latency that all readings share, so it remains.
     """
     if sampling.late is not None:
         return _separate(time_s)
@@ -31,7 +31,7 @@ def find_taken_times(time_s: Array, sampling: Sampling) -> Array:
 
 
 def _separate(time_s: Array) -> Array:
-    """Return strictly increasing times (n,): equal or decreasing times are spread up to the next later time."""
+    """Return strictly increasing times (n,); equal or decreasing ones are spread evenly up to the next later time."""
     latest_s = np.maximum.accumulate(time_s)
     new = np.concatenate([[True], np.diff(latest_s) > 0])
     if new.all():

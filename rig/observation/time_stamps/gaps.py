@@ -16,17 +16,17 @@ REACH, FEWEST = 4, 12  # lengths of a gap on either side, and at least so many r
 
 
 def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> Array:
-    """Return the standard deviation (k,) of the rotation over each of the steps `gaps` (k,), if it is bridged.
+    """Return the standard deviation (k,) of the rotation over each of the steps `gaps` (k,), if it is interpolated.
 
-    readings (n, 3) are rates at rising times (n,); a step is numbered by its first reading. It is infinite for a gap
-    that is too long, or without enough readings next to it.
+    `readings` (n, 3) are rates at rising times (n,); a step has the number of its first reading. The result is infinite
+    for a gap that is too long, or without enough readings next to it.
     """
     turned = integrate_rates(time_s, readings)
     return np.array([_hidden_rad(time_s, readings, turned, int(gap)) for gap in gaps])
 
 
 def find_hiding_gaps(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the gaps among `gaps` (k,) that cannot be bridged; arguments as for `hidden_angles_rad`."""
+    """Return those of the `gaps` (k,) that cannot be interpolated; arguments as for `hidden_angles_rad`."""
     return np.asarray(gaps[hidden_angles_rad(time_s, readings, gaps) > HIDDEN_RAD], dtype=np.intp)
 
 
@@ -43,7 +43,7 @@ def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> floa
 
 
 def _bridging_rad(time_s: Array, readings: Array, turned: Array, lasts_s: float) -> float | None:
-    """Return the rms error of bridging steps of a length in some readings; None if they are too few."""
+    """Return the RMS error of interpolating steps of some length; None if the readings are too few."""
     end = np.searchsorted(time_s, time_s + lasts_s * (1 - 1e-9))
     start = np.flatnonzero(end < len(time_s))
     if len(start) < 2:

@@ -6,7 +6,10 @@ from rig.estimation.arrays import Array
 
 
 def find_least_around(values: Array, width: int) -> Array:
-    """Return the least (n,) of the values around each: the larger of the minima ahead and behind, if both exist."""
+    """Return for each value the larger of two minima (n,): that of the values ahead, and that of those behind.
+
+    At the ends, where one is missing, return the other.
+    """
     ahead, behind = find_least_ahead(values, width), find_least_behind(values, width)
     least = np.maximum(ahead, behind)
     least[:width], least[-width:] = ahead[:width], behind[-width:]
@@ -14,7 +17,7 @@ def find_least_around(values: Array, width: int) -> Array:
 
 
 def find_least_ahead(values: Array, width: int) -> Array:
-    """Return the least (n,) of each value and those after it, `width` in all."""
+    """Return the minimum (n,) of each value and those after it, `width` values in all."""
     least, covered = values.copy(), 1
     while covered < min(width, len(values)):
         more = min(covered, width - covered)
@@ -24,12 +27,12 @@ def find_least_ahead(values: Array, width: int) -> Array:
 
 
 def find_least_behind(values: Array, width: int) -> Array:
-    """Return the least (n,) of each value and those before it, `width` in all."""
+    """Return the minimum (n,) of each value and those before it, `width` values in all."""
     return find_least_ahead(values[::-1], width)[::-1]
 
 
 def average_around(values: Array, width: int) -> Array:
-    """Return the mean (n,) of the values around each, of fewer at either end."""
+    """Return the moving average (n,) of the values, over fewer values at either end."""
     total = np.concatenate([[0.0], np.cumsum(values - values[0])])
     index = np.arange(len(values))
     first, last = np.maximum(index - width // 2, 0), np.minimum(index + width - width // 2, len(values))

@@ -79,7 +79,7 @@ class Sampling:
 
     @classmethod
     def even(cls, count: int) -> "Sampling":
-        """Return even sampling for `count` readings, too few to show gaps."""
+        """Return even sampling for `count` readings, which are too few to show gaps."""
         return cls(0.0, np.zeros(max(count - 1, 0), dtype=np.intp), 0.0, 1, on_arrival=False)
 
     @property
@@ -88,7 +88,7 @@ class Sampling:
         return np.concatenate([[0], np.cumsum(1 + self.missing)])
 
     def count_expected(self, time_s: Array, windows_s: Array) -> Array:
-        """Return how many readings belong in each of `windows_s` (k, 2), missing ones counted, from times (n,)."""
+        """Return the number of readings, including missing ones, in each of `windows_s` (k, 2), from times (n,)."""
         beyond_s = np.minimum(windows_s - time_s[0], 0.0) + np.maximum(windows_s - time_s[-1], 0.0)
         numbers = np.interp(windows_s, time_s, self.numbers) + beyond_s / self.interval_s
         return np.asarray(numbers[:, 1] - numbers[:, 0], dtype=np.float64)
@@ -132,26 +132,29 @@ def find_sampling(time_s: Array) -> Sampling:
 
 
 def _is_misleading(time_s: Array, interval_s: float, resolution_s: float) -> bool:
-    """Return whether a coarse resolution makes every step a whole multiple of another interval than the true one."""
+    """Return whether, because of coarse resolution, all steps are whole multiples of a wrong interval."""
     # Equal steps are as coarse as their resolution, and good.
     is_coarse = resolution_s > COARSE * interval_s and float(np.ptp(np.diff(time_s))) > SETTLED * interval_s
     return is_coarse and abs(interval_s / resolution_s - round(interval_s / resolution_s)) > WHOLE
 
 
 def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
-    """Return whether readings were late and not lost: the step after a late one is short."""
+    """Return whether readings were late rather than lost: after a late one the step is short."""
     return bool(np.count_nonzero(np.diff(time_s) < SHORT * single.interval_s) > LATE * single.gap_count)
 
 
 def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
-    """Return the candidates of more than one reading whose losses are not a beat, the narrowest first."""
+    """Return the candidates of more than one reading, narrowest first, without those whose losses are a beat."""
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
     wider = (_count_missing(time_s, width, quantile) for width in widths for quantile in (MEDIAN, UNDISTURBED))
     return [candidate for candidate in wider if not _is_beat(candidate.missing)]
 
 
 def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) -> _PeriodCandidate | None:
-    """Return the first candidate that fits with few gaps, None if none fits: a wider one also explains true losses."""
+    """Return the first candidate that fits with few gaps, or None.
+
+    Later, wider candidates would explain true losses away.
+    """
     # The steps inside a burst would make the time between bursts look like a gap.
     fitting = [
         candidate for candidate in candidates if candidate.fit >= MOSTLY and candidate.interval_s > typical_s / 2
@@ -161,7 +164,7 @@ def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) 
 
 
 def _exceeds_rounding(time_s: Array, sampling: Sampling, resolution_s: float) -> bool:
-    """Return whether stamps (n,) are later than rounding to their resolution makes them."""
+    """Return whether stamps (n,) are later than rounding to their resolution explains."""
     late_s = time_s - sampling.interval_s * sampling.numbers
     allowed_s = max(resolution_s, NEAR * sampling.interval_s)
     return float(np.max(late_s - find_least_around(late_s, sampling.width))) > MORE * allowed_s
@@ -195,10 +198,10 @@ def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandida
 
 
 def _is_beat(missing: NDArray[np.intp]) -> bool:
-    """Return whether readings seem to be missing (n − 1,) more regularly than by chance.
+    """Return whether the missing readings (n − 1,) come more regularly than by chance.
 
-    Stamps of a polled port, whole multiples of a time shorter than the interval, show that. A logger that loses every
-    n-th reading shows the same, but hardly so often.
+    Such a beat is caused by stamps of a polled port, multiples of a time shorter than the interval. A logger that loses
+    every n-th reading looks the same, but hardly loses so many.
     """
     missing = np.minimum(missing, 1)  # a gap is one
     lost = int(missing.sum())
@@ -211,7 +214,7 @@ def _is_beat(missing: NDArray[np.intp]) -> bool:
 
 
 def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
-    """Return the mean interval from the least late readings at either end, missing readings counted."""
+    """Return the mean interval, missing readings counted, between the least late readings at either end."""
     steps_s, few = np.diff(time_s), missing <= COUNTED
     interval_s = float(steps_s[few].sum() / (1 + missing[few]).sum())
     numbers = np.concatenate([[0], np.cumsum(1 + missing)])
@@ -223,7 +226,7 @@ def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
 
 
 def _estimate_unlocated_losses(time_s: Array) -> Sampling:
-    """Return the sampling if bad stamps, or too many missing readings, prevent locating the losses.
+    """Return the sampling for losses that cannot be located, because stamps are bad or losses too many.
 
     Random losses of a fraction p of all readings give the lateness the variance p m T² over m readings. It grows
     fourfold from m to 4 m; errors that do not accumulate stay constant, and the random walk of a clock grows much more.
@@ -245,7 +248,7 @@ def _estimate_unlocated_losses(time_s: Array) -> Sampling:
 def _walk_variance(walk: Array, apart: int) -> float:
     """Return the variance that a random walk (k,) gains over `apart` steps, without trend (overlapping Allan variance).
 
-    Only the smaller second differences count, because a buffer that is emptied at first causes a large one.
+    The largest second differences are omitted, because emptying a buffer at the start causes a large one.
     """
     bends = (walk[2 * apart :] - 2 * walk[apart:-apart] + walk[: -2 * apart]) ** 2
     if not len(bends):
@@ -254,7 +257,7 @@ def _walk_variance(walk: Array, apart: int) -> float:
 
 
 def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.intp]:
-    """Return the missing readings (n − 1,) counted once, at the longest of neighbouring steps with the same loss."""
+    """Return the missing readings (n − 1,); a loss that neighbouring steps share counts once, at the longest."""
     merged = np.zeros_like(missing)
     steps = np.flatnonzero(missing)
     if not len(steps):
@@ -267,13 +270,13 @@ def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.i
 
 
 def _interval_quantile(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
-    """Return the median (or another quantile) of the mean intervals between readings that are `apart` apart."""
+    """Return a quantile, by default the median, of the mean intervals of readings `apart` places apart."""
     apart = min(apart, len(time_s) - 1)
     return float(np.quantile(time_s[apart:] - time_s[:-apart], quantile) / apart)
 
 
 def find_resolution_s(time_s: Array) -> float:
-    """Return the time that all stamps are multiples of: a power of ten of a second, or of two (float32); 0 if none."""
+    """Return the resolution of the stamps: a power of ten of a second, or of two (float32); 0 if none is found."""
     units = sorted((*(10.0**-decimals for decimals in range(DECIMALS)), *(2.0**-bits for bits in range(BITS))))
     since_s = time_s - time_s[0]
     for unit_s in reversed(units):

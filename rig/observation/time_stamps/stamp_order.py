@@ -86,7 +86,7 @@ class _UnorderedLog:
     findings: tuple[StampFinding, ...] = ()
 
     def select(self, kept: NDArray[np.bool_], reason: str) -> "_UnorderedLog":
-        """Return the log with only the rows `kept`; note the `reason` for the omission. No change if all are kept."""
+        """Return the log with only the rows `kept`, and note the `reason` if any row is left out."""
         if kept.all():
             return self
         finding = self._describe(~kept, reason, left_out=True)
@@ -104,7 +104,7 @@ class _UnorderedLog:
 
 
 def order_stamps(stamps_s: Array, readings: Array, where: str = "the samples") -> OrderedStamps:
-    """Return a log with `stamps_s` (n,) and `readings` (n, c) in order.
+    """Return a log with `stamps_s` (n,) and `readings` (n, c) in the order of time.
 
     Raise Refused `time_not_increasing`, which names `where`, if a clock was set back.
     """
@@ -136,7 +136,7 @@ def _drop_zeros(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log with a counter that began anew continued."""
+    """Return the log with continuous stamps, if a counter restarted at zero."""
     steps_s = np.diff(log.stamps_s)
     backward_steps = np.flatnonzero(steps_s < 0)
     if not len(backward_steps):
@@ -154,9 +154,9 @@ def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _drop_repeated(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log without rows that repeat stamp and readings of another one.
+    """Return the log without rows that repeat both stamp and readings of another row.
 
-    Of a sensor whose readings often repeat, neighbours with equal stamps may be two readings.
+    If a sensor's readings often repeat, neighbours with equal stamps may be two readings and stay.
     """
     shared = np.flatnonzero(np.isin(log.stamps_s, _find_repeated_values(log.stamps_s)))
     if not len(shared):
@@ -180,7 +180,7 @@ def _find_repeated_values(values: Array) -> Array:
 
 
 def _sort(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log in the order of time if rows were written in another; one whose clock was set back as it is."""
+    """Return the log in the order of time, if its rows were written in another; unchanged if its clock was set back."""
     latest_s = np.maximum.accumulate(log.stamps_s)
     early = log.stamps_s < latest_s
     if not early.any():
@@ -214,7 +214,7 @@ def _check_rising(log: _UnorderedLog, where: str) -> None:
 
 
 def _drop_stale(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log without the readings at its start that had waited: they come faster than they were taken."""
+    """Return the log without old readings at its start, which come faster than they were taken."""
     interval_s = find_typical_interval_s(log.stamps_s)
     late_s = log.stamps_s - interval_s * np.arange(len(log.stamps_s))
     delays_s = late_s - find_least_ahead(late_s, LONG[-1])
@@ -230,9 +230,9 @@ def _drop_stale(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log with readings that waited while a link stalled at the times at which they were taken.
+    """Return the log with the times at which readings were taken while a link stalled and they waited.
 
-    If some were lost meanwhile, nothing shows which: then all that waited are left out.
+    If some were lost meanwhile, it is unknown which, and all that waited are left out.
     """
     stamps_s, interval_s = log.stamps_s.copy(), find_typical_interval_s(log.stamps_s)
     steps_s = np.diff(stamps_s)
@@ -260,10 +260,10 @@ def _spread_stalled(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log without second readings of one stamp that have no time of their own.
+    """Return the log without readings that share a stamp and have no time of their own.
 
-    Stamps that are coarse or those of arrival are often equal, and an even series has a time for each reading. Of good
-    stamps a reading has one if an interval is missing before or after it.
+    Coarse stamps and those of arrival are often equal, and an even series has a time for each reading. With good
+    stamps, a reading has a time of its own if an interval is missing before or after it.
     """
     steps_s = np.diff(log.stamps_s)
     equal = np.flatnonzero(steps_s == 0)
@@ -288,5 +288,5 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _estimate_usual_delay_s(late_s: Array, interval_s: float) -> float:
-    """Return a delay, over the least soon after it, that hardly any reading exceeds unless it waited."""
+    """Return the delay that readings rarely exceed unless they waited, relative to the shortest delay soon after."""
     return USUAL * float(np.median(late_s - find_least_ahead(late_s, LONG[-1]))) + ON_TIME * interval_s

@@ -28,7 +28,7 @@ class MagneticFieldReader:
     def feed(
         self, messages: NDArray[Any], numbers: NDArray[Any], times_us: NDArray[Any], host_time_s: float
     ) -> NDArray[Any]:
-        """Take messages (n,) with their numbers (n,) and times (n,), and return the readings that they complete."""
+        """Add messages (n,) with their numbers (n,) and times (n,); return the readings that are now complete."""
         slot = messages["sequence"].astype(np.int64) % READING_MESSAGES
         gauss = messages["fourth"].astype(np.float64)
         is_axis = (slot > 0) & np.isfinite(gauss)

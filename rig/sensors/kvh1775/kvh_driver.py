@@ -108,7 +108,7 @@ class Kvh1775:
         )
 
     def start(self, settings: Kvh1775Settings) -> None:
-        """Start to pass messages to `on_messages`, from the next one on."""
+        """Pass messages to `on_messages` from the next one on."""
         with self.own_port.news:
             self._counter = MessageCounter(self._where, 1e6 / settings.rate_hz, timed=settings.message == "B")
             self._format = settings.message.encode()
@@ -120,11 +120,11 @@ class Kvh1775:
         return 0 if self._counter is None else self._counter.lost
 
     def listen(self, duration_s: float) -> None:
-        """Wait for `duration_s` of the stream. Raise errors of the meantime."""
+        """Receive the stream for `duration_s`. Raise errors that occur in this time."""
         self.own_port.wait(lambda: False, duration_s)
 
     def close(self) -> None:
-        """Leave the instrument in normal mode, its state after power-up, and close the port. May be called twice."""
+        """Put the instrument into normal mode, its state after power-up, and close the port. May be called twice."""
         self.own_port.close()
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
@@ -176,7 +176,7 @@ class Kvh1775:
         self._write("=CONFIG,0")  # this command has no answer
 
     def _write(self, command: str) -> None:
-        """Send a command. The leading line end completes half a command from before."""
+        """Send a command. A line end precedes it, in case half a command was sent before."""
         self.own_port.write(b"\r\n" + command.encode("ascii") + b"\r\n")
 
     # -- the reader's thread ---------------------------------------------------------------------------------------

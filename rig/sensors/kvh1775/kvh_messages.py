@@ -108,7 +108,7 @@ class MessageReader:
         self._rest = b""
 
     def feed(self, data: bytes) -> MessageBatch:
-        """Take received bytes, and return the messages and tests that they complete."""
+        """Add received bytes; return the messages and tests that are now complete."""
         data = self._rest + data
         backwards = memoryview(data.translate(_BITS_REVERSED))
         starts: dict[bytes, list[int]] = {header: [] for header in _HEADERS.values()}
@@ -174,7 +174,7 @@ def encode(
 
 
 def encode_one(name: Format, rotation: Sequence[float], acceleration_g: Sequence[float], **tail: float) -> bytes:
-    """Return the bytes of one message, without arrays; `tail` has at least the other fields of the format."""
+    """Return the bytes of one message, without arrays; `tail` contains at least the other fields of the format."""
     packer, fields = _PACKERS[name]
     data = packer.pack(_HEADERS[name], *rotation, *acceleration_g, *[tail[field] for field in fields])
     return data + _crc(data.translate(_BITS_REVERSED))

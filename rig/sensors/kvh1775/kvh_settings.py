@@ -83,7 +83,7 @@ def refusals(sensor: str, stored: Mapping[str, str]) -> Iterable[SensorError]:
 
 
 def same(one: str, other: str) -> bool:
-    """Return whether two values of a setting are equal, however their numbers are written."""
+    """Return whether two values of a setting are equal, in any notation of their numbers."""
     ours, theirs = one.split(","), other.split(",")
     return len(ours) == len(theirs) and all(map(_equal_entries, ours, theirs))
 

@@ -35,13 +35,13 @@ INVALID_S = 1.0  # tolerated duration of messages in a row that are marked inval
 
 
 class Kvh1775Source:
-    """An instrument, set up for a run.
-
-    A message with an axis marked invalid is no sample: it counts as lost.
-    """
+    """An instrument, set up for a run. A message with an axis marked invalid is no sample: it counts as lost."""
 
     def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
-        """Connect and set up the instrument. Raise SensorError as `Kvh1775`, `refusals`; `kvh_other_serial_number`."""
+        """Connect and set up the instrument.
+
+        Raise SensorError: `kvh_other_serial_number`, and those of `Kvh1775` and `refusals`.
+        """
         self._name, self._on_samples = name, on_samples
         line = _port_section(section)
         self._required = make_settings(section)
@@ -78,7 +78,7 @@ class Kvh1775Source:
         self._driver.start(self._required)
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors since the last call: SensorError as `OwnPort.check`, and `kvh_axis_invalid`."""
+        """Raise errors since the last call: SensorErrors of `OwnPort.check`, and `kvh_axis_invalid`."""
         self._driver.own_port.check(clock_s)
 
     def close(self) -> None:
@@ -124,7 +124,7 @@ class Kvh1775Source:
             )
 
     def _temperatures_c(self, messages: NDArray[Any]) -> Array:
-        """Return (n,) °C, NaN in messages without a temperature: format C sends it in every fourth."""
+        """Return the temperatures (n,), °C, NaN for messages without one: format C sends it in every fourth."""
         if self._required.message == "C":
             celsius = np.where(messages["sequence"] % 4 == 0, messages["fourth"].astype(np.float64), np.nan)
         else:
@@ -159,7 +159,7 @@ def describe(name: str, section: SensorSection) -> RecordedSensor:
 
 
 def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
-    """Return the description of its magnetometer for a recording; None if its messages have no field."""
+    """Return the magnetometer's description for a recording; None if the messages have no field."""
     if _port_section(section).message != "C":
         return None
     field = fine_axes(FIELD, FIELD_FULL_SCALE_T)  # the ICD does not state its range
@@ -170,12 +170,15 @@ def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
 def kvh1775(
     name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL
 ) -> closing[Kvh1775Source]:
-    """Return the instrument's source as a context manager. Raise SensorError as `Kvh1775Source`."""
+    """Return the instrument's source as a context manager. Raise the SensorErrors of `Kvh1775Source`."""
     return closing(Kvh1775Source(name, section, on_samples, patience=patience))
 
 
 def look(name: str, section: SensorSection) -> Iterator[str | SensorError]:
-    """Yield the instrument's state and its problems; its memory stays unchanged. Raise SensorError as `Kvh1775`."""
+    """Yield the instrument's state and its problems; its memory stays unchanged.
+
+    Raise the SensorErrors of `Kvh1775`.
+    """
     line = _port_section(section)
     with closing(Kvh1775(name, line.port, line.baud)) as driver:
         yield f"KVH 1775 at {line.port}: serial number {driver.serial_number}"

@@ -18,7 +18,7 @@ _POWERS = 10.0 ** np.arange(MOST_DECIMALS + 1)
 
 
 def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
-    """Return the numbers (n,) in `text` from `starts` to before `ends`, NaN for text that is none."""
+    """Return the numbers (n,) in `text`, each from one of `starts` to before one of `ends`; NaN if it is no number."""
     if not len(starts):
         return np.empty(0)
     integer, digits = _sum_digits(text, starts, ends)
@@ -48,7 +48,7 @@ def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArr
 def _sum_digits(
     text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the digits of each number as an integer, without its point, and their count."""
+    """Return the digits of each number as an integer, without the decimal point, and their count."""
     lengths = ends - starts
     longest = min(int(lengths.max()), MOST_DIGITS + 2)
     values = text - np.uint8(_ZERO)  # other characters wrap around to more than nine

@@ -68,7 +68,7 @@ class LineReader:
         self.byte_count = 0
 
     def feed(self, data: bytes) -> LineBatch:
-        """Take received bytes, and return the lines that they complete."""
+        """Add received bytes; return the lines that are now complete."""
         self.byte_count += len(data)
         data = (self._rest + data).replace(b"\r", b"\n")
         end = data.rfind(b"\n") + 1
@@ -136,7 +136,7 @@ class LineReader:
 
     @staticmethod
     def _match(raw: NDArray[np.uint8], starts: NDArray[np.intp], text: bytes) -> NDArray[np.bool_]:
-        """Return the lines that begin with `text`; without a line end in it, no shorter line matches."""
+        """Return the lines that begin with `text`, which has no line end, so that no shorter line matches."""
         expected = np.frombuffer(text, np.uint8)
         positions = np.minimum(starts[:, None] + np.arange(len(expected)), len(raw) - 1)
         matches: NDArray[np.bool_] = (raw[positions] == expected).all(axis=1)
@@ -146,7 +146,7 @@ class LineReader:
     def _match_checksums(
         raw: NDArray[np.uint8], text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """Return which lines end with a correct checksum `*hh` (XOR); replace it by blanks in `text`."""
+        """Return which lines end with a correct checksum `*hh` (XOR), and blank it in `text`."""
         star = np.maximum(ends - 3, 0)
         high, low = _HEX[raw[ends - 2]], _HEX[raw[ends - 1]]
         body_starts = starts + np.isin(raw[starts], np.frombuffer(b"$!", np.uint8))
@@ -160,7 +160,7 @@ class LineReader:
         return sum_ok
 
     def _mark_keys(self, text: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the text with one byte for each key, after replacing bytes that look like one."""
+        """Return the text with each key replaced by its marker, after replacing bytes that look like a marker."""
         data = np.where(text >= _KEYS, np.uint8(0x7F), text).tobytes()
         for key, marker in self._keys.items():
             data = data.replace(key, marker)
@@ -174,7 +174,7 @@ class LineReader:
         good: NDArray[np.bool_],
         sum_ok: NDArray[np.bool_],
     ) -> Array:
-        """Return the numbers (m, columns) of the lines with one per column, in order; `good` then marks these."""
+        """Return the numbers (m, columns) of lines with a number in every column; mark these lines in `good`."""
         line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])
         edges = np.flatnonzero(number[1:] != number[:-1])
@@ -207,7 +207,7 @@ class LineReader:
 def _have_valid_bytes(
     classes: NDArray[np.uint8], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Return the lines with only bytes that a sample may contain. Bytes between lines belong to none."""
+    """Return which lines have only bytes that a sample may contain. Bytes between lines belong to none."""
     good = np.ones(len(line_starts), np.bool_)
     others = np.flatnonzero(classes == _OTHER)
     if len(others):
@@ -218,7 +218,7 @@ def _have_valid_bytes(
 
 
 def _count(positions: NDArray[np.intp], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the number of `positions`, which increase, in each line."""
+    """Return how many of the increasing `positions` lie in each line."""
     counts: NDArray[np.intp] = np.searchsorted(positions, line_ends) - np.searchsorted(positions, line_starts)
     return counts
 
@@ -241,7 +241,7 @@ def _are_in_lines(
 
 
 def _markers(keys: tuple[str, ...]) -> Mapping[bytes, bytes]:
-    """Return a marker for each key, of the key's length; longer keys first, because they may contain others."""
+    """Return a marker of each key's length, longer keys first, because they may contain shorter ones."""
     by_length = sorted(enumerate(keys), key=lambda indexed_key: -len(indexed_key[1]))
     return MappingProxyType({key.encode(): bytes([_KEYS + index]) + b" " * (len(key) - 1) for index, key in by_length})
 

@@ -29,7 +29,7 @@ class TextFieldReader:
         self._keyed = re.compile(f".*?{keys}(.*)") if section.keys else None
 
     def read(self, line: bytes) -> Array | None:
-        """Return the values (columns,) of a line without prefix and checksum, NaN if missing; None for no sample."""
+        """Return the values (columns,) of a line without prefix and checksum, NaN if missing; None if not a sample."""
         fields = self._split(line.decode("ascii", "replace"))
         if len(fields) == len(self._columns) + 1 and not fields[-1]:
             fields.pop()

@@ -24,7 +24,7 @@ class StatedProperties:
 def section(
     shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, user: StatedProperties | None = None
 ) -> str:
-    """Return the YAML of `sensors`; `rig check` refuses every value that is still `?` and names its key."""
+    """Return the YAML of `sensors`, with `?` for unknown values, which `rig check` refuses by their keys."""
     user = user or StatedProperties()
     lines: dict[str, object] = {"columns": _format_list(guess.columns)}
     if shape.keys:

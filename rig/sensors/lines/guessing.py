@@ -92,9 +92,9 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
 
 
 def guess_triads(names: tuple[str, ...], values: Array, still: Flags, rate_hz: float) -> Guess:
-    """Guess which columns of readings (n, k) at a rate are triads of sensors, and their units; time is known.
+    """Guess which columns of readings (n, k) at a given rate are triads of sensors, and their units.
 
-    `still` (n,) are the rows at rest; if there are none, all count.
+    `still` (n,) are the rows at rest; if it marks none, all rows count as at rest.
     """
     count = values.shape[1]
     still = still if still.any() else np.ones(len(values), dtype=np.bool_)
@@ -108,7 +108,7 @@ def guess_triads(names: tuple[str, ...], values: Array, still: Flags, rate_hz: f
 
 
 def _match_names(names: tuple[str, ...]) -> dict[int, str]:
-    """Return the columns that a header names, by index, without names that occur twice."""
+    """Return the columns that a header names, by index; a name that occurs twice names none."""
     names_by_index: dict[int, str] = {}
     for index, name in enumerate(names):
         plain = re.sub(r"\s*[\[(].*?[\])]", "", name).strip().lower()
@@ -167,14 +167,14 @@ def _set_time(guess: Guess, index: int, column: Array, unit: str) -> None:
 
 
 def _increases(column: Array) -> bool:
-    """Return whether a column never decreases except at a wrap; a coarse time may repeat."""
+    """Return whether a column never decreases, except where a counter restarts; a coarse time may repeat."""
     steps = np.diff(column)
     backwards = int(np.count_nonzero(steps < 0))
     return bool(backwards <= max(2, 0.02 * len(steps)) and steps.max() > 0 and np.all(column >= 0))
 
 
 def _wrap(column: Array) -> int | None:
-    """Return the power of two at which a column wrapped; None if it did not."""
+    """Return the power of two at which a column restarted; None if it did not."""
     if not (np.diff(column) < 0).any():
         return None
     return int(2 ** np.ceil(np.log2(column.max() + 1)))

@@ -112,7 +112,7 @@ class LinesDevice:
         return find_time_step_s(printed, self._lines.time_decimals, self._section.time.unit)
 
     def start(self) -> None:
-        """Start to pass values to `on_values`, from the next line on."""
+        """Pass values to `on_values` from the next line on."""
         with self.own_port.news:
             self._stamper = Stamper(self._section, self._rate_hz, self.where, self.time_step_s)
             self._skipped = 0
@@ -124,7 +124,7 @@ class LinesDevice:
 
     # -- the first lines -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
-        """Return the rate of its samples by its own time, NaN if it has none. Raise as the constructor does."""
+        """Return the sample rate by the device's own time, NaN if it prints none. Raise as the constructor does."""
         has_enough = self.own_port.wait(self._has_enough, timeout_s)
         if not has_enough and not self.counts.samples:
             raise self._why_no_sample(timeout_s)
@@ -140,7 +140,7 @@ class LinesDevice:
         return rate_hz
 
     def _has_enough(self) -> bool:
-        """Return whether the rate can be judged: a slow device needs few samples, coarse times need more."""
+        """Return whether the samples suffice to judge the rate: at a low rate few do, coarse times need more."""
         if self._section.time is None:
             return self.counts.samples >= 3
         is_long_enough = self.counts.samples >= 5 and self._span_s() >= LOOK_S
@@ -164,7 +164,7 @@ class LinesDevice:
         return float(passed.sum()) * UNITS[self._section.time.unit].size
 
     def _measure_rate_hz(self) -> float:
-        """Return samples a second, by the median step of the device's time if fine, else by the whole interval."""
+        """Return the sample rate: by the median step of the device's time if fine, else by the whole interval."""
         time_section = self._section.time
         if time_section is None or self.counts.samples < 5:
             return float("nan")

@@ -80,7 +80,7 @@ class LinesSource:
         self._device.start()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise SensorError as `OwnPort.check`, `lines_damaged`, `lines_time_jumped`, `temperature_lost`."""
+        """Raise SensorError `lines_damaged`, `lines_time_jumped`, `temperature_lost`, or one of `OwnPort.check`."""
         self._device.own_port.check(clock_s)
 
     def close(self) -> None:
@@ -88,7 +88,7 @@ class LinesSource:
         self._device.close()
 
     def _take(self, values: Array, numbers: NDArray[np.int64], times_us: NDArray[np.int64], host_time_s: float) -> None:
-        """Pass the lines' numbers on as samples, on the reader's thread."""
+        """Pass the numbers of the lines on as samples, on the reader's thread."""
         for name, (sensor, printed_channels) in self._readers.items():
             readings = [
                 self._thermometer.read(_temperatures_c(self._lines, values))
@@ -164,7 +164,7 @@ def _make_readers(
 def stamp_std_s(lines: LinesSection, rate_hz: float, step_s: float = 0.0) -> float | None:
     """Return the standard uncertainty of a sample's time on the clock that stamps it; None if it is negligible.
 
-    The device prints its time in steps of `step_s`; if that is 0, in whole units, except for seconds.
+    The device prints its time in steps of `step_s`. If that is 0, it prints whole units, except for seconds.
     """
     if lines.clock == "arrival":
         return 1e-3 * lines.jitter_ms / 3**0.5
@@ -177,12 +177,12 @@ def stamp_std_s(lines: LinesSection, rate_hz: float, step_s: float = 0.0) -> flo
 def lines(
     name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL
 ) -> closing[LinesSource]:
-    """Return the device's source as a context manager. Raise SensorError as `LinesSource`."""
+    """Return the device's source as a context manager. Raise the SensorErrors of `LinesSource`."""
     return closing(LinesSource(name, section, on_samples, patience=patience))
 
 
 def look(name: str, section: SensorSection) -> Iterator[LookResult]:
-    """Yield the device's state and its problems. Raise SensorError as `LinesDevice`."""
+    """Yield the device's state and its problems. Raise the SensorErrors of `LinesDevice`."""
     line, spec = _split_section(section)
     with closing(LinesDevice(name, line, spec, section.rate_hz)) as device:
         counts = device.counts
@@ -219,7 +219,7 @@ def _describe_temperature(lines: LinesSection, values: Array) -> Iterator[str]:
 
 
 def _mean(values: Array) -> Array:
-    """Return (k,) means of the numbers in values (n, k), NaN for a column without any."""
+    """Return the means (k,) of the numbers in values (n, k); NaN for a column without numbers."""
     is_number = np.isfinite(values)
     count = is_number.sum(axis=0)
     sums = np.where(is_number, values, 0.0).sum(axis=0)
@@ -229,7 +229,7 @@ def _mean(values: Array) -> Array:
 def _make_triad(
     lines: LinesSection, quantity: Quantity, section: _TriadSection, full_scale: float
 ) -> tuple[Channel, _Printed]:
-    """Return a channel of three axes, with the step of the last printed digit if it is stated and fits 32 bits."""
+    """Return a channel of three axes, with the stated step of the last printed digit if it fits 32 bits."""
     unit = section.scale * UNITS[section.unit].size
     step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals
     step = max(step, full_scale / FULL_SCALE_COUNTS)
@@ -249,7 +249,7 @@ def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[
 
 
 def _temperatures_c(lines: LinesSection, values: Array) -> Array:
-    """Return (n,) °C of printed `values` (n, columns), NaN if the device provides none."""
+    """Return the temperatures (n,), °C, in printed `values` (n, columns); NaN if the device provides none."""
     temperature = lines.temperature
     celsius = values[:, lines.columns.index("temperature")] * temperature.scale + temperature.offset_c
     return np.where(NOT_PROVIDED["temperature"].mask_provided(celsius), celsius, np.nan)

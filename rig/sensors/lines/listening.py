@@ -20,7 +20,8 @@ def listen(
 ) -> tuple[int, list[TimedLine], float]:
     """Return the baud rate, the lines, and the end of the rest, s, on the clock of their arrival.
 
-    `tell` gets the instructions for the operator. Raise SensorError `no_port`, `lines_silent`, `lines_wrong_baud_rate`.
+    `tell` receives the instructions for the operator. Raise SensorError `no_port`, `lines_silent`,
+    `lines_wrong_baud_rate`.
     """
     speed = baud or _find_speed(port, tell)
     still_s, turned_s = seconds

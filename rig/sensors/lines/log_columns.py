@@ -58,9 +58,9 @@ class _ColumnGroup:
 
 
 def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> LogColumns:
-    """Return the map of a log with numbers (n, k) in the columns of its layout, at `time` (n,), None without times.
+    """Return the map of a log with numbers (n, k) in the columns of its layout.
 
-    Times are in the layout's unit. Values may be NaN in rows that belong to other sensors.
+    `time` (n,) is in the layout's unit, None without times. Values may be NaN in rows that belong to other sensors.
     """
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
     rate_hz = LIKELY_HZ if time is None else _mean_rate_hz(unit_s * time)
@@ -77,7 +77,10 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
 def _guess_samples(
     layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
 ) -> tuple[dict[str, ColumnEntry], list[str]]:
-    """Return the map of the columns of readings, of two sensors the first, and what nothing shows about them."""
+    """Return the map of the columns of readings, and sentences on what nothing shows about them.
+
+    Of two sensors the first is read.
+    """
     samples: dict[str, ColumnEntry] = {}
     gaps: list[str] = []
     for group in _group_columns(layout, values, quaternion, rate_hz):
@@ -99,7 +102,7 @@ def _guess_samples(
 
 
 def _may_be_gyroscope(names: Sequence[str], guessed: Guess) -> bool:
-    """Return whether three columns without names, or without units, are no accelerometer."""
+    """Return whether three columns without names or units can be a gyroscope, and not an accelerometer."""
     is_nameless = not any(names) or not guessed.units
     return is_nameless and len(names) == 3 and set(guessed.units) <= {"m"}
 
@@ -107,7 +110,7 @@ def _may_be_gyroscope(names: Sequence[str], guessed: Guess) -> bool:
 def _map_triad(
     layout: TableLayout, group: _ColumnGroup, guessed: Guess, kind: str
 ) -> tuple[dict[str, ColumnEntry], str]:
-    """Return the map of a triad's three columns, and why its unit is not sure."""
+    """Return the map of a triad's three columns, and the reason if its unit is uncertain."""
     positions = [guessed.columns.index(kind + axis) for axis in AXES]
     indices = [group.indices[position] for position in positions]
     values, stated = group.values[:, positions], layout.units[indices[0]]
@@ -120,7 +123,7 @@ def _map_triad(
 
 
 def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[str]:
-    """Return the columns with a heading or numbers that no entry reads."""
+    """Return the columns that have a heading or numbers and are in no entry of the map."""
     read = {entry["column"] for entry in entries}
     return [
         heading or f"column {index + 1}"
@@ -130,12 +133,12 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
 
 
 def _name_once(names: list[str]) -> list[str]:
-    """Return names, blank where one occurs again: of two sensors the first is read."""
+    """Return names without repetitions, which become blank: of two sensors of one name, the first is read."""
     return [name if name not in names[:index] else "" for index, name in enumerate(names)]
 
 
 def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
-    """Return the rows (n,) at rest: in blocks in which no column scatters more than in the quietest."""
+    """Return the rows (n,) at rest: blocks in which every column scatters as little as in its quietest block."""
     width = max(int(BLOCK_S * rate_hz), 5)
     count = len(values) // width
     if count < 2:
@@ -153,7 +156,7 @@ def _mean_rate_hz(time_s: Array) -> float:
 
 
 def _plain_name(layout: TableLayout, index: int) -> str:
-    """Return a heading in the form that names of a device's columns have: `gyro_x [deg/s]`."""
+    """Return a heading in the form of a device's column names: `gyro_x [deg/s]`."""
     name = layout.headings[index].rpartition(".")[2] if "(:" in layout.headings[index] else layout.headings[index]
     if (match := re.fullmatch(r"(.*)\((?::,)?([1-3])(?:,:)?\)", name)) is not None:
         name = f"{match[1]}_{'xyz'[int(match[2]) - 1]}"
@@ -183,7 +186,7 @@ KINDS = {
 
 
 def _strip_units(words: list[str]) -> list[str]:
-    """Return the words of a heading up to the axis, if a unit follows: x_rad_s."""
+    """Return the words of a heading up to the axis if a unit follows, as in x_rad_s."""
     axes = [position for position, word in enumerate(words) if word in AXES]
     if axes and axes[-1] < len(words) - 1 and all(word in UNIT_WORDS for word in words[axes[-1] + 1 :]):
         kind = {"rad": "gyro", "deg": "gyro", "dps": "gyro", "m": "acc", "t": "mag", "ut": "mag"}.get(
@@ -200,7 +203,10 @@ UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
 def _group_columns(
     layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
 ) -> Iterator[_ColumnGroup]:
-    """Yield the columns that vary, other than a reference's, by the rows they fill: a group for each logger's rate."""
+    """Yield the columns that vary, in groups that fill the same rows, one for each rate of the logger.
+
+    Columns of a reference are left out.
+    """
     names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
     used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
     groups: dict[bytes, list[int]] = {}
@@ -214,7 +220,7 @@ def _group_columns(
 
 
 def _find_quaternion(layout: TableLayout, values: Array) -> dict[str, int]:
-    """Return the columns of a quaternion by qw qx qy qz: by their names, or four neighbours of length 1."""
+    """Return the columns of a quaternion, qw qx qy qz: by their names, else four neighbours whose norm is 1."""
     named: dict[str, int] = {}
     for index in layout.numbers:
         name = re.sub(r"[\W_]+", "_", layout.headings[index].lower()).strip("_")
@@ -235,7 +241,7 @@ def _have_length_1(values: Array) -> bool:
 
 
 def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
-    """Return unit and factor of a triad as a map of columns has them, and why they are not sure."""
+    """Return unit and factor of a triad in the form of a column map, and the reason if they are uncertain."""
     if (scale := unit.pop("scale", None)) is not None:
         steps = 1 / float(scale)
         near = min(ROUND_STEPS, key=lambda round_steps: abs(steps / round_steps - 1))
@@ -258,7 +264,7 @@ def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.b
 
 
 def _compare_stated(kind: str, stated: str, values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
-    """Return the unit that the heading states, and how an accelerometer's size at rest contradicts it."""
+    """Return the unit that the heading states, and a sentence if an accelerometer's norm at rest contradicts it."""
     level = float(np.median(np.linalg.norm(values[still] if still.any() else values, axis=1)))
     fitting = [unit for unit, size in GRAVITY.items() if abs(level / size - 1) < 0.15]
     if kind == "a" and fitting and stated not in fitting:
@@ -277,7 +283,7 @@ def _time_entry(layout: TableLayout, time: Array | None) -> dict[str, Any]:
 
 
 def _find_wrap(time: Array) -> int | None:
-    """Return the power of two at which a counter of time begins again, in steps of the counter; None if it does not."""
+    """Return the power of two, in steps of a time counter, at which it restarts; None if it does not."""
     time = time[np.isfinite(time)]
     has_fall = len(time) > 1 and bool((np.diff(time) < -0.5 * np.ptp(time)).any())
     if not has_fall or time.max() < 100 or time.min() < 0:

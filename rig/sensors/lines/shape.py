@@ -111,7 +111,7 @@ def _find_number_shape(checked: Sequence[_CheckedLine]) -> Shape:
 
 
 def _select_short(checked: list[_CheckedLine]) -> list[_CheckedLine]:
-    """Return the lines that are short enough for one sample each. Raise NoShape if too few remain."""
+    """Return the lines that are short enough to be one sample each. Raise NoShape if too few remain."""
     if len(checked) < FEWEST:
         raise NoShape(f"only {len(checked)} lines came, which is too few to see what they have in common")
     short = [line for line in checked if len(line[1]) <= LONGEST_LINE]
@@ -147,7 +147,7 @@ def _find_field_shape(checked: Sequence[_CheckedLine]) -> Shape | None:
 
 
 def _split_by(sign: str, name: str, checked: Sequence[_CheckedLine]) -> Shape | None:
-    """Return the shape of lines with the separator `sign`, called `name`; None if they have another."""
+    """Return the shape of lines with the separator `sign`, called `name`; None if they do not have it."""
     rows = [[field.strip() for field in text.split(sign or None)] for _, text, _ in checked]
     count, frequency = Counter(map(len, rows)).most_common(1)[0]
     if not 3 <= count <= MOST_NUMBERS or frequency < ENOUGH * len(checked):
@@ -160,7 +160,7 @@ def _split_by(sign: str, name: str, checked: Sequence[_CheckedLine]) -> Shape | 
 def _find_columns(
     name: str, alike: Sequence[_CheckedLine], fields: list[list[str]], others: Sequence[str]
 ) -> Shape | None:
-    """Return the shape of the lines `alike` by their fields, beside the texts of others; None without three numbers."""
+    """Return the shape of the lines `alike`, with a header from `others`; None with fewer than three number columns."""
     if not any(row[-1] for row in fields):
         fields = [row[:-1] for row in fields]
     count = len(fields[0])
@@ -196,7 +196,7 @@ def _split_prefix(fields: list[list[str]]) -> tuple[str, list[list[str]]]:
 
 
 def _parse_column(fields: Sequence[str]) -> Array | None:
-    """Return (n,) the numbers of a column, NaN if missing; None if it holds a text."""
+    """Return the numbers (n,) of a column, NaN if missing; None if it holds a text."""
     numbers = np.array([float(field) if NUMBER.fullmatch(field) else np.nan for field in fields])
     numbers[np.abs(numbers) >= LARGEST] = np.nan
     missing = sum(field.lower() in WORDS for field in fields)
@@ -206,7 +206,7 @@ def _parse_column(fields: Sequence[str]) -> Array | None:
 
 
 def _split_sum(text: str) -> tuple[str, bool]:
-    """Return a line without the checksum at its end, and whether the checksum is right."""
+    """Return a line without the checksum at its end, and whether the checksum is correct."""
     match = _SUM.search(text)
     if match is None:
         return text, False

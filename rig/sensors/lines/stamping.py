@@ -55,7 +55,7 @@ class Stamper:
     ) -> tuple[NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64]]:
         """Return a mask (n,) of the samples in `values` (n, columns), their numbers (m,) from 0, and times (m,), µs.
 
-        `skipped` rejected lines preceded them; they came at `host_time_s`. Raise SensorError `lines_time_jumped`.
+        `skipped` rejected lines preceded them; they arrived at `host_time_s`. Raise SensorError `lines_time_jumped`.
         """
         if not len(values):
             return np.zeros(0, np.bool_), np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -90,7 +90,7 @@ class Stamper:
 
     # -- numbers -------------------------------------------------------------------------------------------------
     def _steps(self, values: Array, skipped: int) -> tuple[Array, NDArray[np.int64]]:
-        """Return the device time, s (0 if not printed), and the samples (n,) from the previous line to each line."""
+        """Return the device time, s (0 if not printed), and the number of samples (n,) since the previous line."""
         columns = self.section.columns
         passed_s = np.zeros(len(values))
         steps = np.ones(len(values), np.int64)
@@ -128,7 +128,10 @@ class Stamper:
         self._last_sequence = float(row[columns.index("sequence")]) if "sequence" in columns else None
 
     def _select_possible(self, values: Array) -> NDArray[np.bool_]:
-        """Return the rows of (n, columns) that can follow the previous rows. Raise SensorError `lines_time_jumped`."""
+        """Return the rows of (n, columns) whose time or number can follow that of the previous row.
+
+        Raise SensorError `lines_time_jumped`.
+        """
         is_sample = np.zeros(len(values), np.bool_)
         last = (self._last_time, self._last_sequence)
         try:
@@ -147,7 +150,7 @@ class Stamper:
         return is_sample
 
     def _is_possible(self, passed_s: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return the samples that can follow the one before: later, or equal if times are coarse, and not too late."""
+        """Return which samples can follow the previous one: later, or equal if times are coarse, and not too late."""
         later = passed_s > 0 if self.section.time is not None and not self._is_coarse else passed_s >= 0
         in_time = (passed_s <= LONGEST_GAP_S) & (steps >= 1) & (steps <= LONGEST_GAP_S * self.rate_hz + 1)
         possible: NDArray[np.bool_] = later & in_time
@@ -161,7 +164,7 @@ class Stamper:
     def _count_coarse_steps(self, device_s: Array) -> NDArray[np.int64]:
         """Return the number of samples (n,) since the previous one, by coarse times (n,): more than one after a jump.
 
-        A loss within a step of the time is invisible.
+        A loss that is shorter than a step of the time does not show.
         """
         clock = SmoothedClock(self.rate_hz) if self._smoothed is None else copy(self._smoothed)
         steps = np.ones(len(device_s), np.int64)
@@ -184,7 +187,7 @@ class Stamper:
 
     # -- times ---------------------------------------------------------------------------------------------------
     def _add_late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
-        """Return the sequence steps, increased by samples whose loss shows only as a delay of the lines."""
+        """Return the sequence steps plus the lost samples that show only as a delay of the lines."""
         if "sequence" in self.section.columns or self._smoothed is None:
             return steps
         late_s = host_time_s - (self._host_began_s or 0.0) - self._smoothed.predict_s(int(steps.sum()))
@@ -228,7 +231,7 @@ class SmoothedClock:
         return self._time_s + steps * self._period_s
 
     def advance_to(self, numbers: NDArray[np.int64], input_s: float) -> Array:
-        """Advance the clock by samples (n,), the last with the input time `input_s`; return their times (n,), s."""
+        """Advance the clock by samples (n,), of which the last has the time `input_s`; return their times (n,), s."""
         last, time_before_s, count = int(numbers[-1]), self._time_s, int(numbers[-1]) - self.number
         if not self.is_set:
             self.number, self._time_s = last, input_s
@@ -242,7 +245,7 @@ class SmoothedClock:
         return times_s
 
     def advance_through(self, numbers: NDArray[np.int64], input_s: Array) -> Array:
-        """Advance the clock by samples (n,) with an input time each (n,), s; return their times (n,), s."""
+        """Advance the clock by samples (n,), each with an input time (n,), s; return their times (n,), s."""
         return np.array(
             [self.advance_to(numbers[index : index + 1], float(input_s[index]))[0] for index in range(len(numbers))]
         )

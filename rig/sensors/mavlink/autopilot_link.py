@@ -93,9 +93,9 @@ class AutopilotLink:
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
     def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, AutopilotParameter]:
-        """Read the parameters `needed` and `others`; the `others` may be missing.
+        """Read the parameters `needed` and `others`, which may be missing.
 
-        Raise SensorError `autopilot_silent` if none is answered.
+        Raise SensorError `autopilot_silent` if no request is answered.
         """
         needed = set(needed)
         names = needed | set(others)
@@ -151,7 +151,7 @@ class AutopilotLink:
         self._send(self._command_message(REQUEST_MESSAGE, number, 0.0))
 
     def identify(self) -> None:
-        """Request its version and its unique number, which some do not report."""
+        """Request the autopilot's version and unique number; some autopilots do not report these."""
         for wait_s in self._patience.attempts()[:2]:
             self._send(self._command_message(REQUEST_MESSAGE, AUTOPILOT_VERSION, 0.0))
             if self.own_port.wait(lambda: self._version is not None, wait_s):
@@ -260,7 +260,7 @@ class AutopilotLink:
                 self.own_port.news.notify_all()
 
     def _is_from_autopilot(self, message: Any) -> bool:
-        """Return whether the autopilot sent a message; the first heartbeat of an autopilot selects it."""
+        """Return whether the autopilot sent a message. The first autopilot whose heartbeat comes is selected."""
         source = (message.get_srcSystem(), message.get_srcComponent())
         if self.autopilot is None and message.get_type() == "HEARTBEAT":
             if message.autopilot in FIRMWARES:

@@ -11,7 +11,7 @@ DATAGRAM_BYTES = 65536
 
 
 def open_port(port: str, baud: int) -> DevicePort:
-    """Open the port at `tcp:host:port`, `udp:host:port`, or a serial port's name. Raise OSError."""
+    """Open the port at `tcp:host:port`, `udp:host:port`, or a serial port by its name. Raise OSError."""
     kind, _, address = port.partition(":")
     if kind == "udp":
         host, _, number = address.rpartition(":")
@@ -33,7 +33,7 @@ class UdpPort:
             raise
 
     def read(self) -> bytes:
-        """Return the data received within `READ_TIMEOUT_S`, from one sender."""
+        """Return the data received within `READ_TIMEOUT_S`; datagrams of other senders are ignored."""
         time.sleep(READ_TIMEOUT_S)
         received = bytearray()
         with suppress(BlockingIOError, ConnectionRefusedError):

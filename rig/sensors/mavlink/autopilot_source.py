@@ -73,7 +73,7 @@ class _ImuStream:
         self.description = describe(self.name, self.section, provides_temperature=self.thermometer.provides)
 
     def take(self, message: Any, *, is_consecutive: bool) -> tuple[int, int, ImuReading] | None:
-        """Return number, time and reading of a message; None for a copy.
+        """Return number, time and reading of a message; None for a repeated reading.
 
         `is_consecutive`: no message was lost before it.
         """
@@ -113,7 +113,10 @@ class MavlinkSource:
     def __init__(
         self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
     ) -> None:
-        """Connect and set up. Raise SensorError as link and `refusals`, autopilot_rate, _other_uid, _several_imus."""
+        """Connect and set up.
+
+        Raise the SensorErrors of link and `refusals`, autopilot_rate, _other_uid, _several_imus.
+        """
         self._on_samples = on_samples
         self._imus: dict[str, _ImuStream] = {
             mavlink_section(section).imu: _ImuStream(name, section) for name, section in sections.items()
@@ -135,7 +138,7 @@ class MavlinkSource:
 
     @property
     def corrected(self) -> Mapping[str, str]:
-        """The changed settings, which are none: an autopilot is only read."""
+        """The changed settings, of which there are none: an autopilot is only read."""
         return {}
 
     @property
@@ -148,7 +151,7 @@ class MavlinkSource:
         self.link.own_port.stream()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise errors since the last call: SensorError as `OwnPort.check`, and `autopilot_armed`."""
+        """Raise errors since the last call: SensorErrors of `OwnPort.check`, and `autopilot_armed`."""
         self.link.own_port.check(clock_s)
 
     def close(self) -> None:
@@ -184,7 +187,7 @@ class MavlinkSource:
                 )
 
     def _take(self, messages: list[tuple[Any, bool]], host_time_s: float) -> None:
-        """Pass on the samples of each IMU, on the reader's thread; before the start only judge the rates."""
+        """Pass on the samples of each IMU, on the reader's thread; before the start only measure the rates."""
         readings: dict[str, list[tuple[int, int, ImuReading]]] = {}
         for message, is_consecutive in messages:
             kind = message.get_type()
@@ -229,7 +232,7 @@ def check_parameters(
 
 
 def describe(name: str, section: SensorSection, *, provides_temperature: bool = True) -> RecordedSensor:
-    """Return the description of its samples for a recording; without a connection a temperature counts as provided."""
+    """Return the description of the samples for a recording; without a connection a temperature is assumed."""
     integer = is_integer(mavlink_section(section).imu)
     stated = mavlink_section(section).temperature
     channels = [
@@ -245,12 +248,12 @@ def describe(name: str, section: SensorSection, *, provides_temperature: bool = 
 def mavlink(
     sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
 ) -> closing[MavlinkSource]:
-    """Return the source of the IMUs at one port as a context manager. Raise SensorError as `MavlinkSource`."""
+    """Return the source of the IMUs at one port as a context manager. Raise the SensorErrors of `MavlinkSource`."""
     return closing(MavlinkSource(sections, on_samples, patience=patience))
 
 
 def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
-    """Yield the autopilot's state and its problems; nothing is changed. Raise SensorError as `AutopilotLink`."""
+    """Yield the autopilot's state and its problems; nothing is changed. Raise the SensorErrors of `AutopilotLink`."""
     (first, section), *_ = sections.items()
     line = mavlink_section(section)
     messages: list[Any] = []
@@ -300,7 +303,7 @@ def mavlink_section(section: SensorSection) -> MavlinkSection:
 
 
 def _channel(quantity: Quantity, end_of_scale: float, sent: float | None) -> Channel:
-    """Return the channel of three axes; `sent` is the unit of the integers that are sent, None for floats."""
+    """Return the channel of three axes; `sent` is the unit of the integers in messages, None for floats."""
     channel = fine_axes(quantity, end_of_scale)
     if sent is None:
         return channel

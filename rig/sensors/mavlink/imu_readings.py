@@ -58,7 +58,7 @@ def is_integer(imu: str) -> bool:
 
 
 def decode_reading(message: Any) -> ImuReading:
-    """Decode a message of pymavlink. Its temperature is the IMU's own, in HIGHRES_IMU the barometer's."""
+    """Decode a message of pymavlink. Its temperature is that of the IMU, in HIGHRES_IMU of the barometer."""
     kind = message.get_type()
     sent: Mapping[Field, Array] = {
         "rate": np.array([message.xgyro, message.ygyro, message.zgyro], dtype=np.float64),
@@ -82,6 +82,6 @@ def decode_reading(message: Any) -> ImuReading:
 
 
 def _add_half_step(whole: Array) -> Array:
-    """Return the middle of the interval that a truncated integer covers."""
+    """Return the middle of the interval that a truncated integer stands for."""
     middle: Array = whole + 0.5 * np.sign(whole)
     return middle

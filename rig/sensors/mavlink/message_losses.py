@@ -26,7 +26,7 @@ class LinkCounter:
     _recent: deque[bytes] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
 
     def is_new(self, sequence: int, frame: bytes) -> bool:
-        """Return whether a message, given as the bytes of its frame, is neither a copy nor late."""
+        """Return whether a message, given as the bytes of its frame, is neither a repetition nor late."""
         if frame in self._recent:
             self.doubled += 1
             return False

@@ -34,7 +34,7 @@ class ParameterChange:
     backup: Path
 
     def state(self, parameters: Mapping[str, AutopilotParameter]) -> str:
-        """Return which set `parameters` are, bit by bit: "old", "new" or, if neither, "mixture"."""
+        """Return which set `parameters` equal, bit by bit: "old", "new" or, if neither, "mixture"."""
         fields = {name: parameter.field for name, parameter in parameters.items()}
         for name, expected in (("new", self.new), ("old", self.old)):
             if fields == {key: parameter.field for key, parameter in expected.items()}:
@@ -106,7 +106,7 @@ def read_change(path: Path) -> ParameterChange:
 
 
 def folder() -> Path:
-    """Return the folder of the journals. Raise as `own_folder`."""
+    """Return the folder of the journals. Raise as `own_folder` does."""
     return own_folder() / "autopilots"
 
 
@@ -124,7 +124,7 @@ def _read_parameters(document: Mapping[str, Any], firmware: int) -> dict[str, Au
 
 
 def _write(path: Path, text: str, *, exclusive: bool) -> None:
-    """Write a file atomically, and return when it is on the disk."""
+    """Write a file atomically; return when the disk has it."""
     if exclusive and path.exists():
         raise FileExistsError(17, "there is such a file already")
     new = path.with_name(f".{path.name}.{os.getpid()}")

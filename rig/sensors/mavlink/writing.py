@@ -16,8 +16,8 @@ def autopilot_id(link: AutopilotLink) -> str:
 def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, AutopilotParameter]) -> None:
     """Bring an autopilot to one of the two sets of a change, `target`.
 
-    Raise SensorError as `AutopilotLink.set_parameter`, and `autopilot_not_stored` if it reads back another value; after
-    any such end the journal still holds the change. Raise Refused as `ParameterChange.begin`.
+    Raise SensorError as `AutopilotLink.set_parameter` does, and `autopilot_not_stored` if it reads back another value;
+    then the journal still holds the change. Raise Refused as `ParameterChange.begin` does.
     """
     planned.begin()
     for parameter in target.values():
@@ -36,7 +36,8 @@ def change(link: AutopilotLink, planned: ParameterChange, target: Mapping[str, A
 def find_unfinished_change(link: AutopilotLink) -> Iterator[SensorError]:
     """Yield the error `autopilot_mixture` if a change of this autopilot stopped between the sets.
 
-    Remove one from the journal that stopped before the first parameter or after the last. Raise as `find_change`.
+    A change that stopped before the first parameter or after the last is removed from the journal. Raise as
+    `find_change` does.
     """
     begun = find_change(autopilot_id(link))
     if begun is None:

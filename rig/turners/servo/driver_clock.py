@@ -19,7 +19,10 @@ class Clock(Protocol):
         """Wait for an event; return whether it came in time."""
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done`, evaluated at each notification of `changed` (which is locked); return its value."""
+        """Wait until `done` is true; it is evaluated at each notification of `changed`, a locked condition.
+
+        Return its value.
+        """
 
 
 class HostClock:
@@ -38,11 +41,11 @@ class HostClock:
         return time.monotonic() if raw is None else time.clock_gettime(raw)
 
     def wait(self, event: threading.Event, timeout_s: float) -> bool:
-        """Wait for an event by the host's clock; return whether it came in time."""
+        """Wait for an event by the host's clock; return whether it occurred in time."""
         return event.wait(timeout_s)
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done` by the host's clock; return its last value."""
+        """Wait until `done` is true, by the host's clock; return its last value."""
         return changed.wait_for(done, timeout_s)
 
 

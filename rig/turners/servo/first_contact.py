@@ -32,7 +32,7 @@ ANSWER_ALL = 2  # value of Status Return Level: every write is acknowledged
 
 
 def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
-    """Return the servo's report of itself. Raise Refused `no_servo`, `servo_not_alone`, `other_servo`."""
+    """Read the servo's report of itself. Raise Refused `no_servo`, `servo_not_alone`, `other_servo`."""
     try:
         _ping(bus, port, servo_id)
         _request_acknowledgements(bus)
@@ -46,7 +46,10 @@ def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
 
 
 def _ping(bus: Bus, port: str, servo_id: int) -> None:
-    """Confirm that a ping has exactly one answer; one wrong answer in four is accepted, because it may be late."""
+    """Raise Refused unless one servo answers pings.
+
+    One wrong answer in four is accepted, because it may be a late one.
+    """
     answers = odd = 0
     for _ in range(PINGS):
         try:
@@ -71,7 +74,7 @@ def _ping(bus: Bus, port: str, servo_id: int) -> None:
 
 
 def _request_acknowledgements(bus: Bus) -> None:
-    """Make the servo acknowledge writes (a setting in RAM); otherwise the arrival of a goal is unconfirmed."""
+    """Make the servo acknowledge writes (a setting in RAM), so that the arrival of a goal is confirmed."""
     try:
         (level,) = bus.read(RETURN_LEVEL)
     except ReplyLost:

@@ -23,7 +23,7 @@ class ProfileMove(NamedTuple):
 
 
 def move_of(motion: Motion) -> ProfileMove:
-    """Return the servo's nearest equivalent of a motion: ramps by acceleration, both within the total duration."""
+    """Return the servo's profile nearest to a motion: same total duration, ramps as long as its units allow."""
     total_ms = max(SHORTEST_MS, round(1000 * motion.duration_s))
     ramp_ms = min(round(1000 * motion.speed_rad_s / motion.acceleration_rad_s2), total_ms // 2)
     return ProfileMove(round(motion.target_q_rad[0] / PULSE_RAD), total_ms, ramp_ms)
@@ -36,7 +36,7 @@ def cruise_rad_s(from_rad: float, move: ProfileMove) -> float:
 
 
 def move_problems(motions: Iterable[Motion], velocity_limit_rad_s: float) -> list[Problem]:
-    """Return the problems of motions that exceed the servo's limits, one of each kind."""
+    """Return the problems of motions that exceed the servo's limits, at most one of each kind."""
     problems: dict[str, Problem] = {}
     for motion in motions:
         move = move_of(motion)

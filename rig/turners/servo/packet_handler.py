@@ -83,7 +83,7 @@ class Bus:
         return int(number)
 
     def more_came(self, wait_s: float) -> bool:
-        """Return whether an unrequested byte follows within `wait_s`."""
+        """Return whether a byte that nobody requested follows within `wait_s`."""
         with self._failing():
             for _ in range(max(1, round(wait_s / 0.002))):
                 if self._port.readPort(1):
@@ -104,7 +104,7 @@ class Bus:
         return bytes(data)
 
     def look_up(self, register: Register) -> tuple[int, ...]:
-        """Read a register's values, and repeat after a lost reply. Raise Lost, Denied, PortGone."""
+        """Read a register's values, with a second attempt after a lost reply. Raise Lost, Denied, PortGone."""
         for _ in range(ATTEMPTS - 1):
             try:
                 return self.read(register)
@@ -143,9 +143,10 @@ class Bus:
             self._packets.writeTxOnly(self._port, self._id, register.address, register.size, data)
 
     def settle(self) -> None:
-        """Wait until the line was silent for `SLACK_S`, so that a late reply is not taken for the next. Raise PortGone.
+        """Wait until the line has been silent for `SLACK_S`.
 
-        Replies do not name the instruction that they answer.
+        Raise PortGone. A late reply would be taken for the next one, because replies do not name the instruction that
+        they answer.
         """
         with self._failing():
             now_s = self.clock.now_s()

@@ -118,7 +118,7 @@ class Servo:
         ]
 
     def check(self) -> None:
-        """Raise the problem that a supervising thread found. The shaft is stopped by then if under control."""
+        """Raise the problem that a supervising thread found. A shaft under control is stopped by then."""
         if self._link is not None and (problem := self._thread_problem(self._link)) is not None:
             self._fail(problem)
         if self._problem is None and not (self._link is not None and self._stopper.begun):
@@ -180,7 +180,7 @@ class Servo:
                 self._moving = False
 
     def rest(self, duration_s: float, watch: Callable[[], None] = _watch_nothing) -> None:
-        """Stand still for `duration_s` of the states' clock; `watch` as in `move`."""
+        """Stand still for `duration_s` of the states' clock; `watch` is called as in `move`."""
         with stopping_on_error(self.stop):
             self._doing = "a rest"
             end_s = self.latest.time_s + duration_s
@@ -189,7 +189,7 @@ class Servo:
     def stop(self) -> StopOutcome:
         """Stop the shaft and return its state; takes less than 1 s.
 
-        Safe at any time, repeatedly, from any thread; a second Ctrl-C does not undo it and is raised when it has ended.
+        It may be called at any time, repeatedly, from any thread. A Ctrl-C meanwhile is raised after the stop.
         Afterwards this object moves the shaft no more.
         """
         return self._stopper.outcome() if self._holds else NOT_CONTROLLED
@@ -233,7 +233,7 @@ class Servo:
         return self._link
 
     def _call(self, job: Job) -> None:
-        """Send an instruction; turn its errors into problems of the servo."""
+        """Send an instruction; translate its errors into problems of the servo."""
         try:
             self._linked.call(job)
         except Refused as error:
@@ -245,14 +245,14 @@ class Servo:
         self.check()
 
     def _why_denied(self, error: InstructionDenied) -> Problem:
-        """Return the reason of a refusal: mostly a stop by the watchdog."""
+        """Return the reason why the servo refused: mostly a stop by its watchdog."""
         with suppress(BusError):
             if self._linked.call(lambda bus: bus.look_up(WATCHDOG), also_stopped=True) == (TRIPPED,):
                 return problems.watchdog_tripped()
         return problems.refuses(error)
 
     def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _watch_nothing) -> None:
-        """Block until `done`, while the servo's faults and the caller's watch are checked."""
+        """Block until `done` is true; meanwhile check the servo's faults and call the caller's `watch`."""
         finished = False
         while not finished:
             with self._changed:
@@ -263,7 +263,7 @@ class Servo:
             watch()
 
     def _thread_problem(self, link: ServoLink) -> Problem | None:
-        """Return the problem of a link's thread that no longer runs its loop."""
+        """Return the problem of a link whose thread has ended."""
         silent_s = self._clock.now_s() - link.turned_s
         if not link.alive or silent_s < HUNG_S * process_silence.crowding():
             return None
@@ -298,7 +298,7 @@ class Servo:
             self._stopper.begin()
 
     def _lets_go(self) -> bool:
-        """Return whether the servo's motor is off: by a shutdown, or because torque was switched off elsewhere."""
+        """Return whether the servo's motor is off: it shut down, or another program switched its torque off."""
         return self._linked.torque_off or bool(self.latest.hardware_error & self._report.shutdown)
 
     def _await_rest(self, since_s: float, timeout_s: float) -> bool:

@@ -62,7 +62,7 @@ class ServoLink:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread, unless the system delays it; the bus stays open."""
+        """End the thread; the bus stays open. If the system delays the thread, it ends later."""
         self._closing.set()
         self._woken.set()
         if self._thread.ident is not None:
@@ -155,7 +155,7 @@ class ServoLink:
             self._fail(hardware_problem(self._error_bits))
 
     def _fresh(self, state: ServoState) -> bool:
-        """Return whether a reply is current, by the servo's own clock."""
+        """Return whether the servo's own clock shows that a reply is current."""
         before = self._latest
         if state.took_s > HELD_UP_S:
             return False

@@ -22,7 +22,7 @@ HEADROOM_C = 10.0  # margin below its limit: a servo that holds and turns for mi
 
 
 def servo_problems(report: ServoReport, wanted_model: str, carried: FlangeLoad, period_s: float) -> list[Problem]:
-    """Return every reason why this servo cannot be driven as it is; `period_s` is the period of its states."""
+    """Return all reasons not to drive this servo as it is; `period_s` is the period of its states."""
     problems = [*_identity(report, wanted_model), *_settings(report), *_condition(report), *_load(report, carried)]
     if report.round_trip_s > period_s:
         problems.append(
@@ -132,7 +132,10 @@ def _condition(report: ServoReport) -> list[Problem]:
 
 
 def _load(report: ServoReport, carried: FlangeLoad) -> list[Problem]:
-    """Return a problem if the payload's torque is too high, for a horizontal shaft: its true direction is unknown."""
+    """Return a problem if a payload's torque is too high.
+
+    A horizontal shaft is assumed, as its direction is unknown.
+    """
     lever_m = math.hypot(*carried.centre_m[:2])
     torque_nm = carried.payload_kg * GRAVITY_M_S2 * lever_m
     most_nm = LOAD_FRACTION * report.servo.stall_torque_nm
@@ -149,7 +152,7 @@ def _load(report: ServoReport, carried: FlangeLoad) -> list[Problem]:
 
 
 def hardware_problem(bits: int) -> Problem:
-    """Return the problem of a hardware error, by its worst bit."""
+    """Return the problem that the most serious bit of a hardware error states."""
     what = f"the servo reports {error_words(bits)}"
     if bits & BY_LOAD:
         remedy = "Find what blocked the shaft; hold the board, and switch the servo off and on"

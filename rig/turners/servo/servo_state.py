@@ -84,7 +84,7 @@ def decode(
 
 
 def stands(states: Sequence[ServoState]) -> bool:
-    """Return whether the shaft stands still in the newest of `states` (in order), in `STILL_STATES` at least."""
+    """Return whether the newest `STILL_STATES` of `states` (in order), or more, show a shaft at rest."""
     if len(states) < STILL_STATES:
         return False
     newest = states[-1]

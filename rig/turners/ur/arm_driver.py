@@ -126,7 +126,7 @@ class Arm:
         return read_report(self._host, self._controller, self.latest, self._robot_api_port)
 
     def check(self) -> None:
-        """Raise the problem that a supervising thread found. The arm is stopped by then if under control."""
+        """Raise the problem that a supervising thread found. An arm under control is stopped by then."""
         if self._problem is None and not self._stopper.begun:
             return
         problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "Start again when ready")
@@ -142,9 +142,9 @@ class Arm:
     # Moving -------------------------------------------------------------------------------------------------------
 
     def take_control(self, carried: FlangeLoad) -> None:
-        """Upload the control script and set the payload. Raise `Refused` by name.
+        """Upload the control script and set the payload.
 
-        The client would end a program that runs, so a running program is refused here.
+        Raise `Refused` by name. A running program is refused, because the client would end it.
         """
         self.check()
         problem = readiness(self.latest)
@@ -187,7 +187,10 @@ class Arm:
             deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
 
             def is_late() -> bool:
-                """Return whether the move is late by the controller's clock; the report of its arrival takes time."""
+                """Return whether the move lasts too long by the controller's clock.
+
+                The report of its arrival takes time.
+                """
                 has_arrived = self._stands_at(motion) and time.monotonic() < reported_s
                 return self.latest.time_s > deadline_s and not has_arrived
 
@@ -208,7 +211,7 @@ class Arm:
             self._silent_s = 0.0
 
     def rest(self, duration_s: float, watch: Callable[[], None] = _watch_nothing) -> None:
-        """Stand still for `duration_s` of the controller's clock; `watch` as in `move`."""
+        """Stand still for `duration_s` of the controller's clock; `watch` is called as in `move`."""
         with stopping_on_error(self.stop):
             self._doing = "a rest"
             end_s = self.latest.time_s + duration_s
@@ -217,7 +220,7 @@ class Arm:
     def stop(self) -> StopOutcome:
         """Stop the arm and return its state; takes less than 1 s.
 
-        Safe at any time, repeatedly, from any thread; a second Ctrl-C does not undo it and is raised when it has ended.
+        It may be called at any time, repeatedly, from any thread. A Ctrl-C meanwhile is raised after the stop.
         Afterwards the control script has ended and this object moves the arm no more.
         """
         if not self._holds_arm:
@@ -229,7 +232,7 @@ class Arm:
         self._close()
 
     def _close(self) -> str | None:
-        """Stop and end as `close` does; return a warning if a client's program may still run there, else None."""
+        """Stop and end as `close` does. Return a warning if a client's program may still run on the controller."""
         try:
             outcome = self.stop()
         finally:
@@ -281,14 +284,14 @@ class Arm:
             self._watch.start()
 
     def _prove_the_stop(self) -> None:
-        """Raise `Refused` if the arm could not be stopped without the client."""
+        """Raise `Refused` if a trial shows that the arm cannot be stopped without the client."""
         problem = stop_trial(self._host, RobotApi(self._host, self._robot_api_port, ANSWER_S), self._shows)
         if problem is not None:
             self._holds_arm = False
             raise Refused.of(readiness(self.latest) or problem)
 
     def _shows(self, runtime_state: RuntimeState, timeout_s: float) -> bool:
-        """Return whether the arm's states report this state of its program within `timeout_s`."""
+        """Return whether the arm's states report that state of its program within `timeout_s`."""
         with self._changed:
             return self._changed.wait_for(lambda: self.latest.runtime_state == runtime_state, timeout_s)
 
@@ -307,7 +310,7 @@ class Arm:
         self.check()
 
     def _explain(self, problem: Problem) -> Problem:
-        """Return the problem of an ended program with the controller's reason, such as a refused payload."""
+        """Return the problem of an ended program, with the controller's reason, such as a refused payload, if known."""
         watch = self._watch
         if watch is None or problem.name != "program_stopped":
             return problem
@@ -325,7 +328,7 @@ class Arm:
         self._link.send(request)
 
     def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _watch_nothing) -> None:
-        """Block until `done`, while the arm's faults and the caller's watch are checked."""
+        """Block until `done` is true; meanwhile check the arm's faults and call the caller's `watch`."""
         finished = False
         while not finished:
             with self._changed:
@@ -339,7 +342,7 @@ class Arm:
             self._changed.wait_for(lambda: self._problem is not None, REASON_S)
 
     def _unbegun(self, problem: Problem) -> Problem:
-        """Return why a move did not begin: the controller refused it, or had lost the client during a silence."""
+        """Return why a move did not begin: the controller refused it, or lost the client during a silence."""
         if self._silent_s <= SILENCE_S:
             return problem
         what = f"the arm at {self._host} was silent for {self._silent_s:.1f} s, and {problem.what}"
@@ -420,6 +423,6 @@ def _not_started(motion: Motion) -> Problem:
 
 
 def look(host: str, robot_api_port: int = ROBOT_API_PORT) -> ArmReport:
-    """Look at the arm: receive and query only; nothing moves and no program is stopped. Raise `Refused` by name."""
+    """Read the arm's report; nothing moves and no program is stopped. Raise `Refused` by name."""
     with Arm(host, robot_api_port=robot_api_port) as arm:
         return arm.report()

@@ -29,7 +29,7 @@ MAX_TOOL_ROTATION_RAD = 1e-3  # above a pendant's rounding, below any intended r
 def preflight_problems(plans: Sequence[Plan], arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Return all reasons against moving: another arm, a plan beyond a limit, an arm that is not ready.
 
-    The last of the `plans` is the one to drive. For another arm nothing else is reported, because all other reasons
+    The last of the `plans` is the one to drive. If it is another arm, only that is reported, because all other reasons
     concern the configured arm.
     """
     if others := identity_problems(arm, report):

@@ -88,7 +88,7 @@ def readiness(state: ArmState) -> Problem | None:
 
 
 def local_control_during_run(what: str) -> Problem:
-    """Describe a pendant that was switched to local control while the rig controls the arm; `what` shows it."""
+    """Describe a pendant that was switched to local control during a run; `what` shows it."""
     return Problem(
         "switched_to_local_control",
         what,
@@ -126,7 +126,7 @@ def payload_refused(carried: FlangeLoad) -> Problem:
 
 
 def program_interruption(state: ArmState) -> Problem | None:
-    """Return why the control program no longer runs, or None while it does."""
+    """Return why the control program no longer runs; None while it runs."""
     if state.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING):
         return Problem("arm_paused", "the program was paused at the pendant", "Start the procedure again when ready")
     if state.runtime_state != RuntimeState.PLAYING:

@@ -100,7 +100,7 @@ class ControlWatch:
         return _no_port_to_stop(self._host, "primary interface" if self._is_x else "dashboard and primary interface")
 
     def _has_lost_primary_alone(self) -> bool:
-        """Return whether the primary interface has closed its connection while states continue."""
+        """Return whether the primary interface has closed its connection although states continue."""
         return self._closed_s is not None and self._lasts(self._closed_s, CLOSED_S)
 
     def _lasts(self, since_s: float, duration_s: float) -> bool:
@@ -108,7 +108,10 @@ class ControlWatch:
         return self._newest_s() - since_s >= duration_s
 
     def _ask(self) -> ControlMode:
-        """Return whether the pendant is in remote control, None if unknown, "gone" if the dashboard does not answer."""
+        """Return whether the pendant is in remote control:
+
+        None if unknown, "gone" without an answer of the dashboard.
+        """
         if self._is_x:
             return self._api.is_in_remote_control()
         for _ in range(2):  # some close the connection with local control; ask once more
@@ -144,7 +147,7 @@ class ControlWatch:
             self._ending.wait(ASK_S)
 
     def _hear(self, primary: socket.socket) -> None:
-        """Record messages on ended programs. Raise `OSError` if the connection has closed."""
+        """Record messages about ended programs. Raise `OSError` if the connection has closed."""
         data = primary.recv(65536)
         if not data:
             raise ConnectionError("the primary interface closed the connection")

@@ -25,7 +25,7 @@ NOT_TOLD = "not told"
 
 
 def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
-    """Return why the rig could not stop an arm there without its client; None if it can."""
+    """Return why the rig could not stop an arm there without its client; None if it could."""
     interface = PrimaryStop if is_polyscope_x(version) else Dashboard
     try:
         interface(host, LOOK_S).close()
@@ -54,7 +54,7 @@ def no_states(host: str, error: OSError) -> Problem:
 
 
 def reports_local_control(host: str, version: tuple[int, ...]) -> bool:
-    """Return whether a dashboard reports local control; for other controllers the trial of the stop finds out."""
+    """Return whether a dashboard reports local control. Other controllers show it in the trial of the stop."""
     if is_polyscope_x(version) or host in MAKERS_SIMULATOR:
         return False
     try:
@@ -107,7 +107,7 @@ def _add_robot_api_answers(report: ArmReport, api: RobotApi) -> ArmReport:
 
 
 def _read_description(host: str) -> ArmDescription:
-    """Return the controller's description of its arm; an empty description without its primary interface."""
+    """Return the controller's description of its arm, which is empty if the primary interface is closed."""
     try:
         return read_description(host, ANSWER_S)
     except OSError:
@@ -115,7 +115,7 @@ def _read_description(host: str) -> ArmDescription:
 
 
 def _has_free_registers(host: str, version: tuple[int, ...]) -> bool | None:
-    """Return whether a half of the registers is free for the client; None if the controller does not answer."""
+    """Return whether a half of the registers is free for the client; None without an answer of the controller."""
     try:
         return find_free_half(host, version, LOOK_S) is not None
     except OSError:

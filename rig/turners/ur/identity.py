@@ -43,23 +43,23 @@ def version_text(version: tuple[int, ...]) -> str:
 
 
 def identify_model(report: ArmReport) -> str | None:
-    """Return the maker's name of the arm that the controller reports; None if it reports none.
+    """Return the maker's name of the arm that the controller reports, or None.
 
-    The geometry or the dashboard's name decides if it does not report the type.
+    If it does not report the type, the geometry or the dashboard's name decides.
     """
     models, robot_type = _models(report), _robot_type(report)
     return None if robot_type is None else models.get(robot_type, f"arm of type {robot_type}")
 
 
 def is_polyscope_x(version: tuple[int, ...]) -> bool:
-    """Return whether that software is a PolyScope X, which has no dashboard."""
+    """Return whether software of that version is a PolyScope X, which has no dashboard."""
     return version[:1] >= (POLYSCOPE_X,)
 
 
 def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
     """Return the problem of a controller of another series, or of software too old for the rig to stop its arm.
 
-    A configured arm of the CB3 series makes `cb3_not_supported` void.
+    If the configured arm is of the CB3 series, `cb3_not_supported` does not apply.
     """
     if is_polyscope_x(version) and version < POLYSCOPE_X_SINCE:
         since = ".".join(map(str, POLYSCOPE_X_SINCE))
@@ -112,7 +112,7 @@ def _models(report: ArmReport) -> Mapping[int, str]:
 
 
 def _robot_type(report: ArmReport) -> int | None:
-    """Return the type of arm: as reported, else by the arm's lengths, else by its name."""
+    """Return the type of arm as reported, else by the arm's lengths, else by its name."""
     if report.setup is not None:
         return report.setup.robot_type
     if report.kinematics is not None:
@@ -125,7 +125,7 @@ def _robot_type(report: ArmReport) -> int | None:
 
 
 def _other_length(arm: DenavitHartenberg, model: TurnerModel) -> str | None:
-    """Return a sentence on the length that differs most from the model's, or None within tolerance."""
+    """Return a sentence on the length that differs most from the model's; None if all are within tolerance."""
     lengths, nominal = lengths_m(arm), lengths_m(model.drawing)
     worst = int(np.argmax(np.abs(lengths - nominal)))
     if abs(lengths[worst] - nominal[worst]) <= LENGTH_TOLERANCE_M:

@@ -46,7 +46,7 @@ def _position_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | 
 
 
 def _nearer(motion: Motion, joint: int, within_rad: tuple[float, float]) -> str:
-    """Return the remedy for a motion beyond a joint's range, by its start and its kind."""
+    """Return the remedy for a motion beyond a joint's range, by the motion's start and kind."""
     name, (low, high) = JOINT_NAMES[joint], within_rad
     if not low <= motion.start_q_rad[joint] <= high and not isinstance(motion, Sweep):
         return f"Bring {name} back inside its range from the pendant, or correct arm.home_deg"
@@ -97,7 +97,7 @@ def _find_excess(values: Array, ours: Joints, theirs: Joints | None) -> Iterator
 
 
 def _fractions(motion: Motion) -> Array:
-    """Return the travel (6,) of each joint relative to the longest, in proportion to which its speed is."""
+    """Return the travel (6,) of each joint relative to the longest one; speeds have the same ratios."""
     travel_rad = np.abs(travel(motion.start_q_rad, motion.target_q_rad))
     fractions: Array = travel_rad / travel_rad.max()
     return fractions

@@ -21,8 +21,8 @@ def plan_problems(
 ) -> list[Problem]:
     """Return the problems of a plan: invalid steps, and limits of position, speed, acceleration, payload and clearance.
 
-    Clearance is the distance of the flange and its payload from the arm. `controller` are the controller's own limits,
-    which count if they are narrower than the `model`'s; the lengths are taken from `arm`, else from the drawing.
+    Clearance is the distance of the flange and its payload from the arm. The narrower of the `controller`'s and the
+    `model`'s limits counts. Lengths are those of `arm`, else of the drawing.
     """
     problems = find_step_problems(plan)
     moving = [motion for motion in plan.motions if travels(motion)]

@@ -15,7 +15,7 @@ FIELDBUS = (
 
 
 def describe_early_end(problem: Problem) -> Problem:
-    """Describe a problem of the preparation as a program that was started and ended at once."""
+    """Describe a problem of the preparation: the program was started and ended at once."""
     what = f"the control program on the arm was stopped right after its start ({problem.what})"
     return Problem("program_stopped", what, FIELDBUS)
 
@@ -39,9 +39,9 @@ class Supervision:
         self._limited_since_s: float | None = None
 
     def judge(self, state: ArmState) -> Problem | None:
-        """Return why the arm cannot continue; the safety bits that explain a stopped program may follow a packet later.
+        """Return why the arm cannot continue; the safety bits that explain a stopped program may come one packet later.
 
-        An interruption ends our program: one that runs again a moment later belongs to another client.
+        An interruption ends our program. If one runs again a moment later, it belongs to another client.
         """
         if self.stage is ControlStage.LOOKING:
             return None

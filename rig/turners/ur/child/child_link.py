@@ -82,7 +82,7 @@ class ChildLink:
             thread.start()
 
     def send(self, request: Request) -> None:
-        """Pass a request to the child; if the child has ended, the reader reports it."""
+        """Pass a request to the child; the reader thread reports a child that has ended."""
         with self._sending:
             try:
                 self._pipe.send(request)
@@ -91,7 +91,7 @@ class ChildLink:
 
     @contextmanager
     def patience(self) -> Iterator[None]:
-        """Tolerate a long silence inside the block, in which a constructor of the client blocks the child."""
+        """Accept a long silence inside the block, in which a constructor of the client blocks the child."""
         self._patient = True
         try:
             yield
@@ -106,7 +106,7 @@ class ChildLink:
         return self._ended.is_set()
 
     def close(self) -> None:
-        """End the child and both threads. Stop an arm under control before."""
+        """Stop an arm under control, then end the child and both threads."""
         self._ended.set()
         if self._process.pid is None:
             self._pipe.close()
@@ -121,7 +121,7 @@ class ChildLink:
             self._process.close()
 
     def kill(self) -> None:
-        """End the child by force: the client may hang, and its destructors may block or abort."""
+        """Kill the child: its client may hang, and the client's destructors may block or abort."""
         self._process.kill()
         self._process.join(1.0)
 
@@ -159,7 +159,7 @@ class ChildLink:
         return None
 
     def _say_alive(self) -> None:
-        """Send the child a sign of life without waiting, so that a child that does not read is detected."""
+        """Send a sign of life without waiting: a full pipe shows that the child does not read."""
         if not self._sending.acquire(blocking=False):
             return
         try:
@@ -171,7 +171,7 @@ class ChildLink:
             self._sending.release()
 
     def _give_up(self, name: str, what: str) -> None:
-        """End an unresponsive child: a client that reconnects uploads its script again."""
+        """End an unresponsive child, because its client would upload its script again if it reconnects."""
         self._ended.set()
         self._process.kill()
         self._lose(name, what)
@@ -181,12 +181,12 @@ class ChildLink:
 
 
 def _readable(pipe: "Connection[Request, Message]") -> bool:
-    """Return whether a message waits in the pipe; False if the system cannot tell."""
+    """Return whether a message waits in the pipe; False if the system cannot say."""
     return os.name == "posix" and bool(select.select([pipe.fileno()], [], [], 0)[0])
 
 
 def _writable(pipe: "Connection[Request, Message]") -> bool:
-    """Return whether the pipe takes a message at once; True if the system cannot tell."""
+    """Return whether the pipe takes a message at once; True if the system cannot say."""
     if os.name != "posix":
         return True
     return bool(select.select([], [pipe.fileno()], [], 0)[1])
@@ -194,7 +194,7 @@ def _writable(pipe: "Connection[Request, Message]") -> bool:
 
 @contextmanager
 def _block_interrupts() -> Iterator[None]:
-    """Block Ctrl-C, so that a child started inside never receives it; the parent receives it afterwards."""
+    """Hold back Ctrl-C in the block: a child started there never receives it, the parent afterwards."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows: the child ignores Ctrl-C once it runs
         yield
         return

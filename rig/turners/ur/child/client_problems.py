@@ -29,7 +29,7 @@ def move_failure(what: str) -> Problem:
 
 
 def payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
-    """Describe a payload that the states do not show, for an unknown reason."""
+    """Describe a payload that the arm's states do not show, for an unknown reason."""
     return Problem(
         "payload_not_set",
         f"the controller uses a payload of {reported_kg:g} kg instead of {wanted_kg:g} kg",
@@ -38,12 +38,12 @@ def payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
 
 
 def link_lost(what: str) -> Problem:
-    """Describe a connection over which no state can come any more."""
+    """Describe a connection that delivers no more states."""
     return Problem("arm_link_lost", what, LINK_REMEDY)
 
 
 def payload_changed(ours: StatePacket, theirs: StatePacket) -> Problem:
-    """Describe a payload that another program has set since ours."""
+    """Describe a payload that another program has set after this one."""
 
     def show(packet: StatePacket) -> str:
         centre = ", ".join(f"{1e3 * coordinate_m:.0f}" for coordinate_m in packet.payload_centre_m)

@@ -141,7 +141,7 @@ class _Child:
                 batch.clear()
 
     def _payload_changed(self, packet: StatePacket) -> Problem | None:
-        """Return the problem if another program has set a payload since ours."""
+        """Return the problem if another program has set a payload after this one."""
         ours = self._carried
         if ours is None:
             return None
@@ -166,9 +166,9 @@ class _Child:
             self.abandon()
 
     def watch_parent(self) -> None:
-        """Stop the arm if the parent is silent for too long: it hangs, and the arm is unsupervised.
+        """Stop the arm if the parent is silent for too long: it hangs, and nobody supervises the arm.
 
-        In a thread of its own, because sending states to a parent that does not read them blocks in the end.
+        A thread of its own does this, because sending states to a parent that does not read them blocks in the end.
         """
         while True:
             time.sleep(TICK_S)
@@ -180,7 +180,7 @@ class _Child:
     def watch_move(self) -> NoReturn:
         """Report the end of a move.
 
-        In a thread of its own: the client answers only between the work of its own threads, and heartbeats cannot wait.
+        It has a thread of its own, because the client may take long to answer, and heartbeats cannot wait.
         """
         while True:
             time.sleep(MOVE_POLL_S)
@@ -228,7 +228,7 @@ class _Child:
         return self._await_payload(request.carried.payload_kg)
 
     def _await_payload(self, wanted_kg: float) -> Message:
-        """Wait until the states show the payload; the parent judges everything else in them."""
+        """Wait until the states show the payload; the parent judges everything else in the states."""
         host_s, arm_s = time.monotonic(), self._latest.state.time_s
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
             if (lost := self._link_problem()) is not None:
@@ -241,13 +241,13 @@ class _Child:
         return ControlTaken()
 
     def _link_problem(self, *, silent: bool = False) -> Problem | None:
-        """Return the problem of a lost link, if any, so that its consequences are not reported as the arm's faults."""
+        """Return the problem of a lost link, if any; its consequences would else be reported as the arm's faults."""
         if self._states.problem is not None or not (self._states.closed or silent):
             return self._states.problem
         return link_lost(f"no new state comes from the arm at {self._host}")
 
     def _let_parent_see(self) -> None:
-        """Wait until all states so far have been sent to the parent."""
+        """Wait until the parent has been sent all states so far."""
         beats, began_s = self._beats, time.monotonic()
         while self._beats < beats + 2 and time.monotonic() - began_s < ABANDON_S:
             time.sleep(HEARTBEAT_S)
@@ -267,7 +267,7 @@ class _Child:
             self.send(RequestFailed(move_failure("the controller did not start the move")))
 
     def _await_state(self) -> None:
-        """Wait for another state, because a lost link may be the reason why the move did not begin.
+        """Wait for another state: if none comes, a lost link is the reason why the move did not begin.
 
         Without a state the parent reports the lost link before this wait ends.
         """
@@ -290,8 +290,7 @@ class _Child:
     def abandon(self) -> NoReturn:
         """Stop the arm, which nobody supervises any more, and exit.
 
-        The program is stopped over the controller's ports; only if none confirms it, the arm is braked by the RTDE
-        client.
+        The program is stopped over the controller's ports. If none confirms it, the RTDE client brakes the arm.
         """
         if self._holds_arm:
             # The client's stop may wait forever for a controller that is gone; the system's alarm ends that.
@@ -304,15 +303,15 @@ class _Child:
 
 
 def _leave(status: int) -> NoReturn:
-    """End at once: the client's destructors may block or abort after a lost connection; the system closes sockets."""
+    """Exit at once, because the client's destructors may block or abort; the system closes sockets."""
     sys.stderr.flush()
     os._exit(status)
 
 
 def _outlive_the_parent() -> None:
-    """Ignore signals to the process group, which must not end the process that stops the arm; a closed pipe does.
+    """Ignore signals to the process group, because this process has to stop the arm.
 
-    SIGTERM stops the arm, and SIGALRM ends a stop in `_Child.abandon` that does not return.
+    A closed pipe ends it. SIGTERM stops the arm, and SIGALRM ends a stop in `_Child.abandon` that does not return.
     """
     for number in ENDING_SIGNALS:
         if number not in (signal.SIGTERM, getattr(signal, "SIGALRM", None)):
@@ -322,7 +321,7 @@ def _outlive_the_parent() -> None:
 
 
 def _send_output_to(log: str | None) -> None:
-    """Redirect stdout and stderr to the log: the client prints to both, and stdout is for results."""
+    """Redirect stdout and stderr to the log: the client prints to both, and stdout is reserved for results."""
     sink = os.open(os.devnull, os.O_WRONLY) if log is None else open_to_append(log)
     for stream in (sys.stdout, sys.stderr):
         stream.flush()

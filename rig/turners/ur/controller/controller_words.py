@@ -49,7 +49,7 @@ class ProgramStopped:
 
 
 def decode_message(message: bytes) -> ErrorCode | ProgramException | ProgramStopped | None:
-    """Decode a robot message; return None for one of another kind, or one cut short."""
+    """Decode a robot message; return None for a message of another kind, or an incomplete one."""
     if len(message) < MESSAGE.size:
         return None
     kind, rest = MESSAGE.unpack_from(message)[2], message[MESSAGE.size :]

@@ -44,7 +44,7 @@ class Dashboard:
     def stop_program(self) -> None:
         """Stop the running program, and with it the arm.
 
-        In local control the controller refuses in a sentence. Without a running program it may fail to execute the
+        In local control the controller refuses with a sentence. Without a running program it may fail to execute the
         command, which is not a refusal.
         """
         answer = self.ask("stop")
@@ -61,7 +61,7 @@ class Dashboard:
         return {"true": True, "false": False}.get(self.ask("is in remote control").lower())
 
     def polyscope(self) -> str:
-        """Ask the controller for its software version, and return the answer's text."""
+        """Return the controller's answer to a request for its software version."""
         return self.ask("PolyscopeVersion")
 
     def serial_number(self) -> str:
@@ -69,7 +69,7 @@ class Dashboard:
         return self.ask("get serial number")
 
     def robot_model(self) -> str:
-        """Return the arm's name; an error text from a controller that does not know the command."""
+        """Return the arm's name; a controller that does not know the command returns an error text."""
         return self.ask("get robot model")
 
     def close(self) -> None:

@@ -25,9 +25,10 @@ OWNERS = (
 
 
 def find_free_half(host: str, version: tuple[int, ...], timeout_s: float) -> int | None:
-    """Return the free half, `LOWER` or `UPPER`, at the controller `host` with software `version`, or None.
+    """Return the half of the registers, `LOWER` or `UPPER`, that is free at the controller `host`, or None.
 
-    The query reserves nothing. Raise `OSError` if the controller does not answer within `timeout_s`.
+    `version` is the controller's software. The query reserves nothing. Raise `OSError` if no answer comes within
+    `timeout_s`.
     """
     with socket.create_connection((host, PORT), timeout_s) as connection:
         deadline_s, received = time.monotonic() + timeout_s, bytearray()
@@ -64,7 +65,7 @@ def usable_halves(version: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _await_answer(connection: socket.socket, kind: str, received: bytearray, deadline_s: float) -> bytes:
-    """Return the payload of the next package of a kind, and skip others."""
+    """Return the payload of the next package of a kind; skip packages of other kinds."""
     while True:
         for answer_kind, payload in packages(received):
             if answer_kind == kind:

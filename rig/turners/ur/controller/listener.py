@@ -27,7 +27,8 @@ def is_loopback(host: str) -> bool:
 def find_listener(host: IPv4Address, port: int) -> int | None:
     """Return the id of the process that listens at this host and port.
 
-    None if proc(5) does not show it: on systems other than Linux, for another user's processes, in another container.
+    Return None if proc(5) does not show it: on systems other than Linux, for another user's processes, in another
+    container.
     """
     addresses = {f"{int.from_bytes(ip.packed, 'little'):08X}:{port:04X}" for ip in (host, IPv4Address(0))}
     with suppress(OSError):

@@ -48,7 +48,7 @@ class ArmDescription:
 
     @property
     def complete(self) -> bool:
-        """Whether all expected items are there; the software comes before them, or never."""
+        """Whether all expected items have come; the software comes before all others, or never."""
         return None not in (self.kinematics, self.tcp_offset, self.setup)
 
 
@@ -115,16 +115,13 @@ def _software(message: bytes) -> str | None:
 
 
 def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
-    """Decode the numbers of a payload; return none if it is too short or a value is impossible."""
+    """Decode the numbers of a payload; return an empty tuple if it is too short or a value is impossible."""
     values = layout.unpack_from(payload) if len(payload) >= layout.size else ()
     return values if all(isinstance(value, int) or abs(value) <= VALUE_MAX for value in values) else ()
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
-    """Remove complete packages from the start of `buffer` and yield them.
-
-    Raise `ConnectionError` for bytes that are no package.
-    """
+    """Yield complete packages and remove them from the start of `buffer`. Raise `ConnectionError` for other bytes."""
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if not HEADER.size <= size <= SIZE_MAX:

@@ -55,7 +55,7 @@ class RobotApi:
     def request(self, method: str, path: str, order: Mapping[str, str] | None = None) -> tuple[int, bytes]:
         """Send a request and return status and body of the answer; follow redirections on the same controller.
 
-        Raise `OSError` and `HTTPException` if none comes.
+        Raise `OSError` and `HTTPException` if no answer comes.
         """
         body = None if order is None else json.dumps(order)
         headers = {"Accept": "application/json", **({} if body is None else {"Content-Type": "application/json"})}
@@ -95,11 +95,11 @@ class RobotApiStop:
             self.refusal = " ".join(filter(None, (f"HTTP status {status}", _message(body))))
 
     def program_running(self) -> bool:
-        """Raise `ConnectionError`: the Robot API is not queried for programs."""
+        """Raise `ConnectionError`, because the Robot API is not asked about programs."""
         raise ConnectionError("the Robot API is not asked")
 
     def close(self) -> None:
-        """Return at once: every exchange has closed its connection."""
+        """Do nothing, because every exchange closes its own connection."""
 
 
 def _message(body: bytes) -> str:

@@ -14,10 +14,7 @@ def package(kind: str, payload: bytes) -> bytes:
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[str, bytes]]:
-    """Remove complete packages from the start of `buffer` and yield them.
-
-    Raise `ConnectionError` for bytes that are no package.
-    """
+    """Yield complete packages and remove them from the start of `buffer`. Raise `ConnectionError` for other bytes."""
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if size < HEADER.size:

@@ -118,10 +118,11 @@ class StateStream:
         return self._first
 
     def read(self, timeout_s: float) -> list[StatePacket]:
-        """Return the packets received, oldest first; wait at most `timeout_s` for the first. Empty once `closed`.
+        """Return the packets received, oldest first; wait at most `timeout_s` for the first one.
 
-        An impossible state or time is omitted and becomes the stream's `problem`. An impossible state also closes the
-        stream; after a step of the clock the states continue, because they still show whether the arm stands.
+        Once `closed`, there are none. A packet with an impossible state or time is omitted and becomes the stream's
+        `problem`. An impossible state also closes the stream. After a step of the clock the states continue, because
+        they still show whether the arm stands.
         """
         looked_s = time.monotonic()
         if self.closed:
@@ -169,9 +170,9 @@ class StateStream:
 
     @property
     def _missed_s(self) -> float:
-        """The greatest time, s of the controller's clock, in which recent silences may have lost states.
+        """The longest time, s of the controller's clock, for which recent silences may have lost states.
 
-        A local controller sets its own pace, and nothing between it and this process can lose states.
+        A local controller's connection loses none, unless it was silent for `SILENT_S`: then any number.
         """
         if self._is_remote:
             return CLOCKS_DIFFER * self._gap_s
@@ -194,7 +195,7 @@ class StateStream:
             raise ConnectionError("it does not start to send")
 
     def _ask(self, kind: str, payload: bytes) -> bytes:
-        """Send a request and return its answer; skip messages in between."""
+        """Send a request and return its answer; skip messages that come before it."""
         self._socket.sendall(package(kind, payload))
         while True:
             self._await_bytes()

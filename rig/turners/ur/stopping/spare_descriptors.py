@@ -12,7 +12,7 @@ class SpareDescriptors:
         self._descriptors: list[int] = []
 
     def keep(self) -> None:
-        """Reserve the descriptors. Raise OSError if none are available."""
+        """Reserve the descriptors. Raise OSError if the system has none left."""
         try:
             while len(self._descriptors) < SPARE:
                 self._descriptors.append(os.open(os.devnull, os.O_RDONLY))

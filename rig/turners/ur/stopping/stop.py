@@ -36,20 +36,20 @@ class StopOrder:
             threading.Thread(target=self._give, args=(path,), name=f"arm stop by {path.name}", daemon=True).start()
 
     def await_delivery(self) -> bool:
-        """Wait, at most the order's time, until it is delivered or has failed on every path; return whether that is so.
+        """Wait until every path has delivered the order or failed; return whether that happened in the order's time.
 
-        A later delivery would end a program that is started meanwhile.
+        A delivery after that would end a program that is started meanwhile.
         """
         with self._changed:
             return self._changed.wait_for(lambda: not self._pending, max(0.0, self._remaining_s))
 
     def await_answers(self, timeout_s: float) -> None:
-        """Wait, at most `timeout_s`, until every path has answered the order, which may come after its delivery."""
+        """Wait at most `timeout_s` for every path's answer to the order, which may come after its delivery."""
         with self._changed:
             self._changed.wait_for(lambda: not self._unanswered, timeout_s)
 
     def await_program_end(self) -> bool:
-        """Wait, within the order's time, for a report that the program has ended; return whether one came."""
+        """Wait for a report that the program has ended; return whether one came in the order's time."""
         with self._changed:
             self._changed.wait_for(lambda: self._ended or not self._active, max(0.0, self._remaining_s))
         self.await_delivery()
@@ -85,7 +85,7 @@ class StopOrder:
             self._remove(path, self._pending, self._active, self._unanswered)
 
     def _note(self, path: StopPath, result: StopConnection | OSError) -> None:
-        """Record a path's answer; an error after an answer does not replace it."""
+        """Record a path's answer; an error that follows an answer does not replace it."""
         with self._changed:
             if isinstance(result, OSError):
                 if path.name in self._pending:
@@ -105,7 +105,7 @@ class StopOrder:
             self._changed.notify_all()
 
     def _ask(self, path: StopPath, connection: StopConnection) -> None:
-        """Poll until the program has ended, and at least until the path has answered the order."""
+        """Poll until the program has ended and the path has answered the order."""
         looks = 0
         while connection.tells_of_programs and self._remaining_s > 0.0:
             running = connection.program_running()

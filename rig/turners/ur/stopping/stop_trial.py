@@ -42,7 +42,7 @@ def stop_trial(host: str, api: RobotApi, shows: Callable[[RuntimeState, float], 
 
 
 def _has_ended_at_once(primary: PrimaryStop) -> bool:
-    """Return whether the controller reports the end of a program that no state showed running."""
+    """Return whether the controller reports the end of a program that no state showed as running."""
     with suppress(OSError):
         primary.program_running()
     return NAME in primary.stopped_programs
