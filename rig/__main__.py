@@ -8,7 +8,7 @@ from typing import Any
 
 
 def main() -> int:
-    """Run `rig` as `rig.cli.main` does; a Ctrl-C gives one line from the first moment on."""
+    """Run `rig` as `rig.cli.main` does; from the first moment on, Ctrl-C prints one line."""
     signal.signal(signal.SIGINT, _end)  # until `rig.cli.run_guarded` installs its own
     from rig.cli import main as command
     from rig.errors import INTERRUPTED
@@ -22,7 +22,7 @@ def main() -> int:
 
 
 def _end(*_: Any) -> None:
-    """End at once: while modules are loaded nothing has begun, and an exception would print a traceback."""
+    """Exit at once: while modules are loaded nothing has begun, and an exception would print a traceback."""
     with suppress(OSError):
         os.write(2, b"rig: interrupted\n")
     os._exit(130)  # `rig.errors.INTERRUPTED`, which may not be loaded yet

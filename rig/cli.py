@@ -235,7 +235,7 @@ def _first_steps() -> int:
 
 
 def _carry_out(name: str | None, command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
-    """Carry out a command; its first line of progress is printed before its modules are loaded."""
+    """Carry out a command. Its first line of progress is printed before its modules are loaded."""
     if name is not None and COMMANDS[name].waits_for:
         say_on_terminal(COMMANDS[name].waits_for)
     return command(options)
@@ -281,13 +281,13 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose error is one line before the usage, with the choices that may have been meant."""
 
     def error(self, message: str) -> NoReturn:
-        """Print the error, the usage of the command and the way to help; end with status 2."""
+        """Print the error, the command's usage and how to get help; exit with status 2."""
         usage = self.format_usage()
         self.exit(2, f"{self.prog}: error: {_suggest_choice(message)}\n{usage}more: {self.prog} --help\n")
 
 
 def _suggest_choice(message: str) -> str:
-    """Return a message of argparse about a wrong choice as a sentence, with the nearest of the choices."""
+    """Return argparse's message on a wrong choice as a sentence, with the nearest valid choice."""
     wrong = re.fullmatch(r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)", message)
     if wrong is None:
         return message
@@ -301,7 +301,7 @@ def _suggest_choice(message: str) -> str:
 
 
 def _build_parser(meant: str | None) -> argparse.ArgumentParser:
-    """Return a parser of all commands; only the `meant` one has its arguments."""
+    """Return a parser of all commands; only the one called `meant` has its arguments."""
     parser = _Parser(prog="rig", description="Calibrate inertial sensors on a robot arm, a servomotor or by hand.")
     parser.add_argument("--version", action="version", version=f"rig {VERSION}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")

@@ -101,10 +101,7 @@ def is_incomplete(columns: Mapping[str, Any]) -> bool:
 
 
 def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]:
-    """Return all numbers (n, k) of a table, NaN in columns without any, and its times (n,) or None.
-
-    Times are in the unit of their column.
-    """
+    """Return all numbers (n, k) of a table, NaN where missing, and times (n,) in their column's unit or None."""
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
     columns = {f"column_{index}": (str(index + 1), 1.0) for index in layout.numbers if index != layout.time}
     if layout.time is not None:

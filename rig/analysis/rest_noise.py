@@ -73,10 +73,7 @@ def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
 
 
 def log_at_rest(samples: Samples) -> SensorAtRest:
-    """Return the noise of a sensor that was at rest during a whole log of another program.
-
-    Raise Fault `not_at_rest`.
-    """
+    """Return the noise of a sensor at rest during a whole log of another program. Raise Fault `not_at_rest`."""
     for quantity, readings in samples.readings.items():
         check_at_rest(samples.time_s, readings, quantity)
     sampling = samples.sampling or find_sampling(samples.time_s)

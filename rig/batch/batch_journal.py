@@ -39,10 +39,7 @@ class Journal:
         self._path = self.folder / JOURNAL
 
     def enter(self, entry: Entry) -> None:
-        """Write an entry to the disk before returning.
-
-        Raise ValueError for an entry that cannot follow the last entry.
-        """
+        """Write an entry to the disk before returning. Raise ValueError if it cannot follow the last entry."""
         self.batch = after(self.batch, entry)
         _append(self._path, entry)
 
@@ -50,7 +47,7 @@ class Journal:
 def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
     """Continue or begin the batch in the folder `out`; without `out` begin one in a new folder below `parent`.
 
-    Raise Refused `run_folder` and as `resume_journal`; `no_batch` if one is measured and the other simulated.
+    Raise Refused `run_folder`, and as `resume_journal` does; `no_batch` if one is measured and the other simulated.
     """
     if out is not None and (out / JOURNAL).exists():
         journal = resume_journal(out)
@@ -68,10 +65,7 @@ def open_journal(out: Path | None, parent: Path, entry: Begun) -> Journal:
 
 
 def resume_journal(folder: Path) -> Journal:
-    """Return the journal in `folder`; an incomplete line at its end is cut off.
-
-    Raise Refused `no_batch`, and as `refuse_links`.
-    """
+    """Return the journal in `folder` without an incomplete last line. Raise Refused `no_batch`, as `refuse_links`."""
     path = folder / JOURNAL
     try:
         text = read_regular_file(path, LARGEST_BYTES, follow_links=False)

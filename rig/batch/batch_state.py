@@ -41,7 +41,7 @@ class Chip:
     who_am_i: tuple[int, ...] = ()
 
     def is_that(self, other: "Chip") -> bool:
-        """Return whether both are the same; sensors that were not read do not count."""
+        """Return whether both are the same, by the sensors that were read."""
         both_read = self.who_am_i and other.who_am_i
         return self.board == other.board and (not both_read or self.who_am_i == other.who_am_i)
 
@@ -108,7 +108,7 @@ class Batch:
         return self.parts[-1] if self.parts and self.parts[-1].ended is None else None
 
     def count(self, *states: str) -> int:
-        """Return the number of parts whose state is one of `states`."""
+        """Return the number of parts in any of `states`."""
         return sum(part.state in states for part in self.parts)
 
     @property
@@ -118,11 +118,11 @@ class Batch:
         return all(part is not None and part.state == "pass" for part in newest)
 
     def done(self, serial: str) -> BatchPart | None:
-        """Return the newest run of the serial number that has a verdict."""
+        """Return the newest run of the serial number with a verdict, or None."""
         return next((part for part in reversed(self.parts) if part.serial == serial and _has_verdict(part)), None)
 
     def same_chip(self, chip: Chip, serial: str) -> BatchPart | None:
-        """Return the part of another serial number that had this chip and has a verdict."""
+        """Return the part of another serial number with this chip and a verdict, or None."""
         for part in reversed(self.parts):
             earlier = part.ended.chip if part.ended is not None and _has_verdict(part) else None
             if part.serial != serial and earlier is not None and earlier.is_that(chip):
@@ -130,12 +130,12 @@ class Batch:
         return None
 
     def folder_of(self, serial: str) -> str:
-        """Return a folder's name for the next part: its number, and its serial number as a file system permits it."""
+        """Return a folder's name for the next part: its number, and its serial number without forbidden letters."""
         return f"{len(self.parts) + 1:02d}-{re.sub(r'[^A-Za-z0-9._-]', '_', serial)}"
 
 
 def state_of(entries: Iterable[Entry]) -> Batch:
-    """Return the batch of a journal's entries. Raise ValueError if they form none."""
+    """Return the batch that a journal's entries describe. Raise ValueError if they describe none."""
     batch: Batch | None = None
     for entry in entries:
         batch = after(batch, entry)
@@ -169,7 +169,7 @@ class Doubt:
 
 
 def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable[[str], str | None]) -> Doubt | None:
-    """Return the objection to running that number now; `today` describes a run of today in the history."""
+    """Return the objection to running that number now, or None; `today` describes a run of today in the history."""
     try:
         check_serial_number(serial)
     except ValueError as error:

@@ -41,7 +41,7 @@ def files_of(label: Label) -> Mapping[str, bytes]:
 
 
 def text(label: Label) -> str:
-    """Return the label for any printer, with the QR code in half blocks. Raise Refused `missing_extra`."""
+    """Return the label for any printer; half blocks form the QR code. Raise Refused `missing_extra`."""
     from io import StringIO
 
     drawn = StringIO()
@@ -69,7 +69,7 @@ def qr_svg(content: str) -> bytes:
 
 
 def refuse_without_library() -> None:
-    """Raise Refused `missing_extra`, before anything has moved, if labels cannot be made."""
+    """Raise Refused `missing_extra`, before anything moves, if labels cannot be made."""
     _qr("")
 
 

@@ -53,12 +53,12 @@ class Question:
         return CHOICES[self.kind]
 
     def meaning(self, answer: str) -> bool | None:
-        """Return True for yes and False for no; None if the text is not an answer to this question."""
+        """Return True for yes and False for no; None if the text does not answer this question."""
         typed = answer.lower()
         return next((choice.yes for choice in self.choices if typed in choice.words), None)
 
     def after_no_answer(self, answer: str) -> "Question":
-        """Return the question to ask again after something that did not answer it."""
+        """Return the question with a hint, to be asked again after an invalid answer."""
         expected = " or ".join(choice.words[0] or "Enter" for choice in self.choices) or "a serial number"
         return replace(self, hint=f'"{answer}" does not answer this question: {expected}')
 
@@ -73,7 +73,7 @@ class Terminal:
     """The keyboard of the terminal. A scanner is a keyboard that ends each number with Enter."""
 
     def answer(self, question: Question) -> str | None:
-        """Return the text typed after the question: earlier input does not answer it. None if the terminal has gone."""
+        """Return the text typed after the question, ignoring earlier input; None if the terminal has gone."""
         forget_what_was_typed()
         for line in (question.hint,) if question.hint else question.lines:
             print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
@@ -106,7 +106,7 @@ class Operator:
         return self.numbers is not None
 
     def next_part(self, done: Sequence[BatchPart], why: str = "") -> str | None:
-        """Return the next serial number, from the list or typed; `why` explains the refusal of the last number."""
+        """Return the next serial number, from the list or typed; `why` is the reason if the last was refused."""
         if self.numbers is not None:
             return following(self.numbers, [part.serial for part in done])
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"
@@ -127,11 +127,11 @@ class Operator:
             return self._agrees("doubt", "Continue anyway? yes or no:", f"{doubt.why}.")
 
     def tries_again(self, part: BatchPart, error: RigError) -> bool:
-        """Ask whether a part that was refused, or ended in a fault, is tried again; "no" puts it aside."""
+        """Ask whether to try a part again that was refused or ended in a fault; "no" puts it aside."""
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Ask whether the announced run may start; an operator who cannot answer has agreed in advance."""
+        """Ask whether the announced run may start. An operator who cannot be asked has agreed in advance."""
         if to_do == Prompt(()).to_do:
             return self.voice is None or self._agrees("go", f"Type go to {to_do}:", *announcement)
         return self.voice is None or self._agrees("doubt", f"Type yes to {to_do}, or no:", *announcement)
@@ -150,7 +150,7 @@ class Operator:
         return nullcontext() if self.voice is None else self.asking(what)
 
     def _agrees(self, kind: Kind, text: str, *lines: str) -> bool:
-        """Ask until an answer is one of the question's own; no if the operator has left, or without a voice."""
+        """Ask until an answer is valid. Without a voice, or if the operator has left, the answer is no."""
         question = Question(kind, text, lines)
         while (answer := self._answer(question)) is not None:
             if (yes := question.meaning(answer)) is not None:
@@ -163,7 +163,7 @@ class Operator:
 
 
 def refuse_without_terminal() -> None:
-    """Raise Refused `not_confirmed` if there is no one to ask."""
+    """Raise Refused `not_confirmed` if nobody can be asked."""
     if not sys.stdin.isatty():
         raise Refused(
             "not_confirmed",

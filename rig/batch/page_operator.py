@@ -52,7 +52,7 @@ class OnPage:
                 self._sections.put(asked=None)
 
     def takes(self, number: int, text: str) -> bool:
-        """Take the answer to the question of that number; return False if it is not open any more."""
+        """Take the answer to the question of that number; return False if that question is closed."""
         with self._changed:
             if not self._open or number != self._number:
                 return False
@@ -88,7 +88,7 @@ class OnPage:
 
 @contextmanager
 def on_page(present: Present, address: PageAddress) -> Iterator[tuple[OnPage, str]]:
-    """Open the page that shows `present` during the `with` block; yield the page and its URL.
+    """Open the page that shows `present` during the block; yield the page and its URL.
 
     Its last state shows how the station ended. Raise Refused `page_address`.
     """

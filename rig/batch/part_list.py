@@ -12,10 +12,7 @@ HEADING = "serial_number"
 
 
 def numbers_in(path: Path) -> tuple[str, ...]:
-    """Return the serial numbers in a CSV file: its column `serial_number`, else the first cell of each line.
-
-    Raise Refused `parts_file`.
-    """
+    """Return the serial numbers in a CSV file's column `serial_number`, or first one. Raise Refused `parts_file`."""
     try:
         text = read_regular_file(path, LARGEST_BYTES).decode("utf-8-sig")
         rows = [row for row in csv.reader(text.splitlines()) if any(cell.strip() for cell in row)]
@@ -39,7 +36,7 @@ def _unfit(path: Path, why: str) -> Refused:
 
 
 def following(numbers: Sequence[str], done: Sequence[str]) -> str | None:
-    """Return the first serial number that is not done yet, None if all are done. Raise Refused `another_series`."""
+    """Return the first serial number that is not done yet; None if all are done. Raise Refused `another_series`."""
     if tuple(done) != tuple(numbers[: len(done)]):
         raise Refused(
             "another_series",

@@ -36,11 +36,11 @@ class Bench(Protocol):
     def simulated(self) -> bool: ...
 
     def today(self, serial: str) -> str | None:
-        """Return a history's run of that number today, in words; None without one."""
+        """Describe the history's run of that number today; None if there is none."""
         ...
 
     def known_as(self, chip: Chip, serial: str) -> str | None:
-        """Return another serial number under which the history has the chip, or None."""
+        """Return another serial number that the history has for the chip, or None."""
         ...
 
     def fit(self, serial: str) -> None:
@@ -60,7 +60,7 @@ class Desk:
     part: BatchPart
 
     def agrees(self, announcement: Sequence[str], to_do: str, chip: Chip | None) -> bool:
-        """Return whether the run may do that. Raise Refused `same_chip`."""
+        """Return whether the run may do `to_do`. Raise Refused `same_chip`."""
         if chip is not None:
             self.work.refuse_same_chip(self.part, chip)
         return self.work.operator.agrees(announcement, to_do)
@@ -77,10 +77,7 @@ class Work:
     notify: Callable[[Batch], None] = lambda batch: None
 
     def all_parts(self) -> None:
-        """Run one part after the other, until the operator or the list ends.
-
-        Raise Fault if a question stays unanswered.
-        """
+        """Run one part after the other, until operator or list ends. Raise Fault if a question gets no answer."""
         self._write_table()
         self.notify(self.journal.batch)
         while True:

@@ -89,7 +89,7 @@ class Present:
 
     @contextmanager
     def asking(self, what: str) -> Iterator[None]:
-        """Show that the operator is asked between two runs, for the length of the `with` block."""
+        """Show during the block that the operator is asked between two runs."""
         self._becomes(replace(self.now, state="asking", doing=what, left_s=None))
         yield
         self._becomes(replace(self.now, state="checking" if self.now.part else "waiting", doing=""))
@@ -127,7 +127,7 @@ def update_by_batch(now: Now, batch: Batch) -> Now:
 
 
 def last(now: Now) -> Now:
-    """Return the last state: a batch that has not ended, by itself or by a fault, has stopped."""
+    """Return the last state. A batch that has not ended, by itself or by a fault, becomes stopped."""
     return replace(now, state=now.state if now.state in ENDINGS else "stopped", left_s=None, over=True)
 
 

@@ -9,7 +9,7 @@ ASK_AGAIN_S = 0.1
 
 
 def follows_crystal(board: Board) -> bool:
-    """Wait until the board's clock is locked to its crystal, at most the start-up time; return whether it is locked.
+    """Wait, at most the start-up time, until the board's clock follows its crystal; return whether it does.
 
     Raise as `Board.status` does.
     """

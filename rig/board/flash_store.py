@@ -54,7 +54,7 @@ def store_calibrations(
 def calibration_of(solved: SensorSolution, entry: OverTemperatureEntry | None = None) -> Calibration:
     """Return a sensor's solution as a record for the board, with the present time.
 
-    It includes the polynomials if `entry` is a calibration over temperature. Raise Refused `not_in_result` if the
+    If `entry` is a calibration over temperature, the record has its polynomials. Raise Refused `not_in_result` if the
     temperature is missing.
     """
     if solved.temperature_c is None:

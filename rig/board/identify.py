@@ -40,7 +40,7 @@ def refuse_other_firmware(identity: BoardIdentity) -> None:
 
 
 def sensor_entry(identity: BoardIdentity, name: str, section: ConfiguredSensor) -> SensorInfo:
-    """Return the board's entry for a configured sensor, whichever part answers. Raise Refused `sensor_missing`."""
+    """Return the board's entry for a configured sensor, even of another part. Raise Refused `sensor_missing`."""
     for info in identity.sensors:
         if spell_part(info.part) == section.part:
             return info
@@ -95,7 +95,7 @@ def read_stored_calibration(board: Board, name: str, section: SensorSection) -> 
 def refuse_other_sensor(
     calibration: str, part: str, serial_number: str, range_deg_s: float, section: SensorSection
 ) -> None:
-    """Raise Refused `another_sensor`, `another_range` unless a calibration fits the configured sensor and its range.
+    """Raise Refused `another_sensor`, `another_range` if a calibration does not fit the configured sensor.
 
     `calibration` names the calibration in the message; it was made for `part`, `serial_number` and `range_deg_s`.
     """
@@ -115,6 +115,6 @@ def refuse_other_sensor(
 
 
 def spell_part(part: str) -> str:
-    """Return a part's name in the configuration's spelling; the board spells it as its maker does."""
+    """Return a part's name in the configuration's spelling; the board uses the maker's."""
     names = {part_on_board.name: name for name, part_on_board in BOARD_PARTS.items()}
     return names.get(part, part.lower())

@@ -33,7 +33,7 @@ def add_script(parser: ArgumentParser) -> None:
 def add_run(
     parser: _ActionsContainer, name: str, text: str, *, metavar: str = "RUN", nargs: str | None = None, **more: Any
 ) -> None:
-    """Add an argument that is a run; `latest` is this user's last one."""
+    """Add an argument that names a run; `latest` is this user's last one."""
     text += "; latest: your last one"
     action = parser.add_argument(name, type=_parse_run, metavar=metavar, nargs=nargs, help=text, **more)
     action.completer = _complete_runs  # type: ignore[attr-defined]  # as argcomplete asks for it
@@ -69,7 +69,7 @@ def add_columns(parser: _ActionsContainer) -> None:
 
 
 def read_column_map(path: Path | None) -> "ColumnMap":
-    """Return the map that `--columns` names, an empty one if none is given. Raise Refused as `load_as`."""
+    """Return the map that `--columns` names; an empty one without the option. Raise Refused as `load_as` does."""
     from rig.config.column_map import AS_NAMED, ColumnMap
     from rig.config.load import load_as
 
@@ -77,7 +77,7 @@ def read_column_map(path: Path | None) -> "ColumnMap":
 
 
 def find_logs(path: Path) -> list[Path]:
-    """Return a path that names a log of another program, or the logs in a folder of `rig record`; none for a run."""
+    """Return a log of another program by its path, or the logs in a folder of `rig record`; none for a run."""
     from rig.observation.formats.sample_files import is_in_format, whole
 
     if is_in_format(path):

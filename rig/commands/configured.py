@@ -28,7 +28,7 @@ def load_configured(
 ) -> Configured:
     """Load a configuration; a `script` (a file, or loaded) replaces the procedure that it names.
 
-    Raise Refused as `load`, `installed`, `load_script` and `first_phase`; also `script_failed`.
+    Raise Refused as `load`, `installed`, `load_script` and `first_phase` do; also `script_failed`.
     """
     if isinstance(script, Path):
         script = load_script(script)
@@ -45,7 +45,7 @@ def load_configured(
 
 
 def change_configured(configured: Configured, overrides: Sequence[str]) -> Configured:
-    """Change values of a configuration, given as `load` takes them. Raise Refused as `load_configured`."""
+    """Change values of a configuration, given as for `load`. Raise Refused as `load_configured` does."""
     procedures: Procedures = {**installed(), configured.script.procedure.name: configured.script.procedure}
     with script_errors(f"the section of {configured.script.name} fails"):
         loaded = parse(configured.loaded.text, "configuration", overrides, sections(procedures), turners.sections())
@@ -56,7 +56,7 @@ def change_configured(configured: Configured, overrides: Sequence[str]) -> Confi
 def open_configured(
     config_path: Path, overrides: Sequence[str] = (), script: ScriptFile | Path | None = None
 ) -> Iterator[Configured]:
-    """Load as `load_configured`; for the length of the block the simulated laboratory has an address of its own."""
+    """Load as `load_configured` does; in the block a simulated laboratory has an address of its own."""
     configured = load_configured(config_path, overrides, script)
     with find_own_address(configured.loaded.config, configured.loaded.laboratory) as moved:
         yield load_configured(config_path, [*overrides, *moved], script and configured.script) if moved else configured

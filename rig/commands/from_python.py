@@ -95,7 +95,7 @@ def write_certificate(
 ) -> list[Path]:
     """Write the certificate of a finished run again, as `rig report` does, and print the file names.
 
-    HTML always; a PDF and the digital certificate (XML) if wanted. `changes` replace entries on it:
+    HTML is always written; a PDF and the digital certificate (XML) on request. `changes` replace entries on it:
     `{"certificate.customer": "Example"}`. `out` is a folder, by default the run's; `history` is the history that notes
     the certificate, by default the user's own. Return the files. Raise Refused as `rig report` does.
     """
@@ -129,14 +129,14 @@ def export(
 
 
 def _parse(command: str, add: Callable[[ArgumentParser], None], words: Sequence[str], about: str | Path) -> Namespace:
-    """Parse `words` as the command line does, so that every omitted argument has the command's default."""
+    """Parse `words` as the command line does, so that omitted arguments get the command's defaults."""
     parser = ArgumentParser(prog=f"rig {command}")
     add(parser)
     return parser.parse_args([*words, "--", str(about)])
 
 
 def _set_words(changes: Changes | None) -> list[str]:
-    """Return `--set` for each change, its value as one line of YAML. Raise Refused `bad_option` if it has none."""
+    """Return `--set` for each change, with its value in one line of YAML. Raise Refused `bad_option`."""
     words = []
     for path, value in (changes or {}).items():
         try:

@@ -83,7 +83,7 @@ def add_page_address(parser: argparse.ArgumentParser) -> None:
 
 
 def read_page_token(options: argparse.Namespace) -> str | None:
-    """Return the page's token if one is given: by the command line, a file or the environment.
+    """Return the page's token, given by the command line, a file or the environment, if any.
 
     Raise Refused `page_address` for a file that cannot be read, or that others can read.
     """
@@ -104,7 +104,7 @@ def read_page_token(options: argparse.Namespace) -> str | None:
 
 
 def read_page_wish(options: argparse.Namespace) -> PageWish | None:
-    """Return the page that the arguments ask for, None for no page.
+    """Return the page that the arguments request; None for no page.
 
     Raise Refused `page_address` for an unusable address, and for options that need `--page`.
     """
@@ -123,10 +123,7 @@ def read_page_wish(options: argparse.Namespace) -> PageWish | None:
 def serve_operators_page(
     wanted: PageWish | None, folder: Path, about: "Callable[[], About]"
 ) -> Iterator[OperatorsPage]:
-    """Serve the page of a run in `folder` for the length of the block; without a wish it does nothing.
-
-    Raise Refused `page_address`.
-    """
+    """Serve the page of a run in `folder` during the block, if requested. Raise Refused `page_address`."""
     if wanted is None:
         yield OperatorsPage()
         return
@@ -153,7 +150,7 @@ def serve_operators_page(
 
 
 class _Address:
-    """A listener that prints the page's address once the page stays: most refusals end a run and its page before."""
+    """A listener that prints the page's address after the pre-flight, because most refusals come before that."""
 
     def __init__(self, url: str) -> None:
         self._url: str | None = url
@@ -168,7 +165,7 @@ class _Address:
 
 
 def stay_for_the_operator() -> None:
-    """Keep the page with its verdict until Ctrl-C if an operator sits at the terminal; a script goes on."""
+    """Keep the page with its verdict until Ctrl-C if there is a terminal; otherwise return at once."""
     if sys.stdin is not None and sys.stdin.isatty():
         say("The page stays until Ctrl-C.", sys.stderr)
         wait_for_interrupt()

@@ -10,7 +10,7 @@ from rig.errors.extras import requiring
 
 @contextmanager
 def refuse_unwritable(folder: Path, option: str = "--out") -> Iterator[None]:
-    """Raise Refused `report_folder` if the `with` block cannot write; `option` chooses another folder."""
+    """Raise Refused `report_folder` if the block cannot write; `option` chooses another folder."""
     try:
         yield
     except OSError as error:
@@ -20,7 +20,7 @@ def refuse_unwritable(folder: Path, option: str = "--out") -> Iterator[None]:
 
 
 def draw_into(folder: Path, draw: Callable[[Path], list[Path]], option: str) -> list[Path]:
-    """Draw into a folder and return the files. Raise Refused `missing_extra`, and as `refuse_unwritable`."""
+    """Draw into a folder and return the files. Raise Refused `missing_extra`, and as `refuse_unwritable` does."""
     with requiring("study"):
         import matplotlib  # noqa: F401
     with refuse_unwritable(folder, option):

@@ -42,7 +42,7 @@ class _Unbroken:
 
 
 def output_lost() -> OSError | None:
-    """Return why stdout has lost output since the last call; None if it has lost none."""
+    """Return why stdout has lost output since the last call; None if it lost none."""
     stream = sys.stdout
     if not isinstance(stream, _Unbroken):
         return None
@@ -52,10 +52,7 @@ def output_lost() -> OSError | None:
 
 
 def say_where_the_result_is(result: Path) -> None:
-    """If stdout has lost output, print on stderr that `path` holds the complete result.
-
-    The exit status of the run thus stays the same.
-    """
+    """Print on stderr that `path` has the complete result, if stdout has lost output; keep the exit status."""
     from rig.station.plain_text import say
 
     if (lost := output_lost()) is not None:
@@ -67,7 +64,7 @@ def keep_streams_usable() -> None:
     """Make stdin, stdout and stderr usable in any state: closed, a pipe without a reader, a closed terminal.
 
     Neither a lost stdout nor a lost stderr ends the work. A lost stderr carries only progress. A full disk under stdout
-    loses results: see `output_lost`. A reader that has gone away (`rig plan … | head`) has read all that it wanted.
+    loses results: see `output_lost`. A reader that has gone away (`rig plan … | head`) has read all that it needs.
     """
     # A closed descriptor would go to the next file opened, and stray output into that file.
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):

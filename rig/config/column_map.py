@@ -47,7 +47,7 @@ class ColumnSection(Section):
     @field_validator("unit")
     @classmethod
     def refuse_unknown_unit(cls, value: str | None) -> str | None:
-        """Refuse a unit that is not in the table, as nothing can be converted from it."""
+        """Refuse a unit that is not in the table, because its conversion is unknown."""
         if value is not None and value not in ALLOWED:
             raise ValueError(f"this unit is not known; allowed: {', '.join(ALLOWED)}")
         return value
@@ -55,7 +55,7 @@ class ColumnSection(Section):
     @field_validator("factor", "lsb_per_unit")
     @classmethod
     def refuse_zero(cls, value: float | None) -> float | None:
-        """Refuse zero, and numbers that no unit of a sensor can have."""
+        """Refuse zero, and numbers that no unit of a sensor can have as its size."""
         if value is not None and not LEAST_FACTOR < abs(value) < 1 / LEAST_FACTOR:
             raise ValueError(f"must be between {LEAST_FACTOR:g} and {1 / LEAST_FACTOR:g}, of either sign")
         return value
@@ -103,7 +103,7 @@ class TableSection(Section):
 
     @model_validator(mode="after")
     def require_rates_of_all_axes(self) -> Self:
-        """Refuse rates of only some axes: the item's rate needs the rates of all axes."""
+        """Refuse rates of only some axes, because the item's rate needs those of all."""
         _fit("time", self.time, TIME)
         if any(column.unit is None for axis in self.axes for column in (self.time, axis.angle, axis.rate) if column):
             raise ValueError("say the unit of every column of a table")
@@ -137,7 +137,7 @@ class ColumnMap(Section):
 
     @model_validator(mode="after")
     def check_combination(self) -> Self:
-        """Refuse a column if its unit and the unit in its name are of different quantities."""
+        """Refuse a column whose stated unit contradicts the unit in its name."""
         for section, rate_hz in ((self.samples, self.samples_rate_hz), (self.motion, self.motion_rate_hz)):
             for name, column in section.items():
                 _fit(name, column, next((what for suffix, what in SUFFIXES if name.endswith(suffix)), NUMBER))

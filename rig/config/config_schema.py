@@ -28,7 +28,7 @@ SHORTEST_SECTION = {"type": OBJECT, "properties": {"target_uncertainty": {"$ref"
 
 
 def config_schema() -> dict[str, Any]:
-    """Return the schema of a whole file, with the procedure and the turner by the names that choose them."""
+    """Return the schema of a whole file; the procedure's and the turner's names select their keys."""
     models: tuple[type[BaseModel], ...] = (
         RigConfig,
         WorldSection,
@@ -73,14 +73,14 @@ def _section(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _with_kind(section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the schema of a turner, which has its kind beside the keys of its section."""
+    """Return the schema of a turner, with its kind next to the keys of its section."""
     return {**section, "properties": {"kind": {"type": "string"}, **section["properties"]}}
 
 
 def _chosen(key: str, sections: Mapping[str, Mapping[str, Any]], text: str) -> dict[str, Any]:
     """Return the schema of a section whose keys depend on the value of one key.
 
-    With an unknown value of that key all other keys are allowed.
+    If that value is unknown, all other keys are allowed.
     """
     names = {"anyOf": [{"enum": [*sections]}, {"type": "string"}], "description": f"one of {', '.join(sections)}"}
     branches = [
@@ -91,7 +91,7 @@ def _chosen(key: str, sections: Mapping[str, Mapping[str, Any]], text: str) -> d
 
 
 def _as_written(schema: Any) -> Any:
-    """Return a model's schema for files: no key is required, null omits a key, text may be a number."""
+    """Return a model's schema for files: all keys are optional, null omits a key, text may be a number."""
     if isinstance(schema, list):
         return [_as_written(item) for item in schema]
     if not isinstance(schema, dict):

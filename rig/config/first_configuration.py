@@ -58,7 +58,7 @@ class Answers:
 
 
 def configuration_text(answers: Answers, schema: str, name: str) -> str:
-    """Return the text of a file called `name`; `schema` is where the JSON schema for editors is."""
+    """Return the text of a file called `name`; `schema` is the location of the JSON schema for editors."""
     sections = (
         [
             f"# yaml-language-server: $schema={schema}",

@@ -92,7 +92,7 @@ def load(
 def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
     """Read the sensors' part of a configuration, and the file with defaults if it has a `world:` section, else None.
 
-    A file with that section must be complete, as the laboratory simulates all of it. Raise `ConfigurationRefused`.
+    A file with that section must be complete, because the laboratory simulates all of it. Raise `ConfigurationRefused`.
     """
     layered = _read(path, overrides)
     if "world" in layered.document:
@@ -108,7 +108,7 @@ def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Senso
 
 
 def load_statement(overrides: Sequence[str]) -> StatementConfig:
-    """Parse overrides of site and certificate without a file. Raise `ConfigurationRefused` as `load`."""
+    """Parse overrides of site and certificate without a file. Raise `ConfigurationRefused` as `load` does."""
     try:
         layered = merge_layers("{}", None, overrides)
     except Unreadable as error:
@@ -120,7 +120,7 @@ def load_statement(overrides: Sequence[str]) -> StatementConfig:
 
 
 def load_as(model: type[Model], path: str | Path) -> Model:
-    """Read a file that holds one section, of this `model`. Raise `ConfigurationRefused` as `load`."""
+    """Read a file that holds one section, of this `model`. Raise `ConfigurationRefused` as `load` does."""
     layered = _read(path, ())
     section, problems = _validate(model, layered.document, (), layered)
     if layered.problems or section is None:
@@ -179,7 +179,7 @@ def _dump(document: Mapping[str, Any]) -> str:
 def _validate_rig(
     document: Mapping[str, Any], sections: Sections, turners: Turners, layered: Layered
 ) -> tuple[RigConfig | None, list[str]]:
-    """Validate all but the world: procedure and turner by the models that their name and kind select."""
+    """Validate all but the world. The procedure's name and the turner's kind select their models."""
     procedure, problems = _validate_procedure(document.get("procedure", {}), sections, layered)
     turner, turner_problems = _validate_turner(document, turners, layered)
     rest = {**document, "procedure": procedure or ProcedureSection(name=""), "turner": turner or TurnerSection()}
@@ -192,7 +192,7 @@ def _validate_rig(
 
 
 def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tuple[ProcedureSection | None, list[str]]:
-    """Validate the procedure's section. If its name is unknown, its other keys are compared with the nearest name's."""
+    """Validate the procedure's section. If its name is unknown, its keys are compared with the nearest name's."""
     name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
     if sections is None:
         return ProcedureSection(name=str(name)), []
@@ -261,7 +261,7 @@ SHAPES = {
 
 
 def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layered) -> str:
-    """Return one validation error as: path (line): the fault, the allowed values, the nearest spelling."""
+    """Return one validation error as a line: path, line number, the fault, the allowed values, the nearest spelling."""
     location: Location = item["loc"]
     where = _where((*prefix, *location), layered.places)
     kind, value = item["type"], item["input"]
@@ -285,7 +285,7 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
 
 
 def _hint_at_override(section: Location, layered: Layered) -> str:
-    """Return the sensors that a misspelt `--set sensors.NAME.…` may mean; empty if a file has this section."""
+    """Return the sensors that a misspelt `--set sensors.NAME.…` may mean; none if a file has this section."""
     if layered.places.get(section) != SET:
         return ""
     siblings: Any = layered.document
@@ -307,7 +307,7 @@ def _not_allowed(value: Any, allowed: Sequence[str]) -> str:
 
 
 def _keys_at(model: type[BaseModel], location: Location) -> list[str]:
-    """Return the keys allowed in the section at `location` of `model`."""
+    """Return the keys that `model` allows in the section at `location`."""
     annotation: Any = model
     for part in location:
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
@@ -325,7 +325,7 @@ def _nearest(word: str, allowed: Sequence[str]) -> str:
 
 
 def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
-    """Yield the conflicts of world and rig: an address on another machine, other sensors than the rig's."""
+    """Yield the conflicts of world and rig: an address on another machine, or sensors that the rig does not have."""
     turner = config.turner
     if (host := turner.simulated_at) is None and not isinstance(turner, HandSection):
         yield "world: simulates an arm, a hand, or a servo whose port is socket://host:port, and turner says otherwise"
@@ -351,7 +351,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _instruments_fit(config: RigConfig, world: WorldSection) -> Iterator[str]:
-    """Yield the simulated instruments at ports where the rig has another sensor."""
+    """Yield conflicts: simulated instruments at ports where the rig has another sensor."""
     for name in sorted(config.sensors.keys() & world.sensors.keys()):
         where = "the sensor is on the board" if name in config.on_board else "the sensor is at another's port"
         if world.sensors[name].kvh1775 is not None and config.sensors[name].part != "kvh1775":
@@ -367,10 +367,7 @@ def _instruments_fit(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _is_loopback(host: str) -> bool:
-    """Return whether a host is this machine.
-
-    A name that begins with 127 does not suffice: 127.example.org is another host.
-    """
+    """Return whether a host is this machine; 127.example.org, which begins with 127 too, is another one."""
     try:
         return host == "localhost" or ipaddress.IPv4Address(host).is_loopback
     except ValueError:

@@ -42,12 +42,12 @@ class TurnerSection(Section):
 
     @property
     def address(self) -> str:
-        """The address at which it answers, a host or a port; empty if nothing is connected to."""
+        """The turner's address, a host or a port; empty if it needs no connection."""
         return ""
 
     @property
     def address_key(self) -> str:
-        """The key of this section with the address; empty if nothing is connected to."""
+        """The key of this section with the address; empty if the turner needs no connection."""
         return ""
 
     @property
@@ -57,11 +57,11 @@ class TurnerSection(Section):
 
     @property
     def simulated_at(self) -> str | None:
-        """The host at which a simulated turner would answer; None if this kind cannot be simulated."""
+        """The host of a simulated turner; None if this kind cannot be simulated."""
         return None
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """Return the keys, with their values, that move a simulated turner to another host."""
+        """Return the keys and values that give a simulated turner another host."""
         return {}
 
 
@@ -137,7 +137,7 @@ class ArmSection(TurnerSection):
         return self.host
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """Return the key of the controller's host, with the new value."""
+        """Return the key of the controller's host with a new value."""
         return {"host": host}
 
     @property
@@ -179,7 +179,7 @@ class ProcedureSection(Section):
 
     @property
     def then_verify(self) -> bool:
-        """Whether a calibration that passed is stored on the board and verified by repeating the movement."""
+        """Whether a passed calibration is stored on the board and verified by repeating the movement."""
         return False
 
     @property
@@ -194,7 +194,7 @@ class ProcedureSection(Section):
 
     @property
     def finds_earth_rate(self) -> bool:
-        """Whether the Earth's rate is estimated from readings; else the site gives it, or it is unknown."""
+        """Whether readings determine the Earth's rate; otherwise the site states it, or it is unknown."""
         return False
 
     def problems(self, config: "RigConfig") -> Iterable[str]:
@@ -243,7 +243,7 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def match_sensors(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
-        """Refuse sensors that share a select line, port, IMU or name, and more than one reference."""
+        """Refuse sensors that share a select line, port, IMU or name, and a second reference."""
         sensor_at: dict[str, str] = {}
         for name, sensor in sensors.items():
             if sensor.mavlink is not None:
@@ -272,7 +272,7 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def check_link_rate(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
-        """Refuse data rates that exceed the link's capacity. Of a sensor's two message sizes, the larger must fit."""
+        """Refuse data rates that exceed the link's capacity. If a sensor has two message sizes, the larger must fit."""
         streams = _streams(sensors)
         if "board" not in info.data or not streams:
             return sensors

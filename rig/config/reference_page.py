@@ -214,7 +214,7 @@ def _row(key: str, schema: Schema, required: bool) -> tuple[str, ...]:
 
 
 def unit_of(key: str, schema: Schema) -> str:
-    """Return the unit of a key's value, by its name or its model; "" for words and switches."""
+    """Return the unit of a key's value, by its name or its model; "" for words and booleans."""
     return schema.get("unit") or next((unit for ending, unit in UNITS.items() if key.endswith(ending)), "")
 
 

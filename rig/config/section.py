@@ -21,7 +21,7 @@ RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key 
 
 
 def no_number_is_true(cls: type[BaseModel], value: Any, info: ValidationInfo) -> Any:
-    """Refuse true and false for numbers: YAML reads yes and on as true, which would pass for the number 1."""
+    """Refuse true and false for numbers: YAML reads yes and on as true, which counts as the number 1."""
     field = cls.model_fields.get(info.field_name or "")
     if isinstance(value, bool) and field is not None:
         kinds = _kinds(field.annotation)

@@ -12,16 +12,17 @@ _DEGREES_OF_FREEDOM = re.compile(r"(.+)_degrees_of_freedom")
 
 @cache
 def meanings() -> Mapping[str, str]:
-    """Return the table: a meaning for each `key`, and for each `Entry.key` that has another meaning in that entry."""
+    """Return the table: a meaning for each `key`, and for each `Entry.key` whose meaning differs in that entry."""
     lines = _TABLE.read_text(encoding="utf-8").splitlines()
     rows = (line.partition(" | ") for line in lines if line and not line.startswith("#"))
     return {key: meaning for key, _, meaning in rows}
 
 
 def meaning_of(entry: str, key: str) -> str:
-    """Return the meaning of a key in an entry, named without its ending `Entry`. Raise KeyError without one.
+    """Return the meaning of a key in an entry, named without its ending `Entry`.
 
-    Standard uncertainties and their degrees of freedom have the meaning that their name gives.
+    Raise KeyError if it has none. Standard uncertainties and their degrees of freedom have the meaning that their name
+    states.
     """
     table = meanings()
     if (meaning := table.get(f"{entry}.{key}", table.get(key))) is not None:

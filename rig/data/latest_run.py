@@ -14,7 +14,7 @@ _LIST_MAX_BYTES = 1_000_000
 
 
 def note_run(folder: Path) -> None:
-    """Remember `folder` as this user's latest run. Errors are ignored."""
+    """Remember `folder` as this user's latest run; ignore errors."""
     with suppress(OSError, Refused):
         path = _list()
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -24,7 +24,7 @@ def note_run(folder: Path) -> None:
 
 
 def latest_run() -> Path:
-    """Return the newest noted run folder that still exists, relative to the working folder if it lies in it.
+    """Return the newest remembered run folder that still exists, relative to the working folder if it is inside.
 
     Raise Refused `no_latest_run`.
     """
@@ -37,7 +37,7 @@ def latest_run() -> Path:
 def meant_run(path: str | Path) -> Path:
     """Return the run that a user names: a path, or `latest` unless a file or folder here has that name.
 
-    Raise Refused as `latest_run`.
+    Raise Refused as `latest_run` does.
     """
     return latest_run() if str(path) == LATEST and not Path(LATEST).exists() else Path(path)
 

@@ -25,7 +25,7 @@ class Absent:
     bits: int = 0
 
     def mask_provided(self, values: ArrayLike, flags: ArrayLike = -1) -> NDArray[np.bool_]:
-        """Return which values (n,) or (n, 3) the source provided, by the messages' `flags` (n,), if present."""
+        """Return which values (n,) or (n, 3) the source provided, by the messages' `flags` (n,) if they have any."""
         numbers = np.asarray(values, dtype=np.float64)
         low, high = self.within
         valid = np.isfinite(numbers) & ~np.isin(numbers, self.numbers) & (numbers >= low) & (numbers <= high)

@@ -84,7 +84,7 @@ class Quantity:
         return "" if self.name == RATE.name else f"{self.name}_"
 
     def full_label(self, sensor: str) -> str:
-        """Return the label of a sensor's readings, distinct from its other quantities."""
+        """Return a label of a sensor's readings that distinguishes them from its other quantities."""
         return f"{sensor}, {self.sensor}"
 
     @property

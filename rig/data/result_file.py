@@ -479,7 +479,7 @@ def write_result(document: ResultDocument, folder: Path) -> None:
 
 
 def read_result(path: Path) -> ResultDocument:
-    """Return the `result.json` of a run folder or at `path` itself. Raise Refused `no_result`, `not_a_result`."""
+    """Return the `result.json` of a run folder, or at `path` itself. Raise Refused `no_result`, `not_a_result`."""
     remedy = "Give a run folder or its result.json"
     return read_document(ResultDocument, _file(path), SIZE_MAX_BYTES, what="a run", remedy=remedy)
 

@@ -12,7 +12,7 @@ from rig.errors import Refused
 
 
 def note_own(*texts: str) -> None:
-    """Record that this user has run the texts; if that fails, the user will be asked again later."""
+    """Note that this user has run the texts. If this fails, the user is asked again later."""
     with suppress(OSError, Refused):
         folder = _folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -21,7 +21,7 @@ def note_own(*texts: str) -> None:
 
 
 def is_own(sha256: str) -> bool:
-    """Return whether the text with this hash, in hexadecimal, was run by this user on this computer."""
+    """Return whether this user has run the text with this hash (hexadecimal) on this computer."""
     with suppress(Refused):
         return len(sha256) == 64 and sha256.isalnum() and (_folder() / sha256).is_file()
     return False

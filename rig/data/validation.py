@@ -26,10 +26,7 @@ _adapters: dict[type[Any], TypeAdapter[Any]] = {}
 
 
 def validate(kind: type[Kind], document: Any, where: str) -> Kind:
-    """Return `document` as a value of type `kind`; unknown keys are refused.
-
-    Raise ValueError naming the first wrong value.
-    """
+    """Return `document` as a value of type `kind`. Raise ValueError naming the first wrong value or unknown key."""
     try:
         value: Kind = _adapter(kind).validate_python(document)
     except ValidationError as error:
@@ -40,7 +37,7 @@ def validate(kind: type[Kind], document: Any, where: str) -> Kind:
 
 
 def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: str, remedy: str) -> Document:
-    """Return a JSON file of type `kind`, called a result of `what`. Raise Refused `no_result`, `not_a_result`."""
+    """Return a JSON file as type `kind`, called a result of `what`. Raise Refused `no_result`, `not_a_result`."""
     try:
         return kind.model_validate(parse_json(read_regular_file(file, limit_bytes), MOST_VALUES))
     except (UnfitFile, OSError) as error:
@@ -78,10 +75,7 @@ def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
 
 
 def refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object of a JSON file.
-
-    Raise ValueError for a duplicate key, because readers disagree on which value counts.
-    """
+    """Return an object of a JSON file. Raise ValueError for a duplicate key, of which readers use either value."""
     document = dict(pairs)
     if len(document) < len(pairs):
         keys = [key for key, _ in pairs]
@@ -90,7 +84,7 @@ def refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _parse_number(text: str) -> int | float:
-    """Return a number of a JSON file. Raise ValueError for one that no measurement has."""
+    """Return a number of a JSON file. Raise ValueError for a number that no measurement has."""
     value = float(text)
     if not abs(value) <= LARGEST_NUMBER:
         raise ValueError(f"{quote(text)} is no number that can be measured")
@@ -98,10 +92,7 @@ def _parse_number(text: str) -> int | float:
 
 
 def sanitize(value: Any) -> Any:
-    """Return a JSON value without hidden characters, so that a terminal, a certificate and a C header show all of it.
-
-    Raise RecursionError.
-    """
+    """Return a JSON value with hidden characters made visible, for any kind of output. Raise RecursionError."""
     if isinstance(value, str):
         return UNSEEN.sub(lambda match: printable(match[0]), value)
     if isinstance(value, list):

@@ -37,7 +37,7 @@ class Unprinted(RigError):
 
 
 def or_fault(solve: Callable[[], Result]) -> Result | Fault:
-    """Return the result of `solve`, or the Fault that it raises, so that other results are unaffected."""
+    """Return the result of `solve`, or the Fault that it raises."""
     try:
         return solve()
     except Fault as fault:
@@ -46,7 +46,7 @@ def or_fault(solve: Callable[[], Result]) -> Result | Fault:
 
 @contextmanager
 def raised_as(kind: type[RigError]) -> Iterator[None]:
-    """Raise problems of board or recording inside the block as `kind`; a Refused stays one."""
+    """Raise problems of board or recording inside the block as `kind`; Refused stays unchanged."""
     try:
         yield
     except ProblemError as error:
@@ -56,7 +56,7 @@ def raised_as(kind: type[RigError]) -> Iterator[None]:
 
 
 def refuse(problems: Sequence[Problem]) -> None:
-    """Raise `Refused` if there are problems, under the name of the first, with all of them and their remedies."""
+    """Raise `Refused` under the name of the first problem, with all problems and remedies; nothing without problems."""
     if not problems:
         return
     *others, last = problems

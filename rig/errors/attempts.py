@@ -24,7 +24,7 @@ class Attempts(Generic[Key, Result]):
     faults: Mapping[Key, Fault] = field(default_factory=dict)
 
     def updated(self, later: "Attempts[Key, Result]") -> "Attempts[Key, Result]":
-        """Return all attempts; those that were repeated count as in `later`."""
+        """Return the attempts with those in `later` added, which replace earlier ones of the same key."""
         repeated = later.results.keys() | later.faults.keys()
         kept = {key: result for key, result in self.results.items() if key not in repeated}
         kept_faults = {key: fault for key, fault in self.faults.items() if key not in repeated}
@@ -33,7 +33,7 @@ class Attempts(Generic[Key, Result]):
     def by_key(
         self, of_result: Callable[[Result], Converted], of_fault: Callable[[Fault], ConvertedFault]
     ) -> dict[Key, Converted | ConvertedFault]:
-        """Return the conversion of each result by `of_result`, then of each Fault by `of_fault`."""
+        """Return each result converted by `of_result`, then each Fault converted by `of_fault`."""
         values: dict[Key, Converted | ConvertedFault] = {key: of_result(result) for key, result in self.results.items()}
         for key, fault in self.faults.items():
             values[key] = of_fault(fault)
@@ -41,7 +41,7 @@ class Attempts(Generic[Key, Result]):
 
 
 def attempt_each(attempts: Mapping[Key, Callable[[], Result]]) -> Attempts[Key, Result]:
-    """Return the result of each attempt, or the Fault in which it ends."""
+    """Return the result of each attempt, or the Fault that ends it."""
     results, faults = dict[Key, Result](), dict[Key, Fault]()
     for key, attempt in attempts.items():
         try:
@@ -52,7 +52,7 @@ def attempt_each(attempts: Mapping[Key, Callable[[], Result]]) -> Attempts[Key, 
 
 
 def attempt(faults: dict[str, Fault], name: str, solve: Callable[[], Result]) -> Result | None:
-    """Return the result of `solve`; on a Fault, store it in `faults` under `name` and return None."""
+    """Return the result of `solve`; on a Fault, store that in `faults` under `name` and return None."""
     try:
         return solve()
     except Fault as fault:

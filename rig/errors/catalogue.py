@@ -26,9 +26,6 @@ class CatalogueEntry:
 
 
 def catalogue() -> tuple[CatalogueEntry, ...]:
-    """Return the error catalogue in the file's order.
-
-    Raise ValueError for a line not of the form `name | kind | when | remedy`.
-    """
+    """Return the catalogue in the file's order. Raise ValueError unless lines are `name | kind | when | remedy`."""
     form = f"name | {' or '.join(KINDS)} | when | what to do"
     return tuple(CatalogueEntry(*cells) for cells in read_rows(TABLE, form, 1, KINDS))

@@ -8,7 +8,7 @@ from rig.errors import Refused
 
 @contextmanager
 def requiring(extra: str) -> Iterator[None]:
-    """Import in the block what the optional part `extra` installs. Raise Refused `missing_extra` without it."""
+    """Import libraries of the optional part `extra` in the block. Raise Refused `missing_extra` without them."""
     try:
         yield
     except ImportError as error:

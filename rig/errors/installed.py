@@ -12,7 +12,7 @@ def added(
 ) -> Iterator[tuple[EntryPoint, Any]]:
     """Yield the entry points of a group, those in `stock` first, each with its loaded object.
 
-    Raise `not_loaded`, called with problem and remedy, for one that cannot be imported.
+    Raise the error `not_loaded` (problem, remedy) for one that cannot be imported.
     """
     for entry in (*stock, *entry_points(group=group)):
         try:

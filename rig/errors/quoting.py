@@ -26,7 +26,7 @@ def printable_lines(text: str) -> str:
 
 
 def shorten(text: str) -> str:
-    """Return the beginning of a long text, printable, with its length."""
+    """Return the beginning of a long text in printable form, with the text's length."""
     shown = printable(text[:SHOWN_CHARACTERS])
     return shown if len(text) <= SHOWN_CHARACTERS else f"{shown}… ({len(text)} characters)"
 
@@ -37,7 +37,7 @@ def quote(value: Any) -> str:
 
 
 def listing(names: Iterable[str]) -> str:
-    """Return the first of many names, which are shortened already, and the number of the others."""
+    """Return the first of many names, which are already shortened, and the number of the others."""
     every = list(names)
     more = len(every) - SHOWN_NAMES
     return (", ".join(every[:SHOWN_NAMES]) + (f", and {more} more" if more > 0 else "")) or "none"

@@ -5,9 +5,9 @@ from pathlib import Path
 
 
 def read_rows(table: Path, form: str, column: int = 0, allowed: Collection[str] | None = None) -> Iterator[list[str]]:
-    """Yield the cells of each row; those of `column` must be `allowed`, if that is given.
+    """Yield the cells of each row; those of `column` must be in `allowed`, if given.
 
-    Raise ValueError naming the line of another form than `form`, which has as many cells.
+    Raise ValueError naming a line that does not have the cells of `form`.
     """
     for number, line in enumerate(table.read_text(encoding="utf-8").splitlines(), 1):
         if line.startswith("#"):

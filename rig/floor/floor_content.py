@@ -44,7 +44,7 @@ def _card(station: StationState) -> dict[str, Any]:
 
 
 def _age(age_s: float | None) -> str:
-    """Return the age in about two digits, so that the text is not sent anew every second."""
+    """Return the age in about two digits, so that the text rarely changes and is rarely sent."""
     if age_s is None:
         return "at an implausible time"
     size, unit = next((unit for unit in UNITS_OF_AGE if age_s >= 2 * unit[0]), UNITS_OF_AGE[-1])
@@ -82,7 +82,7 @@ def standards(pasts: Sequence[Past]) -> list[dict[str, Any]]:
 
 
 def recalls(pasts: Sequence[Past], today: date) -> list[dict[str, Any]]:
-    """Return sensors that are due within a month or overdue, by their first parameter to reach its limit."""
+    """Return sensors that are due within a month or overdue, by the parameter that reaches its limit first."""
     rows = []
     for (part, serial, quantity, _, simulated), series in subjects(pasts).items():
         due = [(trend.recall, name) for name, trend in trends(series).items() if trend.recall is not None]
@@ -94,7 +94,7 @@ def recalls(pasts: Sequence[Past], today: date) -> list[dict[str, Any]]:
 
 
 def _read(text: str) -> dict[str, Any]:
-    """Return a station's state, shortened for a card; nothing for an invalid text."""
+    """Return a station's state, shortened for a card; None for an invalid text."""
     try:
         if len(text) > LONGEST:
             raise ValueError(f"it is longer than {LONGEST} characters")

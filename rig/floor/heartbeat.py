@@ -32,7 +32,7 @@ class Heartbeat:
         self._thread = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
 
     def hear(self, now: Now) -> None:
-        """Take a change of the station; write a new state at once."""
+        """Handle a change of the station; write a new state at once."""
         news = now.state != self._now.state or now.part != self._now.part
         self._now = now
         if news:
@@ -73,7 +73,7 @@ class Heartbeat:
 
 @contextmanager
 def heartbeat(rig: str, address: HistoryAddress, now: Now) -> Iterator[Heartbeat]:
-    """Run the heartbeat of a station on a `rig` for the length of the `with` block; if killed, it just stops."""
+    """Send the heartbeat of a station on a `rig` during the block; a killed process leaves no last state."""
     beating = Heartbeat(rig, address, now)
     beating.start()
     try:

@@ -60,7 +60,7 @@ def history_document(
 def history_csv(pasts: Sequence[Past]) -> str:
     """Return comma-separated values with a heading; an unknown value is empty.
 
-    A text that a spreadsheet would read as a formula has an apostrophe before it, as one would type it there.
+    A text that a spreadsheet would read as a formula gets an apostrophe before it.
     """
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n")
@@ -97,7 +97,7 @@ def calibration_entry(past: Past) -> dict[str, Any]:
 
 
 def subject_entry(subject: Subject) -> dict[str, Any]:
-    """Return the sensor and the quantity that were calibrated."""
+    """Return the sensor and the calibrated quantity."""
     return dict(zip(("part", "serial_number", "quantity", "full_scale", "simulated"), subject, strict=True))
 
 
@@ -164,7 +164,7 @@ def rigs_document(states: Sequence[RigState], effects: Mapping[str, Sequence[Rig
 
 
 def chart_entry(chart: Chart) -> dict[str, Any]:
-    """Return a control chart; null for the first results, which have no predecessors."""
+    """Return a control chart; null for the first results, which nothing precedes."""
     return {
         "out_of_control": bool(chart.out_of_control) if chart.alarm.size else False,
         "deviation": _numbers(chart.deviation),
@@ -186,7 +186,7 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
 
 
 def cell(value: object) -> object:
-    """Return a value safe for a spreadsheet: one line, and not a formula."""
+    """Return a value that a spreadsheet takes for text or a number: one line, and no formula."""
     if not isinstance(value, str):
         return value
     line = " ".join(value.splitlines())

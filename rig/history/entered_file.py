@@ -25,7 +25,7 @@ class FileEntries:
 def find_file_entries(history: History, name: str, content: bytes, anchor: tuple[int, str] | None) -> FileEntries:
     """Return the entries of a file in the history, by its bytes or by the values of a result.json.
 
-    `anchor` is the journal's entry that its signature names. Problems are `unknown_to_history` if the history does not
+    `anchor` is the journal entry that its signature names. Problems are `unknown_to_history` if the history does not
     have the file, `not_as_entered` if its rows have changed since, `journal_rewritten` if the journal is not the one at
     the time of the signature.
     """
@@ -71,7 +71,7 @@ def _list_voided(connection: Connection, run_id: int) -> list[str]:
 
 
 def _runs_of(connection: Connection, content: bytes) -> list[int]:
-    """Return the runs entered with the same result.json: with all its values, in its order."""
+    """Return the runs entered with the same result.json: equal values in equal order."""
     runs = schema.run.c
     try:
         text = content.decode()

@@ -36,8 +36,8 @@ class EntryState:
 def examine_history(history: History) -> Iterator[EntryState]:
     """Yield the state of triggers, numbers and rows, of each run by its result, and of files by their hashes.
 
-    Files are read where they were last seen. Those entered on another computer and not accessible here are `elsewhere`;
-    a file of a run that was not entered with any run is `unknown`.
+    Files are read at their last known location. Those entered on another computer and not accessible here are
+    `elsewhere`; a file of a run that was not entered with any run is `unknown`.
     """
     computer = platform.node()
     for entry in history.broken():
@@ -57,7 +57,7 @@ def examine_history(history: History) -> Iterator[EntryState]:
 
 
 def _contradictions(run: Kept, pasts: Sequence[Past]) -> Iterator[str]:
-    """Yield the first contradictions between the rows of a run and its result."""
+    """Yield the first contradictions between the rows of a run and its result, then the number of others."""
     try:
         if content_sha256(run.result) != run.content_sha256:
             yield "the result in the history is not as it was entered"
@@ -86,7 +86,7 @@ def _record(past: Past) -> HistoryRecord:
 
 
 def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
-    """Return the entered files by folder; a resumed run was entered again from the same one."""
+    """Return the entered files by folder; a resumed run was entered again, from the same folder."""
     by_folder: dict[str, set[tuple[str, str]]] = {}
     for path, name, sha256 in history.files():
         by_folder.setdefault(path, set()).add((name, sha256))
@@ -130,9 +130,9 @@ def _files(
 
 
 def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Iterator[EntryState]:
-    """Yield the files of a run in its folder that were not entered with any run.
+    """Yield the files of a run in its folder that were entered with no run.
 
-    An additional recording would change the folder's result.
+    A further recording would change the folder's result.
     """
     entered_names = {name for name, _ in entered.get(str(folder), set())}
     recorded = [file.name for readings in ("raw", "calibrated") for file in recordings(folder, readings)]
@@ -143,7 +143,7 @@ def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Itera
 
 
 def _names(run: Kept, folder: Path) -> set[str]:
-    """Return the names of the entered files; a file that may be on another computer only if it is present here."""
+    """Return the names of the entered files, of those that may be on another computer only the present ones."""
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
 

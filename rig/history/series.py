@@ -54,7 +54,7 @@ class Trend:
 
     @property
     def enough(self) -> bool:
-        """Whether there are enough results for a statement over time."""
+        """Whether there are enough results for conclusions over time."""
         return self.count >= FEWEST
 
     @property
@@ -96,7 +96,7 @@ class Trend:
 
     @cached_property
     def recall(self) -> date | None:
-        """The day on which value and uncertainty may reach the limit; None if not within ten years."""
+        """The day on which value and uncertainty may reach the limit; None if that is over ten years away."""
         limit = self.last.max_deviation
         if self.line is None or limit is None:
             return None
@@ -147,7 +147,7 @@ class Change:
 
 
 def subjects(pasts: Iterable[Past]) -> dict[Subject, list[Past]]:
-    """Return valid calibrations by subject: neither voided nor unfit by their own checks."""
+    """Return valid calibrations by subject: without voided ones, and without those unfit by their own checks."""
     by_subject: dict[Subject, list[Past]] = {}
     for past in pasts:
         if past.fit and past.voided is None:
@@ -171,7 +171,7 @@ Parameters = Mapping[str, Parameter]
 def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Change, ...], ...]:
     """Return the changes of the parameters common to each pair of calibrations, before and now.
 
-    All pairs belong to one comparison, for example all sensors of a run: the number of all values counts.
+    All pairs, for example all sensors of a run, form one comparison: the number of all values counts.
     """
     shared = [[name for name in now if name in before] for before, now in pairs]
     compared = sum(map(len, shared))
@@ -193,7 +193,7 @@ def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
-    """Return the state of every rig with check standards: sensors that were ever marked as such."""
+    """Return the state of every rig with check standards: sensors that were ever declared as such."""
     # Drifts and curves are not standards, and external readings have no rig.
     by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
     standards = {key: series for key, series in by_subject.items() if any(past.check_standard for past in series)}
@@ -217,7 +217,7 @@ def rig_states(pasts: Sequence[Past]) -> list[RigState]:
 
 
 def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
-    """Return the differences between rigs that share gyroscopes, by parameter; scale factors as fractions."""
+    """Return the differences between rigs that share gyroscopes, by parameter; of scale factors as fractions."""
     by_rigs = subjects(past for past in pasts if past.rig != NO_ARM)
     series = [
         (name, past) for pasts_of_subject in by_rigs.values() for past in pasts_of_subject for name in past.parameters
@@ -236,5 +236,5 @@ def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
 
 
 def time_of(past: Past) -> datetime:
-    """Return the time at which the run of a calibration began."""
+    """Return the time at which a calibration's run began."""
     return datetime.fromisoformat(past.started_utc).astimezone(UTC)

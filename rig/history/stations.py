@@ -64,7 +64,7 @@ class StationState:
 
 
 def make_table(engine: Engine) -> None:
-    """Make the table if there is none. Raise SQLAlchemyError if the role may not make one."""
+    """Make the table if it does not exist. Raise SQLAlchemyError if the role may not make one."""
     if inspect(engine).has_table(station.name):
         return
     try:
@@ -76,7 +76,7 @@ def make_table(engine: Engine) -> None:
 
 
 def tell(engine: Engine, rig: str, computer: str, state: str) -> None:
-    """Store the station's state in place of the previous one. Raise SQLAlchemyError."""
+    """Store the station's state in place of its previous one. Raise SQLAlchemyError."""
     with _writing(engine) as connection, connection.begin():
         row: dict[str, Any] = {"heard_s": _now(connection), "told": state[:LONGEST]}
         key = {"rig": rig[:NAME], "computer": computer[:NAME]}
@@ -88,7 +88,7 @@ def tell(engine: Engine, rig: str, computer: str, state: str) -> None:
 def heard(engine: Engine) -> tuple[list[StationState], int]:
     """Return the last states of stations, sorted by rig, and the number of further stations.
 
-    Of more than `MOST` stations the latest are returned.
+    Of more than `MOST` stations, the latest are returned.
     """
     if not inspect(engine).has_table(station.name):
         return [], 0

@@ -134,7 +134,7 @@ class History:
     engine: Engine
 
     def enter(self, finished: FinishedRun) -> Entered:
-        """Add a run; for one that the history already has, add only a new location of its folder.
+        """Add a run; if the history already has it, add only a new location of its folder.
 
         The result is not compared with its recordings: `rig history import` does that. Raise Refused `entry_not_kept`.
         """
@@ -165,7 +165,7 @@ class History:
             return self._run_id(connection, content_sha256) is not None
 
     def certify(self, content_sha256: str, certificate: Issued) -> bool:
-        """Add a certificate of the run with that result; return False if the history does not have the run.
+        """Add a certificate of the run with that result; return False if the run is not in the history.
 
         Raise Refused `entry_not_kept`.
         """
@@ -178,7 +178,7 @@ class History:
     def calibrations(self, selection: Selection = Selection(), *, replaced_too: bool = False) -> list[Past]:
         """Calibrations in the order of time, including voided ones.
 
-        One that a later calibration of its run replaced is included on request only.
+        Those that a later calibration of their run replaced are included on request only.
         """
         question = select(*_COLUMNS).select_from(_ROWS).order_by(*_IN_TIME)
         return self._pasts(chosen(question if replaced_too else question.where(~replaced()), selection))
@@ -195,10 +195,7 @@ class History:
         return self._pasts(select(*_COLUMNS).select_from(_ROWS).where(_RUN.id == run_id).order_by(*_IN_TIME))
 
     def void(self, number: int, reason: str) -> None:
-        """Mark a calibration as void, with the reason.
-
-        Raise Refused `not_in_history`, `already_voided`, `entry_not_kept`.
-        """
+        """Mark a calibration as void. Raise Refused `not_in_history`, `already_voided`, `entry_not_kept`."""
         before = self.calibration(number).voided
         if before is not None:
             raise Refused(
@@ -212,7 +209,7 @@ class History:
             journal.note(connection, schema.voided, number)
 
     def kept(self, run_id: int | None = None) -> Iterator[Kept]:
-        """Yield one run or all runs, as entered, in the order of entry."""
+        """Yield all runs, or one, as they were entered, in the order of entry."""
         question = select(schema.run).order_by(schema.run.c.id)
         if run_id is not None:
             question = question.where(schema.run.c.id == run_id)
@@ -222,7 +219,7 @@ class History:
                 yield _kept(connection, number)
 
     def files(self) -> Iterator[tuple[str, str, str]]:
-        """Yield path, name and SHA-256 of all files of runs, for each location of their folders."""
+        """Yield path, name and SHA-256 of all files of runs, at each location of their folders."""
         places, files = schema.location, schema.certificate_file
         recorded = places.join(schema.recording, schema.recording.c.run_id == places.c.run_id)
         documented = places.join(schema.document, schema.document.c.run_id == places.c.run_id)
@@ -236,7 +233,7 @@ class History:
             yield from ((path, RESULT, sha256) for path, sha256 in connection.execute(result))
 
     def broken(self) -> Iterator[journal.Broken]:
-        """Yield triggers, numbers and rows that are not as they were entered, as `journal.broken`."""
+        """Yield triggers, numbers and rows that differ from those entered, as `journal.broken` does."""
         with self.engine.connect() as connection:
             yield from triggers.unlike_made(connection)
             yield from row_numbers.gaps(connection)
@@ -248,13 +245,13 @@ class History:
             return journal.head(connection)
 
     def holds(self, earlier: journal.Head) -> bool:
-        """Return whether the journal still contains unchanged all lines up to an earlier end."""
+        """Return whether all lines of the journal up to an earlier end are unchanged."""
         with self.engine.connect() as connection:
             return journal.holds(connection, earlier)
 
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
-        """Begin a transaction that enters rows; read them back when it has ended."""
+        """Begin a transaction that enters rows, and read the rows back after it."""
         with self.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
             journal.alone(connection)
             before = journal.head(connection)
@@ -323,14 +320,14 @@ def _kept(connection: Connection, number: int) -> Kept:
 
 
 def replaced() -> Any:
-    """Return the condition that a run's row has a later result of the same measurement."""
+    """Return the SQL condition that a later result of the same measurement replaces a run's row."""
     later = schema.run.alias("later")
     newer = or_(later.c.solved_utc > _RUN.solved_utc, and_(later.c.solved_utc == _RUN.solved_utc, later.c.id > _RUN.id))
     return exists(select(later.c.id).where(later.c.measurement_sha256 == _RUN.measurement_sha256, newer))
 
 
 def chosen(question: Select[Any], selection: Selection) -> Select[Any]:
-    """Return a query for runs, or for their calibrations, restricted to a selection."""
+    """Return a query for the selected runs, or for their calibrations."""
     if selection.serial_number is not None:
         question = question.where(_CALIBRATION.serial_number == selection.serial_number)
     if selection.part is not None:
@@ -361,6 +358,6 @@ def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dic
 
 
 def _order() -> list[str]:
-    """Return the parameters in their order of display; unknown parameters come last."""
+    """Return the parameters in their order of display, unknown ones last."""
     further = (name for characteristic in every_characteristic() for name in characteristic.parameters)
     return list(dict.fromkeys([*SCALES, *BIASES, *further]))

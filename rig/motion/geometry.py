@@ -73,7 +73,7 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
     """Return the change (…, 13, 3) of a wrist axis' direction in the flange's frame, per radian of `AXIS_ERRORS`.
 
     The joint angles are `q_rad` (…, n). A rotation of the whole flange is part of a sensor's mounting. The wrists of
-    another chain are its last three joints; the errors of joints that it does not have are zero.
+    another chain are its last three joints; if it has fewer, the errors of the others are zero.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = [frame[..., :3, :3] for frame in _frames(q, arm)]
@@ -94,7 +94,7 @@ def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """Return the flange's rotations (3, 6, 3) in the base's frame, per radian of each wrist's errors.
 
     The joint angles are `q_rad` (n,). Errors of a wrist are its twist, its zero, and the `WAVES` of its angle. The
-    wrists of another chain are its last three joints; the errors of joints that it does not have are zero.
+    wrists of another chain are its last three joints; if it has fewer, the errors of the others are zero.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = np.array(_frames(q, arm))[:, :3, :3]
@@ -109,7 +109,7 @@ def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
 
 
 def _last_three(arm: DenavitHartenberg) -> tuple[int, int, int]:
-    """Return the indices of a chain's last three joints, negative for those that it does not have."""
+    """Return the indices of a chain's last three joints; if it has fewer, those of the others are negative."""
     return arm.joints - 3, arm.joints - 2, arm.joints - 1
 
 
@@ -130,7 +130,7 @@ def _twists(arm: DenavitHartenberg) -> tuple[Array, Array]:
 def _link_coefficients(arm: DenavitHartenberg) -> Array:
     """Return the coefficients (n, 3, 4, 4) of cosine, sine and 1 of a joint's angle in its link's transform.
 
-    A link rotates about z, translates along z and x, and rotates about x.
+    A link's transform is a rotation about z, translations along z and x, and a rotation about x.
     """
     (cos, sin), terms = _twists(arm), np.zeros((arm.joints, 3, 4, 4))
     terms[:, 0, 0, 0], terms[:, 0, 1, 1], terms[:, 0, 1, 2], terms[:, 0, 0, 3] = 1.0, cos, -sin, arm.a_m
@@ -165,7 +165,7 @@ def distance_to_forearm(
     """Return distances (…,), m, from a point of the flange's frame to the line from elbow to wrist 1.
 
     The joint angles are `q_rad` (…, 6), the points (…, 3), by default the flange's centre. The line may be offset by
-    `offset_m` on the side of wrist 1.
+    `offset_m` towards wrist 1.
     """
     frames = _frames(q_rad, arm)
     _, elbow, wrist = _find_bends(frames)
@@ -178,7 +178,7 @@ def distance_to_upper_arm(
 ) -> Array:
     """Return distances (…,), m, from a point of the flange's frame to the middle of the upper arm.
 
-    This is the drawing's line from shoulder to elbow, offset by `offset_m` on the side of wrist 1.
+    This is the drawing's line from shoulder to elbow, offset by `offset_m` towards wrist 1.
     """
     frames = _frames(q_rad, arm)
     shoulder, elbow, _ = _find_bends(frames)
@@ -187,7 +187,7 @@ def distance_to_upper_arm(
 
 
 def lengths_m(arm: DenavitHartenberg) -> Array:
-    """Return the lengths (6,), m, named by `LENGTHS`, which can be measured on the arm, whatever its parameters."""
+    """Return the lengths (6,), m, named by `LENGTHS`, which an arm shows to measurement whatever its parameters."""
     frames = _frames(np.zeros(6), arm)
     base, wrist_2, wrist_3, flange = (frames[joint][:3, 3] for joint in (0, 4, 5, 6))
     shoulder, elbow, wrist_1 = _find_bends(frames)
@@ -199,8 +199,8 @@ def lengths_m(arm: DenavitHartenberg) -> Array:
 def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
     """Return shoulder, elbow and wrist 1, (…, 3) m, each in the plane of the previous one.
 
-    The axes of these three are parallel but for the factory's calibration, and meet hundreds of metres away: the
-    origins of a calibrated arm's frames lie anywhere along them.
+    Except for the factory's calibration, the axes of these three are parallel, so they meet hundreds of metres away,
+    and the origins of a calibrated arm's frames lie anywhere along them.
     """
     shoulder = frames[1][..., :3, 3]
     elbow = _nearest_origin(shoulder, frames[1][..., :3, 2], frames[2])

@@ -74,7 +74,7 @@ def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: FlangeLoad, 
     """Return whether a straight path in joint space is clear enough of the arm for sweeps and motions between them.
 
     Lengths are taken from the model's drawing, because plans are made before an arm is connected. Paths beyond the
-    joints' limits count as clear; they are refused elsewhere.
+    joints' limits count as clear; other checks refuse them.
     """
     if not _is_within(model.limits, start_q_rad, target_q_rad):
         return True
@@ -85,14 +85,14 @@ def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: FlangeLoad, 
 
 
 def _clearance_m(radius_m: float, room_m: float) -> float:
-    """Return the smallest permitted distance to the middle of a link, m."""
+    """Return the smallest permitted distance, m, to the middle of a link."""
     return round(radius_m + room_m, 6)
 
 
 def _measure_to_forearm(
     q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
-    """Return name and smallest distance, m, to the forearm of any part of the load in the poses (N, 6)."""
+    """Return the smallest distance, m, of the load from the forearm in the poses (N, 6), and the part that has it."""
     names, points = _list_load_points(carried)
     offset_m, lengths = model.forearm.offset_m, arm or model.drawing
     return _find_nearest(names, distance_to_forearm(q_rad, points, lengths, offset_m=offset_m))
@@ -101,14 +101,14 @@ def _measure_to_forearm(
 def _measure_to_upper_arm(
     q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
-    """Return name and smallest distance, m, to the upper arm of any part of the load in the poses (N, 6)."""
+    """Return the smallest distance, m, of the load from the upper arm in the poses (N, 6), and the part."""
     names, points = _list_load_points(carried)
     offset_m, lengths = model.upper_arm.offset_m, arm or model.drawing
     return _find_nearest(names, distance_to_upper_arm(q_rad, points, lengths, offset_m=offset_m))
 
 
 def _find_nearest(names: Sequence[str], distances_m: Array) -> tuple[str, float]:
-    """Return the name and value of the smallest of the distances (k, N)."""
+    """Return the name and value of the smallest distance of (k, N)."""
     least_m = distances_m.min(axis=1)
     return names[int(least_m.argmin())], float(least_m.min())
 
@@ -121,7 +121,7 @@ def _list_load_points(carried: FlangeLoad) -> tuple[list[str], Array]:
 
 
 def _list_extension_points(carried: FlangeLoad) -> list[Array]:
-    """Return points of an extension in the flange's frame, m, the last at its end; none without an extension."""
+    """Return points along an extension in the flange's frame, m, the last at its end; none without one."""
     end = np.array(carried.extension_m)
     count = 1 + int(np.linalg.norm(end) / EXTENSION_STEP_M)
     return [end * part / count for part in range(1, count + 1)] if end.any() else []
@@ -143,7 +143,7 @@ def _interpolate(start_q_rad: Joints, target_q_rad: Joints) -> Array:
 
 
 def _list_paths(plan: Plan, model: TurnerModel) -> Iterator[_Path]:
-    """Yield the path of each dwell and each motion, except of steps that other checks refuse."""
+    """Yield the path of each dwell and each motion, without steps that other checks refuse."""
     for before, step, after in zip((None, *plan.steps), plan.steps, (*plan.steps[1:], None), strict=False):
         if isinstance(step, Dwell):
             yield _Path(step.name, np.array([step.q_rad]), model.dwell_room_m, OTHER_ATTITUDES)

@@ -55,7 +55,7 @@ class TurnerModel:
 
 @lru_cache
 def load_turner_model(key: ModelName) -> TurnerModel:
-    """Return the model that a configuration names `key`. Raise FileNotFoundError if there is none."""
+    """Return the model called `key` in a configuration. Raise FileNotFoundError if there is none."""
     import yaml  # here, because the process of the arm's client must start fast and needs no model
 
     text = files("rig.motion").joinpath("models", f"{key}.yaml").read_text(encoding="utf-8")
@@ -98,5 +98,5 @@ def model_of(arm: "ArmSection") -> TurnerModel:
 
 
 def find_home(arm: "ArmSection") -> Joints:
-    """Return the home pose (n,), rad: the configured one, or else the model's."""
+    """Return the home pose (n,), rad: the configured one, else the model's."""
     return model_of(arm).home_rad if arm.home_deg is None else tuple(radians(angle) for angle in arm.home_deg)

@@ -38,7 +38,7 @@ def find_step_problems(plan: Plan) -> list[Problem]:
 
 
 def find_travel_to_home(plan: Plan, q_rad: Joints) -> Joints:
-    """Return each joint's travel (n,), rad, in the first motion, from the arm's pose to the plan's home."""
+    """Return each joint's travel (n,), rad, in the first motion, from the present pose to the plan's home."""
     return travel(q_rad, plan.home_q_rad)
 
 

@@ -188,7 +188,7 @@ class Plan:
 
 
 def closes(angle_rad: float) -> bool:
-    """Return whether an angle is a number of whole turns, which the closure of the circle makes exact."""
+    """Return whether an angle is a number of whole turns, which are exact because the circle closes."""
     turns = round(angle_rad / TURN_RAD)
     return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSED_RAD
 
@@ -201,7 +201,7 @@ def turn_words(angle_rad: float) -> str:
 
 
 def trapezoid_duration(distance_rad: float, speed_rad_s: float, acceleration_rad_s2: float) -> float:
-    """Return the duration, s, of a distance with equal ramps; a short distance never reaches the speed."""
+    """Return the duration, s, of a distance with equal ramps, which may be too short to reach the speed."""
     if distance_rad < speed_rad_s**2 / acceleration_rad_s2:
         return 2 * math.sqrt(distance_rad / acceleration_rad_s2)
     return distance_rad / speed_rad_s + speed_rad_s / acceleration_rad_s2

@@ -31,7 +31,7 @@ class StateField:
 def state_dtype(joints: int, more: Sequence[StateField] = ()) -> np.dtype[Any]:
     """Return the type of the rows of states, for a number of joints and `more` fields.
 
-    Without joints there are no columns of them, because HDF5 has no arrays of length 0.
+    Without joints it has no columns for them, because HDF5 has no arrays of length 0.
     """
     angles = [(name, "<f8", (joints,)) for name in ("q_rad", "qd_rad_s")] if joints else []
     others = [(field.name, f"<{field.type}" if field.type[1] != "1" else field.type) for field in more]
@@ -69,7 +69,7 @@ class State(Protocol):
     @property
     def qd_rad_s(self) -> Joints: ...
     def to_record(self) -> Row:
-        """Return the values in the order of `state_dtype`. Called for every state, hundreds of times a second."""
+        """Return the values in the order of `state_dtype`, quickly, as for hundreds of states a second."""
         ...
 
 

@@ -18,7 +18,7 @@ def windings_rad(plan: Plan, q_rad: Joints) -> list[tuple[float, float]]:
 
 
 def cable_words(plan: Plan, q_rad: Joints, names: Sequence[str]) -> list[str]:
-    """Return sentences on the slack that the cable at the flange needs from its present position, by joint `names`."""
+    """Return sentences on the slack that the flange's cable needs from its present position, by joint `names`."""
     travels = [
         f"{name} by {-degrees(low):.0f}° one way (-) and {degrees(high):.0f}° the other (+)"
         for name, (low, high) in zip(names, windings_rad(plan, q_rad), strict=True)

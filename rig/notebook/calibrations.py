@@ -90,12 +90,12 @@ class Calibration:
 
     @property
     def covariance(self) -> Array:
-        """Covariance (6, 6) of the solution alone, in the order kx ky kz bx by bz; U includes the whole budget."""
+        """Covariance (6, 6) of the solution alone, in the order kx ky kz bx by bz; U includes the complete budget."""
         return np.array(self.entry.covariance)
 
     @property
     def std(self) -> Array:
-        """Standard deviations (6,) of that covariance: of noise alone, unlike U."""
+        """Standard deviations (6,) of that covariance: those of noise alone, unlike U."""
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
 
     @property
@@ -139,7 +139,7 @@ class Calibration:
 
 
 def rows(shown: DisplayRow) -> Iterator[tuple[str, ...]]:
-    """Yield the rows of a table under `HEADINGS`, axis by axis with U."""
+    """Yield the rows of a table with `HEADINGS`, axis by axis, with U."""
     for i, label in enumerate(shown.labels[: len(shown.numbers.values)]):
         scale = ("–", "–")
         if shown.scale is not None:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def frame(columns: Mapping[str, Any], index: Sequence[Any], name: str) -> "DataFrame":
-    """Return a table of `columns` (n,) by name over an `index` (n,) of that `name`. Raise Refused `missing_extra`."""
+    """Return a table of `columns` (n,) by name over the `index` (n,) called `name`. Raise Refused `missing_extra`."""
     with requiring("pandas"):
         import pandas
     return pandas.DataFrame(dict(columns), index=pandas.Index(index, name=name))

@@ -5,7 +5,7 @@ from html import escape
 
 
 def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table with a caption; the first column has the headings of the rows."""
+    """Return a table with a caption; its first column heads the rows."""
     head = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
     body = "".join(
         f"<tr><th>{escape(first)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in rest)}</tr>"

@@ -70,7 +70,7 @@ class SensorChanges:
 
     @property
     def changed(self) -> tuple[Change, ...]:
-        """The significant changes among all values of the two runs."""
+        """The changes that are significant among all values of the two runs."""
         return tuple(change for change in self.changes if change.has_changed)
 
     def to_frame(self) -> "DataFrame":
@@ -127,7 +127,7 @@ def calibrations(
     """Return all calibrations of a serial number, of a part, or of all sensors, as `rig history` lists them.
 
     `history` is a file or a URL, by default RIG_HISTORY, else the user's own. Raise Refused `not_in_history` if the
-    history has no calibration of that serial number, and as `open_history`.
+    history has no calibration of that serial number, and as `open_history` does.
     """
     address = None if history is None else str(history)
     with open_history(own_history_address(address) or resolve_address(None)) as opened:

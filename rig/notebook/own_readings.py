@@ -11,10 +11,11 @@ BEYOND = 2.0  # times the nominal range: a part may exceed its range, but not tw
 
 
 def own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, whose: str) -> Array:
-    """Return readings as an array (n, 3), float64. `limit` is the sensor's nominal range in SI, None if unknown.
+    """Return readings as an array (n, 3), float64.
 
-    Raise Refused `not_readings` for whole numbers, which are counts, and for other shapes; `wrong_unit` for numbers
-    beyond the sensor's range, and for accelerations of about 1 all the time, which are in g.
+    `limit` is the sensor's nominal range in SI, None if unknown. Raise Refused `not_readings` for whole numbers, which
+    are counts, and for other shapes. Raise `wrong_unit` for numbers beyond the sensor's range, and for accelerations
+    whose norm is always about 1, which are in g.
     """
     array = np.asarray(readings)
     axes = len(quantity.axes)

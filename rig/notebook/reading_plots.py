@@ -81,14 +81,14 @@ def plot_residuals(panels: Sequence[tuple[str, Unexplained]]) -> Plot:
 
 
 def plot_comparison(comparison: Comparison, sensor: str, reference: str) -> Plot:
-    """Return a plot of both sensors' readings on the left, their difference on the right."""
+    """Return a plot of both sensors' readings on the left, and their difference on the right."""
     figure = _figure(10, 7.5)
     draw_comparison(figure, comparison, sensor, reference)
     return Plot(figure)
 
 
 def _finish(axes: "Axes", title: str) -> None:
-    """Set a title on the left and the axes' names on the right of it."""
+    """Set the title on the left, and the axes' names to its right."""
     axes.set_title(title, loc="left")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=3, frameon=False)
 

@@ -110,7 +110,7 @@ class Readings:
         return self.signal(TEMPERATURE.name)
 
     def signal(self, quantity: str) -> Signal:
-        """Return the readings of the quantity `name`. Raise Refused `no_such_quantity`; Fault as `on_arm_clock`."""
+        """Return the readings of the quantity `name`. Raise Refused `no_such_quantity`; as `on_arm_clock` does."""
         channel = next((channel for channel in self.sensor.channels if channel.quantity == quantity), None)
         if channel is None:
             raise Refused(
@@ -122,9 +122,9 @@ class Readings:
         return Signal(self.name, channel.measures, self._time_s, values, self._windows)
 
     def on_arm_clock(self) -> tuple[Array, Array]:
-        """Return controller times (n,) in s and readings (n, 3) in SI units: rates if there are any.
+        """Return controller times (n,) in s and readings (n, 3) in SI units: rates if the sensor has them.
 
-        Raise Fault as `estimate_time_base`.
+        Raise Fault as `estimate_time_base` does.
         """
         signal = self.signal(self.quantities[0])
         return signal.time_s, signal.values
@@ -166,14 +166,14 @@ class Readings:
 
     @cached_property
     def _time_s(self) -> Array:
-        """Times (n,) of all samples, computed once. For external readings, the times in the file."""
+        """Times (n,) of all samples, computed once. For readings from files, the times in the file."""
         if any(run.external is not None for run in self.recordings):
             times_of_file: Array = self.samples["host_time_s"]
             return times_of_file
         return np.concatenate([times_s(run, self.name, self._bases(run)) for run in self.recordings])
 
     def _bases(self, run: RunData) -> Mapping[str, Any]:
-        """Return the time base by the sensor's own rates, else by a gyroscope on its clock; empty without either."""
+        """Return the time base by the sensor's own rates, else by a gyroscope's on its clock; empty without both."""
         gyroscopes = run.measuring(RATE)
         others = (name for name in gyroscopes if one_clock(run, self.name, name))
         source = self.name if self.name in gyroscopes else next(others, None)

@@ -46,7 +46,7 @@ class Result(Mapping[str, Calibration]):
         return {calibration.name: calibration for calibration in calibrations}
 
     def _characteristics(self, finding: Finding[Any]) -> dict[str, CharacteristicValue]:
-        """Return the characteristics of a sensor's quantity, of any kind of result."""
+        """Return the characteristics of a sensor's quantity, in any kind of result."""
         key = finding.sensor, finding.quantity
         terms = (term for term in terms_of(self.document) if (term.finding.sensor, term.finding.quantity) == key)
         return {
@@ -128,7 +128,7 @@ def solve(run: Run, estimator: str | None = None, **changes: float) -> Result:
     """Solve and judge a run, as `rig solve` does, by its procedure's own estimator unless another is named.
 
     `changes` are thresholds or limits to use instead of the recorded ones: `max_lost_fraction=0.01`. Raise Fault and
-    Refused by name as `rig solve`; `unknown_setting` lists the possible changes.
+    Refused as `rig solve` does; `unknown_setting` lists the possible changes.
     """
     overrides = [f"{setting(key)}={value!r}" for key, value in changes.items()]
     return Result(document_of(judged(run.recorded.judged_by(overrides), estimator)))

@@ -44,7 +44,7 @@ class Run(Mapping[str, Readings]):
 
     @property
     def verification(self) -> "Run | None":
-        """The movement with calibrated readings, if it followed a calibration."""
+        """The movement with calibrated readings, if one followed the calibration."""
         recorded = self.recorded
         if not (recorded.raw and recorded.corrected):
             return None
@@ -52,7 +52,7 @@ class Run(Mapping[str, Readings]):
 
     @cached_property
     def calibration(self) -> Outcome | None:
-        """The outcome of the raw readings alone; None if none were recorded."""
+        """The outcome of the raw readings alone; None without raw readings."""
         return judged(self.recorded.only_raw()) if self.recorded.raw else None
 
     @cached_property
@@ -91,18 +91,19 @@ class Run(Mapping[str, Readings]):
 
 
 def load(path: str | Path, script: str | Path | None = None) -> Run:
-    """Load a run folder or a run file without executing foreign code in the folder.
+    """Load a run folder or a run file, without executing foreign code in the folder.
 
-    `script` is executed: the script of another user's recording. Raise Refused `no_run`, and as `read_run` and
-    `load_script`.
+    `script`, the script of another user's recording, is executed. Raise Refused `no_run`, and as `read_run` and
+    `load_script` do.
     """
     return Run(open_run(Path(path), None if script is None else Path(script)))
 
 
 def read_log(path: str | Path, columns: str | Path | None = None) -> Readings:
-    """Read a log of another program as `rig solve` does: CSV, a bag, `.ulg`, `.mat`. Values are in SI units.
+    """Read a log of another program as `rig solve` does:
 
-    `columns` names the file of `--columns`, if the log has names and units of its own. Raise Refused as `rig solve`.
+    CSV, a bag, `.ulg`, `.mat`. Values are in SI units. `columns` names the file of `--columns`, if the log has names
+    and units of its own. Raise Refused as `rig solve` does.
     """
     column_map = AS_NAMED if columns is None else load_as(ColumnMap, Path(columns))
     recording = read_external_log(Path(path), column_map)

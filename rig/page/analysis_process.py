@@ -30,7 +30,7 @@ class Lookout:
         self._raw = True
 
     def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does: a finished step starts an analysis."""
+        """Handle an event, as a Listener does: a finished step requests an analysis."""
         match event:
             case PhaseStarted(_, _, sensors):
                 self._raw = "calibrated" not in sensors.values()
@@ -40,9 +40,9 @@ class Lookout:
 
 @contextmanager
 def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
-    """Run the analysis for the length of the block, and show its results by `feed`.
+    """Run the analysis during the block, and show its results by `feed`.
 
-    If its process fails, it says so on stderr: the page lacks its results, and the run continues.
+    If its process fails, it prints this on stderr: the page lacks its results, and the run continues.
     """
     lookout = Lookout()
     command = [sys.executable, "-P", "-m", "rig.page.live_analysis", str(folder)]
@@ -86,7 +86,7 @@ def _say_that_it_ended(why: str) -> None:
 
 
 def _follow(questions: TextIO, answers: TextIO, lookout: Lookout, feed: Feed) -> None:
-    """Ask for an analysis whenever one is wanted; return when all is over, or without an answer."""
+    """Request an analysis whenever one is due; return at the end, or if no answer comes."""
     while lookout.wanted.wait() and not lookout.over.wait(WRITTEN_S):
         lookout.wanted.clear()
         start_s = time.monotonic()

@@ -10,12 +10,12 @@ from rig.page.recent_readings import round_digits
 
 
 def built(chain: DenavitHartenberg) -> dict[str, Any]:
-    """Return a turner's geometry and the total length of its links, m, from joint to joint across the axes."""
+    """Return a turner's geometry, and the total length of its links, m, from joint to joint across the axes."""
     return {"geometry": asdict(chain), "long_m": sum(map(abs, chain.a_m))}
 
 
 def geometry(chain: DenavitHartenberg, joints: Sequence[str] = JOINT_NAMES) -> dict[str, Any]:
-    """Return the page section of a turner before it is connected: only its geometry is known."""
+    """Return the page section of a turner that is not connected yet, which has only its geometry."""
     return {**built(chain), "joints": list(joints), "q_rad": None, "missed": 0}
 
 
@@ -32,7 +32,7 @@ def connected(report: Report) -> dict[str, Any]:
 
 
 def stance(state: State) -> dict[str, Any]:
-    """Return a turner's last state; `let_go` if it stays so, because it stood and no program ran."""
+    """Return a turner's last state; `let_go` if it will stay so, because it stood and no program ran."""
     joints = {"q_rad": round_digits(state.q_rad), "qd_rad_s": round_digits(state.qd_rad_s)}
     if not isinstance(state, ArmState):
         return {**joints, "let_go": False}

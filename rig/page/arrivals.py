@@ -17,7 +17,7 @@ class Arrivals:
         self._samples: dict[str, int] = {}  # their number, by sensor
 
     def take(self, event: RunEvent, now_s: float) -> bool:
-        """Take an event at the time `now_s`, s; return whether the event brought newer data."""
+        """Handle an event at the time `now_s`, s; return whether it brought newer data."""
         match event:
             case ArmConnected(report):
                 return self._take_state(report.state.q_rad, report.state.time_s, now_s)
@@ -33,7 +33,7 @@ class Arrivals:
         return False
 
     def ages_s(self, now_s: float) -> dict[str, float]:
-        """Return the ages of the arm's state and of the readings at the time `now_s`, s, if they have arrived."""
+        """Return the ages, s, of the arm's state and of the readings, if they have arrived, at the time `now_s`."""
         return {name: round(now_s - arrived_s, 1) for name, arrived_s in self._arrived_s.items()}
 
     def _take_state(self, q_rad: tuple[float, ...], time_s: float, now_s: float) -> bool:

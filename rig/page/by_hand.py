@@ -37,7 +37,7 @@ def live_section(event: HandSeen) -> Section:
 
 
 def step(event: HandSeen) -> Section:
-    """Return the progress of the list; its remaining time is unknown."""
+    """Return the progress through the list; the remaining time is unknown."""
     count = event.accepted + len(event.pairs) + len(event.turns)
     return {
         "number": event.accepted,
@@ -51,7 +51,7 @@ def step(event: HandSeen) -> Section:
 
 
 def update(before: Section, event: OfTheHand) -> Section:
-    """Return the page section after an event of a session by hand; rests, moves and reminders set a tone."""
+    """Return the page section after an event of a session by hand; rests, moves and reminders play a tone."""
     match event:
         case HandAsked(instruction, again, why):
             instruction_fields = {"say": instruction.say, "face": instruction.face, "turns": instruction.turns}

@@ -21,12 +21,12 @@ NICENESS = 10  # the run comes first
 
 
 def look(folder: Path) -> dict[str, object]:
-    """Return the rows for the recordings of raw readings in a run folder."""
+    """Return the page's rows for the recordings of raw readings in a run folder."""
     return asdict(look_of(so_far([read_run(path) for path in recordings(folder, "raw")])))
 
 
 def main() -> None:
-    """Analyse the run folder once for each line on standard input, until the input ends."""
+    """Analyse the run folder for each line on standard input, until the input ends."""
     with suppress(OSError, AttributeError):
         os.nice(NICENESS)
     folder = Path(sys.argv[1])

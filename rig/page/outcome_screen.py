@@ -47,7 +47,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str], true_rows: Se
 
 
 def since_rows(since: Iterable[Since]) -> dict[str, Row]:
-    """Return the previous results by the name of the row that they are shown with, in that row's units."""
+    """Return the previous results in units of the rows that they are shown with, by the rows' names."""
     rows = {}
     for since_result in since:
         quantity = quantities().get(since_result.quantity)
@@ -94,7 +94,7 @@ def after_fault(command: str, *, repeats: bool) -> Row:
 
 
 def _truth(true: TruthRow | None) -> Row | None:
-    """Return the true values as they are printed, and (result − truth)/U; None without a truth."""
+    """Return the true values in print, and (result − truth)/U; None without a truth."""
     if true is None:
         return None
     return {

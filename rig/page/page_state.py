@@ -166,7 +166,7 @@ class PageState:
             self.put("lines", [*self.sections["lines"], text][-LINES:])
 
     def look(self, look: Look) -> None:
-        """Show the analysis of the recording so far: each sweep's observation or refusal, and the parameters."""
+        """Show the analysis of the recordings so far: each sweep's observation or refusal, and the parameters."""
         for row in look.observations:
             self._observation(row)
         if not self._solved:
@@ -275,7 +275,7 @@ class PageState:
         }
 
     def _observation(self, row: dict[str, Any]) -> None:
-        """Show an observation; the host's replaces the board's of the same sweep, never the reverse."""
+        """Show an observation; the host's replaces the board's of the same sweep, but not the reverse."""
         key = row["sensor"], row["sweep"]
         before = self._observations.get(key, {})
         if before.get("by") != "host" or row["by"] == "host":
@@ -287,7 +287,7 @@ class PageState:
 
 
 def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, DisplayUnit]]:
-    """Yield the quantities of a sensor with the unit in which they are shown, the unit of the bias."""
+    """Yield the quantities of a sensor with their units of display, and the units of their biases."""
     by_name = measured()
     for quantity in (by_name[name] for name in select_displayed(sensor.latest)):
         yield quantity, quantity.bias if isinstance(quantity, Quantity) else quantity.reading

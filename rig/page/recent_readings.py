@@ -26,11 +26,11 @@ class PageHistory:
         return self.first + len(self._points)
 
     def due(self, time_s: float) -> bool:
-        """Return whether a point of that time is due: the last one is older, or time has run backwards."""
+        """Return whether to store a point of that time: enough time has passed, or time has run backwards."""
         return not self._points or not 0 <= time_s - self._points[-1][0] < SOON_S
 
     def add(self, time_s: float, values: Values) -> None:
-        """Add a point if it is due; if time has run backwards, start again."""
+        """Add a point if one is due; if time has run backwards, start again."""
         if not self.due(time_s):
             return
         if self._points and time_s < self._points[-1][0]:
@@ -45,7 +45,7 @@ class PageHistory:
         self._points.clear()
 
     def since(self, number: int) -> dict[str, Any]:
-        """Return the points from `number` on as JSON values: times, and each line's values (null: no value)."""
+        """Return the points from `number` on as JSON values: times, and the values of each line (null if missing)."""
         start = max(number, self.first)
         points = list(self._points)[start - self.first :]
         lines = sorted({line for _, values in points for line in values})

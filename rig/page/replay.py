@@ -57,7 +57,7 @@ class _Done:
 
 
 def moments(run: RunData) -> Iterator[Moment]:
-    """Yield the events of a recording with their times, in order; nothing without a state of the turner."""
+    """Yield the events of a recording with their times, in order; none without a state of the turner."""
     if len(run.states) == 0:
         return
     times_s = run.states["time_s"]
@@ -99,7 +99,7 @@ def ended(result: ResultDocument) -> Iterator[RunEvent]:
 
 
 def _steps(run: RunData, end_s: float) -> list[_Done]:
-    """Return the sweeps, rests and dwells of a recording; one without an end was interrupted."""
+    """Return the sweeps, rests and dwells of a recording; those without an end were interrupted."""
     done: list[_Done] = []
     for recorded in run.events:
         event, time_s = recorded.event, recorded.controller_time_s
@@ -121,7 +121,7 @@ def _steps(run: RunData, end_s: float) -> list[_Done]:
 
 
 def _with_duration(done: _Done) -> Step:
-    """Return the step; add a rest's duration, which the recording does not state."""
+    """Return the step; a rest gets its duration, which the recording does not state."""
     return Rest("rest", done.end_s - done.start_s) if isinstance(done.step, Rest) else done.step
 
 
@@ -138,7 +138,7 @@ _OF_STEPS = (SweepStarted, SweepFinished, RestStarted, RestFinished, DwellStarte
 
 
 def _until(run: RunData, time_s: float) -> RunData:
-    """Return the recording with only the events up to `time_s`."""
+    """Return the recording with the events up to `time_s`, and no later ones."""
     return replace(run, events=tuple(e for e in run.events if (e.controller_time_s or 0.0) <= time_s))
 
 
@@ -156,7 +156,7 @@ def _progress(done: _Done, count: int, state: State, *, time_s: float, start_s: 
 
 
 def _state(row: Any) -> State:
-    """Return a recorded state: an arm's if it has all its fields, else one of joints only."""
+    """Return a recorded state: an arm's state if it has all its fields, else one of joints only."""
     values: dict[str, Any] = {name: row[name].tolist() for name in row.dtype.names}
     joints = {name: tuple(values.get(name, ())) for name in ("q_rad", "qd_rad_s")}
     if row.dtype == ARM_STATE_DTYPE:

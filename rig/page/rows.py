@@ -31,7 +31,7 @@ class Look:
 
 
 def observation_row(sensor: str, observation: Observation) -> Row:
-    """Return a revolution averaged by the host: one axis's reading with the component of 2π/T along it."""
+    """Return a revolution averaged by the host: the reading of one axis, and 2π/T's component along it."""
     average = observation.average
     return {
         "sensor": sensor,
@@ -57,7 +57,7 @@ def projection(axis_flange: Sequence[float] | Array) -> float:
 
 
 def dwell_row(read: ReadAtRest) -> Row:
-    """Return a dwell: the magnitude of the reading with the expected one, in the unit of screens."""
+    """Return the row of a dwell: the norm of the reading, and the expected norm, in the unit of display."""
     quantity, reading = read.subject.quantity, read.reading
     mean, size, unit = reading.mean, float(np.linalg.norm(reading.mean)), quantity.reading
     axis, sign = nearest_axis(mean)
@@ -86,7 +86,7 @@ def look_of(partial: SoFar) -> Look:
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
-    """Return the rows of a run's result, kind by kind; U is the result's U, or twice its noise."""
+    """Return the rows of a run's result, kind by kind, with U, or twice the noise without a budget."""
     return [_row(row) for row in shown(result)]
 
 

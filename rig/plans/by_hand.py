@@ -22,7 +22,7 @@ Pair = tuple[Face, Face]
 def plan_by_hand(
     turner: HandSection, procedure: ByHandSection, start_q_rad: Joints | None = None, done: Collection[int] = ()
 ) -> Plan:
-    """Return a plan without steps: moves by hand are requested during the session, and no joint moves."""
+    """Return a plan without steps, because moves by hand are requested during the session."""
     return Plan((), (), ())
 
 
@@ -35,13 +35,13 @@ class WantedMoves:
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
-        """Flips in the order of the requests, if no other move comes between."""
+        """Flips in the order of the requests, if the operator makes no other move between them."""
         count = len(ROUND)
         return tuple((ROUND[index % count], ROUND[(index + 1) % count]) for index in range(self.flips))
 
     @property
     def about(self) -> tuple[tuple[str, int], ...]:
-        """Whole turns: axis and direction, +1 or -1; a second turn about an axis goes back."""
+        """Whole turns: axis and direction, +1 or -1; a second turn about an axis has the opposite direction."""
         return tuple((AXES[index % 3], -1 if index // 3 % 2 else 1) for index in range(self.turns))
 
 
@@ -57,12 +57,12 @@ class Open:
 
     @property
     def done(self) -> bool:
-        """Whether the session is complete: the flips of the list, or as many others, over all six faces."""
+        """Whether the session is complete: as many flips as the list has, over all six faces."""
         return not self.turns and (not self.pairs or (self.flips == 0 and not self.faces))
 
 
 def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequence[Face]) -> Open:
-    """Return the moves that remain of a list; `faces_up` are the faces that were up at rest."""
+    """Return the moves of a list that remain; `faces_up` are the faces that were up at rest."""
     pairs, turns, flips = list(wanted.pairs), list(wanted.about), wanted.flips
     for move in moves:
         if move.kind == "flip":
@@ -79,7 +79,7 @@ def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequenc
 
 
 def next_instruction(remaining: Open, face: Face | None) -> Instruction | None:
-    """Return the next request for an item with side `face` up (None if unknown); None at the end."""
+    """Return the next request for an item with side `face` up (None if unknown), or None at the end."""
     if remaining.done or face is None:
         return None if remaining.done else Instruction("lay", ROUND[0])
     turn = next((candidate for candidate in remaining.turns if candidate[0] == face[1]), None)
@@ -92,7 +92,7 @@ def next_instruction(remaining: Open, face: Face | None) -> Instruction | None:
 
 
 def simulate_session(wanted: WantedMoves) -> Iterator[Instruction]:
-    """Yield the requests to an operator who follows all of them, beginning with +z up."""
+    """Yield the requests to an operator who follows all of them, from +z up on."""
     moves, faces_up = list[HandMove](), list[Face](["+z"])
     while (instruction := next_instruction(still_open(wanted, moves, faces_up), faces_up[-1])) is not None:
         yield instruction
@@ -102,5 +102,5 @@ def simulate_session(wanted: WantedMoves) -> Iterator[Instruction]:
 
 
 def _side(axis: str) -> Face:
-    """Return the positive side of an axis."""
+    """Return the side of the item in the positive direction of an axis."""
     return next(face for face in FACES if face == f"+{axis}")

@@ -35,8 +35,8 @@ class Phase:
 def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedures) -> Phase:
     """Return the phase with which a run of `procedure` begins; the next phase repeats its movement.
 
-    Raise Refused `no_such_procedure`; the phase's `plan` raises Refused as the procedure's, `script_failed`, and
-    `rank_deficient`, `ill_conditioned` if the whole plan's attitudes do not determine the requested parameters, and
+    Raise Refused `no_such_procedure`. The phase's `plan` raises Refused as the procedure's does; also `script_failed`;
+    `rank_deficient`, `ill_conditioned` if the whole plan's attitudes do not determine the requested parameters; and
     `other_turner` if the procedure plans for another kind than is configured.
     """
 

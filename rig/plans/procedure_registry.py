@@ -84,11 +84,11 @@ class Procedure(Generic[SectionT]):
 
     @property
     def calibrates_along(self) -> bool:
-        """Whether the board averages and solves while the host records, which requires raw readings."""
+        """Whether the board averages and solves during the recording, which requires raw readings."""
         return self.readings == "raw"
 
     def following(self, procedures: "Procedures") -> "AnyProcedure | None":
-        """Return the procedure that follows, as the key `then` names it, or None. Raise Refused `no_such_procedure`."""
+        """Return the procedure that the key `then` names, or None. Raise Refused `no_such_procedure`."""
         if self.then is not None and self.then not in procedures:
             raise Refused(
                 "no_such_procedure",
@@ -104,7 +104,7 @@ Procedures = Mapping[str, AnyProcedure]
 
 @cache
 def _load_installed() -> Mapping[str, tuple[AnyProcedure, str]]:
-    """Return the installed procedures by name, each with its module."""
+    """Return the installed procedures by name, each with its Python module."""
     stock = (EntryPoint(name, f"procedures.{name}:PROCEDURE", GROUP) for name in STOCK_SECTIONS)
     entries = added(GROUP, _not_loaded, stock)
     return {procedure.name: (procedure, entry.module) for entry, procedure in entries}

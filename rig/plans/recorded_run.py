@@ -33,7 +33,7 @@ class RecordedRun:
 
     @property
     def movement(self) -> tuple[RunData, ...]:
-        """The calibration's recordings or, without any, the verification's."""
+        """The calibration's recordings; if there are none, the verification's."""
         return self.raw or self.corrected
 
     def only_raw(self) -> "RecordedRun":
@@ -53,10 +53,10 @@ def open_run(
     only: Container[str] | None = None,
     begun: Mapping[Path, ReadingTask] = MappingProxyType({}),
 ) -> RecordedRun:
-    """Return the recordings in a run folder, or a run file; `script` is executed, if it is named.
+    """Return the recordings in a run folder, or a run file; `script`, if given, is executed.
 
-    `only` selects recordings of a folder by name; without it later recordings are included. Raise Refused `no_run`, and
-    as `read_run` and `load_script`.
+    `only` selects recordings of a folder by name; by default all are included, later ones too. Raise Refused `no_run`,
+    and as `read_run` and `load_script` do.
     """
     named = None if script is None else load_script(script)
     if not path.is_dir():
@@ -78,10 +78,10 @@ def open_run(
 
 
 def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
-    """Return the outcome of a run, phase by phase; a missing phase that was to follow has not passed.
+    """Return the outcome of a run, phase by phase; a planned phase that is missing counts as failed.
 
     The estimator is the procedure's own unless another is requested; a single recording has its own outcome. Raise
-    Fault and Refused by name as the procedure's analysis does.
+    Fault and Refused as the procedure's analysis does.
     """
     procedure = _procedure_of(run, run.movement[0])
     estimator = estimator or procedure.estimator
@@ -95,7 +95,7 @@ def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
 
 
 def left_out(run: RecordedRun) -> str | None:
-    """Return the sentence that the solution lacks a script's analysis, which is not executed here."""
+    """Return a sentence if the solution lacks the analysis of a script, which is not executed here."""
     for recording in (*run.raw, *run.corrected):
         if recording.external is None and _script_of(run, recording) is None and not _is_by_installed(recording):
             return (
@@ -113,8 +113,8 @@ def _is_corrected(run: RunData) -> bool:
 def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
     """Return the procedure of a recording: installed, or defined by the user's own script.
 
-    If neither is available, return an installed procedure for the same kind of readings: a solution needs no script.
-    Raise Refused `another_script` if the script is not the one of the recording, and as `kept_script`.
+    If neither is available, return an installed one for the same kind of readings, because a solution needs no script.
+    Raise Refused `another_script` if the script is not that of the recording, and as `kept_script` does.
     """
     if _is_by_installed(recording):
         return installed()[recording.settings.procedure]
@@ -128,7 +128,7 @@ def _is_by_installed(recording: RunData) -> bool:
 
 
 def _script_of(run: RecordedRun, recording: RunData) -> ScriptFile | None:
-    """Return the script of a recording if it may be executed: named by the user, or executed before."""
+    """Return the script of a recording if it may be executed, because the user has named it or executed it before."""
     folder = run.path if run.path.is_dir() else run.path.parent
     if _is_by_installed(recording) or (run.script is None and not (folder / SCRIPT).exists()):
         return None

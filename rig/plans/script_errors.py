@@ -12,9 +12,9 @@ ENDING = 'Let it end nothing by itself: `if __name__ == "__main__":` belongs bef
 
 @contextmanager
 def script_errors(what: str, remedy: str = "Correct the script") -> Iterator[None]:
-    """Raise Refused `script_failed`, `what` with the reason and its position; errors with a name stay as they are.
+    """Raise Refused `script_failed`, `what` with the reason and its position; named errors stay unchanged.
 
-    A script that ends the program is refused as well: its exit status would be taken for a verdict.
+    A script that ends the program is refused as well, because its exit status would be taken for a verdict.
     """
     try:
         yield
@@ -27,7 +27,7 @@ def script_errors(what: str, remedy: str = "Correct the script") -> Iterator[Non
 
 
 def _reason(error: BaseException) -> str:
-    """Return the error, and the innermost position where it was raised."""
+    """Return the error and the innermost position where it was raised."""
     message = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     places = traceback.extract_tb(error.__traceback__)[2:]  # the first two are the rig's own
     return f"{message}; {Path(places[-1].filename).name}, line {places[-1].lineno}" if places else message

@@ -42,13 +42,13 @@ class ScriptFile:
 
     @property
     def is_installed(self) -> bool:
-        """Whether the script is identical to the one installed under its procedure's name."""
+        """Whether the script is identical to the installed one of its procedure's name."""
         name = self.procedure.name
         return name in installed() and installed_script(name).sha256 == self.sha256
 
 
 def script_in(module: ModuleType, procedure: AnyProcedure) -> ScriptFile:
-    """Return the procedure of a module that is imported already, with the module's file."""
+    """Return the procedure of an imported module, with the module's file."""
     path = Path(inspect.getfile(module))
     return ScriptFile(procedure, path.name, _text(path))
 
@@ -61,7 +61,7 @@ def installed_script(name: str) -> ScriptFile:
 def load_script(path: Path) -> ScriptFile:
     """Execute a file and return its `PROCEDURE`.
 
-    Its neighbours in the folder do not matter. Raise Refused `no_script`, `script_failed`, `not_a_script`.
+    Other files in its folder are not imported. Raise Refused `no_script`, `script_failed`, `not_a_script`.
     """
     return _execute(path, path.name, _text(path))
 
@@ -70,8 +70,8 @@ def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = N
     """Return the script `kept` in a run folder; the text in the folder is executed only if it is the user's own.
 
     An installed script is taken from its package. If the user has `named` the same script, that is the user's consent.
-    The text in the folder may be executed if the user has begun a run with the same text before. Raise Refused
-    `another_script`, `foreign_script`, and the errors of `load_script`.
+    The text in the folder is the user's own if the user has begun a run with it before. Raise Refused `another_script`,
+    `foreign_script`, and as `load_script` does.
     """
     if named is not None:
         if named.sha256 != kept.sha256:
@@ -95,7 +95,7 @@ def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = N
 
 
 def another_script(what: str) -> Refused:
-    """Return the refusal of a script with which a run was not begun."""
+    """Return the refusal of a script other than the one that began the run."""
     return Refused(
         "another_script",
         f"{what} is not the script with which the run was begun",

@@ -18,7 +18,7 @@ Motion = tuple[tuple[object, ...], float, Mapping[str, object]]
 
 
 def vary_arm(config: RigConfig) -> Iterator[Motion]:
-    """Yield sweeps about three axes or six, at one speed or two, over turns or arcs; a file's several speeds stay."""
+    """Yield sweeps about three or six axes, at one or two speeds, over turns or arcs; several speeds of a file stay."""
     procedure = config.procedure
     assert isinstance(procedure, SixSweepsSection)
     axes = (3, 6) if procedure.axes == 3 and not procedure.mountings else (procedure.axes,)
@@ -37,7 +37,7 @@ def vary_arm(config: RigConfig) -> Iterator[Motion]:
 
 
 def vary_attitudes(config: RigConfig) -> Iterator[Motion]:
-    """Yield the file's attitudes and the sets that have a name; with magnetometers only the file's."""
+    """Yield the file's attitudes and the named sets of attitudes; with magnetometers only the file's."""
     procedure = config.procedure
     assert isinstance(procedure, AttitudesSection)
     sets = [procedure.attitudes, *(() if config.magnetometers else SETS.values())]
@@ -46,14 +46,14 @@ def vary_attitudes(config: RigConfig) -> Iterator[Motion]:
 
 
 def vary_imu(config: RigConfig) -> Iterator[Motion]:
-    """Yield sweeps and attitudes; sweeps are single turns at one speed, the period of an accelerometer's wave."""
+    """Yield sweeps with attitudes; sweeps are single turns at one speed: one period of the accelerometer's wave."""
     turns = [motion for motion in vary_arm(config) if motion[1] == TURNS_DEG[0] and not motion[2].get("speeds_deg_s")]
     for (family, turned, keys), (attitudes, _, stood) in product(turns, vary_attitudes(config)):
         yield (*family, *attitudes), turned, {**keys, **stood}
 
 
 def vary_servo(config: RigConfig) -> Iterator[Motion]:
-    """Yield turns of a servo at different speeds and overtravels."""
+    """Yield turns of a servo with different speeds and overtravels."""
     for speed_deg_s, overtravel_deg in product(_speeds_deg_s(config), BEYOND_DEG):
         yield (speed_deg_s,), overtravel_deg, {"speed_deg_s": speed_deg_s, "overtravel_deg": overtravel_deg}
 

@@ -145,7 +145,7 @@ def _refuse_others(wanted: TargetUncertainty, config: RigConfig) -> None:
 
 
 def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
-    """Return the motions of a procedure; nothing if the item is turned by hand. Raise Refused `other_turner`."""
+    """Return the motions of a procedure, none if the item is turned by hand. Raise Refused `other_turner`."""
     script = installed()[procedure.name]
     return script.plan(turner_for(script, config), procedure)
 
@@ -156,7 +156,7 @@ def _change(section: SectionT, **keys: object) -> SectionT:
 
 
 def _add_target(planned: Planned, keys: Mapping[str, float]) -> Planned:
-    """Return the run with the procedure keys that end it when the target is reached."""
+    """Return the run with the keys of the procedure that end it when the target is reached."""
     procedure = planned.candidate.procedure
     with suppress(ValidationError):  # the target is larger than a file may have
         procedure = _change(procedure, **keys)
@@ -212,7 +212,7 @@ class _Swept:
         return candidates
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return each family's candidates with the largest angle and dwell, up to two repeats, and extreme rests."""
+        """Return each family's candidates with the largest angle and dwell, extreme rests, and up to two repeats."""
         selected = {
             (candidate.family, candidate.rests_s): candidate
             for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)
@@ -223,7 +223,7 @@ class _Swept:
     def finer(self, best: Candidate) -> Sequence[Candidate]:
         """Return the candidates with slightly shorter waits, down to the next coarse value.
 
-        The steps are so small that longer waits are taken to give a smaller uncertainty.
+        For such small steps a longer wait is assumed to give a smaller uncertainty.
         """
         waits_s = {key: float(getattr(best.procedure, key)) for key in self.waits}
         counts, candidates = self._counts(plan_of(self.config, best.procedure)), []  # of all repeats
@@ -253,7 +253,7 @@ class _Swept:
             return None
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
-        """Return the target's keys, if the run has several repeats."""
+        """Return the keys that state the target, if the run has several repeats."""
         if not isinstance(procedure, SixObservationSection) or procedure.repeats == 1 or procedure.stages:
             return {}
         sizes = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias_rad_s}
@@ -261,12 +261,12 @@ class _Swept:
 
 
 def _longer_s(counts: Mapping[str, int], waits_s: Mapping[str, float], others_s: Mapping[str, float]) -> float:
-    """Return the extra duration, s, of waits of the lengths `others_s` instead of `waits_s`."""
+    """Return the extra duration, s, with waits of `others_s` instead of `waits_s`."""
     return sum(count * (others_s[key] - waits_s[key]) for key, count in counts.items())
 
 
 def _down_from(wait_s: float) -> list[float]:
-    """Return waits from `wait_s` down to the next coarse value, s."""
+    """Return waits, s, from `wait_s` down to the next coarse value."""
     below = max((rest_s for rest_s in RESTS_S if rest_s < wait_s), default=wait_s - REST_STEP_S)
     return np.arange(wait_s, below + REST_STEP_S / 2, -REST_STEP_S).round(3).tolist()
 
@@ -302,7 +302,7 @@ class _ByHand:
             return None
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
-        """Return the target of a session under its key, less the part of U that no session reduces."""
+        """Return the key and target of a session, less the part of U that no session reduces."""
         remaining = wanted.scale**2 - (2 * REAL_HANDS) ** 2
         return {"target_scale_u": round(remaining**0.5, 7)} if 0 < remaining < inf else {}
 

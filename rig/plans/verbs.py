@@ -11,19 +11,19 @@ class Verbs(Protocol):
 
     @property
     def plan(self) -> Plan:
-        """The steps to be done; fewer than the complete plan if an interrupted run is resumed."""
+        """The steps to be done, fewer than in the complete plan if an interrupted run is resumed."""
         ...
 
     def preflight(self) -> None:
-        """Check all conditions for moving the arm, ask the operator, and take control of the arm."""
+        """Check all conditions for moving the arm, ask the operator, and take control."""
         ...
 
     def start_sampling(self) -> None:
-        """Let the board stream; from here on every sample is recorded."""
+        """Make the board stream; from now on every sample is recorded."""
         ...
 
     def move(self, transfer: Transfer) -> None:
-        """Move the arm without a measurement. The motion must be the plan's next, as a sweep must."""
+        """Move the arm without measuring. The motion must be the next one of the plan, as for `sweep`."""
         ...
 
     def sweep(self, sweep: Sweep) -> None:
@@ -35,13 +35,13 @@ class Verbs(Protocol):
         ...
 
     def dwell(self, dwell: Dwell) -> None:
-        """Stand still in an attitude and measure there, once the sensors have settled."""
+        """Stand still in an attitude and measure, once the sensors have settled."""
         ...
 
     def wait_for_next_temperature(self, rest: Rest) -> bool:
-        """Stand still until the sensors are warm enough for the next set; return False if the range is covered.
+        """Stand still until the sensors have the next set's temperature; return False if the range is covered.
 
-        The steps after it, up to the next call, are one set.
+        The steps up to the next call form one set.
         """
         ...
 

@@ -46,7 +46,7 @@ def _mount(mount: EstimatedMount) -> MountEntry:
 
 
 def _plain(entries: Any) -> dict[str, Any]:
-    """Return entries of a kind that a package adds, as JSON holds them."""
+    """Return entries of a kind from a package, in the form of JSON."""
     return {name: sensor_entry.model_dump(mode="json") for name, sensor_entry in entries.items()}
 
 
@@ -60,7 +60,7 @@ def _check(check: Check) -> CheckEntry:
 
 
 def _meaning(means: Meaning) -> dict[str, Any]:
-    """Return the sensor, the quantity and the parameter that a check is about, by the fields of its entry."""
+    """Return the fields of a check's entry that name its sensor, quantity and parameter."""
     return {
         "kind": means.kind,
         "sensor": means.sensor,

@@ -27,7 +27,7 @@ def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
 
 
 def counted(dof: Array | None) -> list[Any] | None:
-    """Return degrees of freedom of any shape as lists, with infinity as null; None if they are unknown."""
+    """Return degrees of freedom of any shape as lists, with infinity as null, or None if unknown."""
     if dof is None:
         return None
     numbers = dof.astype(object)
@@ -36,7 +36,7 @@ def counted(dof: Array | None) -> list[Any] | None:
 
 
 def _attributes(kind: type[BaseModel], source: object) -> Mapping[str, str]:
-    """Return by field the attribute of a source that fills an entry of `kind`."""
+    """Return for each field of `kind` the name of the source's attribute that fills it."""
     from rig.report.entry_sources import SOURCES  # which imports all entries: only writing one needs it
 
     names = {cls.__name__ for cls in type(source).__mro__}

@@ -29,7 +29,7 @@ class Row:
 
 
 def _row(*classes: str, same: str = "", **renamed: str) -> Row:
-    """Return the correspondence of two classes: fields with attributes of the `same` name, and `renamed` fields."""
+    """Return the correspondence of two classes: attributes of the `same` name as their field, and `renamed` ones."""
     return Row(classes, {**{name: name for name in same.split()}, **renamed})
 
 

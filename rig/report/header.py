@@ -18,7 +18,7 @@ NOTHING: Mapping[str, Array] = MappingProxyType({})
 
 
 def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write `calibration.h`, unless the calibration failed its limits and must not be used."""
+    """Write `calibration.h`, unless the calibration failed its limits, so that it must not be used."""
     by_sensor = {name: g_sensitivity(result) for name, result in outcome.results.items()}
     sensitivities = {name: matrix for name, matrix in by_sensor.items() if matrix is not None}
     if not outcome.passed or not any(_calibrations(document, sensitivities)):
@@ -31,7 +31,7 @@ def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tu
 def g_sensitivity(result: SensorResult) -> Array | None:
     """Return the g-sensitivity (3, 3) in the frame of the corrected rates, rad/s per m/s²; None if unknown.
 
-    The vector model has it for gravity in the flange frame. Its `mounting` R rotates that into the sensor's: G Rᵀ.
+    The vector model states it for gravity in the flange frame. Its `mounting` R rotates that into the sensor's: G Rᵀ.
     """
     vector = result.vector_model
     if not isinstance(vector, VectorSolution) or vector.g_sensitivity is None:

@@ -61,7 +61,7 @@ class TrueValues:
 
     @property
     def truth_texts(self) -> list[str]:
-        """The truth of each axis in print, to the decimal of U."""
+        """The truth of each axis in print, to as many decimals as U."""
         return [in_print(true, u)[0] for true, u in zip(self.truth, self.result.expanded, strict=True)]
 
 
@@ -75,7 +75,7 @@ class TruthRow:
 
 
 def truth_rows(folder: Path, result: ResultDocument) -> list[TruthRow]:
-    """Return the rows of the simulated truth in a run folder; nothing without a valid file."""
+    """Return the rows of the simulated truth in a run folder; none without a valid file."""
     try:
         document = parse_json(read_regular_file(folder / TRUTH, SIZE_MAX_BYTES))
         truth = validate(_TruthFile, document, "truth")
@@ -99,7 +99,7 @@ def _rows(truth: _TruthFile, result: ResultDocument) -> Iterator[TruthRow]:
 
 
 def truth_lines(rows: Sequence[TruthRow]) -> Iterator[str]:
-    """Yield how the result agrees with the truth, in a line; none without rows."""
+    """Yield a line on the agreement of the result with the truth; none without rows."""
     values = [
         (deviation, f"{row.row.name} {letter}{axis}")
         for row in rows

@@ -34,8 +34,7 @@ class Writer(Protocol):
 def write_outcome(folder: Path, outcome: Outcome) -> Iterator[RunEvent]:
     """Write all documents and then `result.json`, which ends the run; yield their events once all are in place.
 
-    No document appears without the result: if the disk is full, none of them is put in place, and the run can be
-    resumed.
+    No document appears without the result: on a full disk none is put in place, and the run can be resumed.
     """
     document = document_of(outcome)
     pictures = dict.fromkeys(kind.figures for kind in kinds() if not isinstance(kind.figures, NoOutlet))

@@ -73,7 +73,7 @@ class _Thinning:
     last_s: float = 0.0
 
     def keeps(self, time_s: float) -> bool:
-        """Return whether to record the state at `time_s`. To be called once for each state, in their order."""
+        """Return whether to record the state at `time_s`. Call it once for each state, in their order."""
         if self.began_s is None:
             self.began_s = time_s
         if time_s - self.began_s > WHOLE_S and time_s - self.last_s < STANDING_S:
@@ -99,7 +99,7 @@ class Acquisition:
     _heard: "SimpleQueue[tuple[str, NDArray[Any]]] | None" = None
 
     def expect(self, name: str, sensor: RecordedSensor) -> None:
-        """Count the samples of a sensor, before its stream begins; watch the settling of one with rates."""
+        """Count the samples of a sensor from now on; if it has rates, watch its settling."""
         self.counts[name] = SensorCount(name, sensor)
         if sensor.measures(RATE):
             self.settling.expect(name, sensor)
@@ -127,7 +127,7 @@ class Acquisition:
 
     @contextmanager
     def thin_states(self) -> Iterator[None]:
-        """Record few of the arm's states inside the `with` block, after its first seconds, while the arm stands still.
+        """Record few of the arm's states inside the block, after its first seconds, while the arm stands still.
 
         Page and supervision still receive all of them.
         """
@@ -138,17 +138,17 @@ class Acquisition:
             self._thinning = None
 
     def hear(self) -> "SimpleQueue[tuple[str, NDArray[Any]]]":
-        """Return a queue into which all samples go from now on, as pairs of the sensor's name and samples (n,)."""
+        """Return a queue that receives all samples from now on, as pairs of the sensor's name and samples (n,)."""
         self._heard = SimpleQueue()
         return self._heard
 
     def keep(self) -> None:
-        """Begin a new part in memory for the data that arrive from now on; drop the oldest if there are too many."""
+        """Begin a new part in memory for data that arrive from now on; drop the oldest of too many parts."""
         with self._lock:
             self._kept.append(_Part(defaultdict(list), []))
 
     def collect_kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
-        """Return the kept samples (n,) of one sensor, the kept arm states, and the number of new states among these.
+        """Return the kept samples (n,) of one sensor, the kept arm states, and how many of these are new.
 
         States since the latest `keep` are new. Older states reach at most `REACHES_BACK_S` before it, however long the
         run has waited.

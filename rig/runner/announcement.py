@@ -16,10 +16,7 @@ NOBODY = "Nobody and nothing may be within its reach."
 
 
 def mounting(plan: Plan, number: int, words: Wording) -> Prompt:
-    """Return the question whether the item is mounted for the stage `number` (from 0) of a plan.
-
-    `words` name the turner.
-    """
+    """Return the question whether the item is mounted for the stage `number` (from 0); `words` names the turner."""
     stages, stage = plan.stages, plan.stages[number]
     far = _farthest(plan)
     lines = (
@@ -77,7 +74,7 @@ def announcement(
 
 
 def _joint_names(plan: Plan) -> list[str]:
-    """Return a name for each joint: its own if a sweep turns it, else its number."""
+    """Return a name for each joint: that of its sweeps, else its number."""
     names = {sweep.joint: sweep.joint_name for sweep in plan.sweeps}
     return [names.get(joint, f"joint {joint + 1}") for joint in range(len(plan.home_q_rad))]
 

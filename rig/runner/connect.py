@@ -68,7 +68,7 @@ class Connector:
     connecting: Connecting | None = None
 
     def _find_omitted(self, whole_plan: Plan) -> frozenset[int]:
-        """Return the indices of the sweeps and dwells that are omitted now: finished, or of other stages."""
+        """Return the indices of sweeps and dwells not to be done now: finished ones, and those of other stages."""
         others = (stage.indices for index, stage in enumerate(whole_plan.stages) if index != self.settings.stage)
         return self.resumed.done.union(*others)
 
@@ -76,7 +76,7 @@ class Connector:
     def open(self) -> Iterator[Rig]:
         """Connect everything and start recording; at the end stop the turner and close the file.
 
-        Nothing moves meanwhile. Raise `Refused` by name if the turner, the board or a sensor differs from the
+        Nothing moves while connecting. Raise `Refused` by name if the turner, the board or a sensor differs from the
         configuration or from the recording so far, or has no calibration to correct by.
         """
         whole_plan = self.phase.plan()
@@ -119,7 +119,7 @@ class Connector:
             )
 
     def _build_early_end(self, plan: Plan, sweeps: int) -> EndingEarly | None:
-        """Return the condition to end before the last repeat; None without a target, or for a verification."""
+        """Return the condition for ending before the last repeat; None without a target, or for a verification."""
         section, procedure = self.loaded.config.procedure, self.phase.procedure
         if procedure.reads_corrected or not isinstance(section, SixObservationSection):
             return None
@@ -151,7 +151,7 @@ class Connector:
             yield HostCorrected(source, calibrations) if calibrations else source
 
     def _find_calibration(self, name: str) -> Calibration:
-        """Return the sensor's calibration from the phase before. Raise Refused `nothing_to_correct_by`."""
+        """Return the sensor's calibration from the previous phase. Raise Refused `nothing_to_correct_by`."""
         if name not in self.results:
             raise Refused(
                 "nothing_to_correct_by",
@@ -175,7 +175,7 @@ class Connector:
         return turner, report, kind.describe_connected(section, report)
 
     def _report_last_state(self, turner: Turner) -> None:
-        """Report the turner's last state again, because the page still shows a moving turner."""
+        """Report the turner's last state once more; otherwise the page shows a moving turner."""
         self.station.event(ArmSeen(turner.latest, turner.missed_states))
 
     def _build_provenance(
@@ -221,7 +221,7 @@ class Connector:
         made_with: Provenance,
         described: Mapping[str, RecordedSensor],
     ) -> HandSession | None:
-        """Return the session in which an operator turns the item, or None. Raise Refused `clock_unknown`."""
+        """Return the session in which an operator turns the item, if any. Raise Refused `clock_unknown`."""
         if self.settings.by_hand is None:
             return None
         name = self.settings.to_calibrate[0]
@@ -264,9 +264,9 @@ class Connector:
     def _build_board_calibration(
         self, source: BoardSource, acquisition: Acquisition, recording: Recording, turner: RecordedTurner
     ) -> BoardCalibration | None:
-        """Return the board's own calibration from raw readings, with its observations before an interruption restored.
+        """Return the board's own calibration from raw readings, with its observations from before an interruption.
 
-        None if the readings are not raw, or no sensor on the board is to be calibrated.
+        Return None if the readings are not raw, or no sensor on the board is to be calibrated.
         """
         to_calibrate = {
             name: (sensor.index, sensor.described)

@@ -57,7 +57,7 @@ class ReadingsFile:
     """
 
     def __init__(self, path: Path, name: str, sensor: RecordedSensor, follows_crystal: bool | None = None) -> None:
-        """Create the file with its header. Raise OSError; FileExistsError if there is such a file."""
+        """Create the file with its header. Raise OSError; FileExistsError if the file exists."""
         self.path = path
         self.follows_crystal = follows_crystal
         self._microsecond_s = 1e-6 * (1 + NOMINAL_DRIFT) if follows_crystal else 1e-6
@@ -95,7 +95,7 @@ class ReadingsFile:
         self._write("".join(f"{self._format % tuple(row)}\n" for row in rows))
 
     def _write(self, lines: str) -> None:
-        """Write complete lines or none, as half a number reads as another one. Raise OSError with the file's name."""
+        """Write complete lines or none, because half a number is another number. Raise OSError with the file's name."""
         whole_bytes = self._file.tell()
         rest = memoryview(lines.encode())
         try:
@@ -109,8 +109,8 @@ class ReadingsFile:
 def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> Mapping[Path, RecordedFile]:
     """Record every sensor for `duration_s` by its own clock; return the summary of each file `folder`/<sensor>.csv.
 
-    Nothing moves. If it ends early, the files keep the readings so far. Raise Refused as `connect_sensors`, and
-    `run_folder`; Fault `no_samples`, and the faults of a source.
+    Nothing moves. If recording ends early, the files keep the readings so far. Raise Refused `run_folder`, and as
+    `connect_sensors` does; Fault `no_samples`, and the faults of a source.
     """
     arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
     with connect_sensors(config, lambda name, samples: arrived.put((name, samples))) as sources, ExitStack() as stack:
@@ -137,7 +137,7 @@ def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> M
 
 
 def _follows_crystal(source: SampleSource) -> bool | None:
-    """Return whether a board's clock follows its crystal, as the board reports; None for other sources."""
+    """Return whether a board's clock follows its crystal, by the board's report; None for other sources."""
     if not isinstance(source, BoardSource):
         return None
     with refusing():

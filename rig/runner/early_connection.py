@@ -27,13 +27,13 @@ class Ahead:
         self._next: _Connection | None = None
 
     def begin(self) -> None:
-        """Connect the next turner in a thread, unless one is connected already."""
+        """Begin to connect the next turner in a thread, unless one is connected already."""
         if self._next is None:
             self._next = _Connection(self._connect, self._log)
 
     @contextmanager
     def connect_turner(self, on_state: OnState, log: Path) -> Iterator[Turner]:
-        """Provide the turner of a run, as its kind connects it; every state from now on goes to `on_state`."""
+        """Provide the turner of a run, as its kind connects it; `on_state` receives every state from now on."""
         connection, self._next = self._next, None
         with ExitStack() as stack:
             turner = None if connection is None else connection.hand_over(stack, on_state)
@@ -66,7 +66,7 @@ class _Connection:
         self._on_state(state)
 
     def hand_over(self, stack: ExitStack, on_state: OnState) -> Turner | None:
-        """Return the turner if it is connected without fault, else None; `stack` closes it later."""
+        """Return the turner if it is connected without fault, else None; `stack` will close it."""
         self._thread.join()
         if self._turner is None:
             return None
@@ -84,7 +84,7 @@ class _Connection:
         return self._turner
 
     def _let_go(self) -> None:
-        """Drop the references to the run, which would retain all of its readings in memory."""
+        """Drop the references to the run, which would keep all of its readings in memory."""
         self._on_state, self._turner = _forget, None
 
     def close(self) -> None:

@@ -68,12 +68,12 @@ class EndingEarly:
             self._stands_at(sweep.end_q_rad, len(remaining))
 
     def due(self) -> bool:
-        """Return whether a repeat was completed and its uncertainty not assessed yet."""
+        """Return whether a repeat was completed whose uncertainty is not assessed yet."""
         return self._due and not self.ended
 
     @contextmanager
     def look_in_background(self) -> Iterator["Future[ReachedUncertainty | None]"]:
-        """Compute the uncertainty so far in a thread; yields its future."""
+        """Compute the uncertainty so far in a thread; yield its future."""
         pool = ThreadPoolExecutor(max_workers=1)
         try:
             yield pool.submit(self._look)
@@ -81,7 +81,7 @@ class EndingEarly:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def conclude(self, looked: "Future[ReachedUncertainty | None]") -> UncertaintySoFar | None:
-        """Return the uncertainty if it was computed in time; note the end of the run if it meets the target."""
+        """Return the uncertainty if it was computed in time; end the run if it meets the target."""
         self._due = False
         reached = looked.result() if looked.done() else None
         if reached is None:
@@ -90,7 +90,7 @@ class EndingEarly:
         return UncertaintySoFar(reached.scale, reached.bias_rad_s, self._repeats_left, self.ended)
 
     def skips(self, motion: Motion) -> bool:
-        """Return whether to skip the next motion of the plan: after the end of the run, all but the way home."""
+        """Return whether to skip the next motion of the plan: at the early end, all but the way home are skipped."""
         index, self._motions = self._motions, self._motions + 1
         return self.ended and index != self._home
 
@@ -107,7 +107,7 @@ class EndingEarly:
         return self.sweeps // self.repeats
 
     def _stands_at(self, pose: Joints, sweeps_left: int) -> None:
-        """Note that an assessment is due if the remaining plan has a motion home from the present pose."""
+        """Note that an assessment is due, if a motion home from the present pose is in the remaining plan."""
         self._repeats_left = -(-sweeps_left // self._per_repeat)
         self._home = next(
             (

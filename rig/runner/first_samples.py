@@ -23,9 +23,9 @@ class FirstSamples:
     _clock_began_s: float | None = None
 
     def wait_on(self, silent: Collection[str], clock_s: float | None = None) -> None:
-        """Count one more poll without data of the sensors `silent`. Raise Fault `no_samples`.
+        """Count one more poll without data of the sensors `silent`.
 
-        `clock_s` is the reading of the turner's clock.
+        Raise Fault `no_samples` after too many. `clock_s` is the reading of the turner's clock.
         """
         if self._clock_began_s is None:
             self._clock_began_s = clock_s

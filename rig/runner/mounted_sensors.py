@@ -67,7 +67,7 @@ class Mounted:
 
     @property
     def doubtful(self) -> tuple[MountedSensor, ...]:
-        """The sensors last calibrated on another board, except those that the operator declared moved."""
+        """The sensors last calibrated on another board, without those that the operator declared as moved."""
         moved = self.memory.moved
         return tuple(sensor for sensor in self.sensors if sensor.other_board and sensor.serial_number not in moved)
 

@@ -46,9 +46,9 @@ class GyroscopeReadings:
 
 
 def refuse_unsteady(readings: GyroscopeReadings, turner: str) -> None:
-    """Raise Refused `item_not_at_rest` if a gyroscope's readings change by more than their noise.
+    """Raise Refused `item_not_at_rest` if a gyroscope's readings change by more than noise.
 
-    `turner` is the operator's name of the turner.
+    `turner` is the operator's name for the turner.
     """
     rates = readings.rates_rad_s
     means = np.array([part.mean(axis=0) for part in np.array_split(rates, PARTS)])
@@ -86,7 +86,7 @@ def refuse_turning_otherwise(
 ) -> None:
     """Raise Fault `mounted_otherwise` if a gyroscope contradicts a small rotation (3,), rad, in the flange's frame.
 
-    `resting_rad_s` (3,) is its reading at rest; its readings begin before the rotation and end after it.
+    `resting_rad_s` (3,) is its reading at rest. Its readings cover the whole rotation.
     """
     turned = (readings.rates_rad_s - resting_rad_s).sum(axis=0) / readings.sensor.rate_hz
     stated = np.array(stage.mount) @ turn_flange_rad
@@ -105,7 +105,7 @@ def refuse_turning_otherwise(
 
 
 def remedy(stage: Stage) -> str:
-    """Return the remedy for an item whose mounting differs from its stage."""
+    """Return the remedy for an item that is not mounted as its stage requires."""
     return f'Mount the item as the stage says ("{stage.instruction}"), or correct its mount in procedure.stages'
 
 

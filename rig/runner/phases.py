@@ -83,7 +83,7 @@ class Run:
         return self._write(outcome)
 
     def has_refused_sweeps(self, phase: Phase) -> bool:
-        """Return whether a phase has sweeps or dwells that do not count, which another run of it repeats."""
+        """Return whether a phase has sweeps or dwells that do not count, so that another run repeats them."""
         if phase.procedure.reads_corrected:
             return False
         plan = phase.plan()
@@ -103,7 +103,7 @@ class Run:
     ) -> tuple[RunData, ...]:
         """Carry out the phase's script, by `results` of the calibration before; return all recordings of the phase.
 
-        Before each stage the item is mounted with nothing connected, as cables that are in the way may be unplugged.
+        Before each stage the item is mounted with nothing connected, as cables may have to be unplugged.
         """
         readings = phase.procedure.readings
         with self.report_end(self._advice, moved=moved):
@@ -167,7 +167,7 @@ class Run:
             )
 
     def _settings(self, phase: Phase) -> RunSettings:
-        """Return the settings that are recorded, and that decide the verdict of the phase."""
+        """Return the recorded settings, which also determine the phase's verdict."""
         then = phase.follows is not None
         settings = settings_of(self.loaded.config, phase.plan())
         return replace(settings, procedure=phase.procedure.name, then_verify=then)
@@ -213,7 +213,7 @@ class Run:
     def report_end(self, advice: Advice | None = None, *, moved: bool = False) -> Iterator[None]:
         """Report the early end of a run, in its log too, followed by `advice` after a fault.
 
-        A refusal means that nothing has moved; after a motion of the run (`moved`) it becomes a fault.
+        A refusal means that nothing has moved; if the run has `moved`, it becomes a fault.
         """
         try:
             yield
@@ -254,7 +254,7 @@ class Run:
 
 
 def _add_notes(what: str, error: BaseException) -> str:
-    """Return the message `what` with the notes of the error, such as the arm's about its stop."""
+    """Return the message `what` followed by the notes of the error, such as the arm's on its stop."""
     return "; ".join([what, *dict.fromkeys(_notes(error))])
 
 

@@ -106,7 +106,7 @@ class Recording:
         self.station.event(event)
 
     def check(self) -> None:
-        """Raise Fault `recording_failed`, or `run_folder_removed` when the file is no longer in its place."""
+        """Raise Fault `recording_failed`, or `run_folder_removed` if the file is no longer at its path."""
         self.recorder.check()
         if self.recorder.removed:
             raise Fault(
@@ -151,8 +151,8 @@ class Rig:
     def preflight(self) -> None:
         """Check every condition of a movement, ask the operator, and take control of the arm.
 
-        A movement agreed to before begins without a question, unless the arm has moved since. Raise `Refused` with
-        every problem; nothing has moved then.
+        A movement with agreement in advance begins without a question, unless the arm has moved since. Raise `Refused`
+        with every problem; nothing has moved then.
         """
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
         refuse(kind.problems([self.whole_plan, self.plan], section, report))
@@ -179,7 +179,7 @@ class Rig:
             raise Refused("not_confirmed", "nobody agreed to the movement", NOT_AGREED)
 
     def _refuse_moved(self) -> None:
-        """Raise Refused `arm_moved` if the arm was moved since the announcement, as it would then take another path."""
+        """Raise Refused `arm_moved` if the arm was moved since the announcement, because its path has changed."""
         moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.turner.latest.q_rad)), default=0.0)
         if moved_rad > SAME_POSE_RAD:
             raise Refused(
@@ -190,7 +190,7 @@ class Rig:
             )
 
     def start_sampling(self) -> None:
-        """Start every source; from here on every sample is recorded. Raise `Fault` for a silent sensor."""
+        """Start every source; from now on every sample is recorded. Raise `Fault` for a silent sensor."""
         sources, turner = self.devices.sources, self.devices.turner
         if self.onboard is not None:
             self.onboard.begin()
@@ -233,7 +233,7 @@ class Rig:
         return [GyroscopeReadings(name, sensor, acquisition.collect_newest(name)) for name, sensor in sensors.items()]
 
     def _try_the_mounting(self, trial: Transfer, took_s: float) -> None:
-        """Raise Fault if the gyroscopes' readings in a trial contradict the stage's mounting."""
+        """Raise Fault if the gyroscopes' readings in a trial motion contradict the stage's mounting."""
         turned = np.array(travel(trial.start_q_rad, trial.target_q_rad))
         axes = flange_axes(np.array(trial.start_q_rad), self.recording.geometry)
         for readings in self._collect_readings(took_s + TRIAL_REST_S, lambda: self._watch(trial)):
@@ -254,7 +254,7 @@ class Rig:
                 self._try_the_mounting(transfer, self.devices.turner.latest.time_s - began_s)
 
     def sweep(self, sweep: Sweep) -> None:
-        """Turn one joint through a revolution, or an arc, at constant speed, and record when it began and ended.
+        """Turn one joint through a revolution, or an arc, at constant speed, and record its begin and end.
 
         Afterwards, while the arm stands still, a board that calibrates by itself averages it. Raise `unplanned_motion`.
         """
@@ -283,7 +283,7 @@ class Rig:
             raise Fault("unplanned_motion", f"{what}, but in the plan that passed pre-flight {planned}", remedy)
 
     def _skips(self, motion: Motion) -> bool:
-        """Return whether to skip a motion as the target is reached; assess that after each repeat."""
+        """Return whether to skip a motion because the target is reached; assess this after each repeat."""
         if self.early is None:
             return False
         if self.early.due():
@@ -299,7 +299,7 @@ class Rig:
         return self.early.skips(motion)
 
     def _observe(self, sweep: Sweep) -> None:
-        """Let the board average the sweep. To find its window takes seconds; a heater gets commands meanwhile."""
+        """Let the board average the sweep. Finding its window takes seconds, in which a heater still gets commands."""
         if self.onboard is None:
             return
         if self.warming is None:
@@ -334,7 +334,7 @@ class Rig:
         self._done.add(dwell.index)
 
     def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None]) -> bool:
-        """Stand still until `until` returns True; return False after `at_most_s` by the controller's clock."""
+        """Stand still until `until` returns True; return False if `at_most_s` of the controller's time has passed."""
         turner = self.devices.turner
         began_s = turner.latest.time_s
         while not until():
@@ -384,7 +384,7 @@ class Rig:
         return self.warming
 
     def _end_set(self) -> None:
-        """End the temperature set: all sweeps and dwells since the latest wait."""
+        """End the temperature set, which has all sweeps and dwells since the latest wait."""
         if self.warming is not None and self._done:
             self.warming.end_set(min(self._done), max(self._done) + 1)
         self._done.clear()
@@ -400,14 +400,15 @@ class Rig:
         self.hand.carry_out(self._check_along)
 
     def _check_along(self) -> None:
-        """Check the sources and the recording, and report the number of samples."""
+        """Check the sources and the recording during a step, and report the number of samples."""
         self._check()
         self.recording.station.event(SamplesTaken(self.devices.acquisition.samples()))
 
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from its averages, for comparison with the host's.
 
-        Only after the last stage, from the sweeps of all stages: it uses speeds alone, for any axis of rotation.
+        It does so only after the last stage, from the sweeps of all stages: it uses speeds alone, for any axis of
+        rotation.
         """
         if self.onboard is not None and self.last:
             self.onboard.solve()
@@ -422,7 +423,7 @@ class Rig:
 
     @contextmanager
     def _step(self, step: Step, then: Callable[[], None] = lambda: None) -> Iterator[None]:
-        """Report the start and the end of a step; `then` is part of the step, but not of its recorded time."""
+        """Report the start and end of a step. `then` is done within the step, but after its recorded time."""
         self._number += 1
         position = self._number, len(self.plan.steps), step
         turner = self.devices.turner
@@ -443,7 +444,7 @@ class Rig:
             self.warming.check(self.devices.turner.latest.time_s)
 
     def _watch(self, step: Step) -> None:
-        """Check the sources and the recording, and report progress; called many times a second during a step."""
+        """Check the sources and the recording, and report progress; it is called many times a second in a step."""
         self._check()
         state = self.devices.turner.latest
         within_s = min(state.time_s - self._step_started_s, step.duration_s)

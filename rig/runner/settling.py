@@ -36,7 +36,7 @@ class _Watched:
     at_rest_counts: list[float] = field(default_factory=list)
 
     def scatter_counts(self, before: int = 0) -> float | None:
-        """Return the RMS over the axes of the newest span's standard deviations; None if there are too few readings.
+        """Return the standard deviation of the newest span of readings, as RMS over the axes; None with too few.
 
         `before` counts spans back from the newest one.
         """
@@ -77,14 +77,14 @@ class Settling:
         self._watched[name] = _Watched(name, column, enough, deque(maxlen=2 * enough))
 
     def add(self, sensor: str, samples: NDArray[Any]) -> None:
-        """Take the newest readings (n,) of a sensor that is watched."""
+        """Add the newest readings (n,) of a watched sensor."""
         watched = self._watched.get(sensor)
         if watched is not None:
             with self._lock:
                 watched.recent.extend(samples[watched.column].astype(np.float64))
 
     def begin(self) -> None:
-        """Drop the readings so far, as the arm stands still from now on."""
+        """Drop the readings so far, because the arm stands still from now on."""
         with self._lock:
             for watched in self._watched.values():
                 watched.recent.clear()
@@ -100,6 +100,6 @@ class Settling:
             return all(len(watched.at_rest_counts) >= SPANS_AT_REST for watched in self._watched.values())
 
     def find_unsettled(self) -> dict[str, float | None]:
-        """Return the unsettled sensors: by name the scatter over that at rest, None with too few readings."""
+        """Return the unsettled sensors by name: their scatter relative to that at rest, None with too few readings."""
         with self._lock:
             return {watched.name: watched.over_rest() for watched in self._watched.values() if not watched.settled}

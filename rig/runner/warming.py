@@ -53,7 +53,7 @@ class Warming:
     _looked_s: float = -np.inf
 
     def prepare(self) -> None:
-        """Raise Refused if a sensor has `no_thermometer` or the board has `no_heater`, before anything has moved."""
+        """Raise Refused, before anything moves, if a sensor has `no_thermometer` or the board `no_heater`."""
         for name in self.names:
             sensor = self.acquisition.counts[name].sensor
             if sensor.temperature_stated or not sensor.measures(TEMPERATURE):
@@ -80,7 +80,7 @@ class Warming:
 
     @property
     def _rate_k_s(self) -> float:
-        """The rate of a ramp: below the limit, and so slow that the temperature changes little during one set."""
+        """The rate of a ramp: below the limit, and slow enough for a nearly constant temperature in each set."""
         allowed_k_s = RAMP_SHARE * self.section.max_rate_k_per_min / 60
         return min(allowed_k_s, SET_SHARE * self.section.max_step_k / max(self.set_s, 1.0))
 
@@ -110,11 +110,11 @@ class Warming:
         return readings_c if len(readings_c) == len(self.names) else {}
 
     def find_missing(self) -> str | None:
-        """Return the part of the temperature range not covered yet, in words; None if all is covered."""
+        """Return the part of the temperature range that is not covered yet, in words, or None."""
         return self.course.missing()
 
     def begin_waiting(self) -> None:
-        """Report the temperature to wait for, which the operator or the heater brings about."""
+        """Report the temperature to wait for; the operator or the heater brings it about."""
         now_c = self.now_c()
         nearest = self._nearest(now_c)
         if self.course.warming is None:
@@ -134,7 +134,7 @@ class Warming:
         self._of_set, self._began_s = [], self._looked_s
 
     def end_set(self, first: int, end: int) -> None:
-        """End the set of the sweeps and dwells from index `first` up to `end`."""
+        """End the set with the sweeps and dwells from index `first` up to `end`."""
         if self._of_set:
             means = {name: float(np.mean([now_c[name] for now_c in self._of_set])) for name in self.names}
             measured = SetMeasured(first, end, bool(self.course.warming), means)
@@ -152,7 +152,7 @@ class Warming:
             self.heater.keep_heating(0.0)
 
     def _nearest(self, now_c: Mapping[str, float]) -> float:
-        """Return the temperature of the sensor that is last in the direction of the course."""
+        """Return the temperature of the sensor that is last on the way through the range."""
         return max(now_c.values()) if self.course.warming is False else min(now_c.values())
 
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:
@@ -167,7 +167,7 @@ class Warming:
             )
 
     def _refuse_fast(self, name: str, read_s: float, temperature_c: float) -> None:
-        """Raise `too_fast` by the board's time of each reading, as a busy computer receives it late."""
+        """Raise `too_fast`, by the board's time of each reading, because a busy computer receives it late."""
         history = self._history.setdefault(name, deque())
         if history and read_s <= history[-1][0]:
             return
@@ -197,7 +197,7 @@ class Warming:
 
 
 def range_not_reached(missing: str, why: str) -> Fault:
-    """Return the fault that the range is not covered and the run ends."""
+    """Return the fault of a run that ends without having covered the range."""
     return Fault(
         "range_not_reached",
         f"{missing}; {why}",

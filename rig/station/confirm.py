@@ -12,7 +12,7 @@ NOT_AGREED = "Run again and agree, or agree in advance: --yes, in Python yes=Tru
 
 
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
-    """Show what will be done and wait for yes or y; return False without a terminal.
+    """Show the planned action and wait for yes or y; return False without a terminal.
 
     Input typed before the question does not count.
     """
@@ -26,7 +26,7 @@ def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
 
 
 def forget_what_was_typed() -> None:
-    """Discard lines that wait at the terminal: they do not answer a question that was not shown yet."""
+    """Discard lines that wait at the terminal, because they cannot answer a question not shown yet."""
     with suppress(ImportError):  # a system with other terminals
         import termios
 
@@ -35,12 +35,12 @@ def forget_what_was_typed() -> None:
 
 
 def agreed_or_refused(announcement: Sequence[str], to_do: str, assume_yes: bool) -> None:
-    """Continue only if the operator agrees. Raise Refused `not_confirmed`."""
+    """Raise Refused `not_confirmed` unless the operator agrees."""
     if not assume_yes and not ask_operator(announcement, to_do):
         raise Refused("not_confirmed", "the operator did not agree to the change", NOT_AGREED)
 
 
 def refuse_unless_answerable(assume_yes: bool) -> None:
-    """Require a terminal before a long action with a question at its end. Raise Refused `not_confirmed`."""
+    """Raise Refused `not_confirmed` without a terminal, before a long action that ends with a question."""
     if not assume_yes and not sys.stdin.isatty():
         raise Refused("not_confirmed", "there is no terminal at which to agree to the change", NOT_AGREED)

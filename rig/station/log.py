@@ -32,9 +32,9 @@ class Log:
 
 @contextmanager
 def log(path: Path) -> Iterator[Log]:
-    """Open the log at `path` for the length of the `with` block; existing lines stay.
+    """Open the log at `path` for the block; existing lines stay.
 
-    Raise Refused `run_folder` if it cannot be written: then the recording in the same folder cannot either.
+    Raise Refused `run_folder` if it cannot be written, as the recording in the same folder cannot be either.
     """
     try:
         file = os.fdopen(open_to_append(path), "a", encoding="utf-8")

@@ -34,7 +34,7 @@ class Stations:
     mount: Callable[[int], None] | None = None
 
     def event(self, event: RunEvent) -> None:
-        """Send an event to all listeners, in order. Drop those that raise, and report that to the others."""
+        """Send an event to all listeners, in order. Drop those that raise an error, and report it to the others."""
         failed: list[tuple[Listener, Exception]] = []
         for listener in self.listeners:
             try:

@@ -19,19 +19,19 @@ UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
 def say(text: str, file: TextIO | None = None) -> None:
-    """Print one printable line, on stdout by default, broken between words for a terminal."""
+    """Print one printable line, on stdout by default; for a terminal it is broken between words."""
     file = sys.stdout if file is None else file
     print(for_file(printable(text), file), file=file)
 
 
 def say_on_terminal(doing: str) -> None:
-    """Print the present activity for a person at a terminal, not for a program that reads stderr."""
+    """Print the present activity on a terminal only, not for a program that reads stderr."""
     if sys.stderr.isatty():
         print(f"{printable(doing)} …", file=sys.stderr, flush=True)
 
 
 def for_file(text: str, file: TextIO) -> str:
-    """Return a message for stderr or its like, in lines broken between words for a terminal, else unchanged."""
+    """Return a message for a file such as stderr: for a terminal in lines broken between words, else unchanged."""
     if not file.isatty():
         return text
     width = _columns(file)
@@ -58,7 +58,7 @@ def _columns(file: TextIO) -> int:
 
 
 def plain(text: str, style: str = "") -> "Text":
-    """Return printable text for rich, which would interpret markup such as `[red]` and `:smileys:` in a string."""
+    """Return printable text for rich, which would otherwise interpret `[red]` and `:smileys:` in a string."""
     from rich.text import Text
 
     return Text(printable(text), style)

@@ -71,7 +71,7 @@ class LiveView:
 
 
 def _text(event: RunEvent) -> str | None:
-    """Return the line of an event; None for advice, which the command prints after the error."""
+    """Return the line of an event; None for advice, because the command prints it after the error."""
     return None if isinstance(event, Advice) else line(event)
 
 
@@ -89,7 +89,7 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
 
 
 def _bar(fraction: float) -> ProgressBar:
-    """Return a bar that is green from its beginning: the library draws the rest in red."""
+    """Return a bar that is green from the beginning; the library's own turns from red to green."""
     return ProgressBar(total=1.0, completed=fraction, width=40, complete_style="green", finished_style="green")
 
 

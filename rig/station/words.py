@@ -36,7 +36,7 @@ from rig.station.events import (
 
 
 def line(event: RunEvent) -> str | None:
-    """Return an event in one line; None for instruments' events and for events printed elsewhere."""
+    """Return an event in one line; None for frequent events of devices and for those printed elsewhere."""
     text: str | None
     match event:
         case Prompt(mounts=int(), announcement=(stage, *_)):
@@ -87,7 +87,7 @@ def _temperature_line(event: RunEvent) -> str | None:
 
 
 def _outcome_line(event: RunEvent) -> str | None:
-    """Return an event in words, of those that come when nothing moves any more; None for others."""
+    """Return an event in words, if it is one of those after the last motion, else None."""
     text: str | None
     match event:
         case CalibrationStored(sensor, part, serial_number, record):
@@ -140,7 +140,7 @@ def _entry_words(history: str, numbers: Sequence[int], *, usual: bool) -> str:
 
 
 def reason(event: RunEvent) -> str | None:
-    """Return why a run ended early. The log keeps it; on a terminal the command prints it last."""
+    """Return why a run ended early. The log keeps this; on a terminal the command prints it last."""
     match event:
         case Failed(error) if error.name == "script_failed" and error.__cause__ is not None:
             return f"{error}\n{''.join(format_exception(error.__cause__)).rstrip()}"

@@ -179,7 +179,7 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
 
 
 def _apply_nonlinearity(along_rad_s: Array, effects: Effects, rng: np.random.Generator) -> Array:
-    """Return the rates (N, 3) that a nonlinear sensor indicates; they are exact at the speed of the sweeps."""
+    """Return the rates (N, 3) that a nonlinear sensor indicates; at the sweeps' speed they are exact."""
     cube, square = effects.nonlinearity / np.array([[CUBE_MISSED], [SQUARE_MISSED]]) * rng.uniform(-1, 1, (2, 3))
     fraction, sweep_fraction = along_rad_s / effects.full_scale_rad_s, effects.speed_rad_s / effects.full_scale_rad_s
     curve = cube * (fraction**2 - sweep_fraction**2) + square * fraction
@@ -187,14 +187,14 @@ def _apply_nonlinearity(along_rad_s: Array, effects: Effects, rng: np.random.Gen
 
 
 def _draw_warming(rng: np.random.Generator, effects: Effects, session: Session) -> tuple[Array, Array]:
-    """Draw the mean temperature above the start, K (N,), of each average: true, and recorded in steps."""
+    """Draw the mean temperature, K (N,), of each average above the start: true, and as recorded in steps."""
     middle_s = session.windows_s.mean(axis=1)
     warmth = effects.warming_k * rng.uniform(-1, 1) * (1 - np.exp(-middle_s / WARM_UP_S))
     return warmth, STEP_K * np.round(warmth / STEP_K)
 
 
 def _build_session(twists: Array, speed_rad_s: float) -> Session:
-    """Return six sweeps of wrists 3, 1 and 2 about flange z, y and x, each with the rest after it; then the rests.
+    """Return six sweeps of wrists 3, 1 and 2 about flange z, y and x, each followed by a rest; sweeps come first.
 
     In the flange's frame a wrist's axis is fixed while that wrist turns, and `twists` (3, 2) tilt it. At home the
     flange's x, y and z point forward, left and up in the base.

@@ -34,7 +34,7 @@ class _Example:
 
     @property
     def speed_rad_s(self) -> float:
-        """The speed at which the first pass gives Table I's values: ω² = β0 / (1 − (k/k₁)²)."""
+        """The speed for which the first pass gives Table I's values: ω² = β0 / (1 − (k/k₁)²)."""
         scale, bias, first = np.array(self.last_scale), np.array(self.last_bias_rad_s), np.array(self.first_scale)
         missing = 1 - np.sum(scale**2) / np.sum(first**2)
         return float(np.sqrt(np.sum((scale * bias) ** 2) / missing))
@@ -71,7 +71,7 @@ RATIOS = np.round(np.concatenate([np.arange(0.02, 0.48, 0.02), np.arange(0.48, 0
 
 
 def study(settings: Settings) -> StudyReport:
-    """Show the estimators' convergence without noise, hence without random numbers: `settings` have no effect."""
+    """Show the estimators' convergence without noise; no random numbers are drawn, so `settings` have no effect."""
     rows = []
     for name, example in TABLE_I.items():
         for speed in (sim.FAST_RAD_S, example.speed_rad_s, sim.ARM_RAD_S):
@@ -104,7 +104,7 @@ def _build_rows(example: str, scale: Array, bias_rad_s: Array, speed_rad_s: floa
 
 
 def _count_passes(scale: float, ratio: float) -> int | None:
-    """Return the number of passes until k (1 ± Γⁿ/2) has its final four decimals; None if it never has."""
+    """Return the number of passes until four decimals of k (1 ± Γⁿ/2) are final; None if they never are."""
     factor = ratio / (1 - ratio) if ratio < 0.5 else 1.0
     return None if factor == 1 else int(np.ceil(np.log(2 * FOUR_DECIMALS / scale) / np.log(factor)))
 

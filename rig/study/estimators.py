@@ -45,7 +45,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
-    """Return the mean squared error of kx ky kz bx by bz, over the bound and absolute, (speeds, estimators, 2, 6)."""
+    """Return mean squared errors of kx ky kz bx by bz, over the bound and absolute, (speeds, estimators, 2, 6)."""
     scale, bias = sim.NORMAL.draw(rng)
     mounting = sim.draw_mountings(rng, 1)[0]
     F = sim.build_sensitivity(scale, mounting)
@@ -87,7 +87,7 @@ def _gyroscope_rows(ratios: Array) -> Iterator[dict[str, Any]]:
 
 
 def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]:
-    """Return the mean squared error of each parameter, over its bound and absolute, (2, 15 or 18), by estimator."""
+    """Return each parameter's mean squared error, divided by its bound, and absolute, (2, 15 or 18), by estimator."""
     attitudes = rt.draw_attitudes(TABLE_POSES)
     ratios = {}
     rates = 0.5 * np.random.default_rng(TABLE_POSES).normal(size=(TABLE_POSES, 3))  # rad/s, the same in every run
@@ -132,7 +132,7 @@ def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[st
 
 
 def _compare(errors: Array, bound: Array) -> Array:
-    """Return the mean squared error of R runs (R, p), over the bound's diagonal and absolute, (2, p)."""
+    """Return the mean squared error of R runs (R, p), divided by the bound's diagonal, and absolute, (2, p)."""
     return np.array([efficiency(errors, bound), np.mean(errors**2, axis=0)])
 
 

@@ -44,7 +44,7 @@ def write(report: StudyReport, folder: Path, name: str, table_format: Format) ->
 
 @contextmanager
 def _remove_incomplete(path: Path) -> Iterator[None]:
-    """Remove the file at `path` if the `with` block cannot write it completely. Raise Refused `study_folder`."""
+    """Remove the file at `path` if the block fails to write it. Raise Refused `study_folder`."""
     try:
         yield
     except OSError as error:
@@ -75,7 +75,7 @@ def _write_csv(columns: Columns, path: Path) -> None:
 
 
 def _format_value(value: Any) -> str:
-    """Return a value as text. Numbers have ten digits: more than a study needs, and the same on every machine."""
+    """Return a value as text. Numbers have ten digits: more than a study needs, but equal on all machines."""
     if value is None:
         return ""
     return f"{value:.10g}" if isinstance(value, float | np.floating) else str(value)

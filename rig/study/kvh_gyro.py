@@ -80,7 +80,7 @@ def _calibrate(noise_rad_s: float, rng: np.random.Generator, _: int) -> tuple[Ar
 
 
 def _simulate_drift(seed: int) -> list[dict[str, Any]]:
-    """Return the repeats of TRIAX, Fig. 4: the bias stays below 1 deg/h; here it takes steps of 0.1 deg/h an hour."""
+    """Return the repeats of TRIAX, Fig. 4: the bias stays below 1 deg/h; here it steps by 0.1 deg/h every hour."""
     sensor = rt.DriftingSensor(
         rt.GYRO_MATRIX,
         rt.GYRO_REFERENCE_RAD_S * (rt.EARTH_RATE_RAD_S / np.linalg.norm(rt.GYRO_REFERENCE_RAD_S)),

@@ -88,7 +88,7 @@ def _draw_mountings(rng: np.random.Generator, runs: int, angle_deg: float) -> Ar
 
 
 def _draw_axes(rng: np.random.Generator, runs: int, angle_rad: float) -> Array:
-    """Draw unit axes as rows (runs, 3, 3), all three angles ±`angle_rad` from 90°; x straight, y in x–y."""
+    """Draw unit axes as rows (runs, 3, 3), all three angles ±`angle_rad` from 90°; x unchanged, y in the x–y plane."""
     sines = np.sin(angle_rad) * rng.choice([-1.0, 1.0], size=(runs, 3))
     gram = np.broadcast_to(np.eye(3), (runs, 3, 3)).copy()
     for pair, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):

@@ -119,7 +119,7 @@ def draw_means_and_squares(
 
 
 def _draw_means(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: SimulatedSweep) -> tuple[Array, Array]:
-    """Draw mean readings (…, 6, 3); return also each axis' reading per rad/s along the turn, (…, 6, 3)."""
+    """Draw mean readings (…, 6, 3); return also each axis' reading per rad/s about the axis of the turn, (…, 6, 3)."""
     per_rate = np.asarray(np.einsum("...ij,sj->...si", F, DIRECTIONS), dtype=np.float64)
     speed: Array | float = sweep.speed_rad_s
     if sweep.vibration == "white":

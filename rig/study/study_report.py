@@ -62,6 +62,6 @@ class StudyReport:
 
 
 def table(rows: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Return rows of equal keys as columns."""
+    """Return a table, by column, from rows with equal keys."""
     listed = list(rows)
     return {name: [row[name] for row in listed] for name in listed[0]}

@@ -6,10 +6,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def use_style() -> Iterator[None]:
-    """Draw alike within this block, with the same bytes of SVG each time.
+    """Draw in one style within this block, with the same bytes of SVG each time.
 
-    matplotlib reads settings from a file in the working folder, which may be another user's run folder and let LaTeX
-    set the text. So its own defaults are restored.
+    By default matplotlib reads settings from a file in the working folder, which may be another user's run folder and
+    make LaTeX set the text. So its own defaults are restored.
     """
     import matplotlib as mpl
 

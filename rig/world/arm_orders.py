@@ -92,14 +92,14 @@ def robot_state(robot: Robot) -> Reply:
 
 
 def _unlock(robot: Robot) -> None:
-    """Unlock a protective stop on the pendant. Raise ValueError before the controller permits it."""
+    """Unlock a protective stop on the pendant. Raise ValueError if the controller does not permit it yet."""
     if robot.safety_mode == SafetyMode.PROTECTIVE_STOP and robot.stopped_for_s < dashboard_server.UNLOCK_AFTER_S:
         raise ValueError(dashboard_server.TOO_EARLY)
     robot.unlock_protective_stop()
 
 
 def _free(robot: Robot) -> None:
-    """Release the registers that a fieldbus has claimed, not the rig's."""
+    """Release the registers that a fieldbus has claimed; the rig's stay claimed."""
     for name in [name for name, owner in robot.claims.items() if owner is FIELDBUS]:
         del robot.claims[name]
 

@@ -51,7 +51,7 @@ class WorldClock:
         self._anchor()
 
     def advance(self, duration_s: float) -> int:
-        """Let `duration_s` of virtual time pass, then hold. Return the tick at which the clock will hold."""
+        """Let `duration_s` of virtual time pass, then hold the clock; return the tick at which it holds."""
         self._anchor()
         self._stop_at = self.tick + max(1, round(duration_s * TICKS_PER_SECOND))
         return self._stop_at
@@ -64,7 +64,7 @@ class WorldClock:
         self._anchor()
 
     def dialogue(self) -> None:
-        """Note that a client has asked something and that its next question depends on the answer."""
+        """Note that a client has asked something, and that its next question depends on the answer."""
         self._dialogue_until_s = self._wall() + DIALOGUE_S
 
     def wait_s(self) -> float:

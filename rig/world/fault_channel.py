@@ -272,11 +272,11 @@ class ControlSession:
         return mounts[name]
 
     def _silence_board(self, on: bool) -> None:
-        """Let the board's cable carry nothing while its port stays open."""
+        """Make the board's cable carry nothing, while its port stays open."""
         self._world.line.silent = bool(on)
 
     def _host_baud(self, baud: float | None) -> None:
-        """Let the host read and write at a baud rate other than the board's, which TCP would not show."""
+        """Set the baud rate of the host's end, which TCP does not transmit, other than the board's."""
         self._world.line.host_baud = baud
 
 
@@ -286,7 +286,7 @@ def _servo_torque(bench: ServoBench, on: bool) -> None:
 
 
 def _servo_fault(bench: ServoBench, *, lose: int = 0, spoil: int = 0, **faults: float) -> None:
-    """Make a servo misbehave. Raise ValueError for a fault that it does not have."""
+    """Make a servo misbehave. Raise ValueError for an unknown fault."""
     for name, value in faults.items():
         if name not in FAULTS:
             raise ValueError(f"no fault {name!r}; there are {', '.join(FAULTS)}")

@@ -88,7 +88,7 @@ class FlightRecorder:
 
 
 def read_processor_times() -> tuple[float, float]:
-    """Return how long this thread has run and has waited for a processor, s; the latter is 0 without proc(5)."""
+    """Return how long this thread has run, and has waited for a processor, s; the latter is 0 without proc(5)."""
     try:
         ran_ns, starved_ns, _ = Path(f"/proc/self/task/{threading.get_native_id()}/schedstat").read_text().split()
     except (OSError, ValueError):

@@ -20,15 +20,14 @@ class SimulatedInstrument(Device, Protocol):
 
     @property
     def misbehave(self) -> Callable[..., None]:
-        """A function that sets the instrument's own faults by keyword; faults that are not given keep their value."""
+        """A function that sets the instrument's faults by keyword; omitted faults keep their value."""
 
 
 class InstrumentMount(Protocol):
-    """The place of an instrument, with the state that it keeps without power.
+    """The socket of an instrument, with the state that it keeps without power.
 
-    `kind`: its name in control requests; `pty`: whether its port is also a pseudo-terminal. To begin with,
-    `bit_error_rate` is the fraction of wrong bits on its line, and `stolen` the fraction of bytes that another program
-    reads.
+    `kind`: its name in control requests; `pty`: whether its port is also a pseudo-terminal. Initially `bit_error_rate`
+    is the fraction of wrong bits on its line, and `stolen` the fraction of bytes that another program reads.
     """
 
     @property

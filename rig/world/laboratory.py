@@ -105,7 +105,7 @@ class Laboratory:
         self.board = None
 
     def fit(self, part: str) -> bool:
-        """Fit the board of another part, still without power: another chip, with nothing stored.
+        """Exchange the board for another part's, without power: another chip that stores nothing.
 
         Return whether the operator plugs it in. An operator forgets this at most once per part.
         """
@@ -119,9 +119,10 @@ class Laboratory:
         return not forgotten
 
     def set_sensor_fault(self, name: str, fault: str | None) -> None:
-        """Set the fault of the sensor `name`, or clear it with None. It outlasts a loss of power.
+        """Set the fault of the sensor `name`, or clear it with None.
 
-        `fault` is a value of `Fault` or of `ElementFault`. Raise ValueError if there is no such sensor or fault.
+        A fault persists without power. `fault` is a value of `Fault` or of `ElementFault`. Raise ValueError for an
+        unknown sensor or fault.
         """
         if name not in self._faults:
             raise ValueError(f"no sensor {name!r}; there are {', '.join(self._faults)}")
@@ -135,7 +136,7 @@ class Laboratory:
             self._elements[name].set_fault(inside)
 
     def mount(self, stage: int) -> None:
-        """Mount the item for the stage, counted from 0, as the simulated operator does, if that is configured."""
+        """Mount the item for the stage, counted from 0, as the simulated operator does, if this is configured."""
         if stage < len(self._world.mounts):
             self._mount = mount_matrix(self._world.mounts[stage])
             for sensor in self._sensors_on_item:
@@ -151,7 +152,7 @@ class Laboratory:
         self.sense()
 
     def turn(self) -> None:
-        """Simulate one tick of the motion. While the source is `waiting`, several may precede one `sense`."""
+        """Simulate one tick of the motion; several may precede one `sense` while the source is `waiting`."""
         self.motion_source.step()
 
     def sense(self) -> None:
@@ -176,7 +177,7 @@ class Laboratory:
         return 0.0 if self.board is None else self.board.heater_duty
 
     def _build_element(self, name: str, sensor: SensorTruth) -> MotionAt:
-        """Return the motion of a sensor on the board, which can be given a fault."""
+        """Return the motion of a sensor on the board, to which a fault can be added."""
         return self._elements.setdefault(name, SensingElement(self._build_motion(sensor)))
 
     def _build_motion(self, sensor: SensorTruth) -> MotionAt:

@@ -73,7 +73,7 @@ class ClientConnection:
             self.read()
 
     def read(self) -> bool:
-        """Read the client's bytes, or close if the client has hung up. Return whether more bytes may follow."""
+        """Read the client's bytes; close if the client has hung up. Return whether more bytes may follow."""
         try:
             data = self._peer.recv(65536)
         except BlockingIOError:
@@ -93,12 +93,12 @@ class ClientConnection:
         return True
 
     def tick(self) -> None:
-        """Let the session make its bytes of this tick; `deliver` sends them as soon as the wire is free."""
+        """Let the session make its bytes of this tick, which `deliver` sends as soon as possible."""
         self._ticks += 1
         self.due = (b"" if self.listener.silent else self.due) + self.session.tick()
 
     def deliver(self, idle: bool, patient: bool) -> float:
-        """Send the bytes of past ticks. If `patient` and the client lags too far, return the wall time to wait, s."""
+        """Send the bytes of past ticks. Return the time to wait, s, if a client lags too far and `patient` is set."""
         if self.listener.silent:
             return 0.0
         if self.listener.gathers and not idle and time.monotonic() - self._delivered_s < GATHER_S:
@@ -111,7 +111,7 @@ class ClientConnection:
         return wait_s
 
     def send(self, data: bytes) -> None:
-        """Send as much as possible now and keep the rest; drop whole packages if the client does not read."""
+        """Send as much as possible now and keep the rest. Drop whole packages if the client does not read."""
         if not data or self.listener.silent:
             return
         self._wire.record_send(self._ticks * TICK_S)
@@ -138,7 +138,7 @@ class ClientConnection:
         self.watch()
 
     def watch(self) -> None:
-        """Register the events that this connection waits for with the selector."""
+        """Tell the selector which events this connection waits for."""
         if self.session.closing and not self._unsent:
             self.close()
             return
@@ -232,10 +232,7 @@ class PortListener:
         connection.greet()
 
     def set_silent(self, silent: bool) -> None:
-        """Make the port silent, or end its silence.
-
-        A silent port sends and reads nothing; its connections stay open.
-        """
+        """Make the port silent, or end this. A silent port sends and reads nothing; connections stay open."""
         self.silent = silent
         for connection in self.connections:
             connection.watch()
@@ -286,12 +283,12 @@ class Network:
             key.data(events)
 
     def tick(self) -> None:
-        """Let every session produce the bytes that it sends in this tick."""
+        """Let every session make the bytes that it sends in this tick."""
         for connection in tuple(self.connections):
             connection.tick()
 
     def deliver(self, idle: bool = True, patient: bool = True) -> float:
-        """Send the bytes of past ticks to every client whose wire is free; return the wait for the others, s.
+        """Send the bytes of past ticks to every client that can take them; return the wait for the others, s.
 
         A tick is over when this returns 0. `idle`: the next tick is not due yet, so nothing needs to be gathered.
         `patient`: wait for clients that lag, as no real controller and no real board does.

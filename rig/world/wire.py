@@ -40,7 +40,7 @@ class SocketTable:
                 self._netlink = None
 
     def count_unread(self, connection: socket.socket) -> Unread:
-        """Return a function that counts the bytes sent over `connection` that its other end has not read, if known."""
+        """Return a function that counts the bytes sent by `connection` and not read at its other end, if known."""
         netlink = self._netlink
         if netlink is None:
             return lambda: 0
@@ -122,7 +122,7 @@ class Wire:
         return max(0.0, min(due_s, max(LOOK_S[0], waited_s / 4), LOOK_S[1]))
 
     def _take(self, now_s: float) -> None:
-        """Note that the client has read something; charge its patience if it did not read before."""
+        """Note that the client has read something. If it did not read before, reduce its patience."""
         waited_s = 0.0 if self._waiting_since_s is None else now_s - self._waiting_since_s
         if waited_s > IN_PACE_S:
             self._slept = True

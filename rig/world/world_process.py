@@ -59,7 +59,7 @@ class World:
     """Laboratory, clock and sockets."""
 
     def __init__(self, loaded: Loaded, truth_file: Path | None = None) -> None:
-        """Open all ports. The world may write its truth into `truth_file`; None: nowhere."""
+        """Open all ports. The world may write its truth into `truth_file`, if there is one."""
         section = read_world_section(loaded)
         self._truth, self._truth_file = SimulatedTruth(loaded.config, section), truth_file
         self.laboratory = Laboratory(loaded.config, section)
@@ -143,31 +143,31 @@ class World:
         return listeners
 
     def _listen(self, key: str, url: str, line: SerialLine, *, gathers: bool = True) -> PortListener:
-        """Open the port of a serial line. It accepts one client, and hangs up on a second client."""
+        """Open the port of a serial line, which accepts one client and hangs up on a second one."""
         return self.network.listen(
             *_parse_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=gathers
         )
 
     # -- faults of the wires ---------------------------------------------------------------------------------------
     def silence_arm(self, duration_s: float) -> None:
-        """Let the controller neither send nor read for `duration_s` of wall time, which is what clients time out by."""
+        """Let the controller neither send nor read for `duration_s` of wall time, which clients' time-outs use."""
         self._silent_until_s = time.monotonic() + duration_s
         for listener in self.arm_listeners:
             listener.set_silent(True)
 
     def close_arm(self, *, listen: bool) -> None:
-        """Close every connection of the controller; with `listen` it accepts new connections."""
+        """Close all connections of the controller; with `listen` it then accepts new ones."""
         for listener in self.arm_listeners:
             listener.hang_up() if listen else listener.close()
 
     def close_arm_port(self, port: int) -> None:
-        """Close the connections of one of the controller's ports, which then accepts no new ones."""
+        """Close the connections of one port of the controller, which then accepts no new ones."""
         for listener in self.arm_listeners:
             if listener.port == port:
                 listener.close()
 
     def set_remote_control(self, on: bool) -> None:
-        """Switch the pendant to remote or to local control. The latter closes the connections that accepted scripts."""
+        """Switch the pendant to remote or local control. Local control closes the connections for scripts."""
         robot = self.laboratory.robot
         before, robot.remote_control = robot.local_control, on
         if robot.local_control and not before:
@@ -193,7 +193,7 @@ class World:
             self.board_listener.open()
 
     def fit_part(self, part: str) -> None:
-        """Exchange the board for another part's board, as the simulated operator does."""
+        """Exchange the board for that of another part, as the simulated operator does."""
         self.unplug_board()
         gc.collect()  # an emulated board is a reference cycle of some megabytes; free it before the next one
         if self.laboratory.fit(part):
@@ -239,10 +239,10 @@ class World:
                 alive()
 
     def _tick(self) -> None:
-        """Simulate one tick; or all that are due, at most `LEAP`, while only a client can make the arm move.
+        """Simulate one tick, or all that are due, at most `LEAP`, while only a client can make the arm move.
 
         With a board it is one at a time: its core takes as long in any case, and clients would get their packets in
-        bursts. The motion of an arm at rest can be sensed once at the end of several ticks, with the same bytes as a
+        bursts. If the arm is at rest, its motion is sensed once at the end of several ticks, with the same bytes as a
         result. Every session is called at every tick.
         """
         for remaining in reversed(range(LEAP if self.board_listener is None else 1)):
@@ -283,7 +283,7 @@ def _find_host(config: RigConfig) -> str:
 
 
 def _find_port(config: RigConfig, name: str) -> tuple[str, str]:
-    """Return an instrument's configuration key and port. An autopilot's name is its port."""
+    """Return an instrument's configuration key and port. An autopilot is named by its port."""
     if name not in config.sensors:
         return "mavlink.port", name
     key, port = config.sensors[name].own_port or ("", "")
@@ -291,7 +291,7 @@ def _find_port(config: RigConfig, name: str) -> tuple[str, str]:
 
 
 def _find_closed_ports(arm: SimulatedArmSection, robot: Robot) -> set[int]:
-    """Return the ports that the simulated controller does not offer."""
+    """Return the ports that the simulated controller keeps closed."""
     closed = set() if arm.dashboard and not robot.is_polyscope_x else {dashboard_server.PORT}
     return closed if arm.primary else closed | {script_socket.PRIMARY_PORT}
 

@@ -173,10 +173,7 @@ def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncer
 
 
 def list_mount_rotations(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
-    """Return the rotations (3 S, N, 3) of `VectorInputs`: mounts that are wrong by `mount_deg` about any axis.
-
-    Return None with one stage.
-    """
+    """Return the rotations (3 S, N, 3) of `VectorInputs`: mounts wrong by `mount_deg`; None with one stage."""
     first, *others = dict.fromkeys(stages)
     if not others:
         return None

@@ -122,10 +122,7 @@ def _calibrate(
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
-    """Return the drift of the field between the rests at the home pose; None with fewer than two rests.
-
-    Raise Fault `field_drifts`.
-    """
+    """Return the field's drift between the rests at home; None with fewer than two. Raise Fault `field_drifts`."""
     tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
     if len(tests) < 2:
         return None
@@ -143,10 +140,7 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
 
 
 def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
-    """Return the solution.
-
-    Raise Fault `field_not_uniform` for large residuals: the accelerometer confirms the attitudes.
-    """
+    """Return the solution. Raise Fault `field_not_uniform` for large residuals, as the attitudes are confirmed."""
     try:
         return solve(method=ESTIMATOR)
     except Fault as fault:

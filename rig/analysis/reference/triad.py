@@ -55,10 +55,7 @@ def gravity_reference(site: Site) -> KnownNorm:
 
 
 def field_reference(site: Site, key: str) -> KnownNorm:
-    """Return the field at the site.
-
-    Raise Fault `field_strength_unknown`, which names the option `key` that states it.
-    """
+    """Return the field at the site. Raise Fault `field_strength_unknown`, naming the option `key` that states it."""
     if site.magnetic_field_t is None:
         raise Fault(
             "field_strength_unknown",

@@ -64,7 +64,7 @@ def info(options: Namespace) -> int:
 
 
 def read(options: Namespace) -> int:
-    """Print the stored calibrations of the board, of one sensor or of all."""
+    """Print the calibrations stored on the board, of one sensor or of all."""
     with _connect(options) as (config, board):
         slots = _read_slots(board, config, options.sensor, config.sensors)
     for slot in slots:
@@ -121,7 +121,7 @@ def erase(options: Namespace) -> int:
 
 @contextmanager
 def _connect(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
-    """Connect to the board of a configuration, in its simulated laboratory if it has one."""
+    """Connect to the board of a configuration; start its simulated laboratory if it has one."""
     with ExitStack() as stack:
         loaded = stack.enter_context(load_at_own_address(options.config, options.overrides))
         section = require_board_section(loaded.config)
@@ -139,10 +139,7 @@ def _connect(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
 def _read_slots(
     board: Board, config: RigConfig, sensor: str | None, among: Mapping[str, SensorSection]
 ) -> list[BoardSlot]:
-    """Return the sensors of a command, with their stored calibrations.
-
-    Raise Refused `no_such_sensor`, `sensor_missing`.
-    """
+    """Return a command's sensors with stored calibrations. Raise Refused `no_such_sensor`, `sensor_missing`."""
     among = {name: section for name, section in among.items() if section.on_board}
     if sensor is not None and sensor not in among:
         raise Refused(
@@ -160,7 +157,7 @@ def _read_slots(
 
 
 def _select_calibration(slot: BoardSlot, result: ResultDocument, path: Path) -> Calibration:
-    """Return the run's calibration of a sensor. Raise Refused `not_in_result`, and as `refuse_other_sensor`."""
+    """Return the run's calibration of a sensor. Raise Refused `not_in_result`, and as `refuse_other_sensor` does."""
     entry = result.gyroscopes.get(slot.name)
     if entry is None or entry.role == "reference":
         raise Refused(

@@ -14,7 +14,7 @@ SCHEMA = "docs/config.schema.json"
 
 
 def refuse_existing(path: Path) -> None:
-    """Refuse to replace a file. Raise Refused `configuration_not_written`."""
+    """Raise Refused `configuration_not_written` if the file exists."""
     if path.exists() or path.is_symlink():
         raise _not_written(path, "it is there already")
 

@@ -44,10 +44,10 @@ UNCHECKED = "the board's own result: its readings are gone, so double precision 
 
 
 def hand(options: Namespace) -> int:
-    """Let the board calibrate, or fetch its last result; print it with its difference from double precision.
+    """Let the board calibrate, or read its last result; print it with its difference from double precision.
 
     Raise Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and as
-    `calibrate_by_board` and `read_kept_solution`; Fault as the first of them.
+    `calibrate_by_board` and `read_kept_solution` do; Fault as the first of them does.
     """
     if options.moves not in MOVES or not 0 < options.scale_std < 1:
         raise Refused(
@@ -98,7 +98,7 @@ def hand(options: Namespace) -> int:
 
 
 def _select_sensors(config: RigConfig, wanted: str | None) -> dict[str, SensorSection]:
-    """Return the sensors of the command, only the wanted one if it is named. Raise Refused `no_such_sensor`."""
+    """Return the command's sensors, all or only the one named. Raise Refused `no_such_sensor`."""
     among = {name: section for name, section in config.to_calibrate.items() if section.on_board}
     if not among or (wanted is not None and wanted not in among):
         raise Refused(
@@ -130,7 +130,7 @@ def _run_session(
 def _fetch_session(
     config: RigConfig, among: dict[str, SensorSection]
 ) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
-    """Fetch the result of the board's last session, which must have calibrated one of the sensors."""
+    """Read the result of the board's last session, which must be of one of the sensors."""
     from rig.runner.by_hand.on_board import read_kept_solution
 
     section = require_board_section(config)

@@ -34,7 +34,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the KVH 1775 at the given port, or every one of the given configuration; return 2 if one has a problem."""
+    """Print the KVH 1775 at the given port, or every one in the configuration; return 2 if one has a problem."""
     from rig.commands.laboratory.own_address import load_at_own_address
     from rig.report.terminal.kvh_info import print_kvh_info
 

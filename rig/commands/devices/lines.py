@@ -46,7 +46,8 @@ def add_stated(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print the section on stdout, or write the file; report on stderr what the lines show, and what is missing.
 
-    Return 0, or 1 if the file needs more values. Raise Refused as `look_at_device`, `ask_stated` and `write_checked`.
+    Return 0, or 1 if the file needs more values. Raise Refused as `look_at_device`, `ask_stated` and `write_checked`
+    do.
     """
     if not all(0.5 <= duration_s <= 600 for duration_s in options.seconds):
         raise Refused("bad_option", "--seconds are two times from 0.5 to 600", "Give for example --seconds 4 6")
@@ -68,7 +69,7 @@ def run(options: Namespace) -> int:
 
 
 def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
-    """Ask for values without an option; without a terminal they stay open. Raise Refused `bad_option`."""
+    """Ask for values that no option states; without a terminal they stay open. Raise Refused `bad_option`."""
     from rig.commands.devices.terminal_questions import ask
     from rig.config.sensors.sensor_sections import check_serial_number
     from rig.sensors.lines.guessed_section import StatedProperties
@@ -88,7 +89,7 @@ def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
 
 
 def positive_number(text: str) -> str:
-    """Return the text of a number above 0. Raise ValueError for any other text."""
+    """Return the text unchanged if it is a number above 0. Raise ValueError otherwise."""
     try:
         value = float(text)
     except ValueError:
@@ -101,10 +102,10 @@ def positive_number(text: str) -> str:
 def look_at_device(
     port: str, baud: int | None, name: str, seconds: tuple[float, float], user: "StatedProperties"
 ) -> str:
-    """Look at a device for ten seconds and return its section as YAML; print what the lines show.
+    """Read a device's lines for ten seconds and return its section as YAML; print what the lines show.
 
-    Raise Refused as `listen`, `lines_no_pattern` if its lines have nothing in common, and, for a configuration by
-    hand, `lines_not_turned` if no columns look like a gyroscope's.
+    Raise Refused as `listen` does; `lines_no_pattern` if its lines have nothing in common; for a configuration by hand,
+    `lines_not_turned` if no columns look like a gyroscope's.
     """
     from rig.commands.laboratory.claims import claim_sensor
     from rig.sensors.lines.guessed_section import section

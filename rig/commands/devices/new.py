@@ -49,7 +49,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Ask for values without an option, write the file and check it; return 0, or 1 if values remain to be filled in.
+    """Ask for values that no option states, write the file and check it; return 0, or 1 if values remain open.
 
     Raise Refused `not_answered`, `bad_option`, `configuration_not_written`.
     """
@@ -104,7 +104,7 @@ def _turner_answers(turner: str, options: Namespace) -> dict[str, object]:
 
 
 def _lines_answers(options: Namespace, port: str, *, by_hand: bool) -> dict[str, object]:
-    """Return the values that the device shows; without inspection or answer, those that the user gives."""
+    """Return the values that the device shows; if it is not read or does not answer, those that the user gives."""
     choices = {"yes": "yes: ten seconds, and nothing is left to look up", "no": "no: write an example, to be edited"}
     user_values = ask_stated(options, by_hand=by_hand)
     if ask_choice("Look at the device now?", "--listen", choices, options.listen) == "yes":
@@ -123,7 +123,7 @@ def _literals(annotation: object) -> Mapping[str, str]:
 
 
 def _port(question: str, option: str, chosen_port: str | None) -> str:
-    """Return a serial port: the user chooses one of this computer's, or types another."""
+    """Return a serial port that the user chooses from this computer's, or types."""
     from rig.config.section import check_port
 
     if chosen_port is None:

@@ -27,7 +27,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the meaning of the name. Return 0. Raise Refused `nothing_known`."""
+    """Print the meaning of the name and return 0. Raise Refused `nothing_known`."""
     name = " ".join(options.name).strip()
     lines = [*_explain_check(name), *_explain_limit(name), *_explain_error(name), *_explain_word(name)]
     if not lines:
@@ -71,7 +71,7 @@ def _explain_error(name: str) -> Iterator[str]:
 
 
 def _explain_remedies(name: str, usual: str) -> Iterator[str]:
-    """Yield the remedies, a line for each method if they differ; the latest run's method comes first."""
+    """Yield the remedies, one line for each method if they differ, the latest run's method first."""
     from rig.errors.remedies_by_method import remedies_by_method
 
     remedies = remedies_by_method(name)

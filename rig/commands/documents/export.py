@@ -85,7 +85,7 @@ def export_files(options: Namespace) -> list[Path]:
 def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
     """Return the recordings of a run, or of a log of another program.
 
-    Raise Refused `bad_option`, and the errors of both readers. A folder of `rig record` holds logs; it is not a run.
+    Raise Refused `bad_option`, and the errors of both readers. A folder of `rig record` counts as logs, not as a run.
     """
     from rig.observation.external.from_files import read_log
     from rig.observation.formats.sample_files import is_in_format
@@ -103,9 +103,10 @@ def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
 
 
 def _make_folder(folder: Path, *, named_by_user: bool) -> None:
-    """Make the folder unless a link leads out of it. Raise Refused and OSError.
+    """Make the folder unless a link leads out of it.
 
-    Links among its contents are refused; the folder itself may be one only if the user named it.
+    Raise Refused and OSError. Links among its contents are refused. The folder itself may be a link only if the user
+    named it.
     """
     from rig.data.run_folder import refuse_links
 

@@ -58,7 +58,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Write the certificate as `write_documents`; return 0, or 2 if a requested form could not be made."""
+    """Write the certificate as `write_documents` does; return 0, or 2 if a requested form could not be made."""
     _, left_out = write_documents(options)
     for error in left_out:
         say(f"rig: left out: {error}", sys.stderr)
@@ -142,7 +142,7 @@ def _make_digital(
 ) -> dict[str, bytes]:
     """Return the digital certificate by name, signed if there is a signatory; empty if it cannot be made.
 
-    The reason is appended to `left_out`, or only printed if that is None.
+    The reason is appended to `left_out`, or printed if that is None.
     """
     from rig.report.certificate.dcc import DCC, digital_certificate
 
@@ -164,7 +164,7 @@ def _make_digital(
 def _make_pdf(
     page: str, attached: Mapping[str, bytes], by: "Signatory | None", reason: "Reason", options: Namespace
 ) -> bytes:
-    """Return the page as PDF, signed by a signatory. Raise as `pdf_of`, `read_authorities` and `sign_as_pades`."""
+    """Return the page as PDF, signed by a signatory. Raise as `pdf_of`, `read_authorities` and `sign_as_pades` do."""
     from rig.report.certificate.pdf import pdf_of
 
     document = pdf_of(page, attached)

@@ -22,9 +22,9 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print a finished run as it was judged; nothing is solved again, nothing is written.
+    """Print a finished run as it was judged, without solving or writing anything.
 
-    Return 0, whatever the verdict is. Raise Refused `no_result`, `not_a_result`, `no_such_sensor`.
+    Return 0 for any verdict. Raise Refused `no_result`, `not_a_result`, `no_such_sensor`.
     """
     from rich.console import Console
 
@@ -66,10 +66,7 @@ def _list_sensors(result: "ResultDocument") -> list[str]:
 
 
 def _describe_scalars(run: Path) -> dict[str, str]:
-    """Return the channels without axes in words, by sensor name; only the recording has them.
-
-    Raise Refused as `read_run`.
-    """
+    """Describe the channels without axes, by sensor, from the recording. Raise Refused as `read_run` does."""
     import numpy as np
 
     from rig.data.recording.run_file import read_run

@@ -67,9 +67,9 @@ class VerifiedFile:
 
 
 def run(options: Namespace) -> int:
-    """Verify each file and print the findings; return 0, or the exit status that `--help` names.
+    """Verify each file and print the findings; return 0, or the exit status that `--help` lists.
 
-    Raise Refused `bad_option`, `verify_file`, and as `read_trusted_certificates`, `inspect_file` and `open_history`.
+    Raise Refused `bad_option`, `verify_file`, and as `read_trusted_certificates`, `inspect_file` and `open_history` do.
     """
     from rig.report.signatures.inspection import inspect_file, read_trusted_certificates
     from rig.report.signatures.trust import Trust
@@ -105,7 +105,7 @@ def _read_content(file: Path) -> bytes:
 def _look_up(
     named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]"
 ) -> "dict[Path, FileEntries]":
-    """Return the history's entry of each file. Raise Refused `history_unreachable`, and as `open_history`."""
+    """Return the history's entry of each file. Raise Refused `history_unreachable`, and as `open_history` does."""
     from rig.commands.history.waiting import await_answer
     from rig.history.entered_file import find_file_entries
     from rig.history.storage.address import resolve_address
@@ -133,7 +133,7 @@ def _look_up(
 def _judge(
     file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: "FileEntries | None"
 ) -> VerifiedFile:
-    """Judge one file; without a signature, by a signed file that contains it, or by the history."""
+    """Judge one file. If it has no signature, a signed file that contains it, or the history, decides."""
     look, attached_to = looks[file], None
     problems = look.problems
     if not look.signatures:
@@ -186,7 +186,7 @@ def _print_file(documents: VerifiedFile) -> None:
 
 
 def _describe_state(problems: Sequence[Refused]) -> str:
-    """Return the status; in ETSI EN 319 102-1: TOTAL-PASSED, TOTAL-FAILED, INDETERMINATE."""
+    """Return the status with its term in ETSI EN 319 102-1: TOTAL-PASSED, TOTAL-FAILED, INDETERMINATE."""
     if not problems:
         return "valid"
     altered = {problem.name for problem in problems} - TRUST_PROBLEMS

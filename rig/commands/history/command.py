@@ -15,7 +15,7 @@ _COMMANDS = (LIST, "show", "plot", "rigs", "import", "verify", RECOMPUTE, "compa
 
 
 def insert_usual_command(arguments: Sequence[str]) -> list[str]:
-    """Return the arguments with `list` inserted where `rig history …` names none of its commands."""
+    """Return the arguments with `list` inserted if `rig history …` names none of its commands."""
     words = list(arguments)
     if words[:1] == ["history"] and words[1:2] not in [[command] for command in (*_COMMANDS, "-h", "--help")]:
         words.insert(1, LIST)

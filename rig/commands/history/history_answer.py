@@ -28,7 +28,7 @@ TO_CONNECT = {
 def ask_history(address: "HistoryAddress", work: Callable[[], T], modules: Sequence[str] = ()) -> T:
     """Return the result of `work` on the history at `address`; raise its errors, or TimeoutError after `ANSWER_S`.
 
-    The time does not include the import of the needed modules and of `modules`, which happens first.
+    The needed modules, and `modules`, are imported before that time begins.
     """
     for name in (*TO_ASK, *modules):
         import_module(name)

@@ -37,7 +37,7 @@ DISAGREE = 1
 
 
 def list_calibrations(options: Namespace) -> int:
-    """Print calibrations, and trends of one serial number. Raise `not_in_history`, and as `open_named_history`."""
+    """Print calibrations, and trends of a serial number. Raise `not_in_history`, and as `open_named_history` does."""
     selection = _read_selection(options)
     with open_named_history(options) as history:
         pasts = _select_pasts(history, selection)
@@ -61,7 +61,7 @@ def list_calibrations(options: Namespace) -> int:
 
 
 def show(options: Namespace) -> int:
-    """Print one calibration, and where its run is stored. Raise Refused `not_in_history`."""
+    """Print one calibration, and the location of its run. Raise Refused `not_in_history`."""
     with open_named_history(options) as history:
         past = history.calibration(options.number)
         (kept,) = history.kept(past.run_id)
@@ -102,7 +102,7 @@ def _draw_changes(title: str, changes: Sequence[Change], folder: Path, name: str
 
 
 def rigs(options: Namespace) -> int:
-    """Print how the rigs compare by check standards and shared sensors. Return 1 if one is out of control."""
+    """Print how the rigs compare by check standards and shared sensors. Return 1 if a rig is out of control."""
     with open_named_history(options) as history:
         pasts = history.calibrations(Selection(part=options.part, since=options.since))
     states, rig_effects = rig_states(pasts), effects(pasts)
@@ -123,7 +123,7 @@ def rigs(options: Namespace) -> int:
 
 
 def import_runs(options: Namespace) -> int:
-    """Enter runs as their recordings give them, and report the outcome of each. Return 1 if one was refused."""
+    """Enter runs as solved from their recordings, and report the outcome of each. Return 1 if any was refused."""
     from rig.station.words import calibrations_in_words
 
     new = existing = refused = 0
@@ -147,10 +147,7 @@ def import_runs(options: Namespace) -> int:
 
 
 def verify(options: Namespace) -> int:
-    """Compare rows with their journal and results, files with their hashes.
-
-    Print the differences; return 1 if there are differences.
-    """
+    """Compare rows with journal and results, files with hashes; print the differences, return 1 if there are any."""
     from rig.history.integrity import STATES, WRONG, examine_history
 
     counts = dict.fromkeys(STATES, 0)
@@ -204,7 +201,7 @@ def void(options: Namespace) -> int:
 
 
 def open_named_history(options: Namespace) -> AbstractContextManager[History]:
-    """Open the named history. Raise Refused as `open_history`, and as `load` if a configuration names it."""
+    """Open the named history. Raise Refused as `open_history` does, and as `load` does if a configuration names it."""
     return open_history(own_history_address(read_history_name(options.history)) or resolve_address(None))
 
 
@@ -213,7 +210,7 @@ def _read_selection(options: Namespace) -> Selection:
 
 
 def _select_pasts(history: History, selection: Selection) -> list[Past]:
-    """Return the selected calibrations. Raise Refused `not_in_history` if there is none of the chosen sensor."""
+    """Return the selected calibrations. Raise Refused `not_in_history` if the chosen sensor has none."""
     pasts = history.calibrations(selection)
     if not pasts and selection.serial_number is not None:
         raise Refused(
@@ -225,7 +222,7 @@ def _select_pasts(history: History, selection: Selection) -> list[Past]:
 
 
 def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
-    """Yield the run folders among and within `folders`; a folder without any comes as it is, for its own error."""
+    """Yield the run folders among and within `folders`; yield a folder without any too, to be refused by name."""
     for folder in folders:
         inner = {file.parent for file in folder.rglob(RESULT)}
         if unsolved:
@@ -234,10 +231,10 @@ def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
 
 
 def _recompute_finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
-    """Return the run with its results recomputed from its recordings, unless the history has it.
+    """Return the run with results recomputed from its recordings, unless the history has it.
 
-    Its result.json alone proves nothing. Raise Refused `no_recording`, `result_not_of_recording`, and as the
-    recordings' solution.
+    A result.json alone proves nothing. Raise Refused `no_recording`, `result_not_of_recording`, and as the recordings'
+    solution does.
     """
     claimed = None if solve and not (folder / RESULT).exists() else read_finished_run(folder)
     if claimed is not None:

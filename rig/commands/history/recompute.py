@@ -30,11 +30,11 @@ MOST_SHOWN = 20  # lines on the terminal; the page has them all
 
 
 def recompute_history(options: Namespace, solve: Solve = solve_task) -> int:
-    """Solve the chosen recordings again and write the report into `--out`. Return 1 if a result calls for attention.
+    """Solve the chosen recordings again and write the report into `--out`.
 
-    Raise Refused `bad_option`, `unknown_setting`, `unknown_estimator`, `not_in_history`, `another_question`,
-    `report_folder`, and as `open_named_history`, `refuse_links` and `connect_client`; Fault `cluster_lost`, after a
-    report of the recordings solved until then.
+    Return 1 if a result needs attention. Raise Refused `bad_option`, `unknown_setting`, `unknown_estimator`,
+    `not_in_history`, `another_question`, `report_folder`, and as `open_named_history`, `refuse_links` and
+    `connect_client` do; Fault `cluster_lost`, after a report of the recordings solved until then.
     """
     question = _question(options)
     selection = Selection(options.serial_number, options.part, options.since, options.rig)
@@ -91,7 +91,7 @@ def _load_stated(options: Namespace, selection: Selection) -> tuple[str, tuple[S
 def _solve_all(
     tasks: Sequence[Task], options: Namespace, solve: Solve, journal: RecomputeJournal, answers: dict[str, Answer]
 ) -> Fault | None:
-    """Solve all tasks and note each answer. Return the fault if the cluster was lost, else None."""
+    """Solve all tasks and record each answer. Return the fault if the cluster was lost, else None."""
     try:
         with _solve_by_workers(tasks, options, solve) as answers_by_task:
             for task, answer in _track_progress(answers_by_task, len(tasks)):

@@ -39,7 +39,7 @@ class Task:
 
 
 def solve_task(task: Task) -> Answer:
-    """Solve recordings that are those entered, byte by byte; else return why they are not solved. Writes nothing."""
+    """Solve recordings that equal the entered ones byte by byte, or return why they are not solved. Write nothing."""
     if task.rig_version != VERSION:
         return Unsolved("failed", f"the worker has version {VERSION} of the rig, not {task.rig_version}")
     folder = _find_folder(task)
@@ -47,7 +47,7 @@ def solve_task(task: Task) -> Answer:
 
 
 def _find_folder(task: Task) -> Path | Unsolved:
-    """Return the newest folder in which every recording has its entered content, else why there is none."""
+    """Return the newest folder in which every recording has its entered content, or why there is none."""
     if not task.recordings:
         return Unsolved("missing", "the history has no recording of it")
     damaged = None

@@ -32,17 +32,14 @@ class CalibrationComparison:
 
 
 def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
-    """Enter the run in `folder`.
-
-    Return the event to report, and the comparisons of its calibrations with earlier calibrations.
-    """
+    """Enter the run in `folder`. Return the event to report, and the comparisons with earlier calibrations."""
     from rig.history.storage.address import choose_history_address
 
     return _enter_run(folder, lambda: choose_history_address(section))
 
 
 def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
-    """Enter the run in `folder` in the user's own history, or in the `named` one. Return as `remember`."""
+    """Enter the run in `folder` in the user's own history, or the `named` one. Return as `remember` does."""
     from rig.history.storage.address import own_history_address
 
     return _enter_run(folder, lambda: own_history_address(named))
@@ -67,7 +64,7 @@ def _enter_run(
 
 
 def _is_usual(address: "HistoryAddress") -> bool:
-    """Return whether this history is the default one, which commands use if none is named."""
+    """Return whether this history is the default one, which commands use if they name none."""
     from rig.history.storage.address import own_history_address
 
     try:
@@ -101,7 +98,7 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
 def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, HistoryAddress | None]":
     """Return the configuration of the run in `folder`, and the address of `history`, else of the user's own.
 
-    No address if there is none, or if that configuration wants no history and none is named.
+    There is no address if there is no history, or if that configuration switches it off and none is named.
     """
     from rig.history.entered.finished_run import read_configuration
     from rig.history.storage.address import own_history_address
@@ -114,7 +111,7 @@ def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, Histor
 def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | None:
     """Return number and SHA-256 of the last entry in the journal to which `remember_certificate` would add.
 
-    None if there is no history, if it does not answer, or if it is empty.
+    Return None if there is no history, if it does not answer, or if it is empty.
     """
     try:
         _, address = _find_own(folder, history)
@@ -126,7 +123,7 @@ def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str
 
 
 def describe_changes(calibrations: Sequence[CalibrationComparison]) -> tuple[str, ...]:
-    """Describe in words how calibrations differ from earlier ones: changed sensors first, then unchanged sensors."""
+    """Describe how calibrations differ from earlier ones: changed sensors first, then unchanged sensors."""
     if not calibrations:  # with the history off its modules are not imported
         return ()
     from rig.history.terminal.change_words import change_in_short, select_changed
@@ -193,7 +190,7 @@ def _since_event(calibration: CalibrationComparison) -> Since:
 
 
 def _compare_with_earlier(history: "History", run_id: int) -> "list[CalibrationComparison]":
-    """Compare each calibration of a run with the sensor's previous one, if there is one."""
+    """Compare each calibration of a run with the sensor's previous one, if any."""
     from rig.history.series import changes_in, subjects
     from rig.history.store import Selection
 

@@ -36,8 +36,8 @@ def find_other_board(
 ) -> str | None:
     """Return the serial number, in words, under which the history knows a sensor on this board.
 
-    The newest calibration of one of the `parts` decides. None if its serial number is one of `own_serial_numbers`. A
-    history that does not answer gives None.
+    The newest calibration of one of the `parts` decides. Return None if its serial number is one of
+    `own_serial_numbers`, or if the history does not answer.
     """
     from rig.history.storage.address import choose_history_address
 
@@ -65,7 +65,7 @@ def _load_of_sensors(address: "HistoryAddress", serial_numbers: list[str]) -> tu
 
 
 def _load_calibrations(address: "HistoryAddress", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
-    """Return the valid calibrations of the selections, the newest first; none if the file is missing."""
+    """Return the valid calibrations of the selections, newest first; none if the file is missing."""
     from rig.history.storage.continuity import is_there
     from rig.history.store import open_history
 

@@ -11,7 +11,7 @@ def await_answer(work: Callable[[], T], within_s: float | None = None) -> T:
     """Return the result of `work`, from a thread of its own; pass on its exception.
 
     Raise TimeoutError if it takes longer. Ctrl-C thus takes effect at once, whatever the thread waits for. A late
-    thread is abandoned and ends with the process, as a library that waits for its server cannot be interrupted.
+    thread is abandoned and ends with the process, because a library that waits for its server cannot be interrupted.
     """
     from concurrent.futures import Future  # here, as `rig --help` does not need it
 

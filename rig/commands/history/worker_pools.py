@@ -38,7 +38,7 @@ class Workers(Protocol):
         ...
 
     def room(self) -> int:
-        """Return how many more recordings the workers can take now. Raise Fault `cluster_lost` if no worker is left."""
+        """Return how many more tasks the workers can take now. Raise Fault `cluster_lost` if no worker is left."""
         ...
 
     def give(self, solve: Solve, task: Task) -> None:
@@ -60,9 +60,9 @@ def solve_one_by_one(tasks: Iterable[Task], solve: Solve) -> Iterator[SolvedTask
 
 
 def distribute(tasks: Iterable[Task], solve: Solve, workers: Workers) -> Iterator[SolvedTask]:
-    """Solve the tasks by `workers`, and yield the answers as they arrive. Raise Fault `cluster_lost`.
+    """Solve the tasks by `workers`, and yield the answers as they arrive.
 
-    Only as many tasks are given out as the workers have room for.
+    Raise Fault `cluster_lost`. No more tasks are given out than the workers can take.
     """
     waiting = deque(tasks)
     while waiting or workers.busy:
@@ -72,7 +72,7 @@ def distribute(tasks: Iterable[Task], solve: Solve, workers: Workers) -> Iterato
 
 
 class Processes(AbstractContextManager["Processes"]):
-    """A number of processes of this computer, each a pool of its own: one that dies takes no other with it."""
+    """A number of processes of this computer, each a pool of its own, so that a crash affects no other one."""
 
     def __init__(self, count: int) -> None:
         self._idle = [_new_process() for _ in range(count)]
@@ -117,7 +117,7 @@ class Cluster:
 
     @property
     def busy(self) -> bool:
-        """Whether the scheduler has a task that it has not answered."""
+        """Whether the scheduler has an unanswered task."""
         return bool(self._in_hand)
 
     def threads(self) -> dict[str, int]:
@@ -129,7 +129,7 @@ class Cluster:
         raise _cluster_lost("the scheduler does not answer any more")
 
     def room(self) -> int:
-        """Return the free capacity: a few tasks per thread, less those in progress.
+        """Return how many more tasks the cluster can take: a few per thread, less those in progress.
 
         Raise Fault `cluster_lost` if there has been no worker for long.
         """
@@ -147,7 +147,7 @@ class Cluster:
         future.add_done_callback(self._done.put)
 
     def answers(self) -> Iterator[SolvedTask]:
-        """Wait a moment for an answer, and yield it if it arrives."""
+        """Wait a moment for an answer, and yield one that arrives."""
         try:
             future = self._done.get(timeout=LOOK_S)
         except Empty:
@@ -163,7 +163,7 @@ def _new_process() -> ProcessPoolExecutor:
 
 
 def _read_answer(future: Any) -> Answer:
-    """Return the answer of a finished future, a process's or Dask's. Raise Fault `cluster_lost` if cancelled."""
+    """Return the answer of a finished future, of a process or of Dask. Raise Fault `cluster_lost` if cancelled."""
     if future.cancelled():
         raise _cluster_lost("the scheduler has gone away with its unfinished tasks")
     error = future.exception()
@@ -184,5 +184,5 @@ def _cluster_lost(what: str) -> Fault:
 
 
 def _ignore_interrupts() -> None:
-    """Ignore Ctrl-C, which reaches all processes of a terminal: the recording is finished, the parent then stops."""
+    """Ignore Ctrl-C, which reaches all processes of a terminal, to finish the recording; then the parent stops."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -28,7 +28,7 @@ CREDENTIALS = struct.Struct("3i")  # of the far end: process, user, group (unix(
 
 @contextmanager
 def claim_devices(config: RigConfig) -> Iterator[None]:
-    """Claim all devices of a run for the block. Raise Refused as `claim_arm`, `claim_board` and `claim_sensor`."""
+    """Claim all devices of a run for the block. Raise Refused as `claim_arm`, `claim_board` and `claim_sensor` do."""
     with ExitStack() as stack:
         if config.turner.address:
             stack.enter_context(claim_arm(config.turner.address))
@@ -41,10 +41,7 @@ def claim_devices(config: RigConfig) -> Iterator[None]:
 
 
 def claim_arm(host: str) -> AbstractContextManager[None]:
-    """Claim the arm, or the turner at a serial port, whichever of its names is used.
-
-    Raise Refused `arm_claimed`, `only_on_linux`.
-    """
+    """Claim the arm or serial turner under any of its names. Raise Refused `arm_claimed`, `only_on_linux`."""
     refuse_unless_linux("what moves an arm or a servomotor")
     if "/" in host:
         return _claim("arm_claimed", f"port {_canonical_port(host)}", f"the turner at {host}")
@@ -87,7 +84,7 @@ def _claim(name: str, device: str, description: str) -> Iterator[None]:
 
 
 def _describe_holder(address: str) -> str:
-    """Return the process that holds the claim, and its command line if that may be read."""
+    """Describe the process that holds the claim, with its command line if this may be read."""
     process = 0
     try:
         with socket.socket(socket.AF_UNIX) as question:
@@ -103,7 +100,7 @@ def _describe_holder(address: str) -> str:
 
 
 def _canonical_port(port: str) -> str:
-    """Return the one name of a port, whatever links to it: its device, or its address."""
+    """Return the canonical name of a port, behind any links: its device, or its address."""
     parts = urlsplit(port)
     if parts.scheme == "socket" and parts.hostname is not None:
         return f"{_resolve_host(parts.hostname)}:{parts.port}"

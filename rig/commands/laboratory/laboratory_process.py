@@ -61,7 +61,8 @@ def simulated_laboratory(config_text: str, late: Path | None = None, truth: Path
 def make_mounter(control: str) -> Callable[[int], None]:
     """Return the function that mounts the item for a stage, counted from 0: the simulated operator does it.
 
-    `control` is the laboratory's control channel. The function raises OSError or ValueError if the laboratory is gone.
+    `control` is the laboratory's control channel. The function raises OSError or ValueError if the laboratory has
+    ended.
     """
 
     def mount(stage: int) -> None:
@@ -71,7 +72,10 @@ def make_mounter(control: str) -> Callable[[int], None]:
 
 
 def make_fitter(control: str) -> Callable[[str], None]:
-    """Return the function that fits the part of a serial number: the simulated operator does it. As `make_mounter`."""
+    """Return the function that exchanges the part for that of a serial number: the simulated operator does it.
+
+    `control` and errors as in `make_mounter`.
+    """
 
     def fit(part: str) -> None:
         send_request(control, {"do": "fit", "part": part})
@@ -80,7 +84,7 @@ def make_fitter(control: str) -> Callable[[str], None]:
 
 
 def send_request(control: str, request: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Send a request to the control channel and return the reply. Raise OSError or ValueError if there is none."""
+    """Send a request to the control channel and return the reply. Raise OSError or ValueError if none comes."""
     host, _, port = control.rpartition(":")
     with socket.create_connection((host, int(port)), CONTROL_TIMEOUT_S) as channel:
         channel.sendall(json.dumps(dict(request)).encode() + b"\n")
@@ -90,7 +94,7 @@ def send_request(control: str, request: Mapping[str, Any]) -> Mapping[str, Any]:
 
 @contextmanager
 def write_temporary(config_text: str) -> Iterator[Path]:
-    """Write the configuration to a file that exists for the length of the block."""
+    """Write the configuration to a file that exists during the block."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "config.yaml"
         path.write_text(config_text, encoding="utf-8")

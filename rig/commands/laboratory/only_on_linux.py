@@ -8,9 +8,9 @@ SYSTEMS = {"win32": "Windows", "darwin": "macOS"}
 
 
 def refuse_unless_linux(what: str, system: str = sys.platform) -> None:
-    """Refuse on other systems, which lack prompt stops by signals, loopback addresses or pseudo-terminals.
+    """Raise Refused `only_on_linux` unless the system is Linux.
 
-    Raise Refused `only_on_linux` unless the system is Linux.
+    Others lack prompt stops by signals, loopback addresses or pseudo-terminals.
     """
     if system != "linux":
         raise Refused(

@@ -20,7 +20,7 @@ CANDIDATES = 250
 
 @contextmanager
 def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[str]]:
-    """Yield the overrides that give a configuration's laboratory an address of its own for the length of the block.
+    """Yield the overrides that give a configuration's laboratory an address of its own during the block.
 
     `laboratory` is the file with defaults if it simulates one, else None. There are no overrides if its address is
     free, if it is real, or if no candidate is free: then the device that needs the address reports it.
@@ -38,7 +38,7 @@ def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[
 
 @contextmanager
 def load_at_own_address(path: Path, overrides: Sequence[str]) -> Iterator[Loaded]:
-    """Load a configuration without its procedure, its laboratory at an address of its own. Raise Refused as `load`."""
+    """Load a configuration, procedure excluded, with a laboratory address of its own. Raise as `load` does."""
     loaded = load(path, overrides, sections=None)
     with find_own_address(loaded.config, loaded.laboratory) as moved:
         yield load(path, [*overrides, *moved], sections=None) if moved else loaded
@@ -52,7 +52,7 @@ def _candidates() -> Iterator[str]:
 
 
 def _take_if_free(host: str, stack: ExitStack) -> bool:
-    """Take an address if it is free: no rig works there, no laboratory starts there, nothing listens."""
+    """Claim an address if it is free: no other rig or laboratory uses it, and nothing listens."""
     with ExitStack() as claims, socket.socket() as probe:
         try:
             claims.enter_context(claim_laboratory(host))

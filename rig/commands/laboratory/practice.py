@@ -50,12 +50,12 @@ HELP = "\n".join(["What can happen here:", *(f"  {words:18}{item.text}" for word
 
 
 def opening_text() -> str:
-    """Return the text with which a laboratory greets whoever practises in it."""
+    """Return the greeting of a laboratory for a person who practises in it."""
     return f"The laboratory is ready. {HELP}\nAn empty line shows this again; Ctrl-D ends the laboratory."
 
 
 def find_incident(words: str) -> Incident | None:
-    """Return the incident that `words` name, None if there is none. `slider` takes any whole percentage up to 100."""
+    """Return the incident that `words` name, or None. `slider` takes any whole percentage up to 100."""
     words = " ".join(words.lower().split())
     if (slider := SLIDER.fullmatch(words)) is not None and int(slider[1]) <= 100:
         return _slider(int(slider[1]))
@@ -65,7 +65,7 @@ def find_incident(words: str) -> Incident | None:
 def practise(control: str, words: str) -> str:
     """Cause the incident that `words` name in the laboratory, and return what a person there would see.
 
-    Raise Fault `world_ended` if the laboratory is gone.
+    Raise Fault `world_ended` if the laboratory has ended.
     """
     incident = find_incident(words)
     if incident is None:

@@ -16,7 +16,7 @@ class OperatorListener:
         self._control = control
 
     def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does. Raise OSError or ValueError if the laboratory is gone."""
+        """Handle an event, as a Listener does. Raise OSError or ValueError if the laboratory has ended."""
         if isinstance(event, HandAsked):
             instruction = event.instruction
             request = {"do": "instruct", "say": instruction.say, "face": instruction.face, "turns": instruction.turns}

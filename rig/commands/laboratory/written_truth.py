@@ -20,7 +20,7 @@ Windows = list[tuple[float, float]]
 def write_truth(control: str, folder: Path, loaded: "Loaded", outcome: "Outcome") -> Iterator[DocumentWritten]:
     """Have the laboratory at `control` write the truth over the windows of a run; yield the event of the file.
 
-    It writes none for a calibration over temperature: its values belong to another temperature than the run's.
+    It writes none for a calibration over temperature, whose values are for another temperature than the run's.
     """
     if outcome.polynomials or not (outcome.results or outcome.accelerometers):
         return
@@ -31,9 +31,9 @@ def write_truth(control: str, folder: Path, loaded: "Loaded", outcome: "Outcome"
 
 
 def _windows(outcome: "Outcome", *, follows_arm: bool) -> dict[str, Any]:
-    """Return the windows of all calibrated sensors as the laboratory takes them (`rig.world.board.windowed_truth`).
+    """Return the windows of all calibrated sensors in the form of `rig.world.board.windowed_truth`.
 
-    Only an arm's controller has the laboratory's clock. With any other clock the whole time is one window.
+    Only an arm's controller shares the laboratory's clock. With any other clock the whole time is one window.
     """
     recordings = outcome.recordings if follows_arm else ()
     gyroscopes, accelerometers = {}, {}

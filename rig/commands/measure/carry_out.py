@@ -38,9 +38,10 @@ def carry_out(
     as_json: bool,
     page: PageWish | None,
 ) -> int:
-    """Run the phases in a run folder, or continue them; on a `page` too if wanted. Return 0 if passed, 1 if failed.
+    """Carry out the phases in a run folder, or continue them; on a `page` too on request.
 
-    `moved` are serial numbers of sensors that are declared to be on another board than before.
+    Return 0 if passed, 1 if failed. `moved` are serial numbers of sensors that are declared to be on another board than
+    before.
     """
     with serve_operators_page(page, folder, lambda: _about(folder, configured, page)) as page_of_run:
         # In a laboratory that this process simulates no person can be hurt, so no operator is asked.
@@ -99,7 +100,7 @@ def _about(folder: Path, configured: Configured, page: PageWish | None) -> "Abou
 
 
 def _storing_command(folder: Path, configured: Configured) -> str | None:
-    """Return the command that stores the run's calibration on the board; None if simulated, as that board then ends."""
+    """Return the command that stores the run's calibration on the board; None for a simulated board, which ends."""
     if configured.loaded.simulated or not configured.loaded.config.parts_on_board:
         return None
     return f"rig board calibration write {shlex.quote(str(folder / CONFIG))} {shlex.quote(str(folder))}"

@@ -54,7 +54,7 @@ def run(options: Namespace) -> int:
 def _catch_problem(
     check: "Callable[[Configured, Tell], list[Problem]]", configured: "Configured", tell: Tell
 ) -> list[Problem]:
-    """Return the problems of one check, including the one that ended it."""
+    """Return the problems of one check, including an error that ended it."""
     try:
         return check(configured, tell)
     except RigError as error:
@@ -97,7 +97,7 @@ def _check_board(configured: "Configured", tell: Tell) -> list[Problem]:
 
 
 def _check_instruments(configured: "Configured", tell: Tell) -> list[Problem]:
-    """Return the problems of the sensors with a port of their own; nothing in their memories is changed."""
+    """Return the problems of sensors with a port of their own, without changing their memories."""
     from rig.commands.laboratory.claims import claim_sensor
     from rig.sensors.errors import SensorError
     from rig.sensors.sensor_registry import group_by_port
@@ -135,7 +135,7 @@ def _check_turner(configured: "Configured", tell: Tell) -> list[Problem]:
 def _find_other_claims(host: str) -> list[Problem]:
     """Return a problem if another rig has claimed the arm.
 
-    The claim lasts no longer than this call, because a check of the arm disturbs no other rig.
+    The claim is released at once, because a check of the arm disturbs no other rig.
     """
     from rig.commands.laboratory.claims import claim_arm
 

@@ -28,9 +28,9 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Run the demonstration and return as `rig run` does; with `--files` copy and return 0.
+    """Run the demonstration and return as `rig run` does; with `--files` copy the files and return 0.
 
-    Raise Refused `files_not_copied`, and as `rig run`.
+    Raise Refused `files_not_copied`, and as `rig run` does.
     """
     if options.files is not None:
         return _copy(options.files)
@@ -42,7 +42,7 @@ def run(options: Namespace) -> int:
 
 
 def _copy(folder: Path) -> int:
-    """Copy each supplied file that the folder does not have yet under its path; no file is replaced."""
+    """Copy each supplied file to the folder under its path, unless it exists there."""
     import shutil
 
     copied = existing = 0

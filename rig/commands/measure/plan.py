@@ -28,7 +28,7 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print the plan of `make_plan`, or the shortest one for a target uncertainty.
 
-    Return 0, or 1 if no plan reaches the target. Raise Refused as `make_plan` and `print_shortest_run`.
+    Return 0, or 1 if no plan reaches the target. Raise Refused as `make_plan` and `print_shortest_run` do.
     """
     if options.target_uncertainty or options.max_duration_s is not None or options.write is not None:
         return print_shortest_run(options)
@@ -49,7 +49,7 @@ def run(options: Namespace) -> int:
 
 
 def _print_by_hand(section: "ByHandSection", *, as_json: bool) -> None:
-    """Print the instructions to the operator, in their order if nothing interrupts."""
+    """Print the instructions to the operator, in the order of an uninterrupted session."""
     from rig.plans.by_hand import WantedMoves, simulate_session
 
     instructions = list(simulate_session(WantedMoves(section.flips, section.turns)))
@@ -65,7 +65,7 @@ def _print_by_hand(section: "ByHandSection", *, as_json: bool) -> None:
 def make_plan(options: Namespace) -> "DryRun":
     """Plan the motion from the home pose.
 
-    Raise `Refused` if a motion breaks a limit, and if the attitudes do not determine the parameters.
+    Raise `Refused` if a motion breaks a limit, or if the attitudes do not determine the parameters.
     """
     from rig.commands.configured import load_configured
     from rig.errors import refuse

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def add(parser: ArgumentParser, *, script: bool = True) -> None:
-    """Add the arguments of `rig run`, without `--script` if a procedure's script is run by itself."""
+    """Add the arguments of `rig run`, without `--script` if a procedure's script is run itself."""
     add_config(parser)
     if script:
         add_script(parser)
@@ -41,7 +41,7 @@ def add_outcome(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Run the procedure in a new run folder; on a page too if wanted. Return 0 if passed, 1 if failed."""
+    """Run the procedure in a new run folder; on a page too on request. Return 0 if passed, 1 if failed."""
     page = read_page_wish(options)
     with prepare_run(options) as (folder, configured):
         from rig.commands.measure.carry_out import (
@@ -58,10 +58,10 @@ def run(options: Namespace) -> int:
 
 @contextmanager
 def prepare_run(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
-    """Yield a new run folder and its configuration; a simulated laboratory has an address of its own meanwhile.
+    """Yield a new run folder and its configuration; meanwhile a simulated laboratory has an address of its own.
 
-    If the operator does not agree, no folder is left, so the same command can be given again. Raise Refused as
-    `load_configured` and `new_folder`.
+    If the operator does not agree, no folder remains, so the same command can be given again. Raise Refused as
+    `load_configured` and `new_folder` do.
     """
     from rig.commands.configured import open_configured
     from rig.data.run_folder import discard, new_folder

@@ -25,7 +25,7 @@ EXAMPLE = "Give for example --target-uncertainty scale=5e-4 --target-uncertainty
 
 
 def add_target(parser: ArgumentParser) -> None:
-    """Add the argument `--target-uncertainty`, which may be repeated, and its companion arguments."""
+    """Add the argument `--target-uncertainty`, which may be repeated, and those that belong to it."""
     parser.add_argument(
         "--target-uncertainty",
         action="append",
@@ -41,7 +41,7 @@ def add_target(parser: ArgumentParser) -> None:
 def print_shortest_run(options: Namespace) -> int:
     """Print the shortest run for the target, and write its configuration; return 1 if there is none.
 
-    Raise Refused `bad_option`, `configuration_not_written`, `not_foretold`, and as `load_configured`.
+    Raise Refused `bad_option`, `configuration_not_written`, `not_foretold`, and as `load_configured` does.
     """
     say("rig plan: looking for the shortest run …", file=sys.stderr)
     from rig.commands.configured import load_configured
@@ -66,7 +66,7 @@ def print_shortest_run(options: Namespace) -> int:
 
 
 def parse_target(options: Sequence[str], at_most_s: float | None) -> "TargetUncertainty":
-    """Parse the words `scale=U`, `bias=U` and their like. Raise Refused `bad_option`."""
+    """Parse targets such as `scale=U` and `bias=U`. Raise Refused `bad_option`."""
     from rig.analysis.design.candidate_search import TargetUncertainty
 
     uncertainties: dict[str, float] = {}
@@ -87,7 +87,7 @@ def parse_target(options: Sequence[str], at_most_s: float | None) -> "TargetUnce
 
 
 def _write(options: Namespace, best: "Planned") -> None:
-    """Write the configuration of a run, as `rig run` takes it: the file's values with the procedure of the plan."""
+    """Write a configuration for `rig run`: the file's values with the procedure of the plan."""
     from rig.commands.configured import load_configured
     from rig.config.files.safe_writing import write_new
     from rig.report.terminal.shortest_words import changed_keys

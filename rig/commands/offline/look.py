@@ -61,7 +61,7 @@ def run(options: Namespace) -> int:
 def _print(
     looks: "Sequence[LookedFile]", columns: dict[str, Any], stated: "ColumnMap | None", named: Path | None
 ) -> None:
-    """Print the files and the commands that can use them; set in `columns` the convention that the gyroscope shows."""
+    """Print the files and the commands that can use them. Set the convention that the gyroscope shows in `columns`."""
     from rig.analysis.log_contents import count_from
     from rig.report.terminal.look_lines import describe_convention, describe_file, describe_solutions
 
@@ -127,7 +127,7 @@ def _try_solutions(
 
 
 def _adopt(columns: dict[str, Any], *, inverse: bool, scalar_last: bool) -> None:
-    """Change the map of a reference's columns to the convention of its quaternions."""
+    """Change the map of a reference's columns to its quaternions' convention."""
     from rig.data.recording.motion_file import QUATERNION
 
     if inverse:
@@ -139,7 +139,7 @@ def _adopt(columns: dict[str, Any], *, inverse: bool, scalar_last: bool) -> None
 
 
 def _write(path: Path, looks: "Sequence[LookedFile]", columns: Mapping[str, Any]) -> None:
-    """Write the map to a new file. Raise Refused `bad_option` if there is none, `configuration_not_written`."""
+    """Write the map to a new file. Raise Refused `configuration_not_written`, and `bad_option` if there is no map."""
     import yaml
 
     from rig.config.files.safe_writing import write_new

@@ -15,9 +15,10 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the biases that the runs give together, and write them to `--out`; nothing else is changed. Return 0.
+    """Print the biases that the runs together determine, and write them to `--out`; change nothing else.
 
-    Raise Refused `report_folder`, and Refused and Fault as `open_run`, `turner_of`, `judged` and `reversals`.
+    Return 0. Raise Refused `report_folder`, and Refused and Fault as `open_run`, `turner_of`, `judged` and `reversals`
+    do.
     """
     from rig.analysis.reversal import reversals
     from rig.config.files.safe_writing import write_new

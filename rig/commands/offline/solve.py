@@ -54,7 +54,7 @@ def add(solve: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Solve a recording, or samples with sweeps or attitudes, and print the result.
 
-    For a recording nothing is written. Raise Refused `bad_option`, `unknown_setting`, and the errors of the solution.
+    For a recording, write nothing. Raise Refused `bad_option`, `unknown_setting`, and the errors of the solution.
     """
     if options.sweeps is None and options.attitudes is None and not options.turns:
         if options.out is not None:
@@ -71,7 +71,7 @@ def run(options: Namespace) -> int:
 
 
 def _refuse_samples(path: Path) -> None:
-    """Raise Refused `bad_option` for a file of samples: none of the options says how the sensor was turned."""
+    """Raise Refused `bad_option` for a file of samples without an option that gives the sensor's motion."""
     if path.is_file() and path.suffix.lower() in SAMPLES:
         raise Refused(
             "bad_option",
@@ -81,10 +81,10 @@ def _refuse_samples(path: Path) -> None:
 
 
 def _solve_recording(options: Namespace) -> int:
-    """Recompute the result of a run folder or a run file. Return as `rig run` does.
+    """Recompute the result of a run folder or a run file.
 
-    `--set` changes the settings it is judged by, see `RunSettings.with_overrides`. `--script` is the script that
-    recorded it, if that is another user's.
+    Return as `rig run` does. `--set` changes the settings that judge it, see `RunSettings.with_overrides`. `--script`
+    is the script of another user's recording.
     """
     from rig.data.recording.run_reading import reading_ahead
 

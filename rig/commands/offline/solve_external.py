@@ -114,8 +114,8 @@ def add(solve: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Solve the two files and print the result; with `--out` also write a run folder and enter it in the history.
 
-    Return 0, or 1 if a check failed. Raise Refused `bad_option`, `run_folder`, as `build_recording`, and for whatever
-    the solution refuses.
+    Return 0, or 1 if a check failed. Raise Refused `bad_option`, `run_folder`, and as `build_recording` and the
+    solution do.
     """
     from rig.analysis.analyses import calibrate
     from rig.commands.history.remember import describe_changes
@@ -199,7 +199,7 @@ def _build_recording(options: Namespace) -> "RunData":
 
 
 def _read_only(options: Namespace) -> tuple[str, ...]:
-    """Return the sensors to calibrate, all if none is chosen. Raise Refused `bad_option`."""
+    """Return the sensors to calibrate; all if none is named. Raise Refused `bad_option`."""
     from rig.data.installed_kinds import quantities
     from rig.data.quantity import RATE
 
@@ -215,7 +215,7 @@ def _read_only(options: Namespace) -> tuple[str, ...]:
 
 
 def _read_turn_options(options: Namespace) -> "Columns":
-    """Return the options of a session by hand as a table with one row. Raise Refused `bad_option`, `clock_unknown`."""
+    """Return the options of a session by hand as a table's row. Raise Refused `bad_option`, `clock_unknown`."""
     import numpy as np
 
     from rig.estimation.by_hand.session_parts import FACES

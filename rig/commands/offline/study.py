@@ -58,7 +58,7 @@ def _list_studies() -> int:
 def _run_study(options: Namespace) -> int:
     """Run one study, print its findings and write its files into `--out`.
 
-    Raises Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and as `refuse_links`.
+    Raise Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and as `refuse_links` does.
     """
     from rig.data.run_folder import refuse_links
     from rig.errors.extras import requiring
@@ -92,14 +92,14 @@ def _run_study(options: Namespace) -> int:
 
 
 def _describe_duration(entry: "StudyEntry", jobs: int = 1) -> str:
-    """Return in words how long a study takes; empty if that is not known."""
+    """Return the duration of a study in words; empty if unknown."""
     duration_s = entry.duration_s(jobs)
     return "" if duration_s is None else f"about {duration_words(max(duration_s, 1.0))}"
 
 
 @contextmanager
 def _compute_on_cluster(address: str) -> Iterator[None]:
-    """Make joblib compute on the Dask scheduler at `address` for the length of the block."""
+    """Make joblib compute on the Dask scheduler at `address` during the block."""
     from joblib import parallel_config
 
     from rig.commands.history.cluster import connect_client

@@ -92,7 +92,7 @@ class RigBench:
         return self.configured.loaded.simulated
 
     def today(self, serial: str) -> str | None:
-        """Return in words the newest calibration of today that passed, else None."""
+        """Describe the newest calibration of today that passed; None if there is none."""
         memory = recall_sensors(self._configure(serial).loaded.config, frozenset())
         day = datetime.now(UTC).date().isoformat()
         parts = {self.configured.loaded.config.sensors[name].part for name in self._named}
@@ -104,7 +104,7 @@ class RigBench:
         return next((past.words for past in calibrations if (past.day, past.verdict) == (day, "pass")), None)
 
     def known_as(self, chip: Chip, serial: str) -> str | None:
-        """Return the newest other serial number that the history has of this board, else None."""
+        """Return the newest other serial number that the history has for this board, or None."""
         config = self._configure(serial).loaded.config
         own_numbers = {sensor.serial_number for sensor in config.all_sensors.values()}
         parts = {config.sensors[name].part for name in self._named}
@@ -116,7 +116,7 @@ class RigBench:
             make_fitter(self.control)(serial)
 
     def run(self, part: BatchPart, folder: Path, desk: Desk) -> PartEnded:
-        """Run the part in `folder`, or continue there; refused sweeps are repeated at once. Raise Refused, Fault."""
+        """Run the part in `folder`, or continue its run; repeat refused sweeps at once. Raise Refused, Fault."""
         configured = self._configure(part.serial)
         if (folder / RESULT).exists() and (ended := _read_ended(folder, configured)) is not None:
             return ended
@@ -152,7 +152,7 @@ class RigBench:
     def _run_repeatedly(
         self, folder: Path, configured: Configured, listener: PartListener, answer: Answer
     ) -> tuple[Outcome, int]:
-        """Return the part's outcome, and how often refused sweeps were repeated."""
+        """Return the part's outcome, and the number of repetitions of refused sweeps."""
         config = configured.loaded.config
         with log(folder / LOG) as logged, view() as terminal:
             station = Stations(
@@ -195,9 +195,9 @@ class RigBench:
 
 @contextmanager
 def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> Iterator[RigBench]:
-    """Open the bench for the length of the block; `folder` is the batch's.
+    """Open the bench during the block; `folder` is the batch's.
 
-    Raise Refused as `claim_devices`, and `station_sensors` if the configuration has no sensors that a station can
+    Raise Refused as `claim_devices` does, and `station_sensors` if the configuration has no sensors that a station can
     calibrate.
     """
     config = configured.loaded.config
@@ -226,7 +226,7 @@ def refuse_other_sensors(config: RigConfig) -> None:
 
 
 def _read_ended(folder: Path, configured: Configured) -> PartEnded | None:
-    """Return the result that a run had when the station was killed; None if sweeps remain to be repeated."""
+    """Return a run's result from before the station was killed; None if sweeps remain to be repeated."""
     result = read_result(folder)
     failed = [check for check in result.checks if not check.passed]
     if any(check.means.sweep is not None for check in failed):
@@ -237,7 +237,7 @@ def _read_ended(folder: Path, configured: Configured) -> PartEnded | None:
 
 
 def _prepare_folder(folder: Path, configured: Configured) -> bool:
-    """Prepare a run folder for the part unless a run was begun there. Return whether it is new."""
+    """Prepare a run folder for the part, unless a run was begun in it. Return whether it is new."""
     if (folder / CONFIG).exists():
         return False
     if folder.exists():  # the process was killed while it wrote the first files

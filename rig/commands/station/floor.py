@@ -16,9 +16,9 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Show the state of each rig until Ctrl-C; the history is only read. Return 0.
+    """Show the state of each rig until Ctrl-C; the history is only read.
 
-    Raise Refused `page_address`, `no_history`, and as `open_history`.
+    Return 0. Raise Refused `page_address`, `no_history`, and as `open_history` does.
     """
     from rig.floor.floor_feed import looking
     from rig.history.storage.address import own_history_address

@@ -47,10 +47,10 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Run parts until none follows. Return 0 if all passed in the end, 1 if one did not.
+    """Run parts until none follows.
 
-    Raise Refused as `load_configured`, `claim_devices`, `numbers_in` and `open_journal`; `missing_extra`,
-    `not_confirmed`.
+    Return 0 if all passed in the end, 1 if one did not. Raise Refused as `load_configured`, `claim_devices`,
+    `numbers_in` and `open_journal` do; `missing_extra`, `not_confirmed`.
     """
     from rig.batch.label import refuse_without_library
     from rig.batch.operators import Operator, Terminal, refuse_without_terminal
@@ -115,7 +115,7 @@ def _carry_out_batch(options: Namespace, configured: "Configured", operator: "Op
 
 @contextmanager
 def _send_heartbeats(config: "RigConfig", present: "Present") -> Iterator[None]:
-    """Send the station's heartbeat to the history of its runs for the length of the block, if there is one."""
+    """Send the station's heartbeat to the history of its runs during the block, if there is one."""
     from rig.floor.heartbeat import heartbeat
     from rig.history.storage.address import choose_history_address
 
@@ -139,7 +139,7 @@ def _serve_page(wanted: "PageWish", present: "Present") -> "Iterator[Voice]":
 
 
 def resume_command(options: Namespace, folder: Path) -> str:
-    """Return the command that continues the batch in `folder`; a token typed into the first one is left out."""
+    """Return the command that continues the batch in `folder`; a token typed into the first one is omitted."""
     series = [] if options.series is None else ["--series", str(options.series)]
     script = [] if options.script is None else ["--script", str(options.script)]
     changes = [word for override in options.overrides for word in ("--set", override)]

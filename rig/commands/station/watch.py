@@ -44,7 +44,7 @@ def run(options: Namespace) -> int:
     """Replay every recording in a run folder, `--speed` times as fast; the page stays until Ctrl-C.
 
     Return 0. Raise Refused `no_run`, `page_address`, and as `read_run`, `turner_of`, `check_arms_times` and
-    `read_result`.
+    `read_result` do.
     """
     from rig.data.recording.run_file import read_run
     from rig.data.result_file import read_result

@@ -46,7 +46,7 @@ def read_layers(path: Path, overrides: Sequence[str] = ()) -> Layered:
 
 
 def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) -> Layered:
-    """Merge a file's text with its base files; without a `path` there are none. Raise `Unreadable`."""
+    """Merge a text with the files it is based on, relative to its `path` if it has one. Raise `Unreadable`."""
     layers = list(_layers(text, path))
     document: dict[str, Any] = {}
     places: dict[Location, str] = {}
@@ -63,7 +63,7 @@ def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) ->
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge `over` into `base`: sections key by key, lists and values as a whole; null removes a key of the base."""
+    """Merge `over` into `base`: sections key by key, lists and values complete; null removes a key."""
     merged = dict(base)
     for key, value in over.items():
         below = merged.get(key)
@@ -102,7 +102,7 @@ def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
 
 
 def _layer(text: str, name: str) -> _Layer:
-    """Read one file's text; `name` is given for a base file only."""
+    """Read one file's text; only a base file has a `name`."""
     try:
         document = read_yaml(text)
         if not isinstance(document.data, dict):
@@ -119,7 +119,7 @@ def _layer(text: str, name: str) -> _Layer:
 def _override(
     document: dict[str, Any], places: dict[Location, str], written: dict[Location, str], item: str
 ) -> Iterator[str]:
-    """Apply one `a.b.c=value` in place; yield a problem if it cannot be applied."""
+    """Apply one `a.b.c=value` in place; yield a problem if this is impossible."""
     path, equals, value = item.partition("=")
     path = path.strip()
     what = f"{SET} {shorten(item)}"
@@ -162,6 +162,6 @@ def _override(
 
 
 def _example(item: str) -> str:
-    """Return the override `item` with "=" for ":", or a fixed example if it has no value."""
+    """Return the override `item` with "=" in place of ":"; a fixed example if it has no value."""
     path, colon, value = item.partition(":")
     return f"{path.strip()}={value.strip()}" if colon and value.strip() else "procedure.speed_deg_s=30"

@@ -17,7 +17,7 @@ class UnfitFile(Exception):
 
 
 def file_identity(path: Path) -> FileIdentity | None:
-    """Return the identity of the file or link at that path; None if there is none. Raise OSError."""
+    """Return the identity of the file or link at that path; None if nothing exists there. Raise OSError."""
     try:
         status = path.lstat()
     except FileNotFoundError:
@@ -27,7 +27,7 @@ def file_identity(path: Path) -> FileIdentity | None:
 
 @contextmanager
 def shut_files(identities: Callable[[], Iterable[FileIdentity]]) -> Iterator[None]:
-    """Prevent this process from opening these files during the block, while a database of it uses them.
+    """Prevent this process from opening these files during the block, in which a database uses them.
 
     Opening and closing such a file would release the database's locks.
     """
@@ -40,9 +40,10 @@ def shut_files(identities: Callable[[], Iterable[FileIdentity]]) -> Iterator[Non
 
 @contextmanager
 def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> Iterator[BinaryIO]:
-    """Open a regular file of at most `max_bytes` for reading. Raise `UnfitFile`, and OSError as `open` does.
+    """Open a regular file of at most `max_bytes` for reading.
 
-    A link leads out of the file's folder: it is not followed if the folder is not ours.
+    Raise `UnfitFile`, and OSError as `open` does. In another user's folder a link is not followed, because it leads out
+    of the folder.
     """
     _check(path.stat() if follow_links else path.lstat(), max_bytes)  # before: to open a device may do something
     with open(path, "rb", opener=_open_nonblocking if follow_links else _open_nofollow) as file:
@@ -51,7 +52,7 @@ def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) 
 
 
 def read_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> bytes:
-    """Read the content of a regular file. Raise as `open_regular_file`."""
+    """Read the content of a regular file. Raise as `open_regular_file` does."""
     with open_regular_file(path, max_bytes, follow_links=follow_links) as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:  # it has grown meanwhile, or its size is not told (those of /proc say 0)
@@ -71,7 +72,7 @@ def _check(status: os.stat_result, max_bytes: int) -> None:
 
 
 def _open_nonblocking(path: str, flags: int) -> int:
-    """Open a file without waiting, as a pipe may never have a writer."""
+    """Open a file without waiting, because a pipe may never have a writer."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 

@@ -15,9 +15,9 @@ NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 
 @contextmanager
 def replace_together() -> Iterator[None]:
-    """Put all files that this block writes in place at its end, the one written last first.
+    """Put all files written in this block in place at its end, the one written last first.
 
-    If the block ends in an error, or a file cannot be put in place, new files without a predecessor are removed.
+    If the block raises an error, or a file cannot be put in place, new files that replace none are removed.
     """
     parts: dict[Path, Path] = {}
     token = _held_back.set(parts)
@@ -37,8 +37,8 @@ def replace_together() -> Iterator[None]:
 def new_file(path: Path) -> Iterator[BinaryIO]:
     """Open a file to be written in this block, which then replaces `path` completely or not at all.
 
-    Within `replace_together` that happens at the end of its block. A link at `path` is replaced itself, not its target.
-    Raise OSError as writing does, also if another process creates a file of that name at the same moment.
+    Within `replace_together` this happens at the end of that block. A link at `path` is replaced itself, not its
+    target. Raise OSError as writing does, also if another process creates a file of that name at the same moment.
     """
     part = path.with_name(path.name + PART)
     part.unlink(missing_ok=True)
@@ -58,13 +58,13 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_new(path: Path, content: bytes | str) -> None:
-    """Replace `path` by a file with this content. Raise as `new_file`."""
+    """Replace `path` by a file with this content. Raise as `new_file` does."""
     with new_file(path) as file:
         file.write(content.encode() if isinstance(content, str) else content)
 
 
 def open_to_append(path: str | Path) -> int:
-    """Open a regular file to append, created if it does not exist, and return its descriptor. Raise OSError."""
+    """Open a regular file to append to it, or create it; return its descriptor. Raise OSError."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | NO_LINK | getattr(os, "O_NONBLOCK", 0)
     descriptor = os.open(path, flags, 0o666)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):

@@ -7,6 +7,6 @@ NAMES = ("configs", "examples", "docs/examples", "docs/config.schema.json")  # a
 
 
 def supplied(name: str) -> Path:
-    """Return the location of a supplied file or folder, by its path in the checkout: `configs/demo.yaml`."""
+    """Return the location of a supplied file or folder, given its path in the checkout: `configs/demo.yaml`."""
     in_wheel = PACKAGE / "supplied" / name
     return in_wheel if in_wheel.exists() else PACKAGE.parent / name

@@ -6,7 +6,7 @@ from rig.errors import Refused
 
 
 def own_folder() -> Path:
-    """Return the rig's folder of this user, which may not exist yet. Raise Refused `no_home` without a home folder."""
+    """Return this user's folder of the rig, which may not exist yet. Raise Refused `no_home` without a home folder."""
     from platformdirs import user_data_path
 
     try:

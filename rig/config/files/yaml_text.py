@@ -148,9 +148,9 @@ def _refusal(why: str, mark: Any) -> yaml.MarkedYAMLError:
 def _survey(
     node: yaml.Node | None, location: Location, lines: dict[Location, int], written: dict[Location, str]
 ) -> Iterator[str]:
-    """Record the line of every key, and the text as `written` of every value that is not a string.
+    """Record the line of every key, and the text of every value that is not a string.
 
-    Yield a problem for each key that is no word or occurs twice (YAML would keep the last).
+    Yield a problem for each key that is no word or occurs twice, because YAML would keep the last.
     """
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
@@ -174,14 +174,14 @@ def _survey(
 
 
 def _visible(node: yaml.ScalarNode, location: Location) -> Iterator[str]:
-    """Yield a problem for a control character, which an escape within quotes can hide."""
+    """Yield a problem for a control character, which an escape in quotes can produce unseen."""
     if (character := first_control_character(node.value)) is not None:
         line = node.start_mark.line + 1
         yield f"{dotted_path(location)} (line {line}): holds the control character {printable(character)}"
 
 
 def dotted_path(location: Location) -> str:
-    """Return a location as `sensors.gyro.rate_hz`; the file as a whole is `(file)`."""
+    """Return a location in the form `sensors.gyro.rate_hz`; the whole file is `(file)`."""
     return ".".join(shorten(str(part)) for part in location) or "(file)"
 
 

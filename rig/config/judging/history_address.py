@@ -13,7 +13,7 @@ ENCRYPTED = ("require", "verify-ca", "verify-full")
 
 
 def history_url(text: str) -> "URL":
-    """Parse a URL that has only allowed parts, percent signs resolved. Raise ValueError with the reason."""
+    """Parse a URL that has only allowed parts, with percent encoding resolved. Raise ValueError with the reason."""
     from sqlalchemy import make_url
     from sqlalchemy.exc import ArgumentError
 

@@ -31,7 +31,7 @@ OfSensors = TypeVar("OfSensors")  # a size that a configuration states of all se
 
 
 def _the_parts(what: str, unit: str | None = None) -> Any:
-    """Return the value of a property for each sensor, from its part's row in the catalogue."""
+    """Return the field of a key whose default is the value of the sensor's part in the catalogue."""
     extra: dict[str, Any] | None = None if unit is None else {"unit": unit}
     return Field(default=None, description=f"{what}; if left out, the part's value", json_schema_extra=extra)
 
@@ -188,7 +188,7 @@ class UncertaintySection(UncertaintyKeys[NonNegative | None], extra="forbid"):
 
 
 def refuse_missing_keys(cls: type[BaseModel], document: Any) -> Any:
-    """Return a recording's keys as they are. Raise ValueError naming those that are missing."""
+    """Return a recording's keys unchanged. Raise ValueError naming missing ones."""
     if isinstance(document, dict) and (missing := cls.model_fields.keys() - document.keys()):
         raise ValueError(f"lacks {', '.join(sorted(missing))}")
     return document

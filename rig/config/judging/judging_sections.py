@@ -107,7 +107,7 @@ class SiteSection(Section):
 
     @model_validator(mode="after")
     def require_latitude_of_heading(self) -> Self:
-        """Refuse a heading without a latitude, as the Earth's rate needs both."""
+        """Refuse a heading without a latitude, because the Earth's rate needs both."""
         if self.heading_deg is not None and self.latitude_deg is None:
             raise ValueError("needs latitude_deg and heading_deg, or neither")
         if self.heading_deg is not None and np.linalg.norm(np.cross(self.up, (1, 0, 0))) < MIN_LEVEL:
@@ -172,7 +172,7 @@ class HistorySection(Section):
     @field_validator("url")
     @classmethod
     def refuse_password_in_url(cls, value: str | None) -> str | None:
-        """Refuse a password, which every recording would keep with its configuration."""
+        """Refuse a password, because every recording would keep it with its configuration."""
         if value is not None and "://" in value and history_url(value).password is not None:
             raise ValueError("contains a password, and every recording would keep it; put it into ~/.pgpass")
         return value

@@ -124,7 +124,7 @@ class Limits(BaseModel):
     )
 
     def lacking(self, need: Need) -> list[str]:
-        """Return the configuration paths of limits that are needed and not set."""
+        """Return the configuration paths of limits that are required and not set."""
         return [f"limits.{key}" for key, row in LIMITS.items() if row.needed_by == need and getattr(self, key) is None]
 
 
@@ -135,12 +135,12 @@ _KEYS: Mapping[tuple[str, str], str] = {(row.quantity, row.what): key for key, r
 
 
 def key_of(quantity: str | None, what: str | None) -> str | None:
-    """Return the key of the limit for a check of that quantity, or None if a configuration has none for it."""
+    """Return the key of the limit for a check of that quantity; None if no configuration has one."""
     return _KEYS.get((quantity or "", what or ""))
 
 
 def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, float | None]:
-    """Return the row of that name, and its limit or None if it is not set. Raise KeyError without such a row."""
+    """Return the row of that name, and its limit or None if it is not set. Raise KeyError for an unknown name."""
     key = _KEYS[quantity, what]
     limit: float | None = getattr(limits, key, None)
     return LIMITS[key], limit

@@ -95,7 +95,7 @@ class SixSweepsSection(ProcedureSection):
 
     @model_validator(mode="after")
     def require_every_direction(self) -> Self:
-        """Refuse an order that lacks one of the six directions, which six parameters need (SIX, section II-B)."""
+        """Refuse an order without one of the six directions that six parameters need (SIX, section II-B)."""
         order, directions = self.order or get_args(Wrist), self.directions or ("cw", "ccw")
         if len(set(order)) < 3 or len(order) > 3 or set(directions) != {"cw", "ccw"}:
             raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
@@ -146,7 +146,7 @@ class SixSweepsSection(ProcedureSection):
             yield from verification_problems(config)
 
     def _arc_problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield an arc whose angle is too uncertain, or that takes longer than a board stores readings."""
+        """Yield a problem for an arc whose angle is too uncertain, or that exceeds the board's memory."""
         if self.arcs and config.uncertainty.angle_std_deg is None:
             yield (
                 f"procedure.arc_deg {self.arc_deg:g} is no whole turn, so the encoders measure how far a "
@@ -204,7 +204,7 @@ class SixObservationSection(SixSweepsSection):
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of the sweeps, and stages or magnetometers, which a verification cannot have.
+        """Yield the problems of the sweeps, and of stages or magnetometers together with a verification.
 
         A magnetometer would be recorded, and its lack of a calibration would show only at the end of the run.
         """
@@ -244,7 +244,7 @@ class VerifySection(SixSweepsSection):
 
 
 def set_of_that_name(value: Any) -> Any:
-    """Replace the name of a set by its attitudes; a list stays as it is."""
+    """Return the attitudes of a named set; a list is returned unchanged."""
     if not isinstance(value, str):
         return value
     if value not in SETS:
@@ -304,7 +304,7 @@ class AttitudesSection(ProcedureSection):
     @field_validator("attitudes")
     @classmethod
     def refuse_repeated_attitudes(cls, value: tuple[Vector3, ...]) -> tuple[Vector3, ...]:
-        """Refuse an attitude that is listed twice: the arm makes the same error again, which adds no information."""
+        """Refuse a repeated attitude: the arm repeats its error, so it adds no information."""
         listed: set[tuple[float, ...]] = set()
         for attitude in value:
             angles_deg = tuple(np.mod(attitude, 360).tolist())
@@ -315,11 +315,11 @@ class AttitudesSection(ProcedureSection):
 
     @property
     def accelerometer_order(self) -> AccelerometerOrder:
-        """Order of the accelerometer's model that the file asks for."""
+        """Order of the accelerometer's model, by the file."""
         return 2 if self.second_order else 1
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield what the section lacks for the calibration of an accelerometer."""
+        """Yield what is missing for the calibration of an accelerometer."""
         if not any(sensor.acceleration for sensor in config.to_calibrate.values()):
             yield "attitudes calibrate accelerometers: give a sensor with role: calibrate its section acceleration"
         lacking = config.limits.lacking("accelerometer")
@@ -349,7 +349,7 @@ class BiasDriftSection(AttitudesSection):
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield what the section lacks for the calibration of an accelerometer and for limits of the drift."""
+        """Yield what is missing for the calibration of an accelerometer, and for limits of the drift."""
         yield from AttitudesSection.problems(self, config)
         if lacking := config.limits.lacking("bias drift"):
             yield f"a bias that is watched needs {', '.join(lacking)}"
@@ -443,7 +443,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @model_validator(mode="after")
     def check_temperature_range(self) -> Self:
-        """Refuse a range with too few sets for polynomials, whose order is chosen only after the run."""
+        """Refuse a range with too few sets for polynomials of the highest order, which is chosen after the run."""
         gaps, other = (2, "") if self.both_directions else (3, " with both_directions: false")
         if self.to_c - self.from_c < gaps * self.max_step_k:
             raise ValueError(
@@ -464,7 +464,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         return (2 if self.second_order else 1) if self.with_attitudes else 0
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of the sweeps and attitudes, of a heater and of sensors without a board."""
+        """Yield the problems of sweeps, attitudes and heater, and of sensors without a board."""
         yield from SixSweepsSection.problems(self, config)
         if self.with_attitudes:  # each set is one temperature: no repeat of the attitudes is held out
             yield from AttitudesSection.problems(self.model_copy(update={"repeats": 1}), config)
@@ -499,7 +499,7 @@ STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
 
 
 def verification_problems(config: RigConfig) -> Iterator[str]:
-    """Yield what a verification lacks: without a reference or limits it cannot pass."""
+    """Yield what is missing for a verification to pass: a reference, limits."""
     lacking = []
     if config.reference is None:
         lacking.append("a sensor with role: reference to compare with")

@@ -38,7 +38,7 @@ class TargetUncertaintySection(Section):
 
     @model_validator(mode="after")
     def require_target(self) -> Self:
-        """Refuse a section without a target of either kind: nothing would end the run early."""
+        """Refuse a section without any target, which could not end the run early."""
         if self.scale is None and self.bias is None:
             raise ValueError("say the expanded uncertainty at which the run ends, as {scale: 1e-3, bias: 1e-4}")
         return self
@@ -52,7 +52,7 @@ class ShortestSection(Section):
 
 
 def alternative_procedure(document: Mapping[str, Any]) -> str | None:
-    """Return the advice for a turner that is no arm, which cannot carry out this procedure; None for an arm."""
+    """Return the advice for a turner other than an arm, which cannot carry out this procedure; None for an arm."""
     turner = document.get("turner")
     kind = str(turner.get("kind")) if isinstance(turner, dict) else ""
     if kind not in OTHERS:
@@ -62,7 +62,7 @@ def alternative_procedure(document: Mapping[str, Any]) -> str | None:
 
 
 def expand_procedure(section: Mapping[str, Any], wanted: TargetUncertaintySection) -> dict[str, Any]:
-    """Return the section of the procedure that is carried out: all keys but the name and the target stay."""
+    """Return the section of the procedure to carry out: all keys remain except the name and the target."""
     rest = {key: value for key, value in section.items() if key != "target_uncertainty"}
     ends = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias}
     return {"repeats": REPEATS, **ends, **rest, "name": CARRIED_OUT}

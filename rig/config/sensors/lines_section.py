@@ -39,7 +39,7 @@ Decimals = Annotated[
 
 
 def _refuse_gap(value: str) -> str:
-    """Return the value. Raise ValueError for the gap that `rig lines` leaves if the readings do not determine it."""
+    """Return the value. Raise ValueError for `?`, which `rig lines` writes if the readings do not determine a value."""
     if value == GAP:
         raise ValueError("the readings did not determine it: look it up in the device's program, and write it here")
     return value
@@ -239,7 +239,7 @@ class LinesSection(Section):
 
     @model_validator(mode="after")
     def require_clock_column(self) -> Self:
-        """Refuse a clock without the column that it needs, and a checksum over text that is unknown."""
+        """Refuse a clock without its column, and a checksum over unknown text."""
         if self.clock == "device" and self.time is None:
             raise ValueError(
                 "the clock is the device's, but there is no column time: write clock: counted if the device samples by "

@@ -24,7 +24,7 @@ class LinkLoad:
 
     @property
     def bytes_per_sample(self) -> float:
-        """The bytes of a sample, with its share of the frame."""
+        """The bytes of a sample, including its part of the frame."""
         message = MESSAGE_BY_NAME[self._message]
         item, head = message.item_dtype.itemsize, message.head.size
         full_frame = (PAYLOAD_MAX - head) // item
@@ -44,12 +44,12 @@ class LinkLoad:
 
 
 def capacity_bytes_per_s(baud: int) -> float:
-    """Return the load that a link at `baud` may carry, bytes/s."""
+    """Return the load that a link at `baud` may have, bytes/s."""
     return baud / BITS_PER_BYTE * (1 - MARGIN)
 
 
 def over_budget(streams: Mapping[str, LinkLoad], baud: int) -> str | None:
-    """Return the arithmetic if the link cannot carry all `streams` (by sensor name), else None."""
+    """Return the calculation, in words, if all `streams` (by sensor) together exceed the link's capacity, else None."""
     needed = sum(stream.bytes_per_s for stream in streams.values())
     if needed <= capacity_bytes_per_s(baud):
         return None
@@ -64,7 +64,7 @@ def over_budget(streams: Mapping[str, LinkLoad], baud: int) -> str | None:
 
 
 def sensor_line_over_budget(rate_hz: float, message_bytes: int, baud: int) -> str | None:
-    """Return the arithmetic if a sensor's own line cannot carry its messages, else None."""
+    """Return the calculation, in words, if a sensor's own line lacks the capacity for its messages, else None."""
     if rate_hz * message_bytes <= capacity_bytes_per_s(baud):
         return None
     return (

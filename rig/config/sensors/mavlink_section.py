@@ -55,7 +55,7 @@ class MavlinkSection(Section):
     @field_validator("port")
     @classmethod
     def check_host_and_port(cls, value: str) -> str:
-        """Refuse a port that cannot be one; `udp:` and `tcp:` are followed by an address."""
+        """Refuse an invalid port; `udp:` and `tcp:` need an address."""
         kind, _, rest = value.partition(":")
         if kind in NETWORKS:
             check_port(f"socket://{rest}")
@@ -74,7 +74,7 @@ class MavlinkSection(Section):
 
 
 def autopilots_over_budget(sensors: Mapping[str, tuple[MavlinkSection | None, float]]) -> str | None:
-    """Return the fault of a line whose load exceeds its capacity, or of IMUs at one port with different speeds."""
+    """Return the fault of a line with too much load, or of IMUs at one port with different speeds; else None."""
     imus_at: dict[str, list[tuple[str, MavlinkSection, float]]] = {}
     for name, (section, rate_hz) in sensors.items():
         if section is not None:

@@ -77,7 +77,7 @@ class PartSpec:
         return radians(self.angle_random_walk_deg_sqrt_h) / 60
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError with the nearest if there is none."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if it has none."""
         if self.any_rate:
             return positive(rate_hz)
         return nearest_rate(rate_hz, self.rates_hz, self.rates_rule)
@@ -96,7 +96,7 @@ class MagnetometerPart:
     default_rate_hz: float
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError with the nearest if there is none."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if it has none."""
         return nearest_rate(rate_hz, self.rates_hz, list_numbers(self.rates_hz))
 
     def accept_range(self, range_gauss: float) -> float:
@@ -105,7 +105,7 @@ class MagnetometerPart:
 
 
 def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
-    """Return the exact rate for a nominal `rate_hz`. Raise ValueError with the nearest if there is none."""
+    """Return the exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest rate, if none matches."""
     nearest = min(rates_hz, key=lambda rate: abs(rate - rate_hz))
     if abs(nearest - rate_hz) > RATE_TOLERANCE * nearest:
         raise ValueError(f"not available; the nearest is {nearest:.6g}; allowed: {rule}")
@@ -113,7 +113,7 @@ def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
 
 
 def one_of(value: float, allowed: Sequence[float]) -> float:
-    """Return `value` if it is allowed. Otherwise raise ValueError with the nearest allowed value."""
+    """Return `value` if it is allowed. Otherwise raise ValueError with the nearest allowed one."""
     if value not in allowed:
         nearest = min(allowed, key=lambda candidate: abs(candidate - value))
         raise ValueError(f"not available; the nearest is {nearest:g}; allowed: {list_numbers(allowed)}")

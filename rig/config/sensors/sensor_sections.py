@@ -124,7 +124,7 @@ class ConfiguredSensor(Protocol):
 
 
 def check_serial_number(value: str) -> str:
-    """Return a serial number that the board can store with the calibration. Raise ValueError otherwise."""
+    """Return a serial number that fits the board's record of a calibration. Raise ValueError otherwise."""
     if value == GAP:
         raise ValueError("nobody but you knows it: write the number of this specimen here")
     if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
@@ -133,7 +133,7 @@ def check_serial_number(value: str) -> str:
 
 
 def the_part_has_it(value: float, info: ValidationInfo) -> float:
-    """Refuse a rate or range that the part does not have; another one is never taken silently."""
+    """Raise ValueError for a rate or range that the part does not have; no other one is used silently."""
     part = CATALOGUE.get(info.data.get("part", ""))
     if part is None:
         return value
@@ -192,13 +192,13 @@ class SensorSection(Section):
 
     @property
     def own_port(self) -> tuple[str, str] | None:
-        """The port beside the board's that it answers at, after the key in its section that says so."""
+        """The sensor's own port, if it has one, and the key in its section that states it."""
         if self.serial is not None:
             return "serial.port", self.serial.port
         return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)
 
     def brings(self, name: str) -> set[str]:
-        """Return the names of the further sensors in the device of sensor `name`: a magnetometer, scalars."""
+        """Return the names of the other sensors in the device of sensor `name`: a magnetometer, scalars."""
         if self.lines is None:
             return {field_name(name)} if self.serial is not None and self.serial.message == "C" else set()
         field = {field_name(name)} if self.lines.field is not None else set()
@@ -207,7 +207,7 @@ class SensorSection(Section):
     @model_validator(mode="before")
     @classmethod
     def set_defaults_of_part(cls, data: Any) -> Any:
-        """Fill in the part's usual data rate and ranges if they are left out."""
+        """Fill in the part's default data rate and ranges if they are omitted."""
         if not isinstance(data, Mapping):
             return data
         name = data.get("part")
@@ -241,7 +241,7 @@ class SensorSection(Section):
 
     @model_validator(mode="after")
     def check_own_port(self) -> Self:
-        """Refuse a port of its own for a part on the board, and a part that needs one without it."""
+        """Refuse an own port for a part on the board, and a part that needs one without it."""
         if self.part == "mavlink" or self.mavlink is not None:
             return self._is_in_autopilot()
         own_port = PARTS[self.part].own_port
@@ -273,7 +273,7 @@ class SensorSection(Section):
     @field_validator("turntable")
     @classmethod
     def require_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
-        """Refuse a stored calibration for a sensor that is to be calibrated."""
+        """Refuse a given calibration for a sensor that is to be calibrated."""
         if info.data.get("role") == "calibrate":
             raise ValueError("only a sensor with role: reference has one; a sensor to calibrate gets its own here")
         return value

@@ -81,7 +81,7 @@ KEYS_OF_KIND: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 
 
 def fill_in_joints(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys of `world.arm`, completed by the defaults of its kind of joints."""
+    """Return the keys of `world.arm`, with the defaults of its kind of joints filled in."""
     kind = data.get("joints", "measured")
     usual = KEYS_OF_KIND.get(kind, {}) if isinstance(kind, str) else {}
     drive = data.get("drive", {})

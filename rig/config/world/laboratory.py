@@ -543,7 +543,7 @@ class WorldSection(Section):
     )
 
     def misfits(self, turner: TurnerSection) -> Iterator[str]:
-        """Yield a line for every part of the section that does not fit the turner."""
+        """Yield a line for every part of the section that contradicts the turner."""
         kinds: dict[str, type[TurnerSection]] = {"arm": ArmSection, "servo": ServoSection, "hand": HandSection}
         for name, kind in kinds.items():
             if getattr(self, name) != type(self).model_fields[name].default and not isinstance(turner, kind):

@@ -28,5 +28,5 @@ class EarthRateEntry(Entry):
     degrees_of_freedom: Freedom
 
     def dofs(self, count: int) -> list[Freedom]:
-        """Return the degrees of freedom of `count` of the entry's numbers."""
+        """Return the degrees of freedom of the entry's `count` numbers."""
         return [self.degrees_of_freedom] * count

@@ -61,7 +61,7 @@ class OverTemperatureEntry(Entry):
     repeats: int
 
     def evaluate(self, temperature_c: float) -> tuple[Vector3, Vector3]:
-        """Return scale and bias at a temperature, inside the range or not."""
+        """Return scale and bias at a temperature, even outside the range."""
         powers = [(temperature_c - self.reference_c) ** n for n in range(4)]
 
         def value(cubic: Cubic) -> Vector3:

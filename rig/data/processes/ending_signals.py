@@ -47,14 +47,14 @@ class Interrupts:
         self.allow()
 
     def allow(self) -> None:
-        """Permit the next signal to raise, however soon it follows the last one."""
+        """Permit the next signal to raise, however soon after the last one."""
         self._raised_s = float("-inf")
         self._first_s: float | None = None  # when the signal came that waits for a lock
 
     def hear(self, number: int, frame: FrameType | None, text: str = "") -> None:
-        """Handle a signal by an exception, except within a burst; while a thread takes a lock, a moment later.
+        """Handle a signal by an exception, except within a burst of signals.
 
-        It waits for that lock no longer than a burst lasts.
+        While a thread takes a lock, wait a moment, at most as long as a burst lasts.
         """
         now_s = time.monotonic()
         if now_s - self._raised_s < BURST_S:
@@ -78,7 +78,7 @@ def _takes_a_lock(frame: FrameType | None) -> bool:
 
 
 def _send_later(thread: int, number: int) -> None:
-    """Send a thread a signal in a moment. Started without the module `threading`, whose locks may be taken just now."""
+    """Send a thread a signal in a moment. It does not use the module `threading`, whose locks may be in use."""
     time.sleep(LATER_S)
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(thread, number)

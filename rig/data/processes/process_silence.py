@@ -37,9 +37,10 @@ class Silence:
         self.ticks = self._all_ticks = 0
 
     def tick(self, unheard: bool = False) -> None:
-        """Count one more interval without a sign of life; to be called at even intervals.
+        """Count one more interval without a sign of life.
 
-        `unheard`: an answer has arrived but was not read yet, so the process was not silent.
+        Call it at even intervals. `unheard`: an answer has arrived and not been read yet, so the process was not
+        silent.
         """
         self._all_ticks += 1
         # The first tick of a silence means nothing yet; from the second on the process' threads are examined.
@@ -63,7 +64,8 @@ class Silence:
     def _is_starved(self, has_previous: bool) -> bool:
         """Return whether the process waited for a processor since the last call; False at the first call.
 
-        The system does not count a thread that still waits as waiting, but as ready to run without having run.
+        The system's count of waiting time excludes a thread that is still waiting, so a thread that is ready and has
+        not run counts too.
         """
         now_s = time.monotonic()
         elapsed_s, before = now_s - self._looked_s, self._times
@@ -79,7 +81,7 @@ class Silence:
 def crowding() -> float:
     """Return the number of programs per processor of this machine, 1 to CROWDED, by which a delay may be stretched.
 
-    In the mean of the last minute, or now: after a quarter of a minute the mean shows only a quarter of a crowd.
+    It is the larger of the last minute's mean and the present number, because the mean responds too slowly.
     """
     if not hasattr(os, "getloadavg"):  # Windows
         return 1.0
@@ -87,7 +89,7 @@ def crowding() -> float:
 
 
 def _runnable() -> int:
-    """Return the number of threads of the machine that run or wait for a processor now; 0 without proc(5)."""
+    """Return the number of threads of the machine that run or are ready to run; 0 without proc(5)."""
     try:
         return int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0])
     except (OSError, ValueError, IndexError):

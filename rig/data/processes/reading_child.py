@@ -47,7 +47,7 @@ def _main() -> NoReturn:
 
 
 def _output() -> BinaryIO:
-    """Return the original stdout, and redirect stdout to nowhere, because libraries print comments."""
+    """Return the original stdout, and redirect stdout to nowhere, because libraries print to it."""
     out = os.fdopen(os.dup(1), "wb")
     with Path(os.devnull).open("wb") as nowhere:
         os.dup2(nowhere.fileno(), 1)
@@ -69,7 +69,7 @@ def _encode(part: Part) -> bytes:
 
 
 def _end_with_parent() -> None:
-    """Let the system kill this process when its parent ends; Ctrl-C is for the parent."""
+    """Make the system kill this process when its parent ends; leave Ctrl-C to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":
         import ctypes
@@ -91,7 +91,7 @@ def _limit(limits: Mapping[str, Any]) -> int | None:
 
 
 def _lower(what: int, limit: int) -> int:
-    """Lower a limit of this process, unless it is lower already; return the resulting limit."""
+    """Lower a limit of this process, if it is not lower already; return the resulting limit."""
     import resource
 
     soft, hard = resource.getrlimit(what)
@@ -101,7 +101,7 @@ def _lower(what: int, limit: int) -> int:
 
 
 def _end(status: Status, why: str = "") -> NoReturn:
-    """End without closing files, because HDF5 may fail to close a file that it failed to open."""
+    """Exit without closing files, because HDF5 may fail to close a file that it failed to open."""
     sys.stderr.write(why + "\n" if why else "")
     sys.stderr.flush()
     os._exit(status)

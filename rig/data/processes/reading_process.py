@@ -80,7 +80,7 @@ class CostlyFile(UnreadableFile):
 
 
 def limits_for(stored_bytes: int) -> ReadingLimits:
-    """Return the limits for reading a file, or a folder of files, of that size on the disk."""
+    """Return the limits for reading a file, or a folder of files, by its size on the disk."""
     processor_s = PROCESSOR_S + PROCESSOR_S_PER_BYTE * stored_bytes
     return ReadingLimits(
         memory_bytes=MEMORY_BYTES + MEMORY_TIMES_STORED * stored_bytes,
@@ -117,7 +117,7 @@ def _file_size_on_disk(path: Path, name: str = "it") -> int:
 
 
 def size_without_holes(file: BinaryIO) -> int:
-    """Return the size of an open file without its holes; the full size if the system does not tell."""
+    """Return the size of an open file without its holes; the full size if the system does not state it."""
     size = os.fstat(file.fileno()).st_size
     if not hasattr(os, "SEEK_DATA"):
         return size
@@ -170,7 +170,7 @@ class ReadingTask:
         self._ending.close()
 
     def parts(self) -> list[Part]:
-        """Return the parts that the reader yields, after it has ended.
+        """Return the parts that the reader yields, once it has ended.
 
         Raise `UnreadableFile` for a file that cannot be read, `CostlyFile` for one beyond the limits; Refused
         `temporary_folder_full`, and as the reader does.
@@ -189,16 +189,16 @@ class ReadingTask:
 
 
 def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> list[Part]:
-    """Return the parts that a `reader` yields of a file: see `ReadingTask`. Raise as `ReadingTask.parts`."""
+    """Return the parts that a `reader` yields of a file: see `ReadingTask`. Raise as `ReadingTask.parts` does."""
     with ReadingTask(reader, path, arguments, limits) as reading:
         return reading.parts()
 
 
 def _wait_for(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
-    """Return the process' output on stderr, once it has ended. Raise TimeoutError.
+    """Return the process' output on stderr, once it has ended.
 
-    A library that does not return may sleep, so time on a processor alone does not show it; a process that waits for a
-    processor, or for the disk, does not sleep.
+    Raise TimeoutError. A hanging library may sleep, which uses no processor time, so sleep counts too; waiting for a
+    processor or for the disk is no sleep.
     """
     silent = Silence(reading.pid, spared=SPARED)
     while not silent.lasts_over(idle_s / TICK_S):
@@ -210,7 +210,7 @@ def _wait_for(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
 
 
 def _end(reading: "subprocess.Popen[bytes]") -> None:
-    """End the process; wait for its end no longer than a signal may take, because a dead disk may delay it."""
+    """Kill the process, and wait a limited time for its end, because a dead disk may delay that."""
     reading.kill()
     with suppress(subprocess.TimeoutExpired):
         reading.wait(GONE_S)
@@ -219,7 +219,7 @@ def _end(reading: "subprocess.Popen[bytes]") -> None:
 
 
 def _raise_failure(status: int, complaint: bytes, limits: ReadingLimits) -> None:
-    """Raise as `read_apart` if the status says that the file was not read."""
+    """Raise as `read_apart` does if the process' exit status is a failure."""
     if status == Status.READ:
         return
     lines = complaint[-COMPLAINT_BYTES:].decode(errors="replace").strip().splitlines()

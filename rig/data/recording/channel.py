@@ -57,14 +57,14 @@ class Channel:
     def steps(self, readings: Array, *, trusts_counts: bool = False) -> Steps:
         """Return the resolution steps of readings (n, 3): as stated, or larger if the readings show larger steps.
 
-        `trusts_counts`: the recorded numbers are the converter's own counts, whatever the readings show.
+        `trusts_counts`: the recorded numbers are the converter's own counts, so the readings are not searched.
         """
         if self.step is not None:
             return cut_steps(readings, self.step / 2)
         return Steps(self.resolution if trusts_counts else np.maximum(self.resolution, find_steps(readings)))
 
     def counts(self, samples: NDArray[Any]) -> NDArray[Any]:
-        """Return the recorded numbers (n,) or (n, 3) of the channel in samples (n,), not converted to its unit."""
+        """Return the recorded numbers (n,) or (n, 3) of the channel in samples (n,), unconverted."""
         counts: NDArray[Any] = samples[self.column]
         return counts
 
@@ -78,7 +78,7 @@ class Channel:
         return self.convert(self.counts(samples))
 
     def fill(self, samples: NDArray[Any], readings: Array) -> None:
-        """Write readings (n,) or (n, 3), in the quantity's unit, into samples (n,): the nearest number that fits."""
+        """Write readings (n,) or (n, 3), in the quantity's unit, into samples (n,), as the nearest counts."""
         counts = (readings - self.offset) / self.unit_per_count
         if self.type != "<f8":
             most = np.iinfo(self.type).max
@@ -90,7 +90,7 @@ class Channel:
         return tuple(self.convert(self.counts(samples).mean(axis=0)).reshape(-1).tolist())
 
     def is_saturated(self, samples: NDArray[Any]) -> NDArray[np.bool_]:
-        """Return which of samples (n,) hold a number at the end of the scale, (n,)."""
+        """Return which of the samples (n,) are at the end of the scale."""
         if self.full_scale_counts is None:
             return np.zeros(len(samples), dtype=np.bool_)
         counts = self.counts(samples)
@@ -119,10 +119,7 @@ def stated_temperature_channel(stated_c: float, within_k: float) -> Channel:
 
 
 def sample_dtype(channels: Sequence[Channel]) -> np.dtype[Any]:
-    """Return the NumPy type of samples with the given channels.
-
-    Raise ValueError if two of them, or a stamp, share a column.
-    """
+    """Return the NumPy type of samples with these channels. Raise ValueError if columns have the same name."""
     return np.dtype([*STAMPS, *((channel.column, channel.type, channel.measures.shape) for channel in channels)])
 
 

@@ -25,7 +25,7 @@ MAX_UNWRITTEN_ROWS = 100_000  # announced and missing: more than a kill leaves o
 
 
 def contents(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
-    """Yield the contents of a run file, header first. Raise ValueError with the reason, whatever h5py raises."""
+    """Yield the contents of a run file, header first. Raise ValueError with the reason, for any error of h5py."""
     try:
         yield from extract(path)
     except Exception as error:  # of any kind: a damaged file may raise anything
@@ -33,7 +33,7 @@ def contents(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
 
 
 def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
-    """Yield the contents of a run file, header first. Raise OSError, ValueError and whatever else h5py does."""
+    """Yield the contents of a run file, header first. Raise OSError, ValueError and any other error of h5py."""
     import h5py
 
     # A plain open refuses a file whose writer was killed; an SWMR reader trusts one that is cut short, and waits for
@@ -68,7 +68,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
 
 
 def reason(error: Exception) -> str:
-    """Return the reason why a file cannot be read, in one line; HDF5 wraps the system's message in several."""
+    """Return the reason why a file cannot be read, in one line, without HDF5's wrapping of the system's message."""
     if isinstance(error, OSError) and error.filename is not None:
         error = OSError(error.strerror)  # whoever tells it names the file
     text = " ".join(str(error).split())
@@ -94,7 +94,7 @@ def _is_left_open(path: Path) -> bool:
 
 
 def _member(group: Any, name: str, kind: type) -> Any:
-    """Return a group or dataset that lies in this very file. Raise ValueError."""
+    """Return a group or dataset of this file. Raise ValueError if it is in another one."""
     import h5py
 
     if (link := group.get(name, getlink=True)) is None:
@@ -108,7 +108,7 @@ def _member(group: Any, name: str, kind: type) -> Any:
 
 
 def _check(dataset: Any, name: str) -> None:
-    """Raise ValueError unless the dataset holds rows of numbers, for which the file has space."""
+    """Raise ValueError unless the dataset holds rows of numbers that the file has space for."""
     if dataset.is_virtual or dataset.external:  # first: to tell the shape of the former, the library opens the others
         raise ValueError(f"the rows of {name} lie somewhere else")
     columns = [dataset.dtype[column] for column in dataset.dtype.names or ()] or [dataset.dtype]
@@ -120,7 +120,7 @@ def _check(dataset: Any, name: str) -> None:
 
 
 def _refuse_endless(path: Path, unpacked: int) -> None:
-    """Raise ValueError for contents that a small file expands to by compression or holes, too large for memory."""
+    """Raise ValueError if compression or holes let a small file expand to more than the memory holds."""
     with path.open("rb") as file:
         stored = size_without_holes(file)
     for what, size in (("its rows unpack", unpacked), ("it swells", path.stat().st_size)):
@@ -145,9 +145,9 @@ def _text(file: Any, name: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return an attribute in Python's own types; one that JSON does not have ends in the TypeError of `_encode`.
+    """Return an attribute in Python's own types.
 
-    Raise ValueError for one that no run file has.
+    Raise ValueError for one that no run file has. `_encode` raises TypeError for types that JSON does not have.
     """
     size = getattr(value, "size", 1) or 0  # an attribute of nothing has None
     if size > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):

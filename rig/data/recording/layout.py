@@ -80,7 +80,7 @@ def parse_sensor(name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
 
 
 def check_rows(contents: Contents) -> None:
-    """Raise ValueError if rows are not of the type that the texts and descriptions of the file give."""
+    """Raise ValueError if rows do not have the type that the file's texts and descriptions state."""
     states_dtype = contents.turner.dtype if contents.turner else ARM_STATE_DTYPE
     rows = {
         f"samples/{name}": (contents.samples[name], sensor.sample_dtype) for name, sensor in contents.sensors.items()
@@ -106,7 +106,7 @@ def table_dtype(names: Sequence[str]) -> np.dtype[Any]:
 
 
 def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
-    """Write a run file next to its path and move it there, so that a kill or a full disk leaves all or nothing.
+    """Write a run file next to its path and move it there, so a kill or a full disk leaves a complete file or none.
 
     With `swmr` it can be opened for appending in that mode; without, any HDF5 tool opens it. Raise OSError.
     """
@@ -116,7 +116,8 @@ def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
 def _image(contents: Contents, libver: str | None) -> bytes:
     """Return the bytes of a complete run file.
 
-    The library makes them in memory: after a failed write to a file it tries again at the end and crashes the process.
+    The library makes them in memory, because after a failed write to a file it tries again at exit and crashes the
+    process.
     """
     import h5py
 

@@ -44,7 +44,7 @@ class Header:
         return (*self.needed, *self.one_of, *(name for group in self.optional for name in group))
 
     def check(self, columns: Columns) -> None:
-        """Raise ValueError for columns, or numbers, that such a file cannot have."""
+        """Raise ValueError for columns or numbers that such a file cannot have."""
         names = columns.keys()
         groups = [group for group in self.optional if names & set(group)]
         allowed = {*self.needed, *self.one_of, *(name for group in groups for name in group)}
@@ -62,7 +62,7 @@ class Header:
 
 
 def samples_header(needed: Collection[Quantity] = ()) -> Header:
-    """Return the columns of readings, of the quantities `needed` and of any others."""
+    """Return the header of a file of readings: of the quantities `needed` and any others."""
     columns = (TIME, *(name for quantity in needed for name in quantity.columns))
     others = (quantity.columns for quantity in quantities().values() if quantity not in needed)
     return Header(columns, (), (*others, TEMPERATURE.columns))
@@ -112,7 +112,7 @@ class Item:
 
     @property
     def mounting(self) -> NDArray[np.float64]:
-        """(3, 3) mounting on the body that is moved: the identity, as the file's axes count as the sensor's own."""
+        """Mounting (3, 3) on the moving body: the identity, because the file's axes are taken as the sensor's own."""
         return np.eye(3)
 
 

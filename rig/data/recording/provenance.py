@@ -74,7 +74,7 @@ class Provenance:
 
     @property
     def script_identity(self) -> ScriptIdentity:
-        """The script by which the recording was made; an empty identity if it does not say."""
+        """The script that made the recording; an empty identity if it is not recorded."""
         return ScriptIdentity(self.script or "", self.script_sha256 or "")
 
     def document(self) -> dict[str, Any]:
@@ -88,7 +88,7 @@ class Provenance:
 
 
 def calls_itself_simulated(software: str) -> bool:
-    """Return whether a controller of this version drives no arm, so that its seconds may have any length."""
+    """Return whether a controller of this version drives no arm; its seconds may then have any length."""
     return software.endswith(SIMULATED)
 
 

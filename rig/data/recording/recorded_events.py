@@ -148,9 +148,9 @@ def encode_event(recorded: TimedEvent) -> bytes:
 
 
 def decode_events(stream: bytes) -> Iterator[TimedEvent]:
-    """Yield the events of a run file. A last line without an end was cut off by a kill and is left out.
+    """Yield the events of a run file; a last line without an end, cut off by a kill, is left out.
 
-    Raise ValueError naming the first line that is no event, or not of the shape of its kind.
+    Raise ValueError naming the first line that is no event, or not of the form of its kind.
     """
     for number, line in enumerate(stream.split(b"\n")[:-1], start=1):
         if line.strip(b"\0"):
@@ -178,7 +178,7 @@ def _decode_document(document: Any) -> TimedEvent:
 
 
 def _nest_answer(name: str, detail: dict[str, Any]) -> dict[str, Any]:
-    """Return the details with the board's answer nested: schema "rig.run/1" has its fields among the others."""
+    """Return the details with the board's answer nested; schema "rig.run/1" has its fields among the others."""
     answer = {"board_observed": "observation", "board_solved": "solution"}.get(name)
     return {**detail, answer: detail} if answer is not None and answer not in detail else detail
 
@@ -190,7 +190,7 @@ class _Times:
 
 
 def _check_sweep(sweep: Sweep) -> None:
-    """Raise ValueError for a sweep that could not be planned: readers rely on its numbers."""
+    """Raise ValueError for a sweep that no plan contains, because readers rely on its numbers."""
     low, high = sweep.revolution_rad
     rates = sweep.speed_rad_s, sweep.acceleration_rad_s2, sweep.duration_s
     numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, *rates)

@@ -48,7 +48,7 @@ class RecordedSensor:
 
     @property
     def on_board(self) -> bool:
-        """Whether the board read it, and stamped its samples with the board's clock."""
+        """Whether the board reads it, and stamps its samples by the board's clock."""
         return self.clock is None
 
     @property
@@ -58,12 +58,12 @@ class RecordedSensor:
 
     @property
     def temperature_stated(self) -> bool:
-        """Whether its temperature was stated, for want of a thermometer."""
+        """Whether its temperature was stated, because it has no thermometer."""
         return any(channel.quantity == TEMPERATURE.name and channel.stated is not None for channel in self.channels)
 
     @property
     def unseen_change_k(self) -> float:
-        """The possible change of its temperature, K, within one recorded step."""
+        """The change of its temperature, K, that one recorded step may hide."""
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property
@@ -116,7 +116,7 @@ def build_sensor(
     rate_hz: float | None = None,
     clock: str | None = None,
 ) -> RecordedSensor:
-    """Return the sensor of a section, whose samples hold these channels; `part` and rate by default the section's."""
+    """Return the recorded sensor of a section, with these channels; part and rate are the section's by default."""
     mounting = tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist())
     rate_hz = section.rate_hz if rate_hz is None else rate_hz
     return RecordedSensor(part or section.part, section.serial_number, rate_hz, channels, mounting, clock=clock)
@@ -130,8 +130,8 @@ def range_m_s2(section: AccelerationSection) -> float:
 def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
     """Return the sensor of a description in plain values.
 
-    Raise ValueError naming the error: a value, a quantity that is unknown or duplicate, columns of one name, a mounting
-    that is no rotation, a gyroscope without range.
+    Raise ValueError naming the error: a value, an unknown or duplicate quantity, columns of one name, a mounting that
+    is no rotation, a gyroscope without range.
     """
     sensor = validate(RecordedSensor, document, "sensor")
     quantities = [channel.quantity for channel in sensor.channels]

@@ -75,7 +75,7 @@ def turner_of(text: str) -> RecordedTurner:
 
 
 def check_joints(turner: RecordedTurner, settings: RunSettings, events: Iterable[TimedEvent]) -> None:
-    """Raise ValueError if a pose of a recording has another number of joints than its turner."""
+    """Raise ValueError if a pose and its turner have different numbers of joints."""
     poses: list[Joints] = [settings.home_q_rad, *(dwell.q_rad for dwell in settings.planned_dwells)]
     for event in (recorded.event for recorded in events):
         if isinstance(event, SweepStarted | SweepFinished):

@@ -119,7 +119,7 @@ class RunRecorder:
         self.close()
 
     def add_samples(self, sensor: str, samples: NDArray[Any]) -> None:
-        """Append samples (n,) of a sensor named at the start, of its dtype. The array must not change afterwards."""
+        """Append samples (n,) of a declared sensor, of its dtype. The array must not change afterwards."""
         with self._lock:
             self._pending.samples[sensor].append(samples)
 
@@ -130,7 +130,7 @@ class RunRecorder:
             self._pending.states.append(state)
 
     def add(self, event: Event, *, controller_time_s: float | None = None) -> None:
-        """Append an event, now; its controller time is the newest state's unless given."""
+        """Append an event at this moment; by default its controller time is that of the newest state."""
         with self._lock:
             time_s = self._controller_time_s if controller_time_s is None else controller_time_s
             self._pending.events.append(encode_event(TimedEvent(event, time.monotonic(), time_s)))
@@ -141,7 +141,7 @@ class RunRecorder:
             raise self._fault(self._failure)
 
     def close(self) -> None:
-        """Write what is pending and close the file; afterwards any HDF5 reader opens it. Closing twice is allowed."""
+        """Write pending data and close the file; any HDF5 reader then opens it. Closing twice is allowed."""
         self._closing.set()
         self._thread.join()
         self.check()
@@ -160,7 +160,7 @@ class RunRecorder:
             self._abandon()
 
     def _abandon(self) -> None:
-        """Leave the file as the last flush left it.
+        """Leave the file as after the last flush.
 
         HDF5 repeats a failed write whenever anything is closed, and ends the process with a segmentation fault at exit;
         from here on all writes are discarded.
@@ -193,7 +193,7 @@ class RunRecorder:
 def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask | None = None) -> RunData:
     """Read a run file: finished, still being written, or left behind by a killed process.
 
-    `begun` is its `begin_reading`, if that was called before. Rows that the kill left unwritten or incomplete are
+    `begun` is its `begin_reading`, if that was called before. Rows that a kill left unwritten or incomplete are
     dropped. Raise Refused: `no_run_file` without a file; `not_a_run_file` if it is damaged, of another kind or schema,
     or takes longer than `timeout_s` (None: by its size) on a machine that is not overloaded; `temporary_folder_full`.
     """
@@ -244,9 +244,9 @@ def write_elsewhere(path: Path, run: RunData) -> None:
 
 
 def make_plain(path: Path) -> None:
-    """Rewrite the file of a killed run, which only SWMR readers open, so that any HDF5 tool does. The content stays.
+    """Rewrite a killed run's file, which only SWMR readers open, so that any HDF5 tool opens it.
 
-    Call it only if the file is no longer being written. Raise Refused as `read_run` does; OSError.
+    The content stays. Nothing may be writing the file. Raise Refused as `read_run` does; OSError.
     """
     contents = _contents(path, None)
     samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
@@ -254,7 +254,7 @@ def make_plain(path: Path) -> None:
 
 
 def _contents(path: Path, timeout_s: float | None, begun: ReadingTask | None = None) -> Contents:
-    """Return the file's contents, read by a process that can be ended: see `rig.data.recording.extract`."""
+    """Return the file's contents, read in a process that can be ended: see `rig.data.recording.extract`."""
     try:
         with begun or begin_reading(path, timeout_s) as reading:
             header, *arrays = reading.parts()
@@ -317,7 +317,7 @@ def _elsewhere(contents: Contents) -> ReadElsewhere:
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
-    """Return the rows without the unwritten end: it holds zeros, and a host time is never zero."""
+    """Return the rows without the unwritten end, which holds zeros: a host time is never zero."""
     written = np.flatnonzero(rows["host_time_s"])
     count = int(written[-1]) + 1 if len(written) else 0
     return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last one may be torn
@@ -326,7 +326,7 @@ def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
 def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
     """Raise ValueError for numbers that overflow in calculations, and for a host time that is not finite.
 
-    Readings and angles that are not finite are reported where they are used, as some are never used.
+    Other numbers that are not finite are reported when they are used, because some never are.
     """
     if not np.isfinite(rows["host_time_s"]).all():
         raise ValueError(f"a host time of {name} is not a number")

@@ -15,9 +15,9 @@ LIBRARIES_BYTES = 1 << 29  # of memory, and more than the libraries and the stru
 
 
 def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
-    """Begin to read a run file (`rig.data.recording.extract`), to be done within `timeout_s` (None: by its size).
+    """Begin to read a run file (`rig.data.recording.extract`), within `timeout_s` (None: by its size).
 
-    Raises Refused `no_run_file`, and as `ReadingTask`.
+    Raise Refused `no_run_file`, and as `ReadingTask` does.
     """
     stored = _stored_bytes(path)
     if timeout_s is None:
@@ -26,7 +26,7 @@ def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
 
 
 def _limits(stored_bytes: int, time_s: float) -> ReadingLimits:
-    """Return the resources for reading a run file; a compressed part may state any length."""
+    """Return the resources for reading a run file, because a compressed part may claim any length."""
     rows_bytes = MAX_UNPACKED * stored_bytes + MAX_UNWRITTEN_BYTES
     return ReadingLimits(LIBRARIES_BYTES + 3 * rows_bytes, time_s, time_s, 2 * rows_bytes)  # rows, and their copies
 
@@ -48,7 +48,7 @@ def _stored_bytes(path: Path) -> int:
 def reading_ahead(run: Path) -> Iterator[dict[Path, ReadingTask]]:
     """Read the first recording of a run folder, or a run file, during the block; yield the reading by its path.
 
-    Nothing is read from a folder without a recording. Raise as `begin_reading`.
+    A folder without a recording yields none. Raise as `begin_reading` does.
     """
     first = run / FIRST_RECORDING if run.is_dir() else run
     if first != run and not first.exists():

@@ -103,7 +103,7 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
 
     @property
     def angle_std_rad(self) -> float:
-        """Standard deviation of a joint's angle. Raises Refused `angle_std_not_stated`."""
+        """Standard deviation of a joint's angle by its encoder. Raises Refused `angle_std_not_stated`."""
         if self.angle_std_deg is None:
             raise _angle_std_not_stated()
         return float(np.radians(self.angle_std_deg))
@@ -224,12 +224,12 @@ class RunSettings:
 
     @property
     def mount(self) -> Mounting:
-        """The nominal rotation from the flange's frame to the item's, in which the sensors' mountings stand."""
+        """The nominal rotation from the flange's frame to the item's, to which sensor mountings refer."""
         return self.mounts[self.stage] if self.mounts else AS_THE_FLANGE
 
     @property
     def stated_uncertainty(self) -> Uncertainty:
-        """The uncertainty that a run states. Raise ValueError for external readings, which state none."""
+        """The uncertainty that a run states. Raise ValueError for external readings, which do not."""
         if self.uncertainty is None:
             raise ValueError("its settings state no uncertainty, but those of a run do")
         return self.uncertainty
@@ -248,10 +248,11 @@ class RunSettings:
         return self.procedure, self.then_verify, self.home_q_rad, *steps, self.mounts, self.by_hand
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
-        """Return the settings with other thresholds or limits: `limits.scale_std=0.001`.
+        """Return the settings with other thresholds or limits:
 
-        The uncertainty of the encoders can also be changed if the run has arcs: `uncertainty.angle_std_deg=0.02`. Raise
-        Refused `unknown_setting` or `wrong_setting`, which list the possible settings.
+        `limits.scale_std=0.001`. If the run has arcs, the encoders' uncertainty can also be changed:
+        `uncertainty.angle_std_deg=0.02`. Raise Refused `unknown_setting` or `wrong_setting`, which list the possible
+        settings.
         """
         changed = self
         for item in overrides:
@@ -289,7 +290,7 @@ def settings_from_json(text: str) -> RunSettings:
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
     """Return the settings of a new run; `plan` is the plan of the whole procedure.
 
-    Raise Refused `angle_std_not_stated` if the plan has arcs and the file does not state the error of the encoders.
+    Raise Refused `angle_std_not_stated` if the plan has arcs and the file does not state the encoders' error.
     """
     from rig.config.procedures.hand_sections import ByHandSection
 
@@ -328,7 +329,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
 
 
 def _limits(config: "RigConfig") -> Limits:
-    """Return the limits of the file, with the targets for which its procedure repeats."""
+    """Return the limits of the file, including the targets at which its procedure ends."""
     from rig.config.procedures.procedure_sections import SixObservationSection
 
     limits, section = config.limits.model_dump(), config.procedure
@@ -359,7 +360,7 @@ def _angle_std_not_stated() -> Refused:
 
 
 def _plan_dwells(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:
-    """Return the planned dwells, each with the number of earlier dwells in its attitude."""
+    """Return the planned dwells, each with the number of previous dwells in its attitude."""
     repeats: Counter[tuple[float, ...]] = Counter()
     planned = []
     for dwell in dwells:
@@ -369,7 +370,7 @@ def _plan_dwells(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:
 
 
 def site_of(section: "SiteSection") -> Site:
-    """Return the site, with the Earth's rate in the frame of the base if latitude and heading are known."""
+    """Return the site, with the Earth's rate in the frame of the base if latitude and heading are given."""
     earth_rate: Vector3 | None = None
     if section.latitude_deg is not None and section.heading_deg is not None:
         up = np.array(section.up)
@@ -396,7 +397,7 @@ def _tesla(microtesla: float | None) -> float | None:
 
 
 def uncertainty_of(config: "RigConfig") -> Uncertainty:
-    """Return the stated uncertainties; a sensor without its own statement gets its part's default."""
+    """Return the stated uncertainties. A sensor that states none gets its part's default."""
     stated: dict[str, Any] = config.uncertainty.model_dump()
     of_sensors: dict[str, Any] = {
         what: {

@@ -293,10 +293,7 @@ def _causes(settled: _Settled) -> dict[str, Array]:
 
 
 def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:
-    """Return the Earth's rate by the increments alone, or the Fault if it is not detected.
-
-    The prior of its norm is not used.
-    """
+    """Return the Earth's rate by the increments, without the prior of its norm, or the Fault if undetected."""
     information = np.linalg.inv(covariance)
     data_information: Array = information - EARTH_PRECISION * np.eye(3)
     data_information = data_information + 1e-9 * EARTH_PRECISION * np.eye(3)

@@ -92,10 +92,7 @@ class _PlacementFits:
 
 
 def laid_down(theta: Array, placed: Placed, unplaced: Array, unplaced_variances: Array) -> LaidDown:
-    """Return θ (p,) re-estimated with placement errors, beginning at a solution.
-
-    Rests without an attitude add their means (k, 3).
-    """
+    """Return θ (p,) re-estimated with placement errors, from a solution and means (k, 3) without attitude."""
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _Linear(

@@ -86,10 +86,7 @@ class EarthRate:
 
     @property
     def latitude_rad(self) -> float:
-        """The latitude by the angle between the rate and the vertical.
-
-        By the rate's level part alone if the vertical part is fixed.
-        """
+        """The latitude by the rate's angle to the vertical, or its level part if the vertical one is fixed."""
         return float(np.arcsin(self.up @ self.rate_rad_s / self.norm_rad_s))
 
     @property
@@ -240,10 +237,7 @@ def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array 
 
 
 def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
-    """Return the conditioning of the design (3 N, 3 p + d), and its number of columns.
-
-    Each block of columns is scaled to the same size.
-    """
+    """Return the conditioning of the design (3 N, 3 p + d), its blocks scaled alike, and its number of columns."""
     sweeps = inputs.turns_rad_s / (np.linalg.norm(inputs.turns_rad_s) / len(inputs.turns_rad_s) ** 0.5 or 1.0)
     scaled_gravity = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)
     sensor_columns = np.kron(design_matrix(sweeps, scaled_gravity), np.eye(3))

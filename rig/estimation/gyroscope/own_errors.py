@@ -102,7 +102,7 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
 
 
 def _temperature_deviations_k(sensor: KnownSensor, windows_s: Array, weights: Array) -> Array:
-    """Return deviations (2, N), K, from the weighted mean temperature: recorded ones, then those hidden by the steps."""
+    """Return deviations (2, N), K, from the weighted mean temperature: recorded, then hidden by the steps."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])
 

@@ -254,10 +254,7 @@ def _solve(equations: Sequence[_NormalEquations]) -> tuple[Array, Array]:
 
 
 def _conditioning(equations: Sequence[_NormalEquations]) -> refusals.Conditioning:
-    """Return the conditioning of the design, rates and offsets scaled alike.
-
-    Raise Fault `rank_deficient`, `ill_conditioned`.
-    """
+    """Return the conditioning of the scaled design. Raise Fault `rank_deficient`, `ill_conditioned`."""
     design = np.vstack([equation.design for equation in equations])
     sizes = [np.linalg.norm(design[:, block]) for block in (slice(0, 9), slice(9, 12))]
     conditioning = refusals.condition_of(design / np.repeat(sizes, [9, 3]), 12)

@@ -95,10 +95,7 @@ def solve_by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
 
 
 def extract_parameters(beta: Array) -> tuple[Array, Array]:
-    """Return k = √β_s and b = β_l / (2 β_s), (3,) each: the last lines of Algorithm 1.
-
-    Raise Fault `negative_square`.
-    """
+    """Return k = √β_s and b = β_l / (2 β_s), (3,) each (Algorithm 1). Raise Fault `negative_square`."""
     squares = beta[:3]
     for s, square in enumerate(squares.tolist()):
         if not square > 0:

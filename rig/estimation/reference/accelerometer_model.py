@@ -187,7 +187,7 @@ def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
 
 
 def project_lever_arm(delay_s: float, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) from the lever arm to its acceleration; at constant speed only means are affected."""
+    """Return the matrices (K, 3, 3) from the lever arm to its acceleration; constant speed affects means alone."""
     sweeps, now, change = movement.sweeps, slice(0, 2), slice(2, 4)
     turning = sweeps.turning_rad2_s2
     phase = (delay_s * sweeps.speeds_rad_s)[:, None, None]

@@ -27,10 +27,7 @@ class Decorrelation:
 
 
 def decorrelate(noise: Array, effects: Array) -> Decorrelation:
-    """Return readings with noise V (n, n) and errors E (n, P), decorrelated.
-
-    Raise LinAlgError if V is not positive definite.
-    """
+    """Return decorrelated readings of noise V (n, n) and errors E (n, P). Raise LinAlgError for an invalid V."""
     whitener = np.linalg.inv(np.linalg.cholesky(noise))
     scaled = whitener @ effects
     growth, directions = np.linalg.eigh(scaled @ scaled.T)

@@ -220,7 +220,7 @@ def _temper(weights: Array, fewest: float) -> Array:
 
 
 def _find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
-    """Return h (q,) so that a mixture of normals (s, q) with `weights` (s,) lies within ± h with 95.45 % probability."""
+    """Return h (q,) so that a mixture of normals (s, q) with `weights` (s,) is within ± h with 95.45 % probability."""
     from scipy.special import ndtr
 
     std = np.sqrt(variances)

@@ -9,7 +9,7 @@ from rig.history.storage.schema import certificate, certificate_file
 
 
 def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> None:
-    """Add the certificate and its new files; existing rows stay unchanged."""
+    """Add the certificate and its new files; change no existing rows."""
     number = connection.scalar(select(certificate.c.id).where(certificate.c.number == issued.number))
     if number is None:
         number = next_number(connection, certificate)

@@ -45,7 +45,7 @@ def enter_run(connection: Connection, finished: FinishedRun, content_sha256: str
 
 
 def note_place(connection: Connection, run_id: int, finished: FinishedRun) -> None:
-    """Add the location of the run's folder, unless the history has it."""
+    """Add the location of the run's folder, if it is new to the history."""
     places = schema.location.c
     same = (places.run_id == run_id, places.computer == finished.computer, places.path == finished.path)
     if connection.scalar(select(places.id).where(*same)) is None:

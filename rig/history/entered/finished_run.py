@@ -66,12 +66,12 @@ class FinishedRun:
 
     @property
     def content_sha256(self) -> str:
-        """The checksum of the result without its time of computation: the same numbers are the same result."""
+        """The checksum of the result without its time of computation, so equal numbers have equal checksums."""
         return content_sha256(self.text)
 
 
 def read_finished_run(folder: Path, document: "ResultDocument | None" = None) -> FinishedRun:
-    """Return the run in `folder`, with its result.json or the `document` that was computed from its recordings.
+    """Return the run in `folder`, with its result.json or the `document` computed from its recordings.
 
     Raise the errors of `read_result`; OSError if a recording cannot be read.
     """
@@ -114,7 +114,7 @@ def read_finished_run(folder: Path, document: "ResultDocument | None" = None) ->
 def document_sha256(folder: Path, name: str) -> str | None:
     """Return the checksum of a file in a run folder (for result.json, of its content); None if it is missing.
 
-    Raise OSError, and UnfitFile for a file that does not belong to a run.
+    Raise OSError, and UnfitFile for a file that cannot be a run's.
     """
     try:
         content = read_regular_file(folder / name, PAGE_MAX_BYTES)
@@ -129,7 +129,7 @@ def document_sha256(folder: Path, name: str) -> str | None:
 
 
 def recording_of(file: Path) -> EnteredRecording:
-    """Return a recording with its hash. Raise OSError, and UnfitFile for a file that does not belong to a run."""
+    """Return a recording with its hash. Raise OSError, and UnfitFile for a file that cannot be a run's."""
     digest, size = hashlib.sha256(), 0
     with open_regular_file(file, RECORDING_MAX_BYTES) as stream:
         while chunk := stream.read(CHUNK_BYTES):
@@ -155,9 +155,9 @@ def content_sha256(text: str) -> str:
 
 
 def read_configuration(folder: Path) -> "Loaded | None":
-    """Return the folder's configuration.
+    """Return the folder's configuration, or None if it has none or this program refuses it.
 
-    None if there is none, or if this program refuses it because of an unknown key: the result is entered nevertheless.
+    In the latter case, for example of an unknown key, the result is entered nevertheless.
     """
     if not (folder / CONFIG).exists():
         return None
@@ -170,7 +170,7 @@ def read_configuration(folder: Path) -> "Loaded | None":
 
 
 def _certificate(folder: Path, document: "ResultDocument", stated: "StatedFacts") -> Issued | None:
-    """Return the certificate in the folder if its content is that of this result; its number alone proves nothing.
+    """Return the certificate in the folder if its content is that of this result; an equal number proves nothing.
 
     An amended certificate is entered when it is made.
     """

@@ -28,7 +28,7 @@ def run_row(document: ResultDocument) -> dict[str, str | bool]:
 
 
 def measurement_sha256(document: ResultDocument) -> str:
-    """Return the checksum of the measurement: arm, board, configuration, start time."""
+    """Return the checksum that identifies a measurement: arm, board, configuration, start time."""
     provenance = document.provenance
     identity = (
         provenance.started_utc,
@@ -40,17 +40,17 @@ def measurement_sha256(document: ResultDocument) -> str:
 
 
 def fit(document: ResultDocument) -> bool:
-    """Return whether the measurement passed its own checks; a value beyond a limit of the sensor does not matter."""
+    """Return whether the measurement passed its own checks; limits of the sensor do not matter."""
     return all(check.passed for check in document.checks if check.means.kind == "fitness")
 
 
 def utc(text: str) -> str:
-    """Return a time in one form, UTC, so that texts sort like times."""
+    """Return a time in UTC and one form, so that texts sort like times."""
     return datetime.fromisoformat(text).astimezone(UTC).isoformat(timespec="seconds")
 
 
 def unlike(document: ResultDocument, recomputed: Sequence[HistoryRecord]) -> Iterator[str]:
-    """Yield differences of `recomputed` from the stated calibrations, beyond a processor's rounding."""
+    """Yield how `recomputed` calibrations differ from the stated ones, beyond a processor's rounding."""
     stated = {(record.sensor, record.quantity): record for record in followed(document)}
     present = {(record.sensor, record.quantity): record for record in recomputed}
     for sensor, quantity in sorted(stated.keys() ^ present.keys()):

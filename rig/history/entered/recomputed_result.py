@@ -17,7 +17,7 @@ AS_IT_COMES = ("iterations", "solved_utc")
 
 
 def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
-    """Return parts of a `claimed` result that differ from its recordings' by more than a processor's rounding.
+    """Return the parts of a `claimed` result that differ from the recomputed one beyond a processor's rounding.
 
     `recomputed` is solved from the recordings. Calibrations agree within 1e-6 of their standard uncertainty, other
     numbers within 1e-6 of the largest in their list. Texts are not compared, and fields that the claim lacks are not
@@ -39,7 +39,7 @@ def not_given(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
 
 
 def _without_later_parameters(recomputed: HistoryRecord, claimed: HistoryRecord | None) -> HistoryRecord:
-    """Return a record without the characteristics that the claim lacks, which later versions may add."""
+    """Return a record without characteristics that the claim lacks, because later versions may add some."""
     if claimed is None:
         return recomputed
     names = {*SCALES, *BIASES, *(parameter.name for parameter in claimed.parameters)}
@@ -58,7 +58,7 @@ def _origin(document: ResultDocument) -> dict[str, object]:
 
 
 def _numbers_of(document: ResultDocument) -> dict[str, object]:
-    """Return the numbers of a result as JSON, with checks by name, so that a later version's check shifts no others."""
+    """Return the numbers of a result as JSON; checks are keyed by name, so that added ones shift no others."""
     fields: dict[str, object] = json.loads(document.text())
     checks = {check.name: [check.value, check.limit, check.uncertainty] for check in document.checks}
     return {**{name: value for name, value in fields.items() if name != "provenance"}, "checks": checks}

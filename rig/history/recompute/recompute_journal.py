@@ -56,7 +56,7 @@ class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
         os.close(self._descriptor)
 
     def note(self, key: str, answer: Answer) -> None:
-        """Add an answer. Only solved answers are stored, so that all others are tried again."""
+        """Add an answer. Only solutions are stored, so that everything else is tried again."""
         if isinstance(answer, RecomputedResult):
             self._write(json.dumps({"key": key, "given": asdict(answer)}, allow_nan=False))
 
@@ -77,7 +77,7 @@ class RecomputeJournal(AbstractContextManager["RecomputeJournal"]):
 
 
 def _read(path: Path, question: RecomputeQuestion) -> tuple[Mapping[str, Answer], int]:
-    """Return the answers of a journal, and the number of bytes in complete lines; none without a journal."""
+    """Return the answers of a journal, and the number of bytes in its complete lines; none without a journal."""
     solved, complete_bytes = dict[str, Answer](), 0
     if not path.exists():
         return solved, complete_bytes

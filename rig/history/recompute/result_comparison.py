@@ -73,7 +73,7 @@ class ParameterMove:
 
     @property
     def shift(self) -> float:
-        """The shift of the value in multiples of the stated U; infinite if the value is gone."""
+        """The shift of the value in multiples of the stated U; infinite if there is no new value."""
         return (
             math.inf if self.now is None else _in_units(abs(self.now.value - self.before.value), self.before.expanded)
         )
@@ -101,7 +101,7 @@ class Compared:
 
     @cached_property
     def moves(self) -> Mapping[int, tuple[ParameterMove, ...]]:
-        """Every parameter of each calibration by number, the largest change first; empty if unsolved."""
+        """Every parameter of each calibration, by its number, the largest change first; empty if unsolved."""
         if not isinstance(self.answer, RecomputedResult):
             return {}
         now = {(record.sensor, record.quantity): record.parameters for record in self.answer.calibrations}
@@ -114,7 +114,7 @@ class Compared:
 
     @property
     def moved(self) -> tuple[int, ...]:
-        """The numbers of calibrations with a value shifted, or U grown, by more than `of_u` of the stated U."""
+        """The calibrations, by number, with a value shifted, or a U grown, by more than `of_u` of the stated U."""
         return tuple(number for number, moves in self.moves.items() if moves and moves[0].size > self.of_u)
 
     @property
@@ -124,7 +124,7 @@ class Compared:
 
     @property
     def withdrawn(self) -> tuple[Issued, ...]:
-        """The certificates that the recordings contradict (ISO/IEC 17025, 7.10.1, 7.8.8 and 8.7)."""
+        """The certificates that the recomputed results contradict (ISO/IEC 17025, 7.10.1, 7.8.8 and 8.7)."""
         refused = isinstance(self.answer, Unsolved) and self.answer.state == "refused"
         return self.stated.certificates if refused or self.verdict_changed or self.moved else ()
 
@@ -154,7 +154,7 @@ class RecomputeOutcome:
 
     @property
     def unsolved(self) -> Mapping[State, int]:
-        """The number of unsolved recordings, by the kind of reason."""
+        """The numbers of unsolved recordings, by the kind of reason."""
         return Counter(
             comparison.answer.state for comparison in self.compared if isinstance(comparison.answer, Unsolved)
         )
@@ -186,7 +186,7 @@ class RecomputeOutcome:
 
     @property
     def same(self) -> bool:
-        """Whether all recordings were solved, each with the stated result."""
+        """Whether all recordings were solved and gave the stated result."""
         return all(comparison.same for comparison in self.compared)
 
     @property
@@ -196,14 +196,14 @@ class RecomputeOutcome:
 
 
 def compared(stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = OF_U) -> RecomputeOutcome:
-    """Return the results with their answers, found by the checksum of the result."""
+    """Return the results with their answers, matched by the checksum of the result."""
     return RecomputeOutcome(
         of_u, tuple(Compared(result, answers.get(result.content_sha256), of_u) for result in stated)
     )
 
 
 def to_solve(stated: Sequence[StatedResult], solved: Mapping[str, Answer]) -> tuple[StatedResult, ...]:
-    """Return the recordings still to be solved: those without a result, and those that failed."""
+    """Return the recordings still to be solved: those without an answer, and those that failed."""
     return tuple(result for result in stated if not isinstance(solved.get(result.content_sha256), RecomputedResult))
 
 

@@ -18,7 +18,7 @@ _RUN = schema.run.c
 
 
 def list_stated_results(history: History, selection: Selection) -> tuple[StatedResult, ...]:
-    """Return all valid results in the order of time, and replaced results on which a certificate in force relies.
+    """Return all valid results in the order of time, and replaced results that a certificate in force uses.
 
     Voided calibrations, and runs that have only voided calibrations, are left out. Runs without calibrations, such as a
     verification alone, are included unless a serial number or part is selected.

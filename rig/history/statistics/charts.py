@@ -43,7 +43,7 @@ class Chart:
 
 
 def chart(values: Array, std: Array) -> Chart:
-    """Return the chart of results (…, n) in the order of time, with their stated standard deviations."""
+    """Return the chart of results (…, n), in the order of time, with their stated standard deviations."""
     shape = values.shape
     deviation, ewma, limit = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
     alarm = np.zeros(shape, dtype=bool)
@@ -70,7 +70,7 @@ def merge_charts(deviations: Array) -> Chart:
 def step(average: Array, deviation: Array, before: int) -> tuple[Array, float]:
     """Return the EWMA with one more deviation, after `before` earlier ones, and its limit at that point.
 
-    A single outlier is left to Shewhart's chart: it enters the average clipped to that chart's limit.
+    Shewhart's chart detects single outliers, so deviations are clipped to its limit before they enter the average.
     """
     smoothed = (1 - SMOOTHING) * average + SMOOTHING * np.clip(deviation, -SHEWHART_LIMIT, SHEWHART_LIMIT)
     settled = 1 - (1 - SMOOTHING) ** (2 * (before + 1))

@@ -33,8 +33,8 @@ def choose_history_address(
 ) -> HistoryAddress | None:
     """Return the history of a run: the environment's `RIG_HISTORY`, else the configuration's; None without one.
 
-    `section` must be of a configuration that the user has named or run before, never of a foreign folder. Raise Refused
-    `history_address`.
+    `section` must be of a configuration that the user has named or run before, never of another user's folder. Raise
+    Refused `history_address`.
     """
     variable = environment.get(ENVIRONMENT)
     if variable == SWITCHED_OFF or (section.off and not variable):
@@ -52,7 +52,7 @@ def own_history_address(address: str | None) -> HistoryAddress | None:
 
 
 def resolve_address(address: str | None) -> HistoryAddress:
-    """Return the history at a file's name or a URL; None is the user's own file. Raise Refused `history_address`."""
+    """Return the history at a file's name or a URL; None means the user's own file. Raise Refused `history_address`."""
     if not address:
         address = str(own_folder() / NAME)
     if "://" not in address:

@@ -34,23 +34,23 @@ _identities: dict[Path | URL, _Identity] = {}
 
 
 def is_there(address: HistoryAddress) -> bool:
-    """Return whether there is a history to open; True for a server that was not asked yet.
+    """Return whether a history exists to be opened; True for a server that was not asked yet.
 
-    Raise the errors of `refuse_another_file`.
+    Raise as `refuse_another_file` does.
     """
     refuse_another_file(address)
     return not isinstance(address.where, Path) or address.where.exists()
 
 
 def refuse_another_file(address: HistoryAddress) -> None:
-    """Refuse another file in place of a known history. Raise Refused `history_gone`, `history_exchanged`."""
+    """Raise Refused `history_gone`, `history_exchanged` if the file of a known history is gone or another one."""
     identity = _identities.get(address.where)
     if identity is not None and isinstance(address.where, Path):
         refuse_unlike(identity.file, address.where, address.label)
 
 
 def refuse_unlike(before: FileIdentity | None, file: Path, label: str) -> None:
-    """Refuse a file with another identity than before. Raise Refused `history_gone`, `history_exchanged`."""
+    """Raise Refused `history_gone`, `history_exchanged` for a file whose identity differs from the earlier one."""
     now = file_identity(file)
     if now is None and before is not None:
         raise _gone(label)
@@ -59,13 +59,13 @@ def refuse_unlike(before: FileIdentity | None, file: Path, label: str) -> None:
 
 
 def refuse_anew(address: HistoryAddress) -> None:
-    """Refuse to make new tables in a history that had tables before. Raise Refused `history_gone`."""
+    """Raise Refused `history_gone` for a history that had tables before and has none now."""
     if address.where in _identities:
         raise _gone(address.label)
 
 
 def refuse_another(address: HistoryAddress, connection: Connection) -> None:
-    """Refuse a history that lacks its earlier entries; store its identity. Raise Refused `history_exchanged`."""
+    """Raise Refused `history_exchanged` for a history that lacks its earlier entries; store its identity."""
     identity, created_utc = _identities.get(address.where), _read_created_utc(connection)
     if identity is not None and (identity.created_utc != created_utc or not journal.has(connection, identity.head)):
         raise _history_exchanged(address.label)

@@ -41,13 +41,13 @@ class Head:
 
 
 def alone(connection: Connection) -> None:
-    """Lock out other writers until the end of the transaction; a writing SQLite transaction is exclusive anyway."""
+    """Lock out other writers until the end of the transaction; on SQLite a writing transaction already does."""
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
 
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
-    """Add a line for the row with this primary key, for a run with all its parts. The caller must hold `alone`."""
+    """Add a line for the row with this primary key; for a run it covers all its parts. The caller must hold `alone`."""
     before = head(connection)
     line = {
         "number": before.number + 1,
@@ -60,7 +60,7 @@ def note(connection: Connection, table: Table, *key: int | str) -> None:
 
 
 def head(connection: Connection) -> Head:
-    """Return the last line's number and hash; number 0 if the journal is empty."""
+    """Return number and hash of the last line; number 0 if the journal is empty."""
     lines = schema.journal.c
     newest = select(lines.number, lines.chain_sha256).order_by(lines.number.desc()).limit(1)
     last = connection.execute(newest).one_or_none()
@@ -68,7 +68,7 @@ def head(connection: Connection) -> Head:
 
 
 def has(connection: Connection, earlier: Head) -> bool:
-    """Return whether the journal has a line with the given number and chain hash."""
+    """Return whether the journal has a line with this number and chain hash."""
     lines = schema.journal.c
     if earlier.number == 0:
         return True
@@ -86,7 +86,7 @@ def holds(connection: Connection, earlier: Head) -> bool:
 
 
 def _link(before: str, line: Mapping[Any, Any]) -> str:
-    """Return the SHA-256 of a line and of the chain before it."""
+    """Return the SHA-256 of a line together with the chain before it."""
     parts = [before, *(line[name] for name in ("number", "kind", "key", "sha256", "entered_utc"))]
     return hashlib.sha256(json.dumps(parts, separators=(",", ":")).encode()).hexdigest()
 
@@ -116,7 +116,7 @@ def broken(connection: Connection) -> Iterator[Broken]:
 
 
 def unlike(connection: Connection, table: Table, *key: int | str) -> Broken | None:
-    """Return the difference of the existing row with this primary key from the journal; None if there is none."""
+    """Return how the row with this primary key differs from the journal; None if it does not."""
     lines = schema.journal.c
     query = select(lines.sha256).where(lines.kind == table.name, lines.key == json.dumps(key))
     entered = connection.scalar(query)
@@ -135,7 +135,7 @@ def _sha256(connection: Connection, table: Table, key: tuple[int | str, ...]) ->
 
 
 def _rows(connection: Connection, table: Table, key: tuple[int | str, ...]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the row, and for a run its parts, without nulls, so that a column added later changes no hash."""
+    """Yield the row, and for a run its parts, without nulls: a column that is added later changes no hash."""
     condition = [column == value for column, value in zip(table.primary_key, key, strict=True)]
     questions = [(table.name, select(table).where(*condition))]
     if table is schema.run:

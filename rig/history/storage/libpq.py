@@ -20,10 +20,10 @@ SILENCE_S = 5  # until an unresponsive connection is given up
 
 
 def connect_arguments(server: "URL", environment: Mapping[str, str] = os.environ) -> dict[str, str | int]:
-    """Return the options of a connection; to another computer it is always encrypted and authenticated.
+    """Return the options of a connection; one to another computer is always encrypted and authenticated.
 
-    On this computer there is no network to listen on, and the system may authenticate the user without a password. A
-    user may require more encryption by PGSSLMODE, and another method, such as `gss`, by PGREQUIREAUTH.
+    On this computer nobody can listen on a network, and the system may authenticate the user without a password. A user
+    may require more encryption by PGSSLMODE, and another method, such as `gss`, by PGREQUIREAUTH.
     """
     is_local = _is_on_this_computer(server, environment)
     options: dict[str, str | int] = {
@@ -48,7 +48,7 @@ def _is_on_this_computer(server: "URL", environment: Mapping[str, str]) -> bool:
 
 
 def _is_at_hand(host: str) -> bool:
-    """Return whether the host is this computer: a socket's folder or a local address."""
+    """Return whether the host is this computer: a local address, or a socket's folder."""
     if host in ("", "localhost") or host[0] in "/@":
         return True
     try:

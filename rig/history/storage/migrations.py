@@ -48,7 +48,7 @@ def version_of(connection: Connection, label: str) -> int:
 
 
 def bring_up_to_date(connection: Connection, label: str) -> None:
-    """Make or migrate the tables in the connection's transaction. Raise Refused as `version_of`."""
+    """Make or migrate the tables in the connection's transaction. Raise Refused as `version_of` does."""
     journal.alone(connection)
     version = version_of(connection, label)
     if version == 0:
@@ -62,7 +62,7 @@ def bring_up_to_date(connection: Connection, label: str) -> None:
 
 
 def too_old(label: str) -> Refused:
-    """Return the refusal of a history that a program before 0.1.0 made."""
+    """Return the refusal of a history from a program before 0.1.0."""
     return Refused(
         "history_too_old",
         f"{label} was made by a program before 0.1.0, and this one does not read its tables; it was not changed",

@@ -11,9 +11,9 @@ from rig.history.storage.journal import Head
 
 
 def refuse_lost(connection: Connection, address: HistoryAddress, before: Head, after: Head) -> None:
-    """Refuse entries between two ends of the journal that are missing or changed.
+    """Raise Refused `entry_not_kept` if entries between two ends of the journal are missing or changed.
 
-    Raise Refused `entry_not_kept`, and as `continuity.refuse_another`.
+    Raise as `continuity.refuse_another` does, too.
     """
     if not journal.has(connection, after):
         raise _entry_not_kept(address, f"entry {after.number} of its journal")
@@ -25,7 +25,7 @@ def refuse_lost(connection: Connection, address: HistoryAddress, before: Head, a
 
 
 def refuse_missing(connection: Connection, address: HistoryAddress, table: Table, *key: int | str) -> None:
-    """Refuse an entry that is missing or changed. Raise Refused `entry_not_kept`."""
+    """Raise Refused `entry_not_kept` if an entry is missing or changed."""
     if (broken := journal.unlike(connection, table, *key)) is not None:
         raise _entry_not_kept(address, f"{broken.what}: {broken.why}")
 

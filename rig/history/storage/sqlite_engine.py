@@ -35,7 +35,7 @@ _sharing = threading.Lock()
 
 @contextmanager
 def shared_engine(file: Path, label: str) -> Iterator[Engine]:
-    """Yield this process's engine of a history's file; its last user closes its connections."""
+    """Yield this process's engine of a history's file; when its last user leaves, its connections are closed."""
     key = file.parent.resolve() / file.name
     with _sharing:
         if key not in _engines:
@@ -86,7 +86,7 @@ def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
 
 
 def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
-    """Open a file with a write-ahead log: readers and a writer do not wait for each other. Not for network shares."""
+    """Open a file with a write-ahead log, so readers and a writer do not block each other. Not for network shares."""
     connection = _connect(file, "mode=rwc" if new else "mode=rw")
     if not new:
         refuse_unmarked(connection, file)
@@ -98,9 +98,9 @@ def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
 
 
 def _connect_to_read(file: Path) -> sqlite3.Connection:
-    """Open a file that this user may only read, in a folder in which no files can be made.
+    """Open a file for reading only, in a folder in which the user can make no files.
 
-    A writer would have a log there; without a log the file does not change while it is read, so no lock is needed.
+    A writer would have a log there. Without a log the file does not change while it is read, so no lock is needed.
     """
     log = file.with_name(f"{file.name}-wal")
     return _connect(file, "mode=ro" if log.exists() else "mode=ro&immutable=1")

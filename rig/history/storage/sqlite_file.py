@@ -22,7 +22,7 @@ SUFFIXES = ("-wal", "-shm")  # of SQLite's companion files: its log, and the log
 
 
 def history_is_there(file: Path) -> bool:
-    """Return whether there is a history; False if there is no file at all.
+    """Return whether a history exists; False if there is no file at all.
 
     Raise Refused `not_a_history`, `history_too_old`; OSError.
     """
@@ -39,7 +39,7 @@ def history_is_there(file: Path) -> bool:
 
 
 def identities(file: Path) -> Iterator[FileIdentity]:
-    """Yield the identities of a history's file, its log and the log's index, as far as they exist."""
+    """Yield the identities of a history's file, its log and the log's index, if they exist."""
     for suffix in ("", *SUFFIXES):
         if (identity := file_identity(file.with_name(file.name + suffix))) is not None:
             yield identity
@@ -51,14 +51,14 @@ def address_of(file: Path, options: str) -> str:
 
 
 def refuse_unmarked(connection: sqlite3.Connection, file: Path) -> None:
-    """Refuse a database that is not a history, before the connection writes. Raise Refused `not_a_history`."""
+    """Raise Refused `not_a_history` for another database, before the connection writes."""
     if not _is_marked(connection):
         raise _not_a_history(file, "it is another kind of database")
 
 
 @contextmanager
 def new_file_in_place(file: Path) -> Iterator[Path]:
-    """Yield the path for a new database, which replaces `file` when it is complete, or is removed.
+    """Yield the path for a new database, which is moved to `file` when complete, or removed.
 
     A file that another process has put there meanwhile stays. An incomplete one is never visible. Raise OSError.
     """
@@ -108,7 +108,7 @@ def _is_marked(connection: sqlite3.Connection) -> bool:
 
 
 def _is_too_old(connection: sqlite3.Connection) -> bool:
-    """Return whether the file has the tables of a history before 0.1.0, which may lack a version mark."""
+    """Return whether the file has the tables of a history before 0.1.0, which may have no version number."""
     try:
         version = connection.execute("SELECT value FROM meta WHERE key = ?", [DEVELOPMENT_KEY]).fetchone()
         return version is not None and connection.execute("SELECT count(*) FROM run").fetchone() is not None

@@ -63,7 +63,7 @@ def create_triggers(connection: Connection) -> None:
 
 
 def unlike_made(connection: Connection) -> Iterator[Broken]:
-    """Yield triggers that are missing, disabled, or different from those that were made."""
+    """Yield triggers that are missing, disabled, or different from the original ones."""
     if connection.dialect.name == "postgresql":
         yield from _unlike_made_by_server(connection)
         return
@@ -116,7 +116,7 @@ def _file_triggers() -> Mapping[str, str]:
 
 
 def _same_row(table: Table) -> str:
-    """Return the condition that a row of `table` has the primary key of the new row."""
+    """Return the SQL condition that a row of `table` has the new row's primary key."""
     keys = [list(table.primary_key.columns)]
     keys += [list(unique.columns) for unique in table.constraints if isinstance(unique, UniqueConstraint)]
     keys += [list(index.columns) for index in table.indexes if index.unique]

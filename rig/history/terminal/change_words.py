@@ -19,7 +19,7 @@ def select_changed(changes: Iterable[Change]) -> list[Change]:
 
 
 def comparison_in_words(changes: Sequence[Change]) -> str:
-    """Return the number of significant changes of one sensor, and the E_n above which a change is significant."""
+    """Return the number of significant changes of one sensor, and the limit of E_n for them."""
     if not changes:
         return "the two have no value in common"
     changed, limits, compared = select_changed(changes), [change.limit for change in changes], changes[0].compared
@@ -33,14 +33,14 @@ def comparison_in_words(changes: Sequence[Change]) -> str:
 
 
 def change_in_short(change: Change) -> str:
-    """Return the change of one parameter in a short phrase; U is the uncertainty of the difference."""
+    """Return the change of one parameter as a short phrase; U is the uncertainty of the difference."""
     name = name_in_words(change.name).removeprefix("the ")
     times = f"{change.normalised_error:.{1 if change.normalised_error < 10 else 0}f}"
     return f"{name} changed by {_size(change)}, {times} U"
 
 
 def name_in_words(name: str) -> str:
-    """Return a parameter of the history in words within a sentence; an unknown name stays."""
+    """Return a parameter of the history in words within a sentence; an unknown name is unchanged."""
     if name in SCALES:
         return f"the scale factor of {name[1]}" if name[1:] else "the mean scale factor"
     if name in BIASES:

@@ -47,7 +47,7 @@ class FittingTable:
     columns: Sequence[TableColumn]
 
     def fitting(self, width: int) -> list[TableColumn]:
-        """Return the columns that fit into `width` cells; empty columns are omitted."""
+        """Return the columns that fit into `width` cells, without empty ones."""
         shown = [column for column in self.columns if any(column.cells)]
         while _total_width(shown) > width:
             first = max(shown, key=lambda column: column.rank)

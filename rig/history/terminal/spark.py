@@ -10,9 +10,10 @@ MOST = 16  # of the newest results
 
 
 def picture(trend: Trend) -> str:
-    """Return a block for each of the newest results, at its height between the lowest value − U and the highest + U.
+    """Return a block for each of the newest results, whose height shows the value.
 
-    Equal blocks thus differ by less than U. Empty for a single result.
+    The lowest block stands for the lowest value − U, the highest for the highest + U, so equal blocks differ by less
+    than U. Empty for a single result.
     """
     newest = trend.parameters[-MOST:]
     if len(newest) < 2:

@@ -96,10 +96,7 @@ def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _fit(design: Array, turned: Array) -> tuple[float, Array]:
-    """Return the fraction of the rotations (k, 3) that a fit leaves unexplained, by norms, and its solution (4, 3):
-
-    Fᵀ and b.
-    """
+    """Return the fraction of rotations (k, 3) that a fit leaves unexplained, and the fit (4, 3): Fᵀ and b."""
     aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
     weight = np.ones(len(design))
     solution = aligned

@@ -57,10 +57,7 @@ class DeclaredTurns:
 def find_turns(
     time_s: Array, readings: Array, declared: DeclaredTurns, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
-    """Return the turns from rest to rest among sweeps; None if there are none.
-
-    `readings` (n, 3) in rad/s at `time_s`.
-    """
+    """Return the turns from rest to rest among sweeps, if any. `readings` (n, 3) in rad/s at `time_s`."""
     lying = find_rests(time_s, {RATE: readings}, lying=_find_pauses(time_s, sweeps))
     if not lying:
         return None

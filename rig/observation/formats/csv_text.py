@@ -24,10 +24,7 @@ COMMENT_MARKS = "#%"  # before the heading of a table that NumPy or MATLAB wrote
 
 
 def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
-    """Yield the rows of a regular file that is not too large, after the first `skipped` lines.
-
-    Raise Refused `no_file`.
-    """
+    """Yield the rows of a regular file of limited size, after `skipped` lines. Raise Refused `no_file`."""
     with _raise_no_file(path), open_regular_file(path, largest_mb * 1_000_000) as file, _text(file) as text:
         lines = _lines(text, largest_mb * 1_000_000)
         first = next(islice(lines, skipped, None), "")

@@ -123,10 +123,7 @@ def _have_nan(columns: Any) -> bool:
 
 
 def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
-    """Return the number of lines to skip, and the heading after them, which may be empty.
-
-    Raise Refused `wrong_columns`.
-    """
+    """Return the number of lines to skip, and the heading, which may be empty. Raise Refused `wrong_columns`."""
     for skip in range(MOST_SKIPPED):
         rows = [*islice(read_rows(path, largest_mb, skip), 6)]
         if len(rows) < 3:

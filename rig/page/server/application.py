@@ -62,7 +62,7 @@ def acting(door: Door, handler: Handler) -> Handler:
 
 
 async def body_of(request: Request) -> bytes:
-    """Return a request's body; empty if it is longer than any valid body."""
+    """Return a request's body; empty if it is longer than any valid one."""
     body = b""
     async for chunk in request.stream():
         body += chunk
@@ -72,7 +72,7 @@ async def body_of(request: Request) -> bytes:
 
 
 def run_routes(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> list[Route]:
-    """Return the routes of a run in `folder`: its certificate, and the two routes that control it."""
+    """Return the routes of a run in `folder`: its certificate, and the two that control the run."""
 
     async def certificate(request: Request) -> Response:
         if not door.may_open(request.headers, request.cookies):
@@ -119,7 +119,7 @@ def _file(path: Path) -> Handler:
 
 
 async def _answer(request: Request) -> tuple[int, bool] | None:
-    """Return the question's number and the answer; None for anything else."""
+    """Return the question's number and the answer; None if the body is something else."""
     try:
         document = json.loads(await body_of(request))
     except ValueError:

@@ -47,7 +47,7 @@ class Connections:
 
     @contextmanager
     def answering(self, client: Client, *, has_token: bool) -> Iterator[None]:
-        """Mark a complete request of a client, which is answered in this block."""
+        """Mark a client whose complete request is answered in this block."""
         if (deadline := self._deadlines.pop(client, None)) is not None:
             deadline.cancel()
         if has_token and len(self._trusted) < TRUSTED and client in self._strangers:
@@ -64,7 +64,7 @@ class Connections:
 
 
 def counting_protocol(connections: Connections) -> "type[H11Protocol]":
-    """Return the server's protocol that counts its connections."""
+    """Return a protocol for the server that counts its connections."""
     from uvicorn.protocols.http.h11_impl import H11Protocol
 
     class Counted(H11Protocol):
@@ -83,5 +83,5 @@ def counting_protocol(connections: Connections) -> "type[H11Protocol]":
 
 
 def client_of(peer: Any) -> Client:
-    """Return address and port of a socket's or ASGI's peer (IPv6: more fields); empty if the peer has gone."""
+    """Return a peer's address and port, of a socket or of ASGI (IPv6 has more fields); empty if the peer has gone."""
     return (str(peer[0]), int(peer[1])) if peer else ("", 0)

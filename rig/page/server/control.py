@@ -31,7 +31,7 @@ class Control:
 
     @contextmanager
     def stoppable(self) -> Iterator[None]:
-        """Open a block of the main thread in which `stop` raises KeyboardInterrupt."""
+        """Make `stop` raise KeyboardInterrupt in this block of the main thread."""
 
         def interrupt(number: int, frame: FrameType | None) -> None:
             INTERRUPTS.hear(number, frame, STOPPED if self._stopping else f"interrupted by {signal_name(number)}")
@@ -59,7 +59,7 @@ class Control:
     def ask(self, announcement: Sequence[str], to_do: str) -> bool | None:
         """Wait for the operator's answer from a browser; return None if no page is left to answer.
 
-        The page shows the question like all events.
+        The page shows the question as it shows all events.
         """
         with self._changed:
             self._question += 1
@@ -72,7 +72,7 @@ class Control:
                 self._waiting = False
 
     def answer(self, number: int, *, agreed: bool) -> bool:
-        """Answer question `number`, from 1; return False if that is not the open one."""
+        """Answer question `number`, from 1; return False if another one, or none, is open."""
         with self._changed:
             if not (self._may_answer and self._waiting) or number != self._question or self._answer is not None:
                 return False
@@ -93,7 +93,7 @@ class Control:
 
 
 def _interrupt_the_main_thread() -> None:
-    """Interrupt the main thread, also while it waits if the system allows that."""
+    """Interrupt the main thread, even while it waits, if the system allows that."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, STOP_SIGNAL)
     else:

@@ -45,7 +45,7 @@ class Feed:
         self._seen_at = ""  # the time of the last arrival, by this computer's clock, for people
 
     def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does: change the state without waiting."""
+        """Handle an event, as a Listener does: change the state without waiting."""
         with self._lock:
             before = self._shown.ended
             self._shown.take(event)
@@ -71,7 +71,7 @@ class Feed:
             return frame_of("all", {**self._shown.sections, "points": points, "age_s": self._ages_s()})
 
     def news(self) -> bytes | None:
-        """Return the changes since the last call, None if there are none."""
+        """Return the changes since the last call; None without changes."""
         with self._lock:
             shown = self._shown
             changed = shown.changed()
@@ -96,7 +96,7 @@ class Mailbox:
         self.closed = False
 
     def put(self, frame: bytes) -> None:
-        """Put a frame in; if there is one already, drop both, and send the complete state next."""
+        """Store a frame. If there is one already, drop both, and send the complete state next."""
         self._behind = self._behind or self._frame is not None
         self._frame = None if self._behind else frame
         self._news.set()
@@ -107,7 +107,7 @@ class Mailbox:
         self._news.set()
 
     async def take(self, feed: Source) -> bytes | None:
-        """Return the next frame, or the complete state after a dropped frame; None if closed and empty."""
+        """Return the next frame, or the complete state after a dropped one; None if closed and empty."""
         if not self.closed:
             await self._news.wait()
             self._news.clear()
@@ -127,7 +127,7 @@ class Broadcast:
         self._closing = False
 
     def full(self, *, has_token: bool) -> bool:
-        """Return whether there is no room for another browser with the token, or without: their limits are separate."""
+        """Return whether no further browser, with the token or without, is admitted: the limits are separate."""
         return sum(trusted == has_token for trusted in self._mailboxes.values()) >= (
             CLIENTS if has_token else STRANGERS
         )
@@ -187,7 +187,7 @@ def _clock() -> str:
 
 
 def frame_of(name: str, document: dict[str, Any]) -> bytes:
-    """Return a server-sent event. JSON has no NaN: it becomes null, and an invalid character becomes "?"."""
+    """Return a server-sent event. JSON has no NaN, which becomes null; invalid characters become "?"."""
     try:
         text = json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     except ValueError:

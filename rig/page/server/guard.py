@@ -54,7 +54,7 @@ class Door:
     pass_to_look: str = field(default_factory=new_token)
 
     def may_act(self, headers: Mapping[str, str]) -> bool:
-        """Return whether a request has the token. A cookie does not count: browsers send it without request."""
+        """Return whether a request has the token. A cookie does not count, because browsers send it unasked."""
         scheme, _, token = headers.get("authorization", "").partition(" ")
         return scheme == "Bearer" and _same(token, self.token)
 
@@ -63,11 +63,11 @@ class Door:
         return not self.looking_needs_token or self.may_act(headers)
 
     def may_open(self, headers: Mapping[str, str], cookies: Mapping[str, str]) -> bool:
-        """Return whether a request may read the certificate, which opens by a link without headers."""
+        """Return whether a request may read the certificate, which a link without headers opens."""
         return self.may_look(headers) or _same(cookies.get(COOKIE, ""), self.pass_to_look)
 
     def refusal(self, path: str, headers: Mapping[bytes, bytes]) -> tuple[int, str] | None:
-        """Return status and reason for a request from elsewhere, None for a permitted request."""
+        """Return status and reason for a request that is refused; None for a permitted one."""
         if headers.get(b"host", b"").decode("latin-1").lower() not in self.hosts:
             return 400, "this server does not have that name"
         origin = headers.get(b"origin")
@@ -84,7 +84,7 @@ def _same(one: str, other: str) -> bool:
 
 
 class Guard:
-    """A guard around the application: refuses foreign requests and sets security headers."""
+    """A filter around the application, which refuses foreign requests and sets security headers."""
 
     def __init__(self, app: "ASGIApp", door: Door, connections: Connections) -> None:
         self._app, self._door, self._connections = app, door, connections

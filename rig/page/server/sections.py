@@ -29,7 +29,7 @@ class Sections:
             return frame_of("all", self._shown)
 
     def news(self) -> bytes | None:
-        """Return the changes since the last call, None if there are none."""
+        """Return the changes since the last call; None without changes."""
         with self._lock:
             changed, self._changed = self._changed, {}
         return frame_of("some", changed) if changed else None

@@ -64,10 +64,10 @@ RUN = Page()
 def serving(
     feed: Source, control: Control, folder: Path | None, address: PageAddress, shown: Page = RUN
 ) -> Iterator[str]:
-    """Show `feed` to browsers for the length of the block; yield the page's address, with the token.
+    """Show `feed` to browsers during the block; yield the page's address, with the token.
 
-    Without a `folder` there is no run to stop, and no certificate. If the page fails, it says so on stderr and ends:
-    the run continues. Raise Refused `page_address`.
+    Without a `folder` there is no run to stop, and no certificate. If the page fails, it prints this on stderr and
+    ends: the run continues. Raise Refused `page_address`.
     """
     check(address)
     listening = _listen(address)
@@ -148,7 +148,7 @@ def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | N
 
 
 def check(address: PageAddress) -> None:
-    """Raise Refused `page_address` for an address that is invalid on any computer."""
+    """Raise Refused `page_address` for an address that no computer can have."""
     if address.host in ("", "0.0.0.0", "::", "*"):
         raise Refused(
             "page_address",

@@ -77,7 +77,7 @@ def plan_six_observation(
 
 
 def _check_span(axes: Array) -> None:
-    """Raise Refused `axes_do_not_span` unless the turns are about three independent axes (3, n)."""
+    """Raise Refused `axes_do_not_span` unless the axes (3, n) of the turns span all directions."""
     if axes.shape[1] < 3 or np.linalg.svd(axes, compute_uv=False)[2] < AXES_SPAN:
         raise Refused(
             "axes_do_not_span",
@@ -87,14 +87,14 @@ def _check_span(axes: Array) -> None:
 
 
 def _axes_of_items(mounted: Iterable[Mounted]) -> Iterator[Array]:
-    """Yield the axes (3,) that are swept in each stage, in the item's frame."""
+    """Yield the axes (3,) of the sweeps of each stage, in the item's frame."""
     for section, sweeps in mounted:
         for axis in dict.fromkeys(sweep.axis_flange for sweep in sweeps if sweep.direction == "ccw"):
             yield mount_matrix(section.mount) @ axis
 
 
 def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Step]:
-    """Yield a small turn of each joint that is to be swept, and back: it shows the item's mounting."""
+    """Yield a small turn, and back, of each joint that is swept; it shows how the item is mounted."""
     for joint, name in dict.fromkeys((sweep.joint, sweep.joint_name) for sweep in sweeps):
         station = SweepPose(joint, name, home)
         yield from trial(f"trial of {name}", f"back from the trial of {name}", station, TRIAL_RAD, TRIAL_PACE)
@@ -102,7 +102,7 @@ def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Step]:
 
 @lru_cache(maxsize=16)
 def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, ...]:
-    """Return all sweeps in the file's order, else in the best one: by direction first, then by wrist."""
+    """Return all sweeps in the file's order, else in the best order: by direction first, then by wrist."""
     home = find_home(arm)
 
     def harm(order: Order) -> float:
@@ -147,7 +147,7 @@ def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -
 
 
 def _list_orders(stations: tuple[SweepPose, ...], procedure: SixSweepsSection) -> Iterator[Order]:
-    """Yield every permissible choice of directions, the paper's first."""
+    """Yield every permissible order of directions, the paper's first."""
     if procedure.directions is not None:
         yield Order(stations, (procedure.directions,) * len(stations), alternates=False)
         return
@@ -173,7 +173,7 @@ def _sweeps(order: Order, procedure: SixSweepsSection, repeats: int) -> list[Swe
 
 @lru_cache(maxsize=64)
 def _axis(station: SweepPose, sign: int) -> Vector3:
-    """Return the joint's axis in the flange's frame, reversed for the sign -1."""
+    """Return the joint's axis in the flange's frame, reversed if the sign is -1."""
     x, y, z = (sign * axis for axis in flange_axes(station.pose_q_rad)[:, station.joint].tolist())
     return x, y, z
 

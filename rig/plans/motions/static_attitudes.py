@@ -35,7 +35,7 @@ def dwells(
 ) -> Iterator[Step]:
     """Yield the dwells, numbered from `first`, and the transfers from home and back; nothing if all are `done`.
 
-    There are field tests at home before and after them.
+    Tests of the field at home precede and follow them.
     """
     home = find_home(arm)
     pace = pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2)
@@ -55,7 +55,7 @@ def dwells(
 
 @lru_cache(maxsize=16)
 def _order(arm: ArmSection, procedure: AttitudesSection) -> tuple[Joints, ...]:
-    """Return the attitudes' joint angles, in the order of the shortest round trip from home."""
+    """Return the attitudes' joint angles in the order of the shortest round trip from home."""
     home = find_home(arm)
     attitudes = [(*home[:3], *convert_to_radians(wrists)) for wrists in procedure.attitudes]
     points = np.array([home, *attitudes])

@@ -33,7 +33,7 @@ def drift_effect(steps: Sequence[Step]) -> float:
 
     The vector model of sweeps and rests, m = F ω + c (+ G a, with rests: `rig.estimation.gyroscope.vector_model`), is
     fitted to that ramp about its middle: the changes of the scale, at the mean speed of the sweeps, and of the bias are
-    added in quadrature. For an arm that stands on the floor, with weights for white noise.
+    added in quadrature. The arm stands on the floor; the weights are for white noise.
     """
     looks = list(_list_averages(steps))
     rates = np.array([look.rate_rad_s for look in looks])

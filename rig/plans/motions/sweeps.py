@@ -38,7 +38,7 @@ class Profile:
 
 
 def sweep_about(index: int, station: SweepPose, direction: Direction, axis_flange: Vector3, profile: Profile) -> Sweep:
-    """Return the sweep of the station's joint in `direction`; the flange turns about `axis_flange`."""
+    """Return a sweep of the pose's joint in `direction`, about `axis_flange` in the flange's frame."""
     speed, acceleration = profile.pace.speed_rad_s, profile.pace.acceleration_rad_s2
     half, half_travel = profile.averaged_rad / 2, profile.even_rad / 2 + speed**2 / (2 * acceleration)
     sign, centre = 1 if direction == "ccw" else -1, station.pose_q_rad[station.joint]
@@ -60,7 +60,10 @@ def sweep_about(index: int, station: SweepPose, direction: Direction, axis_flang
 def connect_sweeps(
     sweeps: Sequence[Sweep], home: Joints, pace: Pace, rest_s: float, is_clear: Callable[[Joints, Joints], bool]
 ) -> Iterator[Step]:
-    """Yield sweeps with rests after them and transfers between, from home and back; through home if none is clear."""
+    """Yield sweeps with rests after them and transfers between, from home and back.
+
+    Transfers lead through home if none is clear.
+    """
     pose = home
     for sweep in sweeps:
         if not is_clear(pose, sweep.start_q_rad):
@@ -75,7 +78,7 @@ def connect_sweeps(
 
 
 def trial(name: str, return_name: str, station: SweepPose, by_rad: float, pace: Pace) -> Iterator[Transfer]:
-    """Yield a small turn and back, with these names: it shows the item's mounting."""
+    """Yield a small turn and its reverse, under these names; it shows how the item is mounted."""
     home, tried = station.pose_q_rad, station.rotate_joint(by_rad)
     for step in transfer(name, home, tried, pace):
         yield replace(step, tries=True)
@@ -90,8 +93,7 @@ def build_stages(
 ) -> Plan:
     """Return the approach, then every stage: its remaining sweeps, from home and back.
 
-    Sweeps in `done` are left out. The sweeps are counted through all stages. A stage without remaining sweeps has no
-    steps.
+    Sweeps in `done` are left out. They are numbered through all stages. A stage without remaining sweeps has no steps.
     """
     steps, stages, numbers = list(approach.steps), list[Stage](), count()
     for section, sweeps in mounted:

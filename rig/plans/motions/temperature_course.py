@@ -32,7 +32,7 @@ class TemperatureCourse:
     warming: bool | None = None
 
     def begin(self, temperature_c: float) -> None:
-        """Choose the direction: away from the nearer end, or as in the interrupted run."""
+        """Choose the direction: that of the interrupted run, else away from the nearer end."""
         self.warming = temperature_c <= (self.from_c + self.to_c) / 2
         if self.sets:
             self.warming = self.sets[-1].warming
@@ -50,7 +50,7 @@ class TemperatureCourse:
             self.warming = True
 
     def is_due(self, now_c: Mapping[str, float]) -> bool:
-        """Return whether the sensors have changed enough for the next set, or are at the end of the course."""
+        """Return whether the sensors have changed enough for the next set, or the course has ended."""
         if not self.sets:
             return True
         if min(now_c.values()) >= self.to_c if self.warming else max(now_c.values()) <= self.from_c:
@@ -68,7 +68,7 @@ class TemperatureCourse:
         return min(max(last) + step_k, self.to_c) if self.warming else max(min(last) - step_k, self.from_c)
 
     def missing(self) -> str | None:
-        """Return the part of the range without a set, in words; None if all of it is covered."""
+        """Return the part of the range without a set, in words; None if the range is covered."""
         directions = ((True, "while warming"), (False, "while cooling")) if self.both_directions else ((None, ""),)
         return next(self._missing(directions), None)
 
@@ -92,7 +92,7 @@ class TemperatureCourse:
         ]
 
     def _gap(self, temperatures_c: Sequence[float]) -> tuple[float, float] | None:
-        """Return the first gap between sets, from the cold end on."""
+        """Return the first gap between sets, counted from the cold end."""
         end_k = AT_THE_END * self.max_step_k
         if temperatures_c[0] > self.from_c + end_k:
             return self.from_c, temperatures_c[0]

@@ -35,7 +35,7 @@ def plan_thermal(
 
 
 def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
-    """Yield the steps of each set: one repeat of the sweeps, and the attitudes, whose indices come between."""
+    """Yield the steps of each set: one repeat of the sweeps, and the attitudes, which are numbered between sets."""
     sweeps = len(plan_six_observation(arm, procedure).sweeps)
     in_each, attitudes = sweeps // procedure.repeats, len(procedure.attitudes) if procedure.with_attitudes else 0
     for number in range(procedure.repeats):
@@ -50,6 +50,6 @@ def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
 
 
 def _wait_s(procedure: ThermalSection, steps: list[Step]) -> float:
-    """Return the shortest time of heating to the next set, without the set itself: an estimate for the plan."""
+    """Return an estimate, for the plan, of the time of heating to the next set: the shortest possible."""
     gap_s = 60 * procedure.max_step_k / (procedure.max_rate_k_per_min * 2)
     return max(LEAST_WAIT_S, gap_s - sum(step.duration_s for step in steps))

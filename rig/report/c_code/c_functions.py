@@ -13,7 +13,7 @@ from rig.report.findings.finding import Finding
 
 
 def gyroscope_lines(finding: Finding[GyroscopeEntry], sensitivities: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source for a calibrated gyroscope, no line for a reference gyroscope."""
+    """Yield C source for a calibrated gyroscope; none for a reference gyroscope."""
     if finding.entry.role != "calibrate":
         return
     prefix, sensitivity = prefix_of(finding.sensor), sensitivities.get(finding.sensor)
@@ -98,7 +98,7 @@ def _subtracting(
 ) -> Iterator[str]:
     """Yield bias, matrix and function of a sensor whose bias is subtracted from its reading.
 
-    `true` is the name of the corrected value in C.
+    `true` is the C name of the corrected value.
     """
     name, unit = f"{prefix_of(finding.sensor)}_{finding.quantity}", finding.quantity.suffix
     yield from (
@@ -129,5 +129,5 @@ def _array(values: Iterable[float]) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return text without the end mark of the comment around it, which a serial number could contain."""
+    """Return text without `*/`, which would end the comment around it: a serial number may contain it."""
     return printable(" ".join(text.split())).replace("*/", "* /").replace("/*", "/ *")

@@ -19,10 +19,7 @@ MICRO = 1e6
 
 @dataclass(frozen=True, slots=True)
 class ReversalRow:
-    """One axis of a magnetometer's reversal.
-
-    If it was not turned over, it is `mixed`: its bias is that as mounted, arm's field included.
-    """
+    """One axis of a magnetometer's reversal; `mixed` if not turned over: its bias includes the arm's field."""
 
     axis: str
     scale: Pair

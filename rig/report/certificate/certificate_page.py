@@ -35,7 +35,7 @@ FOOTING = "Relates only to the items calibrated. Not issued under an accreditati
 
 
 def certificate_page(certificate: Certificate) -> str:
-    """Return HTML that loads nothing from outside; every text of configuration, board or arm is escaped."""
+    """Return HTML that loads nothing from outside; texts of configuration, board and arm are escaped."""
     return _template().render(certificate=certificate, deg=DEG, joint=JOINT_FACTOR, footing=FOOTING)
 
 

@@ -137,7 +137,7 @@ class Certificate:
 
     @property
     def mounted(self) -> tuple[str, ...]:
-        """The measured mounting of the item in each stage after the first, one line each."""
+        """The measured mounting of the item in each stage after the first, one line for each."""
         return tuple(mount_lines(self.result))
 
     @property
@@ -228,9 +228,9 @@ class Certificate:
 def certificate_of(
     result: ResultDocument, stated: StatedFacts, reversals: Mapping[str, ReversalEntry] = MappingProxyType({})
 ) -> Certificate:
-    """Return the certificate of a result, whose number too depends on the arguments alone.
+    """Return the certificate of a result; its number too depends on the arguments alone.
 
-    Raise Refused `another_sensor` for reversals of magnetometers, or from runs, other than the result's.
+    Raise Refused `another_sensor` if reversals are of other magnetometers, or of other runs, than the result's.
     """
     _check_same(result, reversals)
     gyroscopes = tuple(
@@ -266,7 +266,7 @@ def _file_words(file: FileEntry) -> str:
 
 
 def is_simulated(result: ResultDocument, stated: StatedFacts) -> bool:
-    """Return whether the laboratory was simulated, by the configuration or by the controller's own statement."""
+    """Return whether the laboratory was simulated, by the configuration or by the controller's statement."""
     return stated.simulated or calls_itself_simulated(result.provenance.arm_software)
 
 
@@ -290,7 +290,7 @@ def _title(result: ResultDocument) -> str:
 
 
 def _find_incomplete(result: ResultDocument) -> Iterator[str]:
-    """Yield sensors with only the noise part of the uncertainty, by estimators without a budget."""
+    """Yield the sensors whose U contains only noise, because their estimator has no budget."""
     for _, show, finding in outlets(result, lambda kind: kind.shown):
         if not finding.is_reference and (row := show(finding)).scale is not None and not row.combined:
             yield finding.sensor
@@ -319,7 +319,7 @@ def _marks(result: ResultDocument, stated: StatedFacts, fitness: Sequence[CheckE
 
 
 def _angles_rad(result: ResultDocument) -> Iterator[float]:
-    """Yield the angles of the sweeps, as far as known: a file may state speeds only."""
+    """Yield the angles of the sweeps that are known: a file may state speeds only."""
     for sensor in result.gyroscopes.values():
         yield from (turn.angle_rad for turn in sensor.observations if turn.angle_rad is not None)
     for verification in result.verification.values():
@@ -342,7 +342,7 @@ def _traceable(result: ResultDocument, stated: StatedFacts) -> bool:
 def _find_held_still(result: ResultDocument, stated: StatedFacts) -> Iterator[HeldStill]:
     """Yield the sensors measured at rest, kind by kind.
 
-    They are traceable if their standard was measured, with a stated uncertainty and origin.
+    They are traceable if the standard was measured, and its uncertainty and origin are stated.
     """
     for kind in kinds():
         entries = tuple(finding.entry for finding in kind.find(result))
@@ -355,7 +355,7 @@ def _find_held_still(result: ResultDocument, stated: StatedFacts) -> Iterator[He
 
 
 def _size_stated(budget: BudgetEntry) -> bool:
-    """Return whether the uncertainty of the standard is stated (normal) and not assumed (a half-width)."""
+    """Return whether the standard's uncertainty is stated (normal), and not assumed (a half-width)."""
     return any(line.kind == "B" and line.distribution == "normal" for line in budget.contributors)
 
 
@@ -382,7 +382,7 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
 
 
 def _references(result: ResultDocument) -> Iterator[str]:
-    """Yield results of others: the calibrations of the references."""
+    """Yield the references' calibrations, which are results of others."""
     for entry in {entry.reference: entry for entry in result.verification.values()}.values():
         serial = result.provenance.sensor_serial_numbers.get(entry.reference, "not stated")
         scale = ", ".join(f"{k:g}" for k in entry.reference_scale)

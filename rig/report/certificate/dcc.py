@@ -36,7 +36,7 @@ UNKNOWN_AIR = dcc(
 def digital_certificate(certificate: Certificate) -> bytes:
     """Return the digital calibration certificate as XML.
 
-    Raise Refused `no_digital_certificate` if nothing was calibrated, or an uncertainty or the country is not known.
+    Raise Refused `no_digital_certificate` if nothing was calibrated, or if an uncertainty or the country is unknown.
     """
     if not certificate.calibrates:
         raise Refused("no_digital_certificate", "the run calibrated nothing", "Give a run that calibrates")

@@ -11,7 +11,7 @@ REPEATED = (
 
 
 def method_in_words(certificate: Certificate) -> str:
-    """Return sentences on the motion of the items and the reference of their readings, then on the procedure."""
+    """Return sentences on the motion of the items, the reference of their readings, and the procedure."""
     if certificate.by_hand:
         sentences = [_describe_hand(certificate)]
     elif certificate.external:
@@ -25,7 +25,7 @@ def method_in_words(certificate: Certificate) -> str:
 
 
 def method_in_short(certificate: Certificate) -> str:
-    """Return the same in a few words, for the digital certificate."""
+    """Return the method in a few words, for the digital certificate."""
     if certificate.by_hand:
         return "by hand: turned on a flat table between rests"
     if certificate.external:

@@ -29,14 +29,15 @@ class StatedFacts:
 
     @property
     def where(self) -> SiteSection:
-        """The site, without statements if no configuration was kept."""
+        """The site; without statements if no configuration was kept."""
         return self.site or SiteSection()
 
 
 def stated_in(folder: Path, overrides: Sequence[str] = ()) -> StatedFacts:
-    """Return the statements of the run folder's configuration with `overrides`; of these alone if it has none.
+    """Return the statements in the configuration of a run folder, with `overrides` applied.
 
-    Raise Refused `unknown_setting` for an override of a measured quantity, and the errors of `load`.
+    If the folder has no configuration, the overrides alone count. Raise Refused `unknown_setting` for an override of a
+    measured quantity, and the errors of `load`.
     """
     for override in overrides:
         section, _, key = override.partition("=")[0].strip().partition(".")
@@ -56,5 +57,5 @@ def stated_in(folder: Path, overrides: Sequence[str] = ()) -> StatedFacts:
 
 
 def of_configuration(loaded: Loaded) -> StatedFacts:
-    """Return the statements on site and certificate of a configuration."""
+    """Return the statements of a configuration on site and certificate."""
     return StatedFacts(loaded.config.site, loaded.config.certificate, loaded.simulated)

@@ -83,7 +83,7 @@ def biases_by_repeat(finding: Finding[DriftEntry]) -> Residuals:
 
 
 def _draw(unexplained: Unexplained) -> Residuals:
-    """Return values (n, 3) side by side, with bars of two standard deviations, in a unit that suits the largest."""
+    """Return a plot of values (n, 3) with bars of two standard deviations, in a unit for the largest value."""
     values, bars, split = unexplained.values, 2 * unexplained.stds, unexplained.split
     reach, unit = reach_in(float((np.abs(values) + bars).max()), unexplained.quantity.residuals)
     across = (WIDTH - LEFT_MARGIN - RIGHT_MARGIN) / len(values)
@@ -106,7 +106,7 @@ def _draw(unexplained: Unexplained) -> Residuals:
 
 
 def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, DisplayUnit]:
-    """Return a round limit above `largest`, and its unit: the first in which `largest` is above 1."""
+    """Return a round limit above `largest`, and its unit, the first of the given ones in which `largest` exceeds 1."""
     unit = next((unit for unit in units if largest >= unit.size), units[-1])
     shown = largest / unit.size
     decade = 10 ** np.floor(np.log10(max(shown, 1e-9)))
@@ -115,7 +115,7 @@ def reach_in(largest: float, units: Sequence[DisplayUnit]) -> tuple[float, Displ
 
 
 def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
-    """Return standard uncertainties over the combined one, for the printed budget, raised to 1e-4 at least."""
+    """Return each contributor's standard uncertainty over the combined one, at least 1e-4, for the printed budget."""
     k, b = printed_indices(budget, scale)
     across = (WIDTH - NAMES - RIGHT_MARGIN) / DECADES
 

@@ -23,7 +23,7 @@ def in_budget(budget: BudgetEntry | None, name: str) -> bool:
 
 
 def list_omitted_rates(sensor: GyroscopeEntry, *, external: bool = False) -> str:
-    """Return the errors that a gyroscope's U omits; for external motion also errors that no reading shows."""
+    """Return the errors that a gyroscope's U omits; for external motion, also errors that readings do not show."""
     bent = ALWAYS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *ALWAYS)
     return ", ".join(("the effect of gravity", *OF_THE_FILE, *bent) if external else bent)
 

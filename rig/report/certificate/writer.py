@@ -13,7 +13,7 @@ from rig.station.events import DocumentWritten, RunEvent
 
 
 def write_certificate(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write the certificate for any verdict; on an unfit run every page names the failed checks."""
+    """Write the certificate for any verdict. If the measurement is unfit, every page names the failed checks."""
     path = folder / CERTIFICATE
     write_new(path, certificate_page(certificate_of(document, stated_in(folder))))
     return (DocumentWritten(path),)

@@ -5,5 +5,5 @@ from rig.errors import Fault
 
 
 def error_entry(fault: Fault) -> ErrorEntry:
-    """Return the entry of the Fault in which an attempt ended."""
+    """Return the entry of a Fault that ended an attempt."""
     return ErrorEntry(error=str(fault))

@@ -72,7 +72,7 @@ def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
 
 
 def rates_in_attitudes(sensor: OfSensor) -> AttitudesEntry | None:
-    """Return a gyroscope's results by attitudes in addition to scale and bias; None if it was swept."""
+    """Return a gyroscope's results from attitudes, other than scale and bias; None if it was calibrated by sweeps."""
     if sensor.rates is None:
         return None
     earth = _earth_rate(sensor.rates)
@@ -103,7 +103,7 @@ def angles_entry(sensor: OfSensor) -> AnglesEntry | None:
 
 
 def _earth_rate(result: Result) -> EarthSeen | Fault:
-    """Return the Earth's rate in the axes of the table, or the Fault that explains why it is unknown."""
+    """Return the Earth's rate in the axes of the table, or the Fault that explains its absence."""
     if isinstance(result, InIncrements):
         return result.solution.earth
     if result.reference_fault is not None:

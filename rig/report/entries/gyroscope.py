@@ -41,8 +41,8 @@ def sensor_entry(
 ) -> GyroscopeEntry:
     """Return scale, bias and covariance by the chosen estimator, and the other estimators' solutions or errors.
 
-    `board` is the comparison with the board's own solution, `more` are further fields of the entry. Fields that the
-    result lacks are left out.
+    `board` is the comparison with the board's own solution, `more` are further fields of the entry. Fields for which
+    the result has no value are left out.
     """
     solution, turns = result.solution, result.observations
     return entry(
@@ -93,12 +93,12 @@ def _uncertainty_fields(result: SensorResult) -> dict[str, Any]:
 
 
 def estimate_entry(solution: Estimate) -> EstimateEntry:
-    """Return the fields that the solutions of all estimators have."""
+    """Return the fields that all estimators' solutions have in common."""
     return entry(EstimateEntry, solution)
 
 
 def _estimate_or_error(solution: Estimate | None, fault: Fault | None) -> EstimateEntry | ErrorEntry:
-    """Return the entry of a solution, or the entry of the error that prevented the solution."""
+    """Return the entry of a solution, or of the error that prevented it."""
     return ErrorEntry(error=str(fault)) if solution is None else estimate_entry(solution)
 
 
@@ -120,7 +120,7 @@ def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
 
 
 def vector_entry(outcome: "vector_model.VectorSolution | TurnedSolution", **more: Any) -> VectorEntry:
-    """Return the vector model's solution with the angles between the axes, and the fields of `more`."""
+    """Return the vector model's solution with the angles between the axes, and the further fields `more`."""
     angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
     sensitivity: dict[str, Any] = {}
     if outcome.g_sensitivity is not None and outcome.g_sensitivity_covariance is not None:

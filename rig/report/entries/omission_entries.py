@@ -15,7 +15,7 @@ LEFT_OUT = "omitted"  # a move by hand that gives no information
 
 
 def omitted_entries(outcome: "Outcome") -> dict[str, tuple[OmittedEntry, ...]]:
-    """Return the omitted parts of the recording, by sensor; sensors without any are left out."""
+    """Return the omitted parts of the recording, by sensor; a sensor without omissions has no entry."""
     by_sensor = {
         name: [entry(OmittedEntry, part, quantity=quantity and quantity.name) for quantity, part in sensor.omitted]
         for name, sensor in outcome.external.items()
@@ -27,7 +27,7 @@ def omitted_entries(outcome: "Outcome") -> dict[str, tuple[OmittedEntry, ...]]:
 
 
 def unsolved_entries(outcome: "Outcome") -> dict[str, dict[str, ErrorEntry]]:
-    """Return why recorded quantities have no solution, by sensor and quantity; solved sensors are left out."""
+    """Return why recorded quantities have no solution, by sensor and quantity."""
     reasons: dict[str, dict[str, ErrorEntry]] = {}
     faults = [(name, *failure) for name, sensor in outcome.external.items() for failure in sensor.unsolved.items()]
     faults += [(kind.name, kind.quantity, kind.fault) for kind in outcome.installed_kinds if kind.fault is not None]
@@ -37,12 +37,12 @@ def unsolved_entries(outcome: "Outcome") -> dict[str, dict[str, ErrorEntry]]:
 
 
 def notes(outcome: "Outcome") -> dict[str, tuple[str, ...]]:
-    """Return remarks on how recordings were read and solved, by sensor; the usual way has none."""
+    """Return remarks on how recordings were read and solved, by sensor, where this was unusual."""
     return {name: sensor.notes for name, sensor in outcome.external.items() if sensor.notes}
 
 
 def omitted_lines(result: ResultDocument, sensor: str | None = None) -> Iterator[str]:
-    """Yield a line for each omission and each note, of one sensor alone if one is named."""
+    """Yield a line for each omission and each note, of all sensors or of one."""
     for name, parts in result.omitted.items():
         if sensor in (None, name):
             prefix = f"{name}: " if len(result.omitted) > 1 else ""

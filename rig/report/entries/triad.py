@@ -77,7 +77,7 @@ def attitudes_entry(
 
 
 def _attitude_error(error: AttitudeError | None) -> dict[str, float | None]:
-    """Return the estimated error of the attitudes and its uncertainty, rad about each axis; None if it was fixed."""
+    """Return the estimated error of the attitudes and its uncertainty, rad about each axis; None if not estimated."""
     if error is None:
         return {"attitude_error_rad": None, "attitude_error_std_rad": None}
     uncertainty_rad = error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None

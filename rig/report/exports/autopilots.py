@@ -103,14 +103,14 @@ def _number_imus(calibrations: ExportedCalibrations) -> dict[str, int]:
 
 
 def symmetric(matrix: Array) -> Array:
-    """Return symmetric P (3, 3) of matrix = R P with a rotation R; P changes a vector's length as `matrix` does."""
+    """Return symmetric P (3, 3) of matrix = R P with a rotation R. P and `matrix` change a vector's length alike."""
     squared, vectors = np.linalg.eigh(matrix.T @ matrix)
     root: Array = vectors @ np.diag(np.sqrt(squared)) @ vectors.T
     return root
 
 
 def _axis_parameters(form: str, values: Iterable[float]) -> Parameters:
-    """Yield a parameter for each axis, with the axis's letter at `{}`."""
+    """Yield a parameter for each axis; the axis's letter replaces `{}` in the name."""
     for axis, value in zip(AXES, values, strict=True):
         yield form.format(axis), float(value)
 
@@ -157,7 +157,7 @@ def _ardupilot_magnetometer(number: int, magnetometer: Corrected) -> Parameters:
 
 
 def _nth(number: int) -> str:
-    """Return the number in a parameter's name; empty for the first sensor."""
+    """Return the sensor's number in a parameter's name; empty for the first sensor."""
     return str(number + 1) if number else ""
 
 

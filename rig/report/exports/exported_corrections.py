@@ -54,7 +54,7 @@ class ExportedCalibrations:
 
     @property
     def not_in_imus(self) -> tuple[str, ...]:
-        """Results that a file of an IMU cannot hold: sensors outside of an IMU, and `further_terms`."""
+        """Results that an IMU's file cannot hold: other sensors, and `further_terms`."""
         parts = [triad for imu in self.imus for triad in (imu.gyroscope, imu.accelerometer)]
         return (*(triad.name for triad in self.sensors if triad not in parts), *self.further_terms)
 

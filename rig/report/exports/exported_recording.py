@@ -116,7 +116,7 @@ class WithMotion:
 
 @dataclass(frozen=True, slots=True)
 class ReadingsAlone:
-    """An `Exported` recording of readings without a recorded motion: by hand, or external."""
+    """An `Exported` recording of readings without a recorded motion: by hand, or from files."""
 
     run: RunData
 
@@ -159,8 +159,8 @@ class ReadingsAlone:
 def exported(runs: Sequence[RunData]) -> tuple[Exported, ...]:
     """Return the recordings of one run for export.
 
-    Raise the errors of `observe_runs`; Refused `nothing_to_export` if there is no finished sweep or dwell, or no
-    reading.
+    Raise Fault as `observe_runs` does; Refused `nothing_to_export` without a finished sweep or dwell, or without
+    readings.
     """
     recordings: tuple[Exported, ...]
     if all(run.turner is not None and run.turner.joints for run in runs):

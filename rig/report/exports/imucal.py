@@ -14,7 +14,7 @@ FORMAT_VERSION = "2.0.0"
 
 
 def imucal_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return one file for each IMU. Raise Refused `nothing_to_export`."""
+    """Return one file for each IMU. Raise Refused `nothing_to_export` if there is none."""
     documents = {imu.name: _document(calibrations, imu) for imu in calibrations.imus}
     return {f"{name}_imucal.json": json.dumps(document, indent=2) + "\n" for name, document in documents.items()}
 

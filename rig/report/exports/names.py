@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 
 def plain_names(names: Iterable[str]) -> dict[str, str]:
-    """Return unique plain names by name; each begins with a letter."""
+    """Return a unique plain name, beginning with a letter, for each name."""
     plain_by_name: dict[str, str] = {}
     for name in names:
         plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)

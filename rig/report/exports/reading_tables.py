@@ -17,7 +17,7 @@ from rig.report.exports.names import plain_names
 
 
 def tables_of(recordings: Sequence[Exported]) -> Iterator[ExportTable]:
-    """Yield the tables of each recording; tables of the second and later recordings have its number in their names."""
+    """Yield the tables of each recording; from the second recording on, their names contain its number."""
     for number, recording in enumerate(recordings, start=1):
         for table in recording.tables():
             yield table if number == 1 else replace(table, name=f"{table.name}-{number}")
@@ -39,7 +39,7 @@ def write_csv(recordings: Sequence[Exported], folder: Path) -> list[Path]:
 
 
 def write_parquet(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """Write a file for each table, with its meaning as metadata `convention`."""
+    """Write a file for each table; its metadata `convention` is the table's meaning."""
     import pyarrow
     import pyarrow.parquet
 
@@ -54,7 +54,7 @@ def write_parquet(recordings: Sequence[Exported], folder: Path) -> list[Path]:
 
 
 def write_mat(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """Write `run.mat`: a struct for each table, columns as fields (n, 1), its meaning as field `convention`."""
+    """Write `run.mat`: a struct for each table, with columns (n, 1) as fields, and its meaning in `convention`."""
     from scipy.io import savemat
 
     tables = tuple(tables_of(recordings))

@@ -30,7 +30,7 @@ CONVENTION = (
 def write_bag(recordings: Sequence[Exported], folder: Path) -> list[Path]:
     """Write the folder `bag`, which must not exist, completely or not at all.
 
-    Raise Refused `report_folder`, `nothing_to_export`, or OSError.
+    Raise OSError, Refused `report_folder`, `nothing_to_export`.
     """
     path = folder / BAG
     if path.exists():
@@ -92,7 +92,7 @@ def _messages(types: Mapping[str, Any], recording: Exported, name: str, frame: s
 
 
 def _covariance(noises: Sequence[Array]) -> Array:
-    """Return the covariance (9,) of one sample, row by row; zeros, in ROS "unknown", without intervals at rest."""
+    """Return the covariance (9,) of one sample, row by row. Without intervals at rest it is zero, in ROS "unknown"."""
     variance = np.mean(np.square(noises), axis=0) if noises else np.zeros(3)
     return np.diag(variance).ravel()
 

@@ -69,7 +69,7 @@ def _change(drift: ResultDocument, sensor: Corrected, to_c: float) -> Array:
 
 
 def _check_same(result: ResultDocument, drift: ResultDocument) -> None:
-    """Raise Refused `another_sensor` if the drift is of another sensor."""
+    """Raise Refused `another_sensor` if the drift is not that of this sensor."""
     watched = drift.provenance.sensor_serial_numbers
     for name, serial_number in result.provenance.sensor_serial_numbers.items():
         if name in watched and watched[name] != serial_number:

@@ -131,7 +131,7 @@ def _read(figure: AllanReading | Fault) -> dict[str, Any]:
 
 
 def _draw(axes: "Axes", quantity: Quantity, result: AtRest) -> None:
-    """Draw the curves with their bands, and the figures that were read from them."""
+    """Draw the curves with their bands, and mark the values that were read from them."""
     size = quantity.drift.size
     curve = result.curve
     for i, (axis, figures) in enumerate(zip("xyz", result.axes, strict=True)):

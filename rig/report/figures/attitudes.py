@@ -54,14 +54,14 @@ def write_attitude_figures(outcome: Outcome, document: ResultDocument, folder: P
 
 
 def draw(figure: "Figure", sensor_plot: AttitudePlot) -> None:
-    """Draw the residuals by attitude with their expected range on the left, and a sphere on the right."""
+    """Draw the residuals by attitude with their expected range on the left, the reference on a sphere on the right."""
     residuals, sphere = figure.subplots(1, 2, width_ratios=(3, 2))
     _draw_residuals(residuals, sensor_plot)
     _draw_sphere(sphere, sensor_plot)
 
 
 def plot_of(finding: Finding[Any], mounting: Array) -> AttitudePlot:
-    """Return the data of a sensor's plots; `mounting` (3, 3) takes the frame of its attitudes to its axes."""
+    """Return the data of a sensor's plots; `mounting` (3, 3) takes the attitudes' frame to the sensor's axes."""
     entry, quantity, unexplained = finding.entry, finding.quantity, find_attitude_residuals(finding)
     noise = np.array([getattr(dwell, quantity.named("mean_std")) for dwell in entry.dwells])
     reference = entry.reference_m_s2 if quantity == ACCELERATION else entry.field_base_t
@@ -77,7 +77,7 @@ def _plots(outcome: Outcome, document: ResultDocument) -> Iterator[tuple[str, At
 
 
 def _mounting(outcome: Outcome, sensor: str) -> Array:
-    """Return the rotation from the flange to the sensor's nominal axes; attitudes of a file are the sensor's own."""
+    """Return the rotation from the flange to the sensor's nominal axes. A file's attitudes are the sensor's own."""
     if sensor in outcome.external:
         return np.eye(3)
     return np.array(outcome.recordings[0].run.sensors[sensor].mounting)
@@ -97,7 +97,7 @@ def _draw_residuals(axes: "Axes", sensor_plot: AttitudePlot) -> None:
 
 
 def _draw_sphere(axes: "Axes", sensor_plot: AttitudePlot) -> None:
-    """Draw the reference in the sensor's nominal axes, from above z (Lambert's equal-area map of both halves)."""
+    """Draw the reference in the sensor's nominal axes, seen from +z (Lambert's equal-area map of both halves)."""
     towards = sensor_plot.towards / np.linalg.norm(sensor_plot.towards, axis=1, keepdims=True)
     for centre, side in ((-1.1, 1.0), (1.1, -1.0)):
         half = towards[np.sign(towards[:, 2] + 1e-12) == side]

@@ -49,9 +49,9 @@ def _draw(figure: "Figure", recording: ObservedRun, sensor: str, fit: Explained,
 
 
 def errors(recording: ObservedRun, sensor: str, fit: Explained, earth: EarthRate) -> tuple[Array, Array, Array]:
-    """Return times (n,), rates of the flange (n, 3), and corrected readings minus flange and Earth (n, 3), rad/s.
+    """Return times (n,), the flange's rates (n, 3), and corrected readings minus the rates of flange and Earth (n, 3).
 
-    They are means over 1 / `RATE_HZ` in the flange's frame, at times that the arm's states cover.
+    In rad/s, averaged over 1 / `RATE_HZ`, in the flange's frame, at times with arm states.
     """
     stream, motion, solution = recording.stream(sensor), recording.motion, fit.solution
     samples = max(1, round(stream.sensor.rate_hz / RATE_HZ))
@@ -68,7 +68,7 @@ def errors(recording: ObservedRun, sensor: str, fit: Explained, earth: EarthRate
 
 
 def draw_errors(figure: "Figure", time_s: Array, flange_rate: Array, error: Array) -> None:
-    """Draw the rate of the flange left as in Fig. 2, the error right as in Fig. 3, °/s."""
+    """Draw the rate of the flange on the left as in Fig. 2, the error on the right as in Fig. 3, °/s."""
     rates, residuals = figure.subplots(1, 2)
     for i, axis in enumerate("xyz"):
         rates.plot(*_curve(time_s, np.degrees(flange_rate[:, i])), lw=0.7, color=f"C{i}", label=axis)
@@ -83,7 +83,7 @@ def draw_errors(figure: "Figure", time_s: Array, flange_rate: Array, error: Arra
 
 
 def _curve(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return a curve's points, without a line across gaps of the arm's states."""
+    """Return the points of a curve, interrupted at gaps of the arm's states."""
     times, values = envelope(time_s, values)
     gaps = np.flatnonzero(np.diff(times) > GAP_S) + 1
     return np.insert(times, gaps, np.nan), np.insert(values, gaps, np.nan)

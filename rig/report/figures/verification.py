@@ -37,7 +37,7 @@ class Picture:
 
 
 def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw each picture as PNG and SVG into `folder`; return the event. Without matplotlib (an extra), draw nothing."""
+    """Draw each picture as PNG and SVG into `folder`; return the event. Draw nothing without matplotlib (an extra)."""
     if not pictures:
         return ()
     try:
@@ -90,7 +90,7 @@ def save(figure: "Figure", folder: Path, name: str) -> None:
 
 
 def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
-    """Draw in rows x, y, z the readings on the left and their difference, enlarged, on the right."""
+    """Draw x, y and z in rows: the readings on the left, their enlarged difference on the right."""
     rows = figure.subplots(3, 2, sharex=True, sharey="col", width_ratios=(3, 2), gridspec_kw=MARGINS)
     elapsed_s = comparison.time_s - comparison.time_s[0]
     error = comparison.reading_rad_s - comparison.reference_rad_s
@@ -111,7 +111,7 @@ def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, refer
 
 
 def envelope(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return the lowest and highest value of a curve (n,) in each column of the panel: a lighter curve, same look."""
+    """Return the lowest and highest value of a curve (n,) in each column of the panel: fewer points, the same look."""
     if len(values) <= 2 * COLUMNS:
         return time_s, values
     starts = np.linspace(0, len(values), COLUMNS, endpoint=False).astype(np.intp)

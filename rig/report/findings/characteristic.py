@@ -66,7 +66,7 @@ class Characteristic:
     remark: Callable[[Any], str] = lambda _: ""
 
     def term_of(self, finding: Finding[Any]) -> "Term":
-        """Return the term of an entry. Raise ValueError if the entry does not state it."""
+        """Return the term that an entry states. Raise ValueError if it states none."""
         if (numbers := self.read(finding.entry)) is None:
             raise ValueError(f"{finding.sensor} has no {self.name}")
         return Term(finding, self, numbers)
@@ -99,7 +99,7 @@ class Term:
 
     @property
     def whose(self) -> str:
-        """The label of the sensor's readings, distinct from its other quantities."""
+        """The label of the sensor's readings that distinguishes them from its other quantities."""
         return self.finding.quantity.label(self.finding.sensor)
 
     @property
@@ -123,7 +123,7 @@ class Term:
 def terms(
     characteristics: Iterable[Characteristic], finding: Finding[Any], outlet: Outlet | None = None
 ) -> Iterator[Term]:
-    """Yield the characteristics that an entry states, optionally only those for `outlet`."""
+    """Yield the characteristics that an entry states, all or only those for `outlet`."""
     for characteristic in characteristics:
         if outlet not in characteristic.exempt and characteristic.read(finding.entry) is not None:
             yield characteristic.term_of(finding)

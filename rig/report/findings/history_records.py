@@ -103,7 +103,7 @@ def is_scale(name: str) -> bool:
 def scale_and_bias(
     sensor: str, quantity: "Quantity", entry: Calibrated, bias: Sequence[float], document: "ResultDocument"
 ) -> Iterator[Parameter]:
-    """Yield scale factor and bias of each axis, then the mean scale factor by their covariance and largest k."""
+    """Yield scale factor and bias of each axis, then the mean scale factor, with its covariance and largest k."""
     from rig.data.meaning import JUDGED_PARAMETERS, limit_held
 
     axes, unit_rows = len(entry.scale), np.eye(2 * len(entry.scale))
@@ -129,7 +129,7 @@ def scale_and_bias(
 
 
 def parameters(characteristics: "Iterable[Term]") -> Iterator[Parameter]:
-    """Yield the parameters of characteristics, by their standard deviations and degrees of freedom."""
+    """Yield the parameters of characteristics, with their standard deviations and degrees of freedom."""
     for term in characteristics:
         numbers = term.numbers
         sign = -1 if term.characteristic.opposite else 1
@@ -139,7 +139,7 @@ def parameters(characteristics: "Iterable[Term]") -> Iterator[Parameter]:
 
 
 def select_uncertain(parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
-    """Return the parameters that have an uncertainty; a history needs it to judge changes."""
+    """Return the parameters that have an uncertainty, without which a history cannot judge changes."""
     return tuple(parameter for parameter in parameters if parameter.std_statistical > 0)
 
 

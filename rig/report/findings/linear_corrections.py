@@ -77,7 +77,7 @@ class Corrected:
 
 
 def noise_of(means: Sequence[Averaged], at_rest: Sequence[tuple[Sequence[float], int]]) -> ReadingNoise:
-    """Return the readings' noise from averages, and from each rest's σ of one sample and number of samples.
+    """Return the readings' noise, from each rest's standard deviation of one sample and number of samples.
 
     The density is σ over √rate of the noisiest axis, for noise that is white up to half the rate. It is None for
     readings in attitudes of a file.

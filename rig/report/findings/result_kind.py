@@ -145,7 +145,7 @@ class ResultKind(Generic[EntryT]):
 
 
 def row_of(term: Term, whose: str | None = None, noun: str | None = None) -> DisplayRow:
-    """Return the row of a characteristic, by default under the names of its sensor and its own."""
+    """Return the row of a characteristic; by default it has the names of the sensor and the characteristic."""
     finding, whose, noun = term.finding, whose or term.whose, noun or term.name
     labels, values, widths = zip(*term.printed, strict=True)
     numbers, unit = AxisValues(values, widths), term.units.shown
@@ -154,5 +154,5 @@ def row_of(term: Term, whose: str | None = None, noun: str | None = None) -> Dis
 
 
 def outlet_items(outlet: Callable[..., Iterable[ItemT]] | NoOutlet, *about: object) -> Iterable[ItemT]:
-    """Return the items that an outlet yields for `arguments`; nothing if the kind lacks the outlet."""
+    """Return the items that an outlet yields for `arguments`; none if the kind does not have the outlet."""
     return () if isinstance(outlet, NoOutlet) else outlet(*about)

@@ -46,7 +46,7 @@ def _build_record(finding: Finding[GyroscopeEntry], _: object) -> HistoryRecord:
 
 
 def _describe_item(finding: Finding[GyroscopeEntry], _: object) -> CertifiedItem | None:
-    """Return the gyroscope as item, with its temperatures; None for a reference."""
+    """Return the gyroscope as an item of the certificate, with its temperatures; None for a reference."""
     sensor = finding.entry
     if finding.is_reference:
         return None

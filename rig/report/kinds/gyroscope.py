@@ -30,7 +30,7 @@ from rig.report.words.validity_words import load_words, speed_words, warmth, whe
 
 
 def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
-    """Return the entries of all gyroscopes; the key is in every result, even without sweeps."""
+    """Return the entries of all gyroscopes. Every result has their key, even without sweeps."""
     from rig.analysis.measurement_conditions import of_gyroscope
     from rig.report.entries.conditions_entry import when_entry
     from rig.report.entries.gyroscope import sensor_entry
@@ -114,14 +114,14 @@ def _build_correction(finding: Finding[GyroscopeEntry]) -> Corrected | None:
 
 
 def temperatures_c(sensor: GyroscopeEntry) -> dict[str, float | None]:
-    """Return the temperatures of a gyroscope's values; scale factors from sweeps alone have one of their own."""
+    """Return the temperatures of a gyroscope's values, one for scale factors if they come from sweeps alone."""
     if sensor.scale_conditions is None or sensor.bias_conditions is None:
         return {"": sensor.temperature_c}
     return warmth(sensor.scale_conditions, " at the scale factors") | warmth(sensor.bias_conditions, " at the biases")
 
 
 def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
-    """Yield the lines below the table: speeds, other estimators, the vector model's axes."""
+    """Yield the lines below the table: speeds, other estimators, and the axes by the vector model."""
     sensor = finding.entry
     yield from _speeds(sensor)
     if sensor.scale_conditions is not None and sensor.bias_conditions is not None:
@@ -155,7 +155,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
 
 
 def _differs(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
-    """Yield a sentence on which of two estimators to use, if they differ by more than U."""
+    """Yield a sentence on which of two estimators to prefer, if they differ by more than U."""
     expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*solution.scale, *solution.bias_rad_s) for solution in (sensor, other))
     differences = divide_or_infinity(np.abs(np.subtract(others, values)), expanded)
@@ -169,7 +169,7 @@ def _differs(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iter
 
 
 def _angle_lines(sensor: GyroscopeEntry) -> Iterator[str]:
-    """Yield how sweeps of a file were read, and their assumed errors."""
+    """Yield lines on how a file's sweeps were interpreted, and with which errors."""
     if (angles := sensor.by_angles) is None:
         if sensor.range_rad_s is None and sensor.in_attitudes is None and sensor.by_hand is None:
             yield "the axes of the sweeps are assumed exact: an error of theirs is an error of F across its rows"
@@ -186,7 +186,7 @@ def _angle_lines(sensor: GyroscopeEntry) -> Iterator[str]:
 
 
 def _attitude_lines(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseEntry]) -> Iterator[str]:
-    """Yield the results of a file's attitudes other than scale and bias."""
+    """Yield the results, other than scale and bias, from a file's attitudes."""
     if attitudes is None:
         return
     for clock in clocks:
@@ -219,7 +219,7 @@ def _attitude_lines(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseE
 
 
 def _speeds(sensor: GyroscopeEntry) -> Iterator[str]:
-    """Yield the speeds at which the calibration is valid: one speed does not show nonlinearity."""
+    """Yield the speeds for which the calibration is valid, as one speed does not show nonlinearity."""
     speeds, loads, nonlinearity = speed_words(sensor), load_words(sensor), sensor.nonlinearity
     if loads is not None:
         yield f"rates along its own axes: {loads} °/s"

@@ -27,34 +27,34 @@ OF_THE_RIG: Final[tuple[ResultKind[Any], ...]] = (
 
 @cache
 def kinds() -> tuple[ResultKind[Any], ...]:
-    """Return all kinds of results: the rig's own, then the kinds of packages (`rig.data.installed_kinds`)."""
+    """Return all kinds of results: the rig's own, then those of packages (`rig.data.installed_kinds`)."""
     return (*OF_THE_RIG, *(kind.result for kind in installed_kinds()))
 
 
 def outlets(
     document: ResultDocument, outlet_of: Callable[[ResultKind[Any]], OutletT | NoOutlet]
 ) -> Iterator[tuple[ResultKind[Any], OutletT, Finding[Any]]]:
-    """Yield kind, outlet and finding for each part of a result whose kind has the outlet."""
+    """Yield kind, outlet and finding for each part of a result whose kind has that outlet."""
     for kind in kinds():
         if not isinstance(outlet := outlet_of(kind), NoOutlet):
             yield from ((kind, outlet, finding) for finding in kind.find(document))
 
 
 def terms_of(document: ResultDocument, outlet: Outlet | None = None) -> Iterator[Term]:
-    """Yield all characteristics in a result, kind by kind, or only the characteristics that `outlet` shows."""
+    """Yield all characteristics in a result, kind by kind, or only those that `outlet` shows."""
     for kind in kinds():
         for finding in kind.find(document):
             yield from terms(kind.characteristics, finding, outlet)
 
 
 def shown(document: ResultDocument) -> Iterator[DisplayRow]:
-    """Yield the rows of page and notebook: the kinds' rows of all sensors, then the characteristics' rows."""
+    """Yield the rows of page and notebook: those of the kinds for all sensors, then those of the characteristics."""
     yield from (show(finding) for _, show, finding in outlets(document, lambda kind: kind.shown))
     yield from map(row_of, terms_of(document, "page"))
 
 
 def followed(document: ResultDocument) -> tuple[HistoryRecord, ...]:
-    """Return the records of all sensors of a result for a history, references included."""
+    """Return the records of a result for a history, of all sensors including references."""
     return tuple(_records(document))
 
 

@@ -84,7 +84,7 @@ def _lines(finding: Finding[MagnetometerEntry]) -> Iterator[str]:
 
 
 def _tests(entry: MagnetometerEntry) -> Iterator[str]:
-    """Yield the tests of whether the field was uniform and constant."""
+    """Yield lines on the tests of whether the field was uniform and constant."""
     if (uniformity := entry.uniformity) is not None:
         yield f"uniform field: χ² of the residuals {uniformity.chi_square:.1f}, at most {uniformity.limit:.1f}"
     if (drift := entry.drift) is not None:

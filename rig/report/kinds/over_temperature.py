@@ -60,13 +60,13 @@ def _render(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
 
 
 def _build_row(finding: Finding[OverTemperatureEntry]) -> DisplayRow:
-    """Return the slopes of the bias at the reference temperature."""
+    """Return the row of the bias's slopes at the reference temperature."""
     noun = f"change per kelvin at {finding.entry.reference_c:g} °C"
     return row_of(BIAS_SLOPE_AT_REFERENCE.term_of(finding), finding.quantity.full_label(finding.sensor), noun)
 
 
 def _build_record(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> HistoryRecord | None:
-    """Return the slopes at the reference temperature; the sensor's calibration states scale and bias there."""
+    """Return the slopes at the reference temperature; scale and bias there are in the sensor's calibration."""
     entry = finding.entry
     return HistoryRecord(
         finding.sensor,

@@ -107,7 +107,7 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
 
 
 def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
-    """Yield the solutions of the other methods, or the reasons why a method has no solution."""
+    """Yield the solutions by the other methods, or why a method has none."""
     for method, other in entry.other_methods.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}{from_what}: {other.error}"
@@ -117,7 +117,7 @@ def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterato
 
 
 def unsolved_lines(document: ResultDocument, quantity: Quantity) -> Iterator[str]:
-    """Yield why external readings have no solution for a quantity."""
+    """Yield why a quantity of external readings has no solution."""
     for name, faults in document.unsolved.items():
         if (fault := faults.get(quantity.name)) is not None:
             yield f"{name}, {quantity.sensor}, not calibrated: {fault.error}"

@@ -16,7 +16,7 @@ WITH_PARAMETERS = "rsassa_pss"
 
 
 def find_uncovered_in_container(der: bytes) -> Iterator[str]:
-    """Yield the content of a signature's container that the signature does not cover.
+    """Yield the parts of a signature's container that the signature does not cover.
 
     `der` is the ContentInfo of a document's signature, which covers its signed attributes only. So the container must
     equal, byte by byte, one rebuilt from these, the signature's value, the certificates of the signer's chain and at
@@ -41,7 +41,7 @@ def find_uncovered_in_container(der: bytes) -> Iterator[str]:
 
 
 def certificates_with(der: bytes) -> list[list[Certificate]]:
-    """Return the certificates of a signature and the certificates of its time stamp, the signer's first in both."""
+    """Return the certificates of a signature and those of its time stamp, the signer's first in both."""
     contents = [cms.ContentInfo.load(der)["content"]]
     for attribute in contents[0]["signer_infos"][0]["unsigned_attrs"] or ():
         contents += [stamp["content"] for stamp in attribute["values"]]
@@ -92,7 +92,7 @@ def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
 
 
 def _plain(algorithm: Any) -> Any:
-    """Return the algorithm without parameters other than NULL."""
+    """Return the algorithm with no parameters other than NULL."""
     name = algorithm["algorithm"].native
     if name == WITH_PARAMETERS:
         return algorithm

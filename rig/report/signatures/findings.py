@@ -44,7 +44,7 @@ def not_signed(name: str) -> Refused:
 
 
 def not_as_signed(name: str, why: str) -> Refused:
-    """Return the problem of a file that was altered, or is not the signed one."""
+    """Return the problem of a file that was altered, or is another one than the signed file."""
     return Refused(
         "not_as_signed", f"{name} is not as it was signed: {why}", "Do not rely on it; ask the laboratory for it"
     )
@@ -69,7 +69,7 @@ def stamp_not_trusted(name: str, server: str) -> Refused:
 
 
 def authority_not_trusted(name: str, authority: str) -> Refused:
-    """Return the problem of a file with an authority's certificate that may have been altered."""
+    """Return the problem of a file with an authority's certificate that may be altered."""
     return Refused(
         "signer_not_trusted",
         f"{name} contains a certificate of {authority} that no trusted authority has issued",

@@ -15,7 +15,7 @@ HEAD_BYTES = 200  # enough to detect the type of a file
 
 
 def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
-    """Inspect a file by its content: PDF, XML, or one without a signature of its own. Raise Refused `missing_extra`."""
+    """Inspect a file by its content: PDF, XML, or another form without a signature. Raise Refused `missing_extra`."""
     with requiring(EXTRA):
         from rig.report.signatures.pdf_signatures import inspect_pdf
         from rig.report.signatures.xml_signature import inspect_xml
@@ -36,7 +36,7 @@ def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
 
 
 def _is_xml(content: bytes) -> bool:
-    """Return whether the file begins like XML, in one or two bytes a character, and not like HTML."""
+    """Return whether the file begins as XML, with one or two bytes per character, and is not HTML."""
     head = content[:HEAD_BYTES].lstrip(b"\xef\xbb\xbf\xfe\xff").replace(b"\0", b"").lstrip().lower()
     return head.startswith(b"<") and not head.startswith(b"<!doctype html")
 

@@ -25,7 +25,7 @@ class Authorities:
     lists: tuple[bytes, ...]
 
     def context(self, by: Signatory) -> "ValidationContext":
-        """Return the context of a check that trusts only these authorities and needs a list for each certificate."""
+        """Return the context of a check that trusts only these authorities and requires all revocation lists."""
         from asn1crypto.crl import CertificateList
         from asn1crypto.x509 import Certificate
         from cryptography.hazmat.primitives.serialization import Encoding
@@ -61,7 +61,7 @@ def read_authorities(files: Sequence[Path]) -> Authorities:
 
 
 def unfit(why: str) -> Refused:
-    """Return the refusal of a signature whose certificates cannot be checked later."""
+    """Return the refusal of a signature whose certificates could not be checked later."""
     return Refused(
         "revocation_list",
         f"the revocation lists are not sufficient: {why}",

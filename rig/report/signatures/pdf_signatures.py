@@ -52,7 +52,7 @@ def inspect_pdf(name: str, content: bytes, trust: Trust) -> FileInspection:
 
 
 def _status(signature: Any, trust: Trust) -> Any:
-    """Return pyHanko's status, which here trusts no signer, and the time servers of `trust`."""
+    """Return pyHanko's status. It trusts no signers here, but the time servers of `trust`."""
     no_signers = ValidationContext(trust_roots=[], allow_fetching=False)
     roots = list(map(Certificate.load, trust.certificates))
     servers = ValidationContext(trust_roots=roots, allow_fetching=False)
@@ -60,7 +60,7 @@ def _status(signature: Any, trust: Trust) -> Any:
 
 
 def _alterations(signature: Any, status: Any, content: bytes, attached: Sequence[tuple[str, bytes]]) -> Iterator[str]:
-    """Yield why the file is not as it was signed: every byte of it must be signed, except the signature itself."""
+    """Yield how the file differs from the signed one: the signature must cover every byte except itself."""
     if not status.intact:
         yield "signed bytes have changed"
     elif not status.valid:

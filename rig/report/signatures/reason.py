@@ -18,7 +18,7 @@ class Reason:
 
     @property
     def anchor(self) -> tuple[int, str] | None:
-        """The entry that the text names, None if there was no history."""
+        """The journal entry that the text names; None if there was no history."""
         match = _ANCHOR.search(self.text)
         return None if match is None else (int(match[1]), match[2])
 

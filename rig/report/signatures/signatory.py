@@ -104,14 +104,14 @@ def _open_file(file: Path) -> Iterator[Signatory]:
 
 
 def _order_chain(certificates: "Sequence[Certificate]", key: Any) -> "list[Certificate]":
-    """Return the certificates, the key's own before those above it; none if the key's own is missing."""
+    """Return the certificates, that of the key before those above it; none if the key's own is missing."""
     matching = [] if key is None else [one for one in certificates if one.public_key() == key.public_key()]
     return chain_of([matching[0], *certificates]) if matching else []
 
 
 @contextmanager
 def _open_token(key: TokenKey) -> Iterator[Signatory]:
-    """Open the key in a token and its certificate, both with the same label."""
+    """Open the key in a token, and its certificate, which has the same label."""
     with requiring(EXTRA):
         import pkcs11
         from pyhanko.config.pkcs11 import TokenCriteria
@@ -140,7 +140,7 @@ def _open_token(key: TokenKey) -> Iterator[Signatory]:
 
 
 def _check(signatory: Signatory, where: str) -> None:
-    """Raise Refused `signing_key` if the certificate is not valid now, or a verifier would not accept its key."""
+    """Raise Refused `signing_key` if the certificate is not valid now, or if verifiers would reject its key."""
     certificate = signatory.certificates[0]
     for why in unfit_for_documents(certificate):
         raise _unfit(where, why)

@@ -29,7 +29,7 @@ class TokenKey:
 
 
 def is_token_address(text: str) -> bool:
-    """Return whether the text is meant as the address of a key in a token, in any spelling, and not as a file."""
+    """Return whether the text is meant as the address of a key in a token, and not as a file's name."""
     return _decode(text).strip().startswith(SCHEME)
 
 
@@ -52,14 +52,14 @@ def token_key(address: str) -> TokenKey:
 
 
 def _decode(address: str) -> str:
-    """Return the address in lower case without variants, percent-decoded repeatedly."""
+    """Return the address in lower case, with percent encoding removed repeatedly."""
     while (unquoted := unquote(address)) != address:
         address = unquoted
     return normalize("NFKC", address).casefold()
 
 
 def _attributes(parts: Sequence[str]) -> dict[str, str]:
-    """Return the attributes by name; duplicates under an empty name, which is not allowed."""
+    """Return the attributes by name. Duplicates have an empty name, which is refused."""
     pairs = [(unquote(name), unquote(value)) for name, _, value in (part.partition("=") for part in parts)]
     names = [name for name, _ in pairs]
     return {name if names.count(name) == 1 else "": value for name, value in pairs}

@@ -52,20 +52,20 @@ def scale_and_bias_table(
 
 
 def decimals(uncertainties: Sequence[float], fewest: int = FEWEST_DECIMALS) -> int:
-    """Return the number of decimals that gives the smallest uncertainty two digits, at least `fewest`."""
+    """Return the number of decimals that shows two digits of the smallest uncertainty, at least `fewest`."""
     smallest = min(uncertainties)
     return max(fewest, 1 - math.floor(math.log10(smallest))) if smallest > 0 else fewest
 
 
 def line_of(term: Term, lead: str, form: str, width: str = ".2g") -> str:
-    """Return a characteristic's numbers in a line behind `lead`, with the largest U."""
+    """Return a characteristic's numbers and their largest U in a line that begins with `lead`."""
     _, values, widths = zip(*term.printed, strict=True)
     unit, words = term.units.shown.name, factor_words(term.numbers.dof)
     return f"{lead}: {triple(values, form)} {unit} (± {max(widths):{width}}, {words})"
 
 
 def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:
-    """Yield F row by row and the angles between its axes, ± U; `covariance` (9, 9) is the covariance of F, row by row.
+    """Yield F row by row and the angles between its axes, ± U; `covariance` (9, 9) is that of F, row by row.
 
     `factor` is the coverage factor, the largest of the scale factors'.
     """

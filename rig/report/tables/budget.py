@@ -13,25 +13,25 @@ from rig.station.plain_text import plain
 
 
 def heading_for(budget: BudgetEntry | None) -> str:
-    """Return the heading of a column of U by a budget, or, without a budget, of two standard deviations."""
+    """Return the heading of a column: U by a budget or, without one, two standard deviations."""
     return heading_of((COVERAGE_FACTOR,) if budget is None else budget.coverage_factors)
 
 
 def heading_of(factors: Sequence[float]) -> str:
-    """Return the heading of a column of U with its coverage factor, or the largest factor if they differ."""
+    """Return the heading of a column of U with its coverage factor, the largest if they differ."""
     printed = sorted({round(factor, 2) for factor in factors})
     return f"± U (k {'=' if len(printed) == 1 else '≤'} {printed[-1]:g})"
 
 
 def list_assumptions(budget: BudgetEntry) -> Iterator[str]:
-    """Yield the assumptions for values that the configuration does not give."""
+    """Yield the values that are assumed because the configuration does not give them."""
     for line in budget.contributors:
         if line.half_width is not None and line.source.endswith(NOT_GIVEN):
             yield f"{line.name}: ± {line.half_width:.3g} {line.unit} is assumed: {line.source}"
 
 
 def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit) -> Table:
-    """Return the budget of one scale factor and of one bias, in unit `bias`, as on the certificate."""
+    """Return the budget of one scale factor and one bias, in unit `bias`, as on the certificate."""
     printed = lay_out_budget(budget, scale, bias)
     k, b = printed.columns
     title = f"uncertainty budget of the scale factor of {k.axis} and of the bias of {b.axis}, which have the largest U"
@@ -49,7 +49,7 @@ def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit)
 
 
 def _label(line: Line) -> str:
-    """Return the line's name with its assumed half-width; negligible lines are listed below the table."""
+    """Return the name of a contributor, with its half-width if assumed. Negligible ones are listed below the table."""
     if not line.kind:
         return line.name.partition(":")[0]
     assumed = " ".join(line.assumed.split())  # a terminal shows no-break spaces as codes

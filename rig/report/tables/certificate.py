@@ -64,7 +64,7 @@ def pair(value: float, uncertainty: float) -> Pair:
 
 
 def axis_rows(sensor: GyroscopeEntry) -> list[AxisRow]:
-    """Return a gyroscope's axes with U of the budget; without a budget, with the standard deviation of the noise."""
+    """Return a gyroscope's axes with U by the budget; without one, with the standard deviation of the noise."""
     return rows_of(sensor.scale, sensor.bias_rad_s, _widths(sensor), too=degrees_of(sensor)[1])
 
 
@@ -88,7 +88,7 @@ def rows_of(
 
 
 def degrees_of(sensor: GyroscopeEntry) -> tuple[str, float]:
-    """Return the unit in which biases are printed in addition to rad/s, and its factor: °/h if U is small."""
+    """Return the unit of biases printed in addition to rad/s, and its factor: °/h if U is small."""
     return ("°/s", DEG) if DEG * max(_widths(sensor)[3:]) >= FINE_DEG_S else ("°/h", 3600 * DEG)
 
 
@@ -99,7 +99,7 @@ def _widths(sensor: GyroscopeEntry) -> Sequence[float]:
 
 
 def check_row(check: CheckEntry) -> CheckRow:
-    """Return a check in print; missing values and limits read so."""
+    """Return the printed row of a check, with words for a missing value or limit."""
     value, uncertainty = ("not measured" if check.value is None else f"{check.value:.4g}"), "not stated"
     if check.value is not None and check.uncertainty:
         printed = pair(check.value, check.uncertainty)
@@ -110,7 +110,7 @@ def check_row(check: CheckEntry) -> CheckRow:
 
 
 def verification_rows(entry: VerificationEntry) -> Iterator[tuple[str, ...]]:
-    """Yield a verification's axes: RMS before and after, largest mean over a revolution before and after, rad/s."""
+    """Yield a verification's axes: RMS, and largest mean over a revolution, before and after, rad/s."""
     for i, axis in enumerate(AXES):
         yield (
             axis,
@@ -126,7 +126,7 @@ def _largest_turn(errors: Sequence[Sequence[float]], axis: int) -> str:
 
 
 def pairs(term: Term) -> list[tuple[str, Pair]]:
-    """Return a characteristic's numbers by their labels, in the unit in which they are shown, with U."""
+    """Return a characteristic's numbers by label, with U, in the unit of print."""
     return [(label, pair(value, width)) for label, value, width in term.printed]
 
 

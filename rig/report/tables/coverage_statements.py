@@ -12,7 +12,7 @@ QUANTITIES = ("scale factors", "biases")
 
 
 def factor_note(budget: BudgetEntry) -> str:
-    """Return the note on U: k if it is one number for all values in print."""
+    """Return the note on U: k, if all printed values have the same."""
     printed = {f"{factor:.2f}" for factor in budget.coverage_factors}
     return f"k\u00a0=\u00a0{_short(printed.pop())}" if len(printed) == 1 else "k as stated below"
 
@@ -54,7 +54,7 @@ def _group(budget: BudgetEntry, factors: Sequence[str], first: int, name: str) -
 
 
 def _percent(probability: float) -> str:
-    """Return whole percent, or all digits of the probability that defines the coverage factor."""
+    """Return a probability as whole percent, or with all its digits if it defines the coverage factor."""
     full = f" ({100 * PROBABILITY:.2f} %)" if math.isclose(probability, PROBABILITY, abs_tol=5e-5) else ""
     return f"{100 * probability:.0f} %{full}"
 

@@ -126,7 +126,7 @@ def over_temperature(entry: OverTemperatureEntry, quantity: Quantity) -> Iterato
 
 
 def verification(entry: VerificationEntry) -> Iterator[Element]:
-    """Yield the RMS against a reference, as found and as left."""
+    """Yield the RMS difference from a reference, as found and as left."""
     statement = f"RMS of reading minus reference {entry.reference}; includes the noise of both, without uncertainty."
     if entry.before is not None:
         yield _result("as found", statement, real_list(AXES, entry.before.movement.rms_rad_s, [RATE.d_si]))
@@ -173,7 +173,7 @@ def _full_uncertainty(entry: GyroscopeEntry) -> tuple[BudgetEntry, Matrix6]:
 
 
 def _conditions(when: ConditionsEntry | None) -> str:
-    """Return time and temperature of the readings as a sentence; nothing for files without them."""
+    """Return time and temperature of the readings as a sentence; none for files, which do not state them."""
     words = "" if when is None else f"{when_words(when)}. "
     return words[:1].upper() + words[1:]
 
@@ -191,7 +191,7 @@ def _speed(sensor: GyroscopeEntry) -> str:
 
 
 def _widths(budget: BudgetEntry) -> tuple[Expanded, Expanded]:
-    """Return the expanded uncertainties of scale factors and of biases."""
+    """Return the expanded uncertainties, of scale factors and of biases."""
     columns = budget.expanded, budget.coverage_factors, budget.coverage_probabilities
     return Expanded(*(column[:3] for column in columns)), Expanded(*(column[3:] for column in columns))
 

@@ -34,14 +34,14 @@ def _extend(element: Element, parts: Iterable[Part]) -> Element:
 
 
 def words(name: str, text: str | date | None) -> Element:
-    """Return an element with a text; an unknown one reads "not stated"."""
+    """Return an element with a text; an unknown text reads "not stated"."""
     element = dcc(name)
     element.text = _plain(text)
     return element
 
 
 def text(name: str, statement: str | None) -> Element:
-    """Return an element with a text that the schema requires in a language."""
+    """Return an element with a text that the schema requires to have a language."""
     content = dcc("content", lang="en")
     content.text = _plain(statement)
     return dcc(name, content)
@@ -53,7 +53,7 @@ def _plain(statement: str | date | None) -> str:
 
 
 def values(name: str, numbers: Iterable[object]) -> Element:
-    """Return a list of numbers or units; floating-point numbers with all digits."""
+    """Return a list of numbers or units as text; floating-point numbers have all their digits."""
     element = si(name)
     element.text = " ".join(str(number) for number in numbers)
     return element
@@ -120,7 +120,7 @@ def _covariance(matrix: Sequence[Sequence[float]], units: Sequence[str]) -> Elem
 
 
 def product(first: str, second: str) -> str:
-    """Return the product of two units in D-SI notation, `\\one` among them."""
+    """Return the product of two units in D-SI notation; one of them may be `\\one`."""
     if r"\one" in (first, second):
         return second if first == r"\one" else first
     if first != second:

@@ -66,7 +66,7 @@ def _axis(axis: Vector3) -> str:
 
 
 def _leading_component(axis: Vector3) -> float:
-    """Return the component that defines the positive direction: the largest; the first of several equal components."""
+    """Return the component that defines the positive direction: the largest, or the first of equal ones."""
     return max(axis, key=lambda component: (round(abs(component), 6), 0))
 
 

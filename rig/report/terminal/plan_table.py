@@ -112,7 +112,7 @@ def print_plan(planned: DryRun, *, as_json: bool) -> None:
 
 
 def _print_steps(planned: DryRun, console: Console) -> None:
-    """Print every step, the total time, and doubts about the plan."""
+    """Print every step, the total time, and warnings about the plan."""
     plan = planned.plan
     table = Table(
         title=f"plan{'' if planned.model is None else f' for a {planned.model}'}, from the home pose",
@@ -151,7 +151,7 @@ def _print_steps(planned: DryRun, console: Console) -> None:
 
 
 def _print_predictions(planned: DryRun, console: Console) -> None:
-    """Print the accuracy by attitudes of accelerometers, and the detection limits of the checks."""
+    """Print the accuracy of accelerometers by attitudes, and the detection limits of the checks."""
     from rig.report.terminal.attitude_accuracy import print_account
 
     account, detection_limits = planned.account, planned.detection_limits
@@ -165,7 +165,7 @@ def _print_predictions(planned: DryRun, console: Console) -> None:
 
 
 def _counts(plan: Plan) -> str:
-    """Return the numbers of sweeps and dwells, before other counts."""
+    """Return the numbers of sweeps and dwells, as the beginning of a line on counts."""
     sweeps = f"{len(plan.sweeps)} sweeps, " if plan.sweeps or not plan.dwells else ""
     return sweeps + (f"{len(plan.dwells)} dwells, " if plan.dwells else "")
 
@@ -205,5 +205,5 @@ def _motion(step: Step) -> tuple[str, str, str]:
 
 
 def _names(q_rad: Joints) -> Sequence[str]:
-    """Return the names of joints: an arm's, or numbers for other turners."""
+    """Return the names of joints: those of an arm, else numbers."""
     return JOINT_NAMES if len(q_rad) == len(JOINT_NAMES) else [f"joint {i + 1}" for i in range(len(q_rad))]

@@ -26,7 +26,7 @@ ALL_OF_IT = "the same command with --all"
 
 
 def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = False, folder: Path | None = None) -> None:
-    """Print a result that is not stored: as JSON for machines, else as its ending or, if `whole`, as all tables.
+    """Print a result that is not stored: as JSON for machines; for people its ending or, if `whole`, all tables.
 
     `folder` is the folder of its run, for remedies.
     """
@@ -41,7 +41,7 @@ def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = Fals
 
 
 def print_kept(folder: Path, document: ResultDocument, since: Sequence[str] = (), *, as_json: bool = False) -> None:
-    """Print the end of the finished run in `folder`; `since` compares it with the last calibrations."""
+    """Print the end of the finished run in `folder`. `since` is the comparison with the last calibrations."""
     if as_json:
         print(document.text())
         for line in since:  # the JSON does not contain it
@@ -73,7 +73,7 @@ def print_result(result: ResultDocument, console: Console) -> None:
 
 
 def print_values(result: ResultDocument, console: Console, sensor: str | None = None) -> None:
-    """Print values, budgets and further results, of one sensor alone if one is named."""
+    """Print values, budgets and further results, of all sensors or of one."""
     for kind in kinds():
         for finding in kind.find(result):
             if sensor not in (None, finding.sensor):
@@ -93,14 +93,14 @@ def print_values(result: ResultDocument, console: Console, sensor: str | None = 
 
 
 def _term_line(term: Term) -> str:
-    """Return a characteristic in a line: each of its numbers ± U."""
+    """Return a characteristic in one line, each number ± U."""
     unit = "" if term.units.shown.name == "1" else f" {term.units.shown.name}"
     numbers = "  ".join(f"{label} {plus_minus(value, u)}".lstrip() for label, value, u in term.printed)
     return f"{term.name}: {numbers}{unit} (U, {factor_words(term.numbers.dof)})"
 
 
 def print_checks(result: ResultDocument, console: Console, sensor: str | None = None) -> None:
-    """Print the checks sensor by sensor, failed checks first; only one sensor's if it is named."""
+    """Print the checks sensor by sensor, failed checks first, of all sensors or of one."""
     by_sensor: dict[str | None, list[CheckEntry]] = {}
     for check in result.checks:
         by_sensor.setdefault(check.means.sensor, []).append(check)
@@ -128,5 +128,5 @@ def _checks(sensor: str | None, checks: Sequence[CheckEntry]) -> Table:
 
 
 def _number(value: float, limit: float | None) -> str:
-    """Return the printed value; values below the digits of the limit are rounding errors and read 0."""
+    """Return the printed value. One smaller than the limit's last digit is rounding error and reads 0."""
     return "0" if limit is not None and abs(value) < ROUNDING * limit else f"{value:.4g}"

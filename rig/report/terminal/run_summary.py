@@ -41,10 +41,10 @@ def ending(
     since: Sequence[str],
     width: int,
 ) -> Iterator[str]:
-    """Yield the lines of the end of a run, the verdict last, at most `width` long except paths and commands.
+    """Yield the lines at the end of a run, the verdict last, at most `width` long except paths and commands.
 
-    `since` compares with the last calibrations; `folder` is the run's, if there is one, for remedies; `everything` is
-    the command that prints all details.
+    `since` is the comparison with the last calibrations; `folder` is the run's, if there is one, for remedies;
+    `everything` is the command that prints all details.
     """
     items = [*_items(result)]
     summary = "; ".join([*_describe_values(items), _count_passed(result)])
@@ -108,7 +108,7 @@ def _one(item: _SensorValues, width: int) -> Iterator[str]:
 
 
 def _several(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
-    """Yield many sensors' values, kind by kind, one line each, or two on a narrow screen."""
+    """Yield the values of many sensors, kind by kind, in one line each, or two on a narrow screen."""
     table = _tabulate(items)
     if not table:
         return
@@ -129,7 +129,7 @@ def _several(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
 
 
 def _tabulate(items: Sequence[_SensorValues]) -> list[tuple[str, Sequence[str]]]:
-    """Return the label and the cells of each line: the heading of a kind's values, then its sensors."""
+    """Return the label and cells of each line: a heading for each kind, then its sensors."""
     blocks: dict[str, list[tuple[str, AxisValues]]] = {}
     for item in items:
         heading = _heading(item)
@@ -178,7 +178,7 @@ def _count_passed(result: ResultDocument) -> str:
 
 
 def _explain_failures(result: ResultDocument, folder: Path | None) -> list[tuple[str, str]]:
-    """Return failed checks with their meaning and remedy: causes first, then those farthest beyond their limits.
+    """Return failed checks with their meaning and remedy: causes first, then the largest excess over the limit.
 
     Checks without a value come last: most have none because another check failed.
     """
@@ -192,7 +192,7 @@ def _explain_failures(result: ResultDocument, folder: Path | None) -> list[tuple
 
 
 def _first(broken: Sequence[tuple[str, str]], count: int) -> Iterator[str]:
-    """Yield the first `count` failures; the last line states the number of further failures."""
+    """Yield the first `count` failures; a last line states how many more there are."""
     more = len(broken[count:])
     for number, (measured, words) in enumerate(broken[:count], 1):
         yield measured + (f" ({more} more failed)" if more and number == count else "") + words
@@ -215,7 +215,7 @@ def _value_and_limit(check: CheckEntry) -> str:
 
 
 def _over(check: CheckEntry) -> float:
-    """Return the value over its limit; infinite if one is missing."""
+    """Return the value divided by its limit; infinite if either is missing."""
     if check.value is None or check.limit is None:
         return float("inf")
     if check.value == 0:

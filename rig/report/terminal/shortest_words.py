@@ -45,7 +45,7 @@ ASSUMED = (
 
 
 def changed_keys(before: ProcedureSection, after: ProcedureSection) -> dict[str, Any]:
-    """Return the changed keys of the procedure with their new values; known sets of attitudes by name."""
+    """Return the changed keys of the procedure with their new values; standard sets of attitudes by name."""
     old, new = _values(before), _values(after)
     return {key: value for key, value in new.items() if old.get(key) != value}
 
@@ -166,7 +166,7 @@ def _limits(title: str, budgets: Budgets) -> Table:
 
 
 def _main_contributors(budgets: Budgets) -> dict[str, list[tuple[str, float, float]]]:
-    """Return the main contributors of each sensor: fractions of the variance of its worst scale factor and bias."""
+    """Return the main contributors of each sensor: their fractions of the worst scale factor's and bias's variance."""
     lines_by_sensor = {}
     kinds = {**budgets.rates, **{f"{name}, acceleration": budget for name, budget in budgets.accelerations.items()}}
     for name, budget in kinds.items():
@@ -185,7 +185,7 @@ def _fraction(part: float, whole: float) -> float:
 
 
 def _floor(shortest: Shortest) -> str:
-    """Return a sentence on the lowest uncertainties that this kind of run can reach, with their contributors."""
+    """Return a sentence on the smallest uncertainties that this kind of run can reach, with their contributors."""
     parts = []
     for index, (size, (unit, what)) in enumerate(SHOWN.items()):
         least = shortest.least(size)

@@ -10,7 +10,7 @@ from rig.station.plain_text import plain
 
 
 def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterator[Table]:
-    """Yield a table for each row of the result that has a truth, of all sensors or one."""
+    """Yield a table for each row of the result whose truth is known, of all sensors or one."""
     for row in rows:
         if sensor not in (None, row.row.sensor):
             continue
@@ -28,7 +28,7 @@ def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterato
 
 
 def _cells(values: TrueValues) -> Iterator[list[str]]:
-    """Yield three columns: the results, their truths to the same decimals, and the deviations."""
+    """Yield three columns: the results, their true values to the same decimals, and the deviations."""
     numbers = values.result
     yield [in_print(value, u)[0] for value, u in zip(numbers.values, numbers.expanded, strict=True)]
     yield values.truth_texts

@@ -9,7 +9,7 @@ STROKE = 1
 
 
 def with_whole_words(table: Table, width: int) -> Table:
-    """Return the table with columns that fit `width` cells of a terminal, but not narrower than their words."""
+    """Return the table with columns that fit `width` cells of a terminal; none is narrower than its words."""
     texts = [[str(column.header), *map(str, column.cells), str(column.footer)] for column in table.columns]
     lines = [max(cell_len(line) for text in column for line in text.split("\n")) for column in texts]
     words = [max((cell_len(word) for text in column for word in _words(text)), default=0) for column in texts]
@@ -26,5 +26,5 @@ def with_whole_words(table: Table, width: int) -> Table:
 
 
 def _words(text: str) -> list[str]:
-    """Return the words between blanks at which a line may break; a number stays with its unit."""
+    """Return the words between which a line may break; a number stays with its unit."""
     return text.replace("\n", " ").split(" ")

@@ -33,7 +33,7 @@ def check_words() -> Mapping[str, CheckWords]:
 
 
 def words_of(check: CheckEntry) -> CheckWords | None:
-    """Return the words of a check of a result; None for checks of installed kinds."""
+    """Return the words of a result's check; None for checks of installed kinds."""
     return check_words().get(check.means.what or "")
 
 
@@ -50,7 +50,7 @@ def words_of_name(name: str) -> CheckWords | None:
 def what_failed(check: CheckEntry, folder: Path | None) -> str | None:
     """Return the meaning of a failed check and its remedy, with run folder and limit key in the commands.
 
-    The advice to raise a limit is left out if no configuration has that limit.
+    If no configuration has that limit, the advice to raise it is left out.
     """
     if (words := words_of(check)) is None:
         return None

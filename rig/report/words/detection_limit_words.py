@@ -29,7 +29,7 @@ def detection_limit_lines(limits: Sequence[DetectionLimitEntry]) -> Iterator[str
 
 
 def list_limits(limits: Sequence[DetectionLimitEntry]) -> str:
-    """Return all faults with the smallest detected size, in one sentence."""
+    """Return a sentence that lists all faults with the smallest size detected."""
     return "; ".join(f"{limit.fault}: {size_words(limit.size, limit.unit)}{_largest_error(limit)}" for limit in limits)
 
 

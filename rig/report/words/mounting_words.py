@@ -14,7 +14,7 @@ ROUNDING = 1e-6  # of its uncertainty: a smaller rotation is the assumed one, no
 
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:
-    """Yield a line for each stage after the first, relative to the first; none if the item stayed mounted."""
+    """Yield a line for each stage after the first, relative to the first; none if the mounting never changed."""
     yield from map(_line, _measured_mounts(result))
 
 

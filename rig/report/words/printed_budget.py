@@ -129,7 +129,7 @@ def _line(line: ContributorEntry, indices: tuple[int, int], sizes: Sequence[_Siz
 
 
 def _explain_missing_dof(line: ContributorEntry) -> str:
-    """Return the words in place of missing degrees of freedom: infinite, included in u, or unknown."""
+    """Return the words for degrees of freedom without a number: infinite, included in u, or unknown."""
     if line.kind == "B":
         return "∞"
     return "in u" if line.source.endswith(IN_U) else "–"

@@ -27,9 +27,9 @@ class Rounded:
 
 
 def rounded(value: float, uncertainty: float) -> Rounded:
-    """Return U to two significant digits, the value to the same decimal.
+    """Return U to two significant digits, and the value to the same decimal.
 
-    Halves are rounded up: so U never falls by more than 4.8 %, and EA-4/02 requires rounding up only from 5 %. Raise
+    Halves are rounded up, so U never falls by more than 4.8 %; EA-4/02 requires rounding up only from 5 %. Raise
     ValueError if the value is not finite or the uncertainty is not a positive number.
     """
     exact, wide = Decimal(repr(value)), Decimal(repr(uncertainty))
@@ -47,7 +47,7 @@ def format_signed(value: float, decimals: int) -> str:
 
 
 def in_print(value: float, uncertainty: float) -> tuple[str, str]:
-    """Return the texts of a value and its U; six digits and a dash if U is not a positive number."""
+    """Return the texts of a value and its U; without a positive U, six digits and a dash."""
     try:
         printed = rounded(float(value), float(uncertainty))
     except ValueError:
@@ -56,7 +56,7 @@ def in_print(value: float, uncertainty: float) -> tuple[str, str]:
 
 
 def plus_minus(value: float, uncertainty: float) -> str:
-    """Return a value ± U in print, the value alone if there is no U."""
+    """Return a value ± U in print; the value alone without U."""
     text, width = in_print(value, uncertainty)
     return text if width == NO_U else f"{text} ± {width}"
 
@@ -70,7 +70,7 @@ def small(value: float) -> str:
 
 
 def figures(value: float) -> str:
-    """Return at most three digits, and a power of ten for very large or small values."""
+    """Return a number with at most three digits, and a power of ten if it is very large or small."""
     mantissa, _, exponent = f"{value:.3g}".partition("e")
     return f"{mantissa}\u00a0×\u00a0{power_of_ten(int(exponent))}" if exponent else mantissa
 

@@ -11,17 +11,17 @@ STEP = 4  # every fourth row of the table is shown
 
 
 def shown_rows(entry: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
-    """Return the rows for the ends and the middle of the range, and half-way between."""
+    """Return the rows for the ends, the middle and the quarters of the range."""
     return entry.table[::STEP]
 
 
 def own_contributors(entry: OverTemperatureEntry) -> Sequence[TemperatureContributorEntry]:
-    """Return the contributors of the polynomials, without the contributors of the calibration at the reference."""
+    """Return the contributors of the polynomials, without those of the calibration at the reference temperature."""
     return [line for line in entry.contributors if line.name in (NOISE, ORDER, LAG, HYSTERESIS, GRADIENT)]
 
 
 def about_lines(entry: OverTemperatureEntry, quantity: Quantity) -> Iterator[str]:
-    """Yield the validity of the polynomials, and the effects that their uncertainty does not include."""
+    """Yield the validity of the polynomials, and the effects outside their uncertainty."""
     low, high = entry.range_c
     scale, bias = entry.orders
     yield f"it is valid from {low:.1f} to {high:.1f} °C only; polynomials of order {scale} for k and {bias} for b"

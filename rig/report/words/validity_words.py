@@ -43,7 +43,7 @@ def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
 
 
 def label_source(use: str) -> str:
-    """Return the source of a temperature as the label for its `warmth`."""
+    """Return the label for `warmth` that names a temperature's source."""
     return use if use.endswith(AS_STATED) else f"{use}, by its own thermometer"
 
 
@@ -53,7 +53,7 @@ def speed_words(sensor: GyroscopeEntry) -> str:
 
 
 def load_words(sensor: GyroscopeEntry) -> str | None:
-    """Return the rates about a gyroscope's own axes, °/s; None if they equal the speeds of the sweeps."""
+    """Return the rates about a gyroscope's own axes, °/s; None if they equal those of the sweeps."""
     loads, speeds = sensor.axis_rate_ranges_rad_s, sensor.speeds_rad_s
     if loads is None or not speeds:
         return None

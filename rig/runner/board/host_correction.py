@@ -26,7 +26,7 @@ class HostCorrected:
 
     @property
     def sensors(self) -> dict[str, RecordedSensor]:
-        """The sensors of `SampleSource` with corrected rates in the same counts, and without accelerations."""
+        """The sensors of `SampleSource`, with corrected rates in the same counts, and no accelerations."""
         return {
             name: describe_corrected(sensor, self.calibrations[name], sensor.channel(RATE).unit_per_count)
             if name in self.calibrations
@@ -44,7 +44,7 @@ class HostCorrected:
 
 
 def correct_rates(name: str, raw: RecordedSensor, calibration: Calibration, on_samples: OnSamples) -> OnSamples:
-    """Return a receiver that passes on M (m + b) for each rate m of the sensor `name`, other samples unchanged."""
+    """Return a receiver that passes on M (m + b) for each rate m of the sensor `name`, and other samples unchanged."""
     per_count = raw.channel(RATE).unit_per_count
     described = describe_corrected(raw, calibration, per_count)
     matrix, bias = np.array(calibration.matrix), np.array(calibration.bias_rad_s) / per_count

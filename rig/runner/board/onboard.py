@@ -49,7 +49,7 @@ class BoardCalibration:
     _observed: dict[str, int] = field(default_factory=dict)
 
     def recall(self, earlier: Sequence[RunData], done: Collection[int]) -> None:
-        """Send the board its observations of the sweeps `done` before the run was interrupted."""
+        """Send the board its observations of the sweeps `done` before an interruption."""
         for name, (index, _) in self.sensors.items():
             for sweep, observed in find_board_averages(earlier, name, done).items():
                 self.board.recall(index, self._count(name), observed.observation.mean_rad_s, observed.speed_rad_s)
@@ -57,21 +57,21 @@ class BoardCalibration:
                 self.note(BoardRecalled(name, sweep))
 
     def begin(self) -> None:
-        """Make the host keep data from before the first sample, for the time base of the first sweep."""
+        """Make the host keep data even before the first sample, for the time base of the first sweep."""
         self.acquisition.keep()
 
     def keep(self, sweep: Sweep) -> None:
-        """Make board and host keep their readings, from just before a sweep."""
+        """Make board and host keep their readings, beginning just before a sweep."""
         self.acquisition.keep()
         self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEP_LONGER_S)
 
     def revolutions(self, sweep: Sweep) -> Attempts[str, Revolution]:
-        """Return each sensor's window of the revolution that has just ended; this may take seconds."""
+        """Return each sensor's window of the revolution just finished; this may take seconds."""
         return attempt_each({name: partial(self._revolution, name, sweep) for name in self.sensors})
 
     @contextmanager
     def look_in_background(self, sweep: Sweep) -> Iterator["Future[Attempts[str, Revolution]]"]:
-        """Compute the windows of the revolution in a thread; yields their future."""
+        """Compute the windows of the revolution in a thread; yield their future."""
         pool = ThreadPoolExecutor(max_workers=1)
         try:
             yield pool.submit(self.revolutions, sweep)
@@ -79,7 +79,7 @@ class BoardCalibration:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def observe(self, sweep: Sweep, revolutions: Attempts[str, Revolution]) -> None:
-        """Make the board average the revolutions. Note one that it cannot use, and leave it out."""
+        """Make the board average the revolutions; record and omit one that it cannot use."""
         for name, fault in revolutions.faults.items():
             self.note(BoardNotObserved(name, sweep.index, str(fault)))
         for name, revolution in revolutions.results.items():
@@ -94,7 +94,7 @@ class BoardCalibration:
             self.note(BoardObserved(name, sweep.index, speed_rad_s, observation))
 
     def solve(self) -> None:
-        """Note the board's solution by each method, after the last sweep."""
+        """Record the board's solution by each method, after the last sweep."""
         for name, (index, _) in self.sensors.items():
             for method in METHODS:
                 self.note(BoardSolved(name, self.board.solve(index, method)))

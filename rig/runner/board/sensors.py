@@ -48,7 +48,7 @@ class BoardSource:
         return {name: sensor.stored for name, sensor in self.set_up.items() if sensor.stored is not None}
 
     def start(self) -> None:
-        """Start the board's samples; stored calibrations correct them (see `SampleSource`)."""
+        """Start the board's samples, which stored calibrations correct (see `SampleSource`)."""
         self.board.start([self.set_up[name].index for name in self.stored])
 
     def check(self, clock_s: float | None = None) -> None:
@@ -58,9 +58,10 @@ class BoardSource:
 
 @contextmanager
 def open_board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
-    """Connect the board and set its sensors up for the `with` block.
+    """Connect the board and set its sensors up for the block.
 
-    Raise BoardError as `Board`, Refused as `require_board_section`, `refuse_other_firmware` and `set_up_sensors`.
+    Raise BoardError as `Board` does, Refused as `require_board_section`, `refuse_other_firmware` and `set_up_sensors`
+    do.
     """
     section = require_board_section(config)
     names: dict[int, str] = {}
@@ -78,7 +79,7 @@ def open_board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrate
 def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
     """Set up every configured sensor on the board; those to calibrate stream corrected readings if `calibrated`.
 
-    Return them by name. Raise Refused as `find_sensor` and `read_stored_calibration`.
+    Return them by name. Raise Refused as `find_sensor` and `read_stored_calibration` do.
     """
     gyroscopes = {
         name: _set_up_corrected(board, name, section)

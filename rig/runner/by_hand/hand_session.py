@@ -102,9 +102,10 @@ class HandSession:
                 self._accepted, self._lay = [], []
 
     def carry_out(self, check: Callable[[], None]) -> None:
-        """Ask for the moves of the list until all are made or U reaches the target. Call `check` many times a second.
+        """Request the moves of the list until all are made or U reaches the target.
 
-        Raise Fault for an error that no move can correct, and for ten errors in a row.
+        `check` is called many times a second. Raise Fault for an error that no move can correct, and for ten errors in
+        a row.
         """
         heard = self.acquisition.hear()
         self._ask(next_instruction(self._open, None))
@@ -162,7 +163,7 @@ class HandSession:
         self._ask(self._next(now, face), wrong)
 
     def _pauses_before(self, rest: HandRest) -> None:
-        """Refuse rests too short to be judged, which are pauses in the hand."""
+        """Refuse rests too short to be judged; they are pauses of a move."""
         for pause in self._segmenter.handled.rests:
             if self._judged_s < pause.start_s and pause.end_s < rest.start_s:
                 event = HandRestRefused(*self._board_us(pause), "held_not_laid_down")
@@ -184,7 +185,7 @@ class HandSession:
         return Fault("turn_not_closed", what, "Lay it back against the rule, and turn again")
 
     def _next(self, now: SessionProgress, face: Face | None) -> Instruction | None:
-        """Return the next instruction; None if the session has enough."""
+        """Return the next instruction; None once the session has enough moves."""
         wanted = self.settings.wanted_scale_u
         enough = wanted is not None and now.solution is not None and float(max(now.expanded_scale)) <= wanted
         return None if enough else next_instruction(self._open, face)
@@ -200,10 +201,10 @@ class HandSession:
         self.note(HandMoveTaken(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
     def _wrong(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
-        """Omit a faulty move, a rest, or all before; return whether the rest counts.
+        """Omit a faulty move, a rest, or everything before; return whether the rest counts.
 
-        A changed bias at one rest may be a creep, so that rest is omitted; at the next rest too it is a new bias. Raise
-        the Fault that no move can correct.
+        A changed bias at one rest may be a creep, so that rest is omitted. At the next rest too, it is a new bias.
+        Raise the Fault that no move can correct.
         """
         self._refused += 1
         if wrong.name not in MENDED_BY_HAND:
@@ -228,7 +229,7 @@ class HandSession:
         return not no_rest
 
     def _remind(self) -> None:
-        """Remind the operator to lay the item down if it is held in the hand."""
+        """Remind the operator to lay the item down if it is held in a hand."""
         live = self._segmenter.live
         in_hand = live.state == "held" and live.time_s - live.since_s >= HELD_S
         if in_hand and not self._reminded and self._request is not None:
@@ -246,11 +247,11 @@ class HandSession:
             self.note(self._request)
 
     def _face(self, of_sensor: str) -> Face:
-        """Return the face of the item that has the sensor's axis `of_sensor` upwards."""
+        """Return the face of the item that is up when the sensor's axis `of_sensor` is."""
         return rotate_face(of_sensor, np.array(self.sensor.mounting).T)
 
     def _board_us(self, part: HandRest | Move) -> tuple[int, int]:
-        """Return the start and the end of a rest or a move by the board's clock, µs."""
+        """Return the start and end of a rest or a move by the board's clock, µs."""
         shift_s, microsecond_s = self._shift_s or 0.0, microsecond_of(self.sensor)
         return round((part.start_s - shift_s) / microsecond_s), round((part.end_s - shift_s) / microsecond_s)
 

@@ -66,7 +66,7 @@ class FollowedSession:
     def take(self, report: HandReport) -> None:
         """Process the board's report and announce its changes.
 
-        If the board's button has begun a new session, begin a new session as well.
+        If the board's button has begun a new session, begin a new one here too.
         """
         wrong = None
         if self.reports and report.judged < self.reports[-1].judged:
@@ -101,7 +101,7 @@ class FollowedSession:
         self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
 
     def _ask(self, wrong: Fault | None) -> None:
-        """Ask for the next move of the list, which restarts until the board has enough."""
+        """Request the next move of the list, which begins again until the board has enough."""
         flips = self.moves
         while (remaining := still_open(WantedMoves(flips, 0), self._accepted, self._lay)).done:
             flips += len(ROUND)
@@ -119,11 +119,11 @@ class FollowedSession:
 def calibrate_by_board(
     config: RigConfig, name: str, moves: int, scale_std: float, tell: Callable[[OfTheHand], None]
 ) -> Iterator[tuple[Board, CalibratedByBoard]]:
-    """Calibrate one sensor by its board, which stays connected in the `with` block.
+    """Calibrate one sensor by its board, which stays connected in the block.
 
-    It ends after `moves` at least, when the standard uncertainty of the scale is at most `scale_std`. Raise Refused
-    `clock_unknown`, `first_face_not_told`, and as `open_board_source`; Fault `board_unverified`, `board_disagrees`, the
-    error of ten refused moves in a row, and the board's own.
+    The session ends after at least `moves`, when the standard uncertainty of the scale is at most `scale_std`. Raise
+    Refused `clock_unknown`, `first_face_not_told`, and as `open_board_source` does; Fault `board_unverified`,
+    `board_disagrees`, the error of ten refused moves in a row, and the board's own.
     """
     arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
     with ExitStack() as stack:
@@ -146,7 +146,7 @@ def calibrate_by_board(
 
 
 def read_kept_solution(board: Board) -> CalibratedByBoard:
-    """Return the board's solution of the last session by hand, begun by its button or a host; its readings are gone.
+    """Return the board's solution of the last session by hand, begun by button or host, without its readings.
 
     Raise Refused `no_answer_by_hand`, BoardError as `Board.hand_report` does.
     """
@@ -182,7 +182,7 @@ def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
 
 
 def _follow(source: BoardSource, session: FollowedSession) -> None:
-    """Follow the session to its end. Raise Fault for the error of the last of ten refused moves."""
+    """Follow the session to its end. Raise Fault, for ten refused moves in a row that of the last."""
     while True:
         report = source.board.hand_report()
         session.take(report)

@@ -113,10 +113,7 @@ class MavlinkSource:
     def __init__(
         self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
     ) -> None:
-        """Connect and set up.
-
-        Raise the SensorErrors of link and `refusals`, autopilot_rate, _other_uid, _several_imus.
-        """
+        """Connect and set up. Raise as link and `refusals`, autopilot_rate, _other_uid, _several_imus."""
         self._on_samples = on_samples
         self._imus: dict[str, _ImuStream] = {
             mavlink_section(section).imu: _ImuStream(name, section) for name, section in sections.items()

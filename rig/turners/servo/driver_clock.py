@@ -19,10 +19,7 @@ class Clock(Protocol):
         """Wait for an event; return whether it came in time."""
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done` is true; it is evaluated at each notification of `changed`, a locked condition.
-
-        Return its value.
-        """
+        """Wait until `done` is true, evaluated whenever the locked condition `changed` notifies; return its value."""
 
 
 class HostClock:

@@ -46,10 +46,7 @@ def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
 
 
 def _ping(bus: Bus, port: str, servo_id: int) -> None:
-    """Raise Refused unless one servo answers pings.
-
-    One wrong answer in four is accepted, because it may be a late one.
-    """
+    """Raise Refused unless one servo answers pings; one wrong answer in four may be a late one and is accepted."""
     answers = odd = 0
     for _ in range(PINGS):
         try:

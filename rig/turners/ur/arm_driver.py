@@ -187,10 +187,7 @@ class Arm:
             deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
 
             def is_late() -> bool:
-                """Return whether the move lasts too long by the controller's clock.
-
-                The report of its arrival takes time.
-                """
+                """Return whether the move lasts too long by the controller's clock, with time for the report."""
                 has_arrived = self._stands_at(motion) and time.monotonic() < reported_s
                 return self.latest.time_s > deadline_s and not has_arrived
 

@@ -154,7 +154,7 @@ class SimulatedAutopilot:
         self._send(message)
 
     def _read_barometer(self, celsius: float) -> tuple[float, int]:
-        """Return temperature, °C, and the flags of new fields. ArduPilot's is always new, PX4's after a reading."""
+        """Return temperature, °C, and the flags of new fields: always with ArduPilot, after a reading with PX4."""
         if not self._provides_temperature:
             return 0.0, UPDATED
         own_s = self._steps / RATE_HZ
@@ -198,7 +198,7 @@ class SimulatedAutopilot:
                 self._send(self._mavlink.MAVLink_command_ack_message(message.command, result))
 
     def _send_parameter(self, name: str) -> None:
-        """Send a parameter. Both firmwares ignore requests for one that they do not have."""
+        """Send a parameter. Both firmwares ignore requests for an unknown one."""
         if name not in self.parameters:
             return
         names = self.parameters.names

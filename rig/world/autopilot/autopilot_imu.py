@@ -22,7 +22,7 @@ Vector = NDArray[np.float64]
 
 
 class LowPass:
-    """ArduPilot's LowPassFilter2p: a second-order Butterworth filter; none at cut-off zero."""
+    """ArduPilot's LowPassFilter2p: a second-order Butterworth filter; no filter if its cut-off is zero."""
 
     def __init__(self) -> None:
         self._cutoff_hz = -1.0

@@ -18,9 +18,9 @@ from rig.world.instruments import FieldOf, MotionOf
 
 @dataclass(slots=True)
 class AutopilotMount:
-    """The place of one autopilot, with the state that it keeps without power.
+    """The socket of one autopilot, with the state that it keeps without power.
 
-    `imus`: sensor names by IMU number. A number in between without a sensor has an IMU with the first one's motion.
+    `imus`: sensor names by IMU number. An IMU without a sensor, between others, has the first one's motion.
     """
 
     kind: ClassVar[str] = "autopilot"

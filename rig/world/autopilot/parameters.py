@@ -94,7 +94,7 @@ class Parameters:
         return list(self._values)
 
     def field(self, name: str) -> bytes:
-        """Return the value's four bytes in a message: PX4 copies integers, ArduPilot casts them."""
+        """Return the four bytes of a value in a message: PX4 copies integers, ArduPilot converts them to floats."""
         if self.types[name] != FLOAT and self._firmware == "px4":
             return struct.pack("<i", int(self._values[name]))
         return struct.pack("<f", self._values[name])

@@ -55,7 +55,7 @@ class HeatedBody:
         return self._parts.setdefault(name, HeatedPart(self._section))
 
     def advance(self, time_s: float, duty: float, *, powered: bool) -> None:
-        """Simulate until `time_s` with the heater's pin up for the fraction `duty` of the time."""
+        """Simulate until `time_s`, with the heater's pin on for the fraction `duty` of the time."""
         section, dt_s = self._section, time_s - self._time_s
         if dt_s <= 0:
             return
@@ -77,5 +77,5 @@ class HeatedBody:
 
 
 def _settle(dt_s: float, time_constant_s: float) -> float:
-    """Return the fraction of a step that a first-order lag has covered after `dt_s`."""
+    """Return the fraction of a step that a first-order lag has completed after `dt_s`."""
     return -expm1(-dt_s / time_constant_s)

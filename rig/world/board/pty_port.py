@@ -32,7 +32,7 @@ class PtyPort:
             self._line.send_to_device(os.read(self._master, 4096), self._baud())
 
     def tick(self) -> None:
-        """Write the device's bytes. Bytes that the user does not read in time are lost, as on a real port."""
+        """Write the device's bytes. Bytes that are not read in time are lost, as on a real port."""
         if self._line.fresh and (data := self._line.read_as_host(self._baud())):
             with suppress(BlockingIOError):
                 os.write(self._master, data)

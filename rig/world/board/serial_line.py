@@ -9,7 +9,7 @@ TOLERANCE = 0.03  # relative error of the baud rate at which a receiver still re
 
 
 def misread(data: bytes, sent_baud: float, read_baud: float) -> bytes:
-    """Return the bytes that a receiver at `read_baud` reads of `data` sent back to back at `sent_baud` (8N1)."""
+    """Return the bytes that a receiver at `read_baud` makes of `data` sent back to back at `sent_baud` (8N1)."""
     if abs(sent_baud / read_baud - 1.0) < TOLERANCE:
         return data
     line = [bit for byte in data for bit in (0, *(byte >> i & 1 for i in range(8)), 1)]
@@ -62,7 +62,7 @@ class SerialLine:
 
     @property
     def baud(self) -> float | None:
-        """The device's baud rate; None while its USART is off or it has no power."""
+        """The device's baud rate; None while its USART is off or the device has no power."""
         device = self._device()
         return device.baud_rate if device is not None else None
 

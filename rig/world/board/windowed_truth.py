@@ -54,7 +54,7 @@ class SimulatedTruth:
         return mean
 
     def depends_on_speed(self, name: str) -> bool:
-        """Return whether a gyroscope's scale factors between plus and minus a speed depend on the speed."""
+        """Return whether a gyroscope's scale factors between plus and minus a speed depend on that speed."""
         return self._world.sensors[name].nonlinearity_odd_per_rad_s != 0
 
     def _rates(self, name: str, windows_s: Windows, rate_rad_s: float) -> np.ndarray:
@@ -119,6 +119,6 @@ def truth_document(truth: SimulatedTruth, windows: Mapping[str, Any], now_s: flo
 
 
 def _instants(windows_s: Windows) -> np.ndarray:
-    """Return the instants (n,) of a mean over the windows, in order."""
+    """Return the instants (n,), in order, at which a mean over the windows is computed."""
     step_s = max(STEP_S, sum(end_s - start_s for start_s, end_s in windows_s) / MOST_INSTANTS)
     return np.concatenate([np.arange(start_s, end_s, step_s) for start_s, end_s in sorted(windows_s)])

@@ -94,7 +94,7 @@ class SimulatedKvh1775:
         return float(self._memory["BAUD"])
 
     def misbehave(self, *, lose: int = 0, status: int | None = None, test: int | None = None) -> None:
-        """Set the given faults; `lose` adds to the messages still to be lost."""
+        """Set the given faults; `lose` is added to the number of messages still to be lost."""
         faults = self.faults
         faults.lose += int(lose)
         faults.status = faults.status if status is None else int(status)
@@ -140,7 +140,7 @@ class SimulatedKvh1775:
         self._sum = [0.0] * 6
 
     def _integrate(self, at_s: float) -> None:
-        """Take the rate at `at_s`, or add to the delta angle by the trapezoidal rule."""
+        """Store the rate at `at_s`, or add to the delta angle by the trapezoidal rule."""
         now = self._motion_at(at_s - self._truth.gyro.delay_s)
         before = self._before or now
         if now is before:  # the mean of two equal numbers is exact
@@ -182,7 +182,7 @@ class SimulatedKvh1775:
         self._tests_due.clear()
 
     def _field_gauss(self, at_s: float) -> NDArray[np.float64]:
-        """Return a new reading of the field, (3,) gauss. Format C sends one axis per message; the others send none."""
+        """Return a new reading of the field, (3,) gauss. Format C sends one of its axes in each message."""
         if self._memory["OUTPUTFMT"] != "C":
             return np.zeros(3)
         field: NDArray[np.float64] = self._memory.axes @ np.array(self._magnetometer.read(at_s)) / GAUSS_T
@@ -216,5 +216,5 @@ class SimulatedKvh1775:
 
 
 def _derive_seed(seed: np.random.SeedSequence) -> np.random.SeedSequence:
-    """Return a seed for the magnetometer's noise that leaves the noise of the other triads unchanged."""
+    """Return a seed for the magnetometer's noise that does not change the noise of the other triads."""
     return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 1775))

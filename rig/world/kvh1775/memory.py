@@ -55,7 +55,7 @@ class KvhMemory:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """Matrix (3, 3) that multiplies rates and accelerations: any matrix, not only a rotation."""
+        """Matrix (3, 3) that multiplies rates and accelerations. It need not be a rotation."""
         return _matrix(self["AXES"])
 
     def obey(self, command: str) -> str:

@@ -17,7 +17,7 @@ from rig.world.kvh1775.memory import KvhMemory
 
 @dataclass(slots=True)
 class KvhMount:
-    """The place of one instrument, with the memory that it keeps without power."""
+    """The socket of one instrument, with the memory that it keeps without power."""
 
     kind: ClassVar[str] = "kvh"
     bit_error_rate: ClassVar[float] = 0.0
@@ -64,7 +64,7 @@ class KvhMount:
 
 
 def build_kvh_mounts(config: RigConfig, world: WorldSection) -> dict[str, KvhMount]:
-    """Return the instruments by sensor name. Raise `Refused` `kvh_settings` for a setting that they do not have."""
+    """Return the instruments by sensor name. Raise `Refused` `kvh_settings` for an unknown setting."""
     mounts = {}
     for name in sorted(name for name, sensor in config.sensors.items() if sensor.part == "kvh1775"):
         try:

@@ -83,7 +83,7 @@ class Printer:
         self._line = b""
 
     def misbehave(self, *, lose: int = 0, stuck: bool | None = None) -> None:
-        """Set the given faults; `lose` adds to the samples still to be lost."""
+        """Set the given faults; `lose` is added to the number of samples still to be lost."""
         self.faults.lose += int(lose)
         self.faults.stuck = self.faults.stuck if stuck is None else bool(stuck)
 

@@ -47,7 +47,7 @@ class SimulatedBus:
     def advance(self) -> None:
         """Simulate every servo until now.
 
-        If this process was stalled, the host's bytes of that time have not been read yet: no watchdog counts it.
+        If this process was suspended, no watchdog counts that time, because the host's bytes have not been read yet.
         """
         now_s = self._now()
         stalled_s, self._advanced_s = now_s - self._advanced_s, now_s
@@ -57,7 +57,7 @@ class SimulatedBus:
             servo.advance(now_s)
 
     def due_s(self) -> float:
-        """Return the time at which the host gets its next bytes, s; infinity if none are pending."""
+        """Return the time at which the next bytes reach the host, s; infinity if none are pending."""
         return min((due_s for due_s, _ in self._pending), default=float("inf"))
 
     def take_sent(self) -> bytes:

@@ -166,13 +166,13 @@ class ServoMemory:
                 self[register.name] = register.initial
 
     def read(self, address: int, length: int) -> bytes | int:
-        """Return the bytes, or an error number if a byte belongs to no register."""
+        """Return the bytes; an error number if a byte belongs to no register."""
         if length == 0 or any(a not in self._defined for a in range(address, address + length)):
             return ACCESS_ERROR
         return bytes(self._bytes[address : address + length])
 
     def parse(self, address: int, data: bytes, locked: bool) -> list[Write] | int:
-        """Return the register writes in `data`, or an error number. `locked`: the EEPROM is, because torque is on."""
+        """Return the register writes in `data`, or an error number. With torque on, the EEPROM is `locked`."""
         writes = []
         if not data:
             return LENGTH_ERROR
@@ -191,7 +191,7 @@ class ServoMemory:
 
 
 def find_write_error(memory: ServoMemory, write: Write, senses_current: bool, firmware: int) -> int:
-    """Return the error of a value that fits its register but not the servo's present state; 0 if there is none.
+    """Return the error of a value that the servo's present state does not permit; 0 if it does.
 
     A goal is out of range while the watchdog's error is active (bus_watchdog.md, step 6). After a shutdown only a
     reboot brings torque back (shutdown.md; the manual does not state the error number).

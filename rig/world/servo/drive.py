@@ -57,7 +57,7 @@ class Drive:
         self.forget_turns(time_s)
 
     def forget_turns(self, time_s: float) -> None:
-        """Reduce the count of revolutions to zero, as the servo does."""
+        """Reset the count of revolutions to zero, as the servo does."""
         self._turns_rad = whole_turns(self.shaft.encoder_at(time_s))
 
     def is_moving(self, time_s: float) -> bool:
@@ -92,14 +92,14 @@ class Drive:
         self._memory["Profile Velocity"] = self._memory["Profile Acceleration"] = 0
 
     def _fail(self, bit: int, time_s: float) -> None:
-        """Report an error, and shut down if that is configured (shutdown.md)."""
+        """Report an error, and shut down if this is configured (shutdown.md)."""
         self._memory["Hardware Error Status"] |= bit
         if bit & self._memory["Shutdown"] and self.torque:
             self.torque_off(time_s)
 
     # -- effects of the registers ------------------------------------------------------------------------------------
     def torque_on(self, time_s: float) -> None:
-        """Hold the shaft where it is; in position mode, forget whole revolutions."""
+        """Hold the shaft at its angle; in position mode, reset the count of revolutions."""
         if self._memory["Operating Mode"] == POSITION:
             self.forget_turns(time_s)
         self.torque, self.fed_s, self._strained_s = True, time_s, inf
@@ -107,7 +107,7 @@ class Drive:
         self._memory["Goal Position"] = self._pulses(time_s, noisy=False)
 
     def torque_off(self, time_s: float) -> None:
-        """Release the shaft: its gear holds it, or it falls by half a revolution at most."""
+        """Release the shaft: its gear holds it, or it falls by at most half a revolution."""
         self.torque = False
         self._memory["Torque Enable"] = 0
         fall = radians(self._truth.fall_deg_s)
@@ -116,7 +116,7 @@ class Drive:
         self.shaft.follow(time_s, falls)
 
     def go(self, goal: int, time_s: float) -> None:
-        """Begin a move to `goal` (register units) in the modes that move to goals. The shaft follows with its lag."""
+        """Begin a move to `goal` (register units) in a mode that has goals. The shaft follows with its lag."""
         memory = self._memory
         if not self.torque or memory["Operating Mode"] not in (POSITION, EXTENDED):
             return

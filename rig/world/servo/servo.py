@@ -71,7 +71,7 @@ class SimulatedServo:
         return float(BAUDS[self.memory["Baud Rate"]]) if self._powered else None
 
     def answers_to(self, servo_id: int) -> bool:
-        """Return whether the servo obeys instructions for the ID `servo_id`."""
+        """Return whether the servo executes instructions for the ID `servo_id`."""
         return servo_id in (self.memory["ID"], BROADCAST) or servo_id == self.memory["Secondary ID"] < 253
 
     # -- life ----------------------------------------------------------------------------------------------------
@@ -89,7 +89,7 @@ class SimulatedServo:
             self.drive.advance(time_s)
 
     def extend_watchdog(self, duration_s: float) -> None:
-        """Give the watchdog `duration_s` more, a time in which no client could be heard."""
+        """Extend the watchdog's time by `duration_s`, in which no client could be heard."""
         self.drive.fed_s += duration_s
 
     def is_moving(self, time_s: float) -> bool:
@@ -97,7 +97,7 @@ class SimulatedServo:
         return self.drive.is_moving(time_s)
 
     def obey(self, packet: ServoPacket, time_s: float) -> bytes | None:
-        """Return the answer to a packet on the bus, which may be for another servo; None if there is none."""
+        """Execute a packet on the bus and return the answer; None if it is for another servo or needs none."""
         if not self._powered or time_s < self._awake_s:
             return None
         if packet.is_valid:
@@ -226,5 +226,5 @@ class SimulatedServo:
 
 
 def _parse_address_and_length(data: bytes) -> tuple[int, int]:
-    """Return the address and the length with which the parameters begin."""
+    """Return the address and the length at the beginning of the parameters."""
     return int.from_bytes(data[:2], "little"), int.from_bytes(data[2:4], "little")

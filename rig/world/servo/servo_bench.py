@@ -75,7 +75,7 @@ class ServoBench:
 
     @property
     def waiting(self) -> bool:
-        """Whether only a client can move the servo: never certain, because its watchdog can also move it."""
+        """Whether only a client can move the servo: always False, because its watchdog can also move it."""
         return False
 
     @property

@@ -28,14 +28,14 @@ class Shaft:
 
     # -- driving -------------------------------------------------------------------------------------------------
     def start_at(self, time_s: float) -> ProfileStart:
-        """Return the drive's state at a time, for a profile that begins then."""
+        """Return the drive's state at a time at which a profile begins."""
         segment = self._segments[self._index(time_s)]
         if time_s >= segment.end_s:
             return ProfileStart(time_s, segment.angle_at(segment.end_s), 0.0)
         return ProfileStart(time_s, segment.angle_at(time_s), segment.rate_at(time_s))
 
     def follow(self, time_s: float, segments: Sequence[ProfileSegment]) -> None:
-        """Drive by `segments` from `time_s` on, in place of the planned segments."""
+        """Follow `segments` from `time_s` on, in place of the planned ones."""
         stands = ProfileSegment(time_s, time_s, self.start_at(time_s).angle_rad, 0.0)
         gap = self._gap_at(time_s)
         last = self._index(time_s)
@@ -77,7 +77,7 @@ class Shaft:
         return start.rate_rad_s * (1.0 + self._ripple * cos(self._ripples * out)) / slope
 
     def encoder_at(self, time_s: float) -> float:
-        """Return the encoder's angle without steps and noise, rad; revolutions are counted."""
+        """Return the encoder's angle with counted revolutions, without resolution and noise, rad."""
         out = self.start_at(time_s).angle_rad - self._gap_at(time_s)
         return out + self._ripple / self._ripples * sin(self._ripples * out)
 
@@ -98,5 +98,5 @@ class Shaft:
 
 
 def whole_turns(angle_rad: float) -> float:
-    """Return the whole revolutions in an angle, rad: the part that is lost without supply."""
+    """Return the whole revolutions of an angle, rad, which a loss of power erases."""
     return angle_rad // (2 * pi) * 2 * pi

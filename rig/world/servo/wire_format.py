@@ -31,7 +31,7 @@ _CRC = [_crc_of(byte) for byte in range(256)]
 
 
 def crc16(data: bytes) -> int:
-    """Return the checksum of `data`, all bytes of a packet before it."""
+    """Return the checksum of `data`, all bytes of a packet that precede the checksum."""
     crc = 0
     for byte in data:
         crc = (crc << 8 & 0xFFFF) ^ _CRC[crc >> 8 ^ byte]
@@ -67,7 +67,7 @@ class Receiver:
         self._received_s = 0.0
 
     def receive(self, data: bytes, time_s: float) -> Iterator[ServoPacket]:
-        """Yield the packets that end in `data`, which arrived at `time_s`."""
+        """Yield the packets that are complete with `data`, which arrived at `time_s`."""
         if time_s - self._received_s > GAP_S:
             self._buffer.clear()
         self._received_s = time_s

@@ -14,7 +14,7 @@ class AtProgramStart:
     after_s: float
 
     def is_due(self, ticks_since_start: int) -> bool:
-        """Return whether to act in the tick `ticks_since_start` after a program's start."""
+        """Return whether to act in the tick that is `ticks_since_start` after a program's start."""
         return ticks_since_start == round(self.after_s / TICK_S)
 
 

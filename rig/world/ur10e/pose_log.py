@@ -13,10 +13,10 @@ LEAST_STEP_S = 2 * ROW_S  # rows come in order, and not at once
 
 
 class PoseLog:
-    """The logger, which looks at the arm at a fixed rate, by the world's time."""
+    """The logger, which writes the arm's pose at a fixed rate, by the world's time."""
 
     def __init__(self, section: SimulatedPoseLogSection, seed: int) -> None:
-        """Begin the file. Raise Refused `arm_log_file` if that cannot be written."""
+        """Create the file. Raise Refused `arm_log_file` if it cannot be written."""
         try:
             section.path.write_text(HEADER, encoding="utf-8")
         except OSError as error:
@@ -31,7 +31,7 @@ class PoseLog:
         self._last_s = float("-inf")
 
     def is_due(self, time_s: float) -> bool:
-        """Return whether the logger looks at the arm at the world's time `time_s`."""
+        """Return whether a row is due at the world's time `time_s`."""
         return time_s * self._section.rate_hz >= self._rows
 
     def write(self, time_s: float, pose: Sequence[float]) -> None:

@@ -68,7 +68,7 @@ class RobotIdentity:
 
 
 class Robot:
-    """The controller. Its methods are all that changes it; `step` simulates 2 ms."""
+    """The controller. Only its methods change it; `step` simulates 2 ms."""
 
     def __init__(
         self,
@@ -147,7 +147,7 @@ class Robot:
         return self.time_s + self.faults.clock_step_s
 
     def step(self) -> None:
-        """Simulate one tick: due changes of mode, the program, the joints."""
+        """Simulate one tick: mode changes that are due, the program, the joints."""
         self.tick += 1
         if self._mode_changes and self._mode_changes[0][0] <= self.tick:
             self.robot_mode = self._mode_changes.pop(0)[1]
@@ -199,7 +199,7 @@ class Robot:
             self.stop_program("")
 
     def _settle(self) -> None:
-        """Complete the states that last until the joints have followed."""
+        """Complete the states that last until the joints have followed their targets."""
         if self.runtime_state == RuntimeState.PAUSING and (self.motion.standing or self.motion.fraction == 0.0):
             self.runtime_state = RuntimeState.PAUSED
         elif self.runtime_state == RuntimeState.RESUMING:
@@ -209,7 +209,7 @@ class Robot:
 
     @property
     def is_polyscope_x(self) -> bool:
-        """Whether its software is PolyScope X, which has a Robot API or nothing in place of a dashboard."""
+        """Whether its software is PolyScope X, which has a Robot API, or nothing, instead of a dashboard."""
         return self.identity.polyscope >= POLYSCOPE_X
 
     @property
@@ -230,8 +230,8 @@ class Robot:
     def start_program(self, program: Program) -> None:
         """Play a program in place of the running one.
 
-        While the brakes are on, a program is accepted but stays paused. A program that arrives while another is paused
-        only stops that one (Universal Robots Client Library, issue 123, observed with the maker's simulator).
+        While the brakes are on, it is accepted but stays paused. If a program is paused, a new one only stops it
+        (Universal Robots Client Library, issue 123, observed with the maker's simulator).
         """
         paused = self.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         if self.runtime_state != RuntimeState.STOPPED:
@@ -268,7 +268,7 @@ class Robot:
         return True
 
     def resume(self) -> bool:
-        """Continue after a pause. Return whether that was possible."""
+        """Continue a paused program. Return whether this was possible."""
         if not self.ready or self.runtime_state not in (RuntimeState.PAUSING, RuntimeState.PAUSED):
             return False
         self.motion.fraction_wanted = self._fraction
@@ -286,7 +286,7 @@ class Robot:
         self._mode_changes = [(self.tick + round(POWER_STEP_S * TICKS_PER_SECOND), RobotMode.POWER_OFF)]
 
     def safeguard_stop(self) -> None:
-        """Stop as for a light curtain or a door: the program pauses and the joints stop on their path, powered."""
+        """Stop as at a light curtain or a door: the program pauses, the joints stop on their path, powered."""
         if self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED):
             self.safety_mode = SafetyMode.SAFEGUARD_STOP
             self.pause()
@@ -304,7 +304,7 @@ class Robot:
         return (self.tick - self._stopped_tick) * TICK_S
 
     def unlock_protective_stop(self) -> None:
-        """Begin to unlock a protective stop, which takes its time."""
+        """Begin to unlock a protective stop, which takes some time."""
         if self.safety_mode == SafetyMode.PROTECTIVE_STOP and self._unlocked_tick is None:
             self._unlocked_tick = self.tick + round(UNLOCK_S * TICKS_PER_SECOND)
 
@@ -351,7 +351,7 @@ class Robot:
 
     @property
     def _fraction(self) -> float:
-        """The permitted fraction of the programmed speed, by the slider and by the safety limit."""
+        """The permitted fraction of the programmed speed, due to the slider and the safety limit."""
         return self.speed_slider * self.faults.safety_limit
 
     def _update_scaling(self) -> None:
@@ -359,7 +359,7 @@ class Robot:
             self.motion.fraction_wanted = self._fraction
 
     def lose_operation(self, mode: RobotMode) -> None:
-        """Change to another robot mode, as when the firmware is updated; the program stops."""
+        """Change to another robot mode, as during an update of the firmware; the program stops."""
         self.stop_program(f"robot mode {mode.name}")
         self.motion.stop(BRAKE_RAD_S2)
         self._mode_changes = []
@@ -380,7 +380,7 @@ class Robot:
             raise ProgramError("not simulated: a tool centre point other than that of the installation")
 
     def feed_watchdog(self) -> None:
-        """Feed the watchdog, because an RTDE client wrote an input."""
+        """Reset the watchdog, because an RTDE client wrote an input."""
         self._last_input_tick = self.tick
 
     def set_watchdog(self, minimum_hz: float) -> None:
@@ -389,7 +389,7 @@ class Robot:
 
     # -- the tool's frame --------------------------------------------------------------------------------------------
     def tcp_pose(self, q_rad: Sequence[float]) -> tuple[float, ...]:
-        """Return the tool centre point's pose (m, rotation vector rad) in the base frame, at these joint angles."""
+        """Return the tool centre point's pose (m, rotation vector rad) in the base frame at these joint angles."""
         return self._rotate_tool(flange_pose(q_rad, self.links), 1)
 
     def flange_pose_for(self, tcp_pose: Sequence[float]) -> tuple[float, ...]:
@@ -407,9 +407,9 @@ class Robot:
     # -- outputs of RTDE ---------------------------------------------------------------------------------------------
     @property
     def speed_scaling(self) -> float:
-        """The joints' speed per speed that the slider permits; clients multiply both. It is 0 while no program runs.
+        """The joints' speed relative to that permitted by the slider; clients multiply both.
 
-        In logs of an UR3 of the CB3 series and of a UR10e.
+        It is 0 while no program runs, as in logs of a UR3 of the CB3 series and of a UR10e.
         """
         if self.runtime_state == RuntimeState.STOPPED:
             return 0.0
@@ -428,7 +428,7 @@ class Robot:
 
     @property
     def still_since_s(self) -> float:
-        """The controller's time at which the joints last moved, s; a paused move is at rest."""
+        """The controller's time at which the joints last moved, s; a paused move counts as rest."""
         return self._moved_tick * TICK_S
 
     @property

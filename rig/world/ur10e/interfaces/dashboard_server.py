@@ -195,7 +195,7 @@ class DashboardSession:
         return "Brake releasing"
 
     def _unlock(self) -> str:
-        """Unlock a protective stop, at the earliest after 5 s: the pendant's rule; the primary interface has none."""
+        """Unlock a protective stop, at the earliest after 5 s: a rule of the pendant and the dashboard only."""
         if self._robot.safety_mode == SafetyMode.PROTECTIVE_STOP and self._robot.stopped_for_s < UNLOCK_AFTER_S:
             return TOO_EARLY
         self._robot.unlock_protective_stop()

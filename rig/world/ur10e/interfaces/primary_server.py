@@ -128,12 +128,12 @@ def _cartesian(robot: Robot) -> bytes:
 
 
 def _list_parameters(links: Links) -> list[float]:
-    """Return the Denavit–Hartenberg parameters a, d and alpha of all six links, in the order of both sub-packages."""
+    """Return the Denavit–Hartenberg parameters a, d, alpha of all links, in the order of both sub-packages."""
     return [*(link.a_m for link in links), *(link.d_m for link in links), *(link.alpha_rad for link in links)]
 
 
 def _kinematics(robot: Robot) -> bytes:
-    """Return the arm's own links, including its calibration, and whether they are calibrated."""
+    """Return the arm's own links, including the calibration, and whether they are calibrated."""
     angles = [link.theta_rad for link in robot.links]
     status = CALIBRATED if robot.links != links(drawing=robot.model.drawing) else NOT_CALIBRATED
     return struct.pack(">6I24dI", *[1] * 6, *angles, *_list_parameters(robot.links), status)

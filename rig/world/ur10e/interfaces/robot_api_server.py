@@ -147,7 +147,7 @@ class RobotApiSession:
         pass
 
     def _answer(self, method: str, path: str, body: bytes) -> bytes:
-        """Return the answer to a request; nothing yet if an order is being carried out."""
+        """Return the answer to a request; None while an order is being carried out."""
         version = self._robot.identity.polyscope
         if not path.startswith(BASE):
             return _http(HTTPStatus.NOT_FOUND, {"message": "not found"})
@@ -176,7 +176,7 @@ class RobotApiSession:
             return _http(HTTPStatus.BAD_REQUEST, {"message": str(error)[:200]})
 
     def _obey(self, path: str, body: bytes) -> bytes:
-        """Begin to carry out an order, and return the answer if there is nothing to wait for."""
+        """Begin to carry out an order; return the answer if it takes no time."""
         if self._robot.local_control:
             return _http(HTTPStatus.FORBIDDEN, {"message": "the robot is in local control mode"})
         key, since = LOADING.get(path, ("action", SINCE))
@@ -203,7 +203,7 @@ class RobotApiSession:
 
 
 def _read_word(body: bytes, key: str) -> str | None:
-    """Return the text that a JSON document has under a key, or None."""
+    """Return the text under a key of a JSON document, or None."""
     try:
         word = json.loads(body)[key]
     except (ValueError, TypeError, KeyError, RecursionError):

@@ -50,7 +50,7 @@ class OutputRecipe:
         self._due_fraction = 1.0 - self._per_tick  # the first package goes out with the first tick
 
     def is_due(self) -> bool:
-        """Return whether this tick has a package. To be called once per tick."""
+        """Return whether this tick has a package. Call it once per tick."""
         self._due_fraction += self._per_tick
         if self._due_fraction < 1.0 - 1e-9:
             return False
@@ -85,7 +85,7 @@ class RtdeSession:
 
     @property
     def dialogue(self) -> bool:
-        """Whether the client asks: until its recipes are set up. Then it reads, and writes registers."""
+        """Whether the client asks questions, as until its recipes are set up. Then it reads, and writes registers."""
         return not self._started
 
     def greeting(self) -> bytes:
@@ -207,7 +207,7 @@ class RtdeSession:
         return b""
 
     def _say(self, text: str) -> bytes:
-        """Return an error message to the client, in its version's form."""
+        """Send the client a message in the form of its protocol version."""
         words, error = text.encode(), 1
         if self._version == 1:
             return build_package("M", bytes([error]) + words)
@@ -216,7 +216,7 @@ class RtdeSession:
 
 
 def _size(kinds: list[str]) -> int:
-    """Return the size of the values of these types, or of the list of types if that is longer."""
+    """Return the size of the values of these types, or of the list of types if this is longer."""
     return max(struct.calcsize(">" + "".join(TYPES[kind][0] for kind in kinds if kind in TYPES)), len(",".join(kinds)))
 
 

@@ -31,7 +31,7 @@ class ScriptReader:
         self._size = 0  # bytes of the incomplete program
 
     def feed(self, data: bytes) -> Iterator[list[str]]:
-        """Yield the programs that `data` completes, each as its lines. Raise `ProgramError` if one is too long."""
+        """Yield the programs that are complete with `data`, as lines. Raise `ProgramError` if one is too long."""
         self._size += len(data)
         *lines, self._partial = (self._partial + data).split(b"\n")
         for raw in lines:
@@ -60,7 +60,7 @@ def compile_program(robot: Robot, lines: list[str]) -> Program:
 
 
 def _parse_register_offset(text: str) -> int:
-    """Return the register offset, which ur_rtde writes on the line after its name. Raise `ProgramError` for others."""
+    """Return the register offset on the line after its name. Raise `ProgramError` for other lines."""
     match = re.search(r"reg_offset_int\s*=[^\n]*\n\s*(\d+)", text)
     offset = int(match.group(1)) if match else 0
     if offset not in REGISTER_OFFSETS:
@@ -144,6 +144,6 @@ class ScriptSession:
 
 
 def run_secondary(program: Program) -> None:
-    """Run a secondary program, which takes no time and does not disturb the running program."""
+    """Run a secondary program, which takes no time and does not disturb the main one."""
     if program.step():
         raise ProgramError("a secondary program may not take time")

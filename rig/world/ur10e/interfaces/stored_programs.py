@@ -33,9 +33,9 @@ class StoredPrograms:
         return self._documents[name]
 
     def store(self, form: bytes, *, replace: bool) -> str:
-        """Store the document in a form that a client sends, and return its name.
+        """Store the document that a client sends, and return its name.
 
-        Raise ValueError if there is no document in it, or if it is stored already and is not to be replaced.
+        Raise ValueError if the form contains no document, or if it is stored already and not to be replaced.
         """
         text = form[form.find(b"{") : form.rfind(b"}") + 1].decode()
         try:

@@ -31,7 +31,7 @@ SINCE: dict[str, tuple[int, int]] = {
 
 
 def find_output_type(robot: Robot, name: str) -> str:
-    """Return the RTDE type of an output; "NOT_FOUND" if a controller of this version does not have it."""
+    """Return the RTDE type of an output; "NOT_FOUND" if this version of the controller does not have it."""
     is_known = name in OUTPUTS and robot.identity.polyscope[:2] >= SINCE.get(name, (0, 0))
     return OUTPUTS[name][0] if is_known else "NOT_FOUND"
 
@@ -65,7 +65,7 @@ def _target_load(robot: Robot) -> Load:
 
 
 def _moments(load_of: Callable[[Robot], Load]) -> Get:
-    """Return a getter of the joints' moments, which are zero without power, when the brakes bear the load."""
+    """Return a getter of the joints' moments, which are zero without power because the brakes bear the load."""
     return lambda robot: load_of(robot).moments_nm if robot.robot_mode == RobotMode.RUNNING else ZERO6
 
 
@@ -174,7 +174,7 @@ def _put_bits(first: int) -> Put:
 
 
 def _ignore(robot: Robot, value: Any) -> None:
-    """Ignore an input: a mask, which `apply_masked` uses, or a force, which is not simulated."""
+    """Ignore an input: a mask, which `apply_masked` reads itself, or a force, which is not simulated."""
 
 
 INPUTS: dict[str, tuple[str, Put]] = {

@@ -59,9 +59,9 @@ def solve_inverse_kinematics(pose: Sequence[float], start_rad: Joints, links: Li
 
 
 def solve_joint_speeds(q: Joints, tool_speed: Sequence[float], links: Links = NOMINAL) -> Joints:
-    """Return the joint speeds, rad/s, for a flange twist (m/s, rad/s, base frame), scaled down to the joint limits.
+    """Return the joint speeds, rad/s, for a flange twist (m/s, rad/s, base frame), within the joint limits.
 
-    Raise `ProgramError` if the arm is singular.
+    A faster twist is scaled down. Raise `ProgramError` if the arm is singular.
     """
     try:
         speeds = np.linalg.solve(_jacobian(q, links), np.array(tool_speed))
@@ -72,7 +72,7 @@ def solve_joint_speeds(q: Joints, tool_speed: Sequence[float], links: Links = NO
 
 
 def approach_speed(tool_speed: Sequence[float], target: Sequence[float], step: float) -> Sequence[float]:
-    """Return the tool's speed after a change by `step` (m/s) towards `target`."""
+    """Return the tool's speed, m/s, after a change by at most `step` towards `target`."""
     change = np.array(target) - np.array(tool_speed)
     size = _length(change)
     return target if size <= step else tuple((np.array(tool_speed) + change * (step / size)).tolist())

@@ -37,7 +37,7 @@ class Encoders:
             self._late_s = self.lateness_s()
 
     def read_angles(self, time_s: float, q_rad: Joints, qd_rad_s: Joints) -> Joints:
-        """Return the angles that are reported at the end of the tick at `time_s`, rad."""
+        """Return the angles that the encoders report at the end of the tick at `time_s`, rad."""
         if self._late_s:
             q_rad = tuple(q + v * self._late_s for q, v in zip(q_rad, qd_rad_s, strict=True))
         if self.noise_rad:
@@ -45,7 +45,7 @@ class Encoders:
         return tuple(round(q / self.step_rad) * self.step_rad for q in q_rad) if self.step_rad else q_rad
 
     def read_speeds(self, time_s: float, qd_rad_s: Joints) -> Joints:
-        """Return the speeds that are reported at the end of the tick at `time_s`, rad/s."""
+        """Return the speeds that the encoders report at the end of the tick at `time_s`, rad/s."""
         if not self.speed_noise_rad_s or max(map(abs, qd_rad_s)) < STANDING_RAD_S:
             return qd_rad_s
         return tuple(
@@ -54,7 +54,7 @@ class Encoders:
         )
 
     def _draw(self, time_s: float) -> Sequence[float]:
-        """Return the standard normal numbers of a tick, whoever asked for which ticks before."""
+        """Return the standard normal numbers of a tick, independent of the ticks asked for before."""
         block, index = divmod(round(time_s / TICK_S), TICKS_PER_SECOND)
         if block != self._block[0]:
             rng = np.random.default_rng([self.seed, block])

@@ -48,7 +48,7 @@ class JointDrive:
     def shake(self, joint: int, u: float, v: float, a: float) -> list[Shaken]:
         """Return the ripple of a joint whose smooth angle is `u` (rad), with rate `v` and acceleration `a`.
 
-        It comes with what the joint's neighbours have of it.
+        It includes the neighbours' ripple as far as it reaches this joint.
         """
         sines = cosines = bends = 0.0
         for n, amplitude, phase in self.orders[joint]:
@@ -73,7 +73,7 @@ class JointDrive:
         return shaken
 
     def advance(self, yielding: Sequence[Yielding], change_rad_s: Sequence[float]) -> tuple[Yielding, ...]:
-        """Return what the joints yield in the next tick, in which their targets' rates change by `change_rad_s`.
+        """Return by how much the joints yield in the next tick, if their targets' rates change by `change_rad_s`.
 
         `yielding` is that of the last tick.
         """
@@ -89,7 +89,7 @@ class JointDrive:
         return tuple(joints)
 
     def yield_at(self, yielding: Yielding, elapsed_s: float) -> Derivatives:
-        """Return what a joint yields `elapsed_s` after the begin of the tick, and its derivatives."""
+        """Return by how much a joint yields `elapsed_s` after the tick's begin, and the derivatives."""
         per_s = 1.0 / self.yield_time_s
         decay = exp(-elapsed_s * per_s)
         remainder = (yielding.start_rad + yielding.slope_rad_s * elapsed_s) * decay

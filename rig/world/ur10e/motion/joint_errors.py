@@ -74,9 +74,10 @@ class JointErrors:
         self._rest: tuple[Joints, Joints] = ((), ())  # encoder and true angles at the last rest
 
     def step(self, time_s: float, smooth_qd_rad_s: Joints, q_rad: Callable[[], Joints]) -> None:
-        """Take the joints' smooth speeds at the end of a tick, and their angles, which are only asked for at reversals.
+        """Update the errors with the joints' smooth speeds at the end of a tick, and their angles.
 
-        A joint's own speed changes its sign where the joint settles or is shaken.
+        Angles are requested at reversals only. A joint's own speed changes its sign where the joint settles or is
+        shaken.
         """
         if smooth_qd_rad_s is self._speed:
             return
@@ -101,7 +102,7 @@ class JointErrors:
         )
 
     def true_state(self, time_s: float, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints) -> JointState:
-        """Return true angles, speeds and accelerations, rad, for those of the encoders at a time."""
+        """Return true angles, speeds and accelerations, rad, for the encoders' values at a time."""
         if qd_rad_s is ZERO and q_rad is self._rest[0]:
             angles, speeds, accelerations = list(self._rest[1]), [0.0] * 6, [0.0] * 6
         else:
@@ -135,7 +136,7 @@ class JointErrors:
         return angles, speeds, accelerations
 
     def _true_angle(self, joint: int, e: float) -> tuple[float, float, float]:
-        """Return the true angle at an encoder's angle, rad, and its two derivatives with respect to that."""
+        """Return the true angle at an encoder's angle, rad, and two derivatives by the latter."""
         errors, (once, twice, _) = self._errors, self._phases[joint]
         a, b = errors.encoder_once_rad, errors.encoder_twice_rad
         lag, slope, bend = self._hysteresis(joint, e)
@@ -146,7 +147,7 @@ class JointErrors:
         )
 
     def _hysteresis(self, joint: int, e: float) -> tuple[float, float, float]:
-        """Return the joint's lag, rad, and its two derivatives with respect to the encoder's angle."""
+        """Return the joint's lag, rad, and two derivatives by the encoder's angle."""
         reversal_rad, lag = self._reversal[joint]
         end = 0.5 * self._errors.hysteresis_rad * self._direction[joint]
         excess = (lag - end) * exp(-abs(e - reversal_rad) / REVERSAL_RAD)

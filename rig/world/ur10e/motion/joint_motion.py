@@ -88,7 +88,7 @@ class JointMotion:
     # -- present state -------------------------------------------------------------------------------------------
     @property
     def fraction(self) -> float:
-        """The time scaling in force: 1 at full speed, 0 when paused."""
+        """The time scaling: 1 at full speed, 0 when paused."""
         return self._fraction
 
     @property
@@ -146,14 +146,14 @@ class JointMotion:
 
     @property
     def settled_q_rad(self) -> Joints:
-        """The angles at which the joints are, or will be, when they have followed their targets."""
+        """The angles at which the joints rest once they have followed their targets."""
         target = self.now.target_q_rad
         smooth = [offset + gain * q for offset, gain, q in zip(self._offset, self._gain, target, strict=True)]
         return tuple(ripple.angle(u) for ripple, u in zip(self._ripples, smooth, strict=True))
 
     @property
     def actual(self) -> tuple[Joints, Joints, Joints]:
-        """Angles, speeds and accelerations by encoders without steps and noise."""
+        """Angles, speeds and accelerations by encoders of perfect resolution without noise."""
         return self._vibrating(self.qdd_rad_s2)
 
     def _vibrating(self, qdd_rad_s2: Joints) -> tuple[Joints, Joints, Joints]:
@@ -169,7 +169,7 @@ class JointMotion:
         return (self.now.q_rad, ZERO, ZERO) if self.still else self._follow(time_s)
 
     def _follow(self, time_s: float) -> tuple[Joints, Joints, Joints]:
-        """Return angles, speeds and accelerations of the joints that follow the trajectory by their drives."""
+        """Return angles, speeds and accelerations of the joints as their drives follow the trajectory."""
         drive = self._drive
         time_s -= drive.lag_s
         tick = self._ticks[-1]
@@ -202,9 +202,9 @@ class JointMotion:
     def _apply_ripples(
         self, tick: _Tick, target: list[float], speed: list[float], change: list[float]
     ) -> tuple[list[float], list[float], list[float]]:
-        """Return angles, speeds and accelerations with the ripples that are in proportion to the speed.
+        """Return angles, speeds and accelerations with the ripples that are proportional to speed.
 
-        Replace the targets by the smooth angles, their speeds and accelerations.
+        The targets are replaced by the smooth angles, speeds and accelerations.
         """
         qd, qdd = [0.0] * 6, [0.0] * 6
         for joint, (offset, gain) in enumerate(zip(tick.offset, tick.gain, strict=True)):
@@ -245,7 +245,7 @@ class JointMotion:
         self._encoders.step()
 
     def _yield(self, standing: bool) -> tuple[Yielding, ...]:
-        """Return what the joints yield in the tick that has just been played."""
+        """Return by how much the joints yield in the tick just simulated."""
         before, last, changes = self.smooth_qd_rad_s, self._ticks[-1].yielding, self._changes
         if standing and before is ZERO:
             changes.append(ZERO)
@@ -268,12 +268,12 @@ class JointMotion:
         )
 
     def follow(self, trajectory: Trajectory) -> None:
-        """Play any trajectory from rest that begins at the joints' angles."""
+        """Play a trajectory that begins at rest at the joints' angles."""
         self._offset, self._gain = self._map(self.settled_q_rad, trajectory.end_rad)
         self._play(trajectory, scaled=True)
 
     def speed(self, qd_rad_s: Joints, acceleration_rad_s2: float) -> None:
-        """Play a speedJ from the joints' present state: to this velocity, and on."""
+        """Play a speedJ from the joints' present state: accelerate to this velocity and keep it."""
         wanted = tuple(max(-m, min(m, v)) for v, m in zip(qd_rad_s, self.speed_limit_rad_s, strict=True))
         velocity = self._trajectory.state_at(self._trajectory_s)[1]
         self._play(plan_speed_change(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
@@ -291,7 +291,7 @@ class JointMotion:
         self._now = None
 
     def _map(self, start: Joints, end: Joints) -> tuple[Joints, Joints]:
-        """Return offset and gain from target to smooth angle, so that the joints rest exactly on the path's ends."""
+        """Return offset and gain from target to smooth angle that make the joints rest exactly on the path's ends."""
         first = [r.smooth(q) for r, q in zip(self._ripples, start, strict=True)]
         last = [r.smooth(q) for r, q in zip(self._ripples, end, strict=True)]
         gain = tuple(  # a path shorter than any useful precision has none

@@ -47,7 +47,7 @@ def find_load(
 ) -> Load:
     """Return joint torques, the payload's wrench in the flange's frame and the arm's momentum: inverse dynamics.
 
-    For joint angles, speeds and accelerations (rad, s) and a payload in the flange's axes.
+    The inputs are joint angles, speeds and accelerations (rad, s), and a payload in the flange's axes.
     """
     q, qd, qdd = (np.array(values) for values in joints)
     masses, centres_m = np.array([*bodies.masses_kg, payload_kg]), np.array([*bodies.centres_m, payload_centre_m])
@@ -78,7 +78,7 @@ def _frames(q: Array, links: Links) -> tuple[Array, Array]:
 
 
 def _centres(rotations: Array, positions: Array, centres_m: Array) -> Array:
-    """Return the centres of mass (7, 3) of links and payload, m, from `centres_m`, those in each one's frame."""
+    """Return the centres of mass (7, 3) of links and payload, m, from `centres_m` in the frame of each."""
     frame_index = [*range(1, len(positions)), len(positions) - 1]  # the payload is fixed to the last link
     centres: Array = positions[frame_index] + np.einsum("nij,nj->ni", rotations[frame_index], centres_m)
     return centres

@@ -38,7 +38,7 @@ class Ripple:
         return -ripple
 
     def smooth(self, angle_rad: float) -> float:
-        """Return a smooth angle at which the joint is at `angle_rad`, by bisection, which suits any amplitude."""
+        """Return a smooth angle for which the joint's angle is `angle_rad`, by bisection, valid for any amplitude."""
         if not self.components:
             return angle_rad
         reach = sum(a for _, a, _ in self.components)
@@ -53,7 +53,7 @@ class Ripple:
 
 
 def draw_ripple(fraction: float, cycles_per_turn: Sequence[int], random: Random) -> Ripple:
-    """Draw a ripple of components of equal rate; the RMS rate ripple over a turn is `fraction` of the rate."""
+    """Draw a ripple with components of equal rate. Its RMS rate over a turn is `fraction` of the joint's rate."""
     if fraction == 0.0:
         return Ripple()
     rate = fraction * sqrt(2.0 / len(cycles_per_turn))

@@ -70,7 +70,7 @@ def plan_joint_move(
 ) -> Trajectory:
     """Plan a moveJ from rest to rest: all joints in step, the one with the longest path at `speed_rad_s` after a ramp.
 
-    A path too short for the speed gives a triangle. No joint exceeds its limit (all slow down together).
+    A path too short to reach the speed has no constant part. If a joint would exceed its limit, all slow down together.
     """
     path = tuple(b - a for a, b in zip(start_rad, end_rad, strict=True))
     longest = max(abs(w) for w in path)
@@ -104,7 +104,7 @@ def plan_soft_joint_move(
     """Plan a moveJ that a controller plays as a program of its own: it starts gently, and stops as any other.
 
     In logs of a UR3 and of the maker's simulator the acceleration grows with the square of time in 19 steps of 8 ms, to
-    1.38 of that asked for, which follows. A move too slow or too short for that is planned without it.
+    1.38 times the requested one, which follows. A move too slow or too short for that is planned without it.
     """
     path = tuple(b - a for a, b in zip(start_rad, end_rad, strict=True))
     longest = max(abs(w) for w in path)
@@ -136,7 +136,7 @@ def plan_soft_joint_move(
 
 
 def plan_speed_change(q_rad: Joints, from_rad_s: Joints, to_rad_s: Joints, acceleration_rad_s2: float) -> Trajectory:
-    """Plan a change of velocity, with the acceleration for the joint that changes most; then go on, or rest."""
+    """Plan a change of velocity, with that acceleration for the joint that changes most; then keep it, or rest."""
     change = tuple(b - a for a, b in zip(from_rad_s, to_rad_s, strict=True))
     ramp_s = max(abs(c) for c in change) / acceleration_rad_s2
     segments = []

@@ -20,7 +20,7 @@ WRIST = 3  # the first joint that vibrates: those before it are mostly at rest
 def build_calibrated_links(
     calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6, drawing: Drawing = UR10E
 ) -> Links:
-    """Return the links by the maker's calibration. With `twist_rad`, unknown to the maker, they are the true ones."""
+    """Return the links by the maker's calibration. With `twist_rad`, unknown to the maker, they are the true links."""
     return links(
         calibration.delta_theta_rad,
         [1e-3 * length for length in calibration.delta_a_mm],

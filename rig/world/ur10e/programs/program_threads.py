@@ -67,7 +67,7 @@ class Threads:
                 self.kill(name)
 
     def take(self, name: str) -> None:
-        """Claim the joints. Raise `ProgramError` if another thread has them."""
+        """Claim the joints for a thread. Raise `ProgramError` if another thread has them."""
         if self._mover not in (None, name):
             raise ProgramError("another thread is already controlling the robot")
         self._mover = name
@@ -77,7 +77,7 @@ class Threads:
             self._mover = None
 
     def move(self, name: str, move: ScriptMove) -> Steps:
-        """Move on behalf of the thread `name`, until the joints rest at the target."""
+        """Move the joints for the thread `name`, until they rest at the target."""
         if not min(move.speed, move.acceleration) >= (SLOWEST_LINE_M_S if move.straight else SLOWEST):
             raise ProgramError("a move needs a speed and an acceleration above zero")
         check_finite([*move.target, move.speed, move.acceleration])

@@ -73,7 +73,7 @@ class ControlProgram:
 
     @property
     def waiting(self) -> bool:
-        """Whether every command is done and answered, and no thread runs."""
+        """Whether every command is finished and answered, and no thread runs."""
         return not self._threads.any and self._idle_code is not None and self._registers.integer(0) == self._idle_code
 
     def _loop(self) -> Steps:
@@ -222,7 +222,7 @@ class ControlProgram:
         return _nothing()
 
     def _servo_thread(self) -> Steps:
-        """Steer towards the newest target every tick, so that the rest of the path takes the look-ahead time."""
+        """Steer towards the newest target every tick, to arrive there after the look-ahead time."""
         while True:
             self._threads.take("servo")
             target, lookahead_s = self._servo_target

@@ -85,7 +85,7 @@ Block = tuple[Call | Loop, ...]
 def check_brackets(lines: Sequence[str]) -> None:
     """Raise `ProgramError` at the line at which the controller's compiler detects unbalanced brackets.
 
-    An open bracket is detected on the line after, and the message contains the line as written.
+    It detects an open bracket one line later. The message contains the line as written.
     """
     depth = 0
     for number, line in enumerate(lines, 1):
@@ -100,8 +100,8 @@ def check_brackets(lines: Sequence[str]) -> None:
 def parse_program(lines: Sequence[str]) -> tuple[str, Block]:
     """Return name and body of a program.
 
-    Raise `ProgramError` at the first line that is not simulated; in the words of the maker's compiler if that would not
-    know it either.
+    Raise `ProgramError` at the first line that is not simulated. If the maker's compiler would not know it either, the
+    message is the compiler's.
     """
     check_brackets(lines)
     name = "unnamed"
@@ -188,7 +188,7 @@ class Arguments:
 
 
 def read_move(name: str, value: Arguments) -> ScriptMove:
-    """Return the move of a `movej` or `movel`. A blend radius is not simulated: it stops at every target."""
+    """Return the move of a `movej` or `movel`. A blend radius is not simulated: the arm stops at every target."""
     target = value("0", "pose" if name == "movel" else "q")
     if not isinstance(target, list | tuple) or len(target) != 6:
         raise ProgramError(f"{name}: six joint angles or a pose expected, got {target}")
