@@ -1,5 +1,7 @@
 """The base of all sections of a configuration file: common checks and types of values."""
 
+import ipaddress
+import re
 from typing import Annotated, Any, Literal, get_args
 from urllib.parse import urlsplit
 
@@ -12,6 +14,8 @@ Vector3 = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 AccelerometerOrder = Literal[0, 1, 2]
 JointAngle = Annotated[float, Field(ge=-JOINT_RANGE_DEG, le=JOINT_RANGE_DEG)]
+_LABEL = "[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?"
+_HOST_NAME = re.compile(rf"(?=.{{1,253}}$)(?:{_LABEL}\.)*(?!\d+\.?$){_LABEL}\.?")
 Words = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
 Offset = Annotated[float, Field(ge=-1000, le=1000)]
 # A name becomes that of a dataset, of files and of C arrays.
@@ -44,12 +48,28 @@ class Section(BaseModel):
 
 
 def check_host(name: str) -> str:
-    """Return a host's name or address unchanged. Raise ValueError if it cannot be one."""
+    """Return a host's IP address or name unchanged. Raise ValueError if it can be neither.
+
+    A name has the form of RFC 1123, section 2.1; one with letters beyond ASCII has it once encoded (IDNA, RFC 3490). A
+    name whose last part is a number could only be an IPv4 address. An address that means any or many hosts is none.
+    """
     try:
-        name.encode("idna")
-    except UnicodeError:
-        raise ValueError("not the name of a host; each part between dots has 1 to 63 characters") from None
+        address = ipaddress.ip_address(name)
+        valid = not (address.is_unspecified or address.is_multicast)
+    except ValueError:
+        valid = _is_host_name(name)
+    if not valid:
+        raise ValueError(
+            "neither an IP address nor a host name; give it as 192.168.1.102 or ur10e.local, without http:// and port"
+        )
     return name
+
+
+def _is_host_name(name: str) -> bool:
+    try:
+        return _HOST_NAME.fullmatch(name.encode("idna").decode("ascii")) is not None
+    except UnicodeError:
+        return False
 
 
 def check_port(value: str) -> str:

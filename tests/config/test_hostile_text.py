@@ -9,6 +9,7 @@ import pytest
 
 from rig.config.files.yaml_text import DEPTH_MAX, SIZE_MAX_BYTES
 from rig.config.load import ConfigurationRefused, load, parse
+from rig.config.section import check_host
 from support.laboratories.commands import rig
 from support.paths import DEMO
 
@@ -202,11 +203,38 @@ def test_a_sensor_s_name_can_be_that_of_a_file_and_a_dataset(name: str) -> None:
     assert "string should" in refusal(text).lower()
 
 
-@pytest.mark.parametrize("host", ["x" * 64, "a..b", ".a", "x" * 300, f"{'ü' * 63}.de", "\u3002"])
+NO_HOSTS = [
+    "x" * 64,
+    "a..b",
+    ".a",
+    "x" * 300,
+    f"{'ü' * 63}.de",
+    "\u3002",
+    "my arm",
+    "-arm",
+    "arm_1",
+    "192.168.1",
+    "1.2.3.456",
+]
+
+
+@pytest.mark.parametrize("host", NO_HOSTS)
 def test_a_host_that_cannot_be_looked_up_is_refused(host: str) -> None:
     for override in (f"arm.host={host}", f"board.port=socket://{host}:7321"):
         (problem, *_) = refusal(DEMO_TEXT, "world=null", override).splitlines()[1:]
         assert problem.strip().startswith(override.partition("=")[0])
+
+
+@pytest.mark.parametrize("host", ["http://10.0.0.3", "10.0.0.3:30004", "10.0.0.3/24", "0.0.0.0", "224.0.0.1"])
+def test_a_text_beside_the_address_of_an_arm_is_refused_with_the_form_of_an_address(host: str) -> None:
+    assert "give it as 192.168.1.102 or ur10e.local" in refusal(DEMO_TEXT, "world=null", f'arm.host="{host}"')
+
+
+@pytest.mark.parametrize(
+    "host", ["10.0.0.3", "fd00::3", "ur10e", "ur10e-2.lab.example.", "prüfstand.local", "3com.example"]
+)
+def test_names_and_addresses_of_hosts_are_taken(host: str) -> None:
+    assert check_host(host) == host
 
 
 @pytest.mark.parametrize(

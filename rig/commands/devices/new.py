@@ -84,15 +84,20 @@ def _turner_answers(turner: str, options: Namespace) -> dict[str, object]:
 
     if turner == "arm":
         usual = ArmSection.model_fields["model"]
-        payload = ask(
-            "mass on the flange (board, holder, cable), kg", "--payload-kg", positive_number, "0.35", options.payload_kg
-        )
         return {
             "arm_host": ask(
                 "address of the arm (pendant: Settings, System, Network)", "--host", check_host, value=options.host
             ),
             "arm_model": ask_choice("Which arm is it?", "--model", _literals(usual.annotation), options.model),
-            "payload_kg": float(payload),
+            "payload_kg": float(
+                ask(
+                    "mass on the flange (board, holder, cable), kg",
+                    "--payload-kg",
+                    positive_number,
+                    "0.35",
+                    options.payload_kg,
+                )
+            ),
         }
     if turner == "servo":
         models = _literals(ServoSection.model_fields["model"].annotation)

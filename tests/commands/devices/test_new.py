@@ -94,15 +94,17 @@ def test_nothing_is_asked_without_a_terminal_and_no_file_is_replaced(
 @pytest.mark.slow
 def test_at_a_terminal_it_asks_until_the_answer_can_be_used(tmp_path: Path) -> None:
     operator, terminal = pty.openpty()
-    words = [sys.executable, "-m", "rig", "new", str(tmp_path / "my.yaml"), *ON_BOARD[:-2]]
-    os.write(operator, b"seven\n1\nG-\xc3\xa4\nG-1\n")  # what turns; the serial number
+    words = [sys.executable, "-m", "rig", "new", str(tmp_path / "my.yaml"), *ON_BOARD[:-2], *ARM[-4:]]
+    os.write(operator, b"seven\n2\nmy arm\n10.0.0.3\nG-\xc3\xa4\nG-1\n")  # what turns; its address; the serial number
     with subprocess.Popen(words, stdin=terminal, stdout=terminal, stderr=terminal) as process:
         os.close(terminal)
         assert process.wait(PATIENCE_S) == 0
     said = os.read(operator, 65536).decode(errors="replace")
     os.close(operator)
     assert "type a number from 1 to 3" in said and "plain ASCII" in said and "checked: it is complete" in said
-    assert load(tmp_path / "my.yaml").config.sensors["gyro"].serial_number == "G-1"
+    assert "neither an IP address nor a host name" in said
+    config = load(tmp_path / "my.yaml").config
+    assert (config.turner.address, config.sensors["gyro"].serial_number) == ("10.0.0.3", "G-1")
 
 
 @pytest.mark.slow
