@@ -10,13 +10,13 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 
-from rig.batch.operators import Question
 from rig.batch.status import Now, Present, last
 from rig.page.server.application import acting, body_of
 from rig.page.server.control import Control
 from rig.page.server.guard import Door
 from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving
+from rig.station.questions import Question
 
 LONGEST = 200  # characters of an answer
 LOOK_S = 0.5  # between two tests whether the page still exists

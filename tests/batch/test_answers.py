@@ -9,13 +9,14 @@ import pytest
 
 from rig.batch.batch_journal import open_journal
 from rig.batch.batch_state import BatchPart, Begun, Doubt, Entry, PartBegun, PartEnded, state_of
-from rig.batch.operators import CHOICES, Kind, Operator, Question
+from rig.batch.operators import Operator
 from rig.batch.part_sequence import Bench, Desk, Work
 from rig.batch.status import Now, after, update_by_batch
 from rig.config.judging.station_section import StationSection
 from rig.errors import Fault
 from rig.motion.steps import Rest
 from rig.station.events import PhaseRecorded, Progress, SamplesTaken, SensorSamples
+from rig.station.questions import CHOICES, Kind, Question
 from support.paths import ROOT
 
 AT = "2026-11-25T08:00:00+00:00"
@@ -95,7 +96,7 @@ def test_the_page_for_technicians_has_this_table() -> None:
     page = (ROOT / "docs" / "how-to" / "at-the-rig" / "station.md").read_text(encoding="utf-8")
     lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
     rows = {name: cells for name, *cells in lines if len(cells) == len(COMES) - 2}
-    names = {"mount": "mount", "go": "go", "doubt": "continue anyway?", "again": "again?"}
+    names = {"mount": "mount", "go": "start", "doubt": "continue anyway?", "again": "again?"}
     said = {
         YES: {"it is mounted", "the arm moves", "yes"},
         NO: {"put aside", "does not start", "no"},

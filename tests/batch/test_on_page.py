@@ -10,11 +10,12 @@ from urllib.parse import urlsplit
 import pytest
 
 from rig.batch.batch_state import BatchPart
-from rig.batch.operators import Operator, Question
+from rig.batch.operators import Operator
 from rig.batch.page_operator import OnPage
 from rig.page.server.control import Control
 from rig.page.server.sections import Sections
 from rig.page.server.serving import Page, PageAddress, serving
+from rig.station.questions import Question
 from support.processes.waiting import PATIENCE_S, wait_for
 
 TOKEN = "a-token-of-two-and-twenty"

@@ -32,7 +32,7 @@ from rig.batch.batch_state import (
 )
 from rig.batch.batch_table import csv_of, page_of, summary
 from rig.batch.label import Label, files_of, zpl
-from rig.batch.operators import Operator, Question, Terminal
+from rig.batch.operators import Operator
 from rig.batch.part_list import following, numbers_in
 from rig.batch.part_sequence import Bench, Desk, Work
 from rig.commands.station import station
@@ -43,6 +43,7 @@ from rig.plans.script_file import ScriptFile
 from rig.runner.phases import Run
 from rig.station.events import Prompt
 from rig.station.operator_station import Stations, always_yes
+from rig.station.questions import Question, Terminal
 from support.processes.full_disk import full_disk
 
 AT = "2026-11-25T08:00:00+00:00"

@@ -46,7 +46,7 @@ def test_twenty_parts_in_a_row_each_get_the_right_verdict(tmp_path: Path) -> Non
                 at.types("yes")
                 at.waits_for("then Enter")
                 at.types("")
-            at.waits_for("Type go to start: ")
+            at.waits_for("Type go to start, or no: ")
             with time_block(motion_s):
                 moves(at, laboratory)
             if number == disturbed:

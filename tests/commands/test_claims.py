@@ -116,7 +116,7 @@ def test_a_second_rig_has_neither_the_arm_nor_the_board_until_the_first_has_ende
         ended.callback(first.kill)
         os.close(terminal)
         said = b""
-        while b"Type yes to start" not in said:
+        while b"Type go to start" not in said:
             said += os.read(operator, 4096)
         for number, second, name in ((2, config, "arm_claimed"), (3, other_arm, "board_claimed")):
             refused = rig("run", second, "--out", tmp_path / str(number), "--yes")

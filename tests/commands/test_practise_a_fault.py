@@ -116,7 +116,7 @@ def check_shown(step: Step, actual: str) -> None:
     """Assert that all that the page shows was shown, in that order."""
     rest = mask(actual)
     for text in step.shown:
-        if text != "Type yes to start:":  # a question for a terminal
+        if text != "Type go to start, or no:":  # a question for a terminal
             assert text in rest, f"{step.typed}: {text!r} is not in {rest!r}"
             rest = rest.partition(text)[2]
 

@@ -43,7 +43,7 @@ def mounted(at: Scanner) -> None:
     """The part that was named is mounted; it is checked without moving."""
     at.waits_for("then Enter")
     at.types("")
-    at.waits_for("Type go to start: ")
+    at.waits_for("Type go to start, or no: ")
 
 
 def test_five_rigs_at_once_of_which_one_is_killed_and_one_unplugged_are_shown_as_they_are(

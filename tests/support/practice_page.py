@@ -53,5 +53,5 @@ def _steps(block: str) -> Iterator[Step]:
 
 def _texts(shown: str) -> tuple[str, ...]:
     """Return the texts that a block shows: a line each, but one that goes on over lines, or has a gap `…`."""
-    lines = re.split(r"\n(?=[a-z]+: |the data are|done: |not ready|Type yes|PASS|An empty| )", shown)
+    lines = re.split(r"\n(?=[a-z]+: |the data are|done: |not ready|Type go|PASS|An empty| )", shown)
     return tuple(mask(text) for line in lines for text in line.split(" … ") if text.strip())

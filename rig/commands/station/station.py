@@ -17,11 +17,12 @@ from rig.errors import Fault
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.batch.operators import Operator, Voice
+    from rig.batch.operators import Operator
     from rig.batch.status import Present
     from rig.commands.configured import Configured
     from rig.commands.page_arguments import PageWish
     from rig.config.models import RigConfig
+    from rig.station.questions import Voice
 
 
 def add(parser: ArgumentParser) -> None:
@@ -53,11 +54,12 @@ def run(options: Namespace) -> int:
     `numbers_in` and `open_journal` do; `missing_extra`, `not_confirmed`.
     """
     from rig.batch.label import refuse_without_library
-    from rig.batch.operators import Operator, Terminal, refuse_without_terminal
+    from rig.batch.operators import Operator, refuse_without_terminal
     from rig.batch.part_list import numbers_in
     from rig.batch.status import Now, Present
     from rig.commands.configured import open_configured
     from rig.commands.station.one_arena import keep_to_one_arena
+    from rig.station.questions import Terminal
 
     keep_to_one_arena()
     refuse_without_library()

@@ -421,12 +421,12 @@ def test_an_arm_that_was_moved_while_the_operator_thought_is_not_driven(world: W
     with start_module("run", config, "--out", tmp_path / "run", stdin=terminal, stderr=terminal) as process:
         os.close(terminal)
         said = b""
-        while b"Type yes to start" not in said:
+        while b"Type go to start" not in said:
             said += os.read(operator, 4096)
         with socket.create_connection((handle.host, 30002)) as pendant:
             pendant.sendall(b"def nudge():\n movej([0.2, -1.57, 1.57, -1.57, -1.57, 0], a=1.4, v=1.0)\nend\n")
             wait_for(lambda: handle.state()["q_rad"][0] > 0.19 and not handle.state()["program_running"], "the nudge")
-        os.write(operator, b"yes\n")
+        os.write(operator, b"go\n")
         with suppress(OSError):  # a terminal whose other end has closed
             while more := os.read(operator, 4096):
                 said += more

@@ -1,0 +1,103 @@
+"""The questions before something moves or changes: the answers that each takes, and how it is asked at a terminal."""
+
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+from rig.errors.quoting import printable_lines
+from rig.station.events import Prompt
+from rig.station.plain_text import for_file
+
+Kind = Literal["number", "mount", "go", "doubt", "again"]
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """An answer of a question: the `words` that may be typed, its `label` on a button, whether it means yes."""
+
+    words: tuple[str, ...]
+    label: str
+    yes: bool
+
+
+# The first choice is the primary one: the safe one wherever something is in doubt. No word answers two questions with
+# yes except the plain "yes", so an answer to one question starts nothing at another.
+CHOICES: Mapping[Kind, tuple[Choice, ...]] = {
+    "number": (),
+    "mount": (Choice(("",), "It is mounted", True), Choice(("no", "n"), "Put it aside", False)),
+    "go": (Choice(("go",), "Go", True), Choice(("no", "n"), "Do not start", False)),
+    "doubt": (Choice(("no", "n"), "No", False), Choice(("yes", "y"), "Continue anyway", True)),
+    "again": (Choice(("yes", "y"), "Again", True), Choice(("no", "n"), "Put it aside", False)),
+}
+COMMAND_WORDS = frozenset(word for choices in CHOICES.values() for choice in choices for word in choice.words if word)
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A question of a `kind`: the `lines` before it, its `text`, and a `hint` on the last answer if it was none."""
+
+    kind: Kind
+    text: str
+    lines: tuple[str, ...] = ()
+    hint: str = ""
+
+    @property
+    def choices(self) -> tuple[Choice, ...]:
+        """The possible answers; empty if the question asks for a number."""
+        return CHOICES[self.kind]
+
+    def meaning(self, answer: str) -> bool | None:
+        """Return True for yes and False for no; None if the text is not an answer to this question."""
+        typed = answer.lower()
+        return next((choice.yes for choice in self.choices if typed in choice.words), None)
+
+    def after_no_answer(self, answer: str) -> "Question":
+        """Return the question to ask again after something that did not answer it."""
+        expected = " or ".join(choice.words[0] or "Enter" for choice in self.choices) or "a serial number"
+        return replace(self, hint=f'"{answer}" does not answer this question: {expected}')
+
+
+class Voice(Protocol):
+    """The way to ask an operator; an answer has no white space around it. It is None if the operator has left."""
+
+    def answer(self, question: Question) -> str | None: ...
+
+
+class Terminal:
+    """The keyboard of the terminal. A scanner is a keyboard that ends each number with Enter."""
+
+    def answer(self, question: Question) -> str | None:
+        """Return the text typed after the question: earlier input does not answer it. None if the terminal has gone."""
+        _forget_what_was_typed()
+        for line in (question.hint,) if question.hint else question.lines:
+            print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
+        print(for_file(printable_lines(question.text), sys.stderr), end=" ", file=sys.stderr, flush=True)
+        line = sys.stdin.readline()
+        return line.strip() if line else None
+
+
+def question_before(announcement: Sequence[str], to_do: str) -> Question:
+    """Return the question before an announced action: `go` lets something start to move, and `yes` anything else."""
+    if to_do == Prompt(()).to_do:
+        return Question("go", f"Type go to {to_do}, or no:", tuple(announcement))
+    return Question("doubt", f"Type yes to {to_do}, or no:", tuple(announcement))
+
+
+def is_agreed(voice: Voice, question: Question) -> bool:
+    """Ask until an answer is one of the question's own, and return its meaning; False if the operator has left."""
+    while (answer := voice.answer(question)) is not None:
+        if (yes := question.meaning(answer)) is not None:
+            return yes
+        question = question.after_no_answer(answer)
+    return False
+
+
+def _forget_what_was_typed() -> None:
+    """Discard lines that wait at the terminal: they do not answer a question that was not shown yet."""
+    with suppress(ImportError):  # a system with other terminals
+        import termios
+
+        with suppress(termios.error, OSError, ValueError):  # no terminal
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
