@@ -55,8 +55,12 @@ class Chip:
 class PartEnded:
     """The outcome of the present part.
 
-    `why` is empty for a passed part; `certificate` is its number, empty without one; `repeated` counts repetitions of
-    refused sweeps; `chip` is None if unknown; `took_s` is the time from "go" to the end.
+    - why: empty for a passed part.
+    - certificate: its number, empty without one.
+    - repeated: how often refused sweeps were repeated.
+    - chip: None if unknown.
+    - took_s: the time from "go" to the end.
+    - truth: the agreement of the result with a simulated laboratory's truth, empty without a truth.
     """
 
     outcome: Outcome
@@ -66,6 +70,7 @@ class PartEnded:
     repeated: int = 0
     chip: Chip | None = None
     took_s: float = 0.0
+    truth: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,13 +65,15 @@ class Operator:
         return self.voice is None or is_agreed(self.voice, question_before(announcement, to_do))
 
     def hears(self, part: BatchPart) -> None:
-        """Print a part's outcome on stdout, one line each."""
+        """Print a part's outcome on stdout in a line, and in another how it agrees with a simulated truth."""
         ended = part.ended
         if ended is None:
             return
         repeated = f"sweeps repeated: {ended.repeated}" if ended.repeated else ""
         more = ", ".join(filter(None, [ended.certificate, repeated, ended.why]))
         say(f"{part.number:3d}  {ended.outcome.upper():7s}  {part.serial}  {more}".rstrip())
+        if ended.truth:
+            say(f"     {ended.truth}")
         sys.stdout.flush()
 
     def _asking(self, what: str) -> AbstractContextManager[None]:

@@ -45,6 +45,7 @@ class Now:
     - sensors: name, number of samples and number of lost samples of each.
     - verdict: the last part's serial number and state, until the next part begins.
     - why: the reason of that state.
+    - truth: the agreement of its result with a simulated laboratory's truth, empty without a truth.
     """
 
     state: State = "waiting"
@@ -63,6 +64,7 @@ class Now:
     sensors: tuple[tuple[str, int, int], ...] = ()
     verdict: tuple[str, str] | None = None
     why: str = ""
+    truth: str = ""
 
     def json(self) -> str:
         """Return the text for the history."""
@@ -119,6 +121,7 @@ def update_by_batch(now: Now, batch: Batch) -> Now:
         sensors=(),
         verdict=(newest.serial, newest.state) if newest else None,
         why=newest.ended.why if newest and newest.ended else "",
+        truth=newest.ended.truth if newest and newest.ended else "",
         operator=batch.begun.operator,
         work_order=batch.begun.work_order,
         counts=counts,

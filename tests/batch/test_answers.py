@@ -160,12 +160,13 @@ def test_a_verdict_stands_until_the_next_part_begins() -> None:
     ended: list[Entry] = [
         Begun("", "", AT),
         PartBegun("G-001", "01-G-001", AT),
-        PartEnded("fail", AT, "gyro.bias is too large"),
+        PartEnded("fail", AT, "gyro.bias is too large", truth="simulated truth: 5 of 6 values within U of it"),
     ]
     now = update_by_batch(Now(), state_of(ended))
     assert (now.verdict, now.why) == (("G-001", "fail"), "gyro.bias is too large")
+    assert now.truth == "simulated truth: 5 of 6 values within U of it"
     now = update_by_batch(now, state_of([*ended, PartBegun("G-002", "02-G-002", AT)]))
-    assert (now.verdict, now.why, now.part) == (None, "", "G-002")
+    assert (now.verdict, now.why, now.truth, now.part) == (None, "", "", "G-002")
 
 
 def test_during_a_run_progress_rates_and_samples_are_shown_and_afterwards_no_rate() -> None:

@@ -41,6 +41,10 @@ def test_a_series_goes_through_its_list_without_questions(tmp_path: Path) -> Non
     assert found[0]["certificate"] in (out / found[0]["folder"] / "certificate.html").read_text(encoding="utf-8")
     assert found[0]["certificate"] in (out / "labels" / "01-G-001.txt").read_text(encoding="utf-8")
     assert {path.name for path in out.glob("0*")} == {"01-G-001", "04-G-004"}  # nothing was measured of the others
+    assert done.stdout.count("simulated truth: 6 of 6 values within U of it") == 2
+    for folder in (out / found[0]["folder"], out / found[3]["folder"]):
+        assert "simulated truth: 6 of 6 values within U of it" in rig("show", folder).stdout
+    assert not (out / "truth.json").exists()
     assert "A. Person" in (out / "batch.html").read_text(encoding="utf-8")
 
 
@@ -60,6 +64,8 @@ def test_after_a_kill_the_same_command_goes_on_with_the_part_in_hand(tmp_path: P
     assert done.returncode == 0, done.stderr + done.stdout
     assert [(row["serial_number"], row["verdict"]) for row in rows(out)] == [("G-001", "pass"), ("G-002", "pass")]
     assert len(list((out / "01-G-001").glob("run*.h5"))) == 2  # what was recorded before the kill counts
+    # … and is of another laboratory's clock.
+    assert [(out / name / "truth.json").exists() for name in ("01-G-001", "02-G-002")] == [False, True]
 
     # A kill between the result and its entry: the part is not run again.
     journal = out / "batch.jsonl"

@@ -17,17 +17,20 @@ if TYPE_CHECKING:
 Windows = list[tuple[float, float]]
 
 
-def write_truth(control: str, folder: Path, loaded: "Loaded", outcome: "Outcome") -> Iterator[DocumentWritten]:
-    """Have the laboratory at `control` write the truth over the windows of a run; yield the event of the file.
+def write_truth(
+    control: str, written: Path, folder: Path, loaded: "Loaded", outcome: "Outcome"
+) -> Iterator[DocumentWritten]:
+    """Have the laboratory at `control` write the truth over the windows of a run; yield the event of its file.
 
-    It writes none for a calibration over temperature, whose values are for another temperature than the run's.
+    The laboratory writes into the file `written` that it was given at its start. The file ends in the run's `folder`.
+    There is none for a calibration over temperature: its values belong to another temperature than the run's.
     """
     if outcome.polynomials or not (outcome.results or outcome.accelerometers):
         return
     windows = _windows(outcome, follows_arm=kind_of(loaded.config.turner).name == "ur")
     with suppress(OSError, ValueError):  # a laboratory that is gone: the run needs no truth
         if send_request(control, {"do": "write_truth", "windows": windows}).get("ok"):
-            yield DocumentWritten(folder / TRUTH)
+            yield DocumentWritten(written.replace(folder / TRUTH))
 
 
 def _windows(outcome: "Outcome", *, follows_arm: bool) -> dict[str, Any]:

@@ -64,7 +64,7 @@ def carry_out(
                     station.listeners = (*station.listeners, OperatorListener(control))
             outcome = run.carry_out(configured.phase)
             if configured.loaded.simulated and not resumed:
-                for event in write_truth(control, folder, configured.loaded, outcome):
+                for event in write_truth(control, folder / TRUTH, folder, configured.loaded, outcome):
                     station.event(event)
             try:
                 entered, comparisons = remember(folder, configured.loaded.config.history)

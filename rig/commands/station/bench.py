@@ -8,7 +8,7 @@ import json
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -21,14 +21,17 @@ from rig.commands.history.remember import remember
 from rig.commands.history.run_serials import find_other_board, recall_sensors
 from rig.commands.laboratory.claims import claim_devices
 from rig.commands.laboratory.laboratory_process import make_fitter, make_mounter, simulated_laboratory
+from rig.commands.laboratory.written_truth import write_truth
 from rig.commands.page_arguments import Answer
 from rig.config.models import RigConfig
 from rig.data.result_file import read_result
-from rig.data.run_folder import ARM_LOG, CONFIG, LOG, RESULT, WORLD_LATE, discard, new_folder
+from rig.data.run_folder import ARM_LOG, CONFIG, LOG, RESULT, TRUTH, WORLD_LATE, discard, new_folder
 from rig.data.user_texts import note_own
 from rig.errors import Fault, Refused
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.statements import of_configuration
+from rig.report.document import document_of
+from rig.report.simulated_truth import truth_lines, truth_rows
 from rig.runner.early_connection import Ahead
 from rig.runner.phases import Run
 from rig.station.events import Advice, BoardConnected, RunEvent, RunFolderWritten, SamplingStarted
@@ -78,13 +81,18 @@ class BatchSettings:
 class RigBench:
     """A bench with the rig of a configuration.
 
-    `control` is the address of its simulated laboratory, None for a real one. `ahead` connects the turner.
+    - control: the address of its simulated laboratory, None for a real one.
+    - ahead: connects the turner.
+    - truth_file: where the simulated laboratory writes its truth.
+    - begun: the folders of the runs that this laboratory has from their beginning.
     """
 
     configured: Configured
     control: str | None
     station: BatchSettings
     ahead: Ahead
+    truth_file: Path
+    begun: set[Path] = field(default_factory=set)
 
     @property
     def simulated(self) -> bool:
@@ -121,6 +129,8 @@ class RigBench:
         if (folder / RESULT).exists() and (ended := _read_ended(folder, configured)) is not None:
             return ended
         new = _prepare_folder(folder, configured)
+        if new:
+            self.begun.add(folder)
         listener, began_s, was_asked = PartListener(), time.monotonic(), False
 
         def answer(announcement: Sequence[str], to_do: str) -> bool:
@@ -131,7 +141,7 @@ class RigBench:
             return agreed
 
         try:
-            outcome, repeated = self._run_repeatedly(folder, configured, listener, answer)
+            outcome, repeated, truth = self._run_repeatedly(folder, configured, listener, answer)
         except (Refused, Fault) as error:
             if isinstance(error, Refused) and new and not listener.recorded:
                 discard(folder)
@@ -147,12 +157,13 @@ class RigBench:
             repeated,
             listener.chip,
             time.monotonic() - began_s,
+            truth,
         )
 
     def _run_repeatedly(
         self, folder: Path, configured: Configured, listener: PartListener, answer: Answer
-    ) -> tuple[Outcome, int]:
-        """Return the part's outcome, and the number of repetitions of refused sweeps."""
+    ) -> tuple[Outcome, int, str]:
+        """Return the part's outcome, how often refused sweeps were repeated, and how it agrees with a simulated truth."""
         config = configured.loaded.config
         with log(folder / LOG) as logged, view() as terminal:
             station = Stations(
@@ -173,11 +184,24 @@ class RigBench:
                     if not (repeats_left and listener.repeats):
                         raise
                 phase = replace(phase, agreed=True)
+            truth = self._compare_with_truth(folder, configured, outcome, station)
             entered, _ = remember(folder, config.history)
             if entered is not None:
                 station.event(entered)
             station.event(RunFolderWritten(folder))
-        return outcome, repeated
+        return outcome, repeated, truth
+
+    def _compare_with_truth(self, folder: Path, configured: Configured, outcome: Outcome, station: Stations) -> str:
+        """Have a simulated laboratory write its truth; return how the result agrees with it, empty without a truth.
+
+        A run that was begun in another laboratory has windows of another clock, so it gets none.
+        """
+        (folder / TRUTH).unlink(missing_ok=True)
+        if self.control is None or folder not in self.begun:
+            return ""
+        for event in write_truth(self.control, self.truth_file, folder, configured.loaded, outcome):
+            station.event(event)
+        return "".join(truth_lines(truth_rows(folder, document_of(outcome))))
 
     @property
     def _named(self) -> tuple[str, ...]:
@@ -206,12 +230,14 @@ def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> 
         stack.enter_context(claim_devices(config))
         control = None
         if configured.loaded.simulated:
-            control = stack.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
+            control = stack.enter_context(
+                simulated_laboratory(configured.loaded.text, folder / WORLD_LATE, folder / TRUTH)
+            )
         connect = partial(kind_of(config.turner).connect, config.turner)
         ahead = Ahead(connect, folder / ARM_LOG)
         stack.callback(ahead.close)
         ahead.begin()
-        yield RigBench(configured, control, station, ahead)
+        yield RigBench(configured, control, station, ahead, folder / TRUTH)
 
 
 def refuse_other_sensors(config: RigConfig) -> None:

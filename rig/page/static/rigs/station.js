@@ -19,6 +19,8 @@ function now(of) {
   $("verdict").hidden = !verdict;
   $("verdict").textContent = verdict ? `${SIGNS[verdict[1]] ?? "·"} ${verdict[1].toUpperCase()}` : "";
   $("why").textContent = verdict ? of.why : "";
+  $("truth").hidden = !(verdict && of.truth);
+  $("truth").textContent = of.truth;
   const running = typeof of.fraction === "number";
   $("run").hidden = !running;
   if (running) $("done").value = of.fraction;
