@@ -29,5 +29,6 @@ def test_all_that_was_said_to_be_entered_is_there(place: tuple[str, str], tmp_pa
     of_one = Rounds(where, tmp_path)
     for this in rounds(0, (ROUNDS if thorough else FEW)[kind]):
         of_one.carry_out(this)
-    print(f"{kind}: {len(of_one.entered)} calibrations entered; not remembered: {of_one.not_remembered}")
+    print(f"{kind}: {len(of_one.entered)} calibrations entered")
+    print(f"not remembered: {of_one.not_remembered}; refused: {of_one.refused}")
     assert of_one.entered and not of_one.not_remembered
