@@ -46,6 +46,15 @@ def interpolate(instants: Array | NDArray[np.intp], points: Array | NDArray[np.i
     return np.column_stack([np.interp(instants, points, column) for column in values.T])
 
 
+def unwrap_counter(values: Array, period: float) -> Array:
+    """Return a counter's values (n,), in order, continued where it began again after `period`; NaN stays NaN."""
+    present = ~np.isnan(values)
+    falls = np.diff(values[present], prepend=values[present][:1]) < -period / 2
+    unwrapped = values.copy()
+    unwrapped[present] += period * np.cumsum(falls)
+    return unwrapped
+
+
 def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
     """Return values divided by sizes ≥ 0 of the same shape; infinite for a nonzero value over a negligible size."""
     value, size = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)

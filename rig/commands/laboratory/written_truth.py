@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from rig.analysis.outcome import Outcome
     from rig.config.load import Loaded
 
-Windows = list[tuple[float, float]]
-
 
 def write_truth(
     control: str, written: Path, folder: Path, loaded: "Loaded", outcome: "Outcome"
@@ -49,7 +47,7 @@ def _windows(outcome: "Outcome", *, follows_arm: bool) -> dict[str, Any]:
         speeds = [] if outcome.settings.by_hand is not None else [turn.speed_rad_s for turn in result.observations]
         gyroscopes[name] = {
             "sweeps_s": sweeps_s,
-            "averages_s": _span(sweeps_s + rests_s),
+            "averages_s": sweeps_s + rests_s,
             "speeds_rad_s": [float(speed) for speed in speeds],
         }
     for name in outcome.accelerometers:
@@ -63,7 +61,3 @@ def _windows(outcome: "Outcome", *, follows_arm: bool) -> dict[str, Any]:
         ]
         accelerometers[name] = {"readings_s": dwells_s + sweeps_s}
     return {"gyroscopes": gyroscopes, "accelerometers": accelerometers}
-
-
-def _span(windows_s: Windows) -> Windows:
-    return [(min(start_s for start_s, _ in windows_s), max(end_s for _, end_s in windows_s))] if windows_s else []

@@ -4,13 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from rig.config.column_map import TIMES, ColumnMap, ColumnSection, TableSection
 from rig.data.recording.motion_file import TIME, Header
 from rig.errors import Refused
 from rig.errors.quoting import quote, shorten
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, unwrap_counter
 from rig.observation.formats.csv_cells import DAY_S, is_value
 
 
@@ -86,15 +84,7 @@ def unwrap_times(columns: Mapping[str, Array], mapped: Mapped | None, *, by_day:
         if mapped is not None and name in mapped.wraps:
             period_s = mapped.wraps[name] * mapped.columns[name][1]
         if period_s is not None and name in columns:
-            unwrapped[name] = _unwrap(columns[name], period_s)
-    return unwrapped
-
-
-def _unwrap(time_s: Array, period_s: float) -> Array:
-    present = ~np.isnan(time_s)
-    falls = np.diff(time_s[present], prepend=time_s[present][:1]) < -period_s / 2
-    unwrapped = time_s.copy()
-    unwrapped[present] += period_s * np.cumsum(falls)
+            unwrapped[name] = unwrap_counter(columns[name], period_s)
     return unwrapped
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import Refused
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, unwrap_counter
 from rig.observation.time_stamps.even_times import find_taken_times
 from rig.observation.time_stamps.moving_values import find_least_ahead
 from rig.observation.time_stamps.sampling import (
@@ -144,12 +144,9 @@ def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
     for period_s in WRAPS_S:
         over_s = steps_s[backward_steps] + period_s
         if ((over_s >= 0) & (over_s <= LONGEST_STEP * period_s)).all() and np.ptp(log.stamps_s) <= period_s:
-            turns = np.concatenate([[0], np.cumsum(steps_s < 0)])
-            return log.restamp(
-                log.stamps_s + period_s * turns,
-                turns > 0,
-                f"their counter begins anew after {period_s:.10g} s, which are added",
-            )
+            stamps_s = unwrap_counter(log.stamps_s, period_s)
+            reason = f"their counter begins anew after {period_s:.10g} s, which are added"
+            return log.restamp(stamps_s, stamps_s > log.stamps_s, reason)
     return log
 
 

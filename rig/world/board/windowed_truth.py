@@ -94,15 +94,15 @@ class SimulatedTruth:
 def truth_document(truth: SimulatedTruth, windows: Mapping[str, Any], now_s: float) -> dict[str, Any]:
     """Return the truth over the windows of a run, by the keys of its result.
 
-    `windows`: of `gyroscopes`, by name, the windows of the sweeps (`sweeps_s`), that of all averages (`averages_s`) and
+    `windows`: of `gyroscopes`, by name, the windows of the sweeps (`sweeps_s`) and of all averages (`averages_s`), and
     the speeds (`speeds_rad_s`); of `accelerometers` the windows of all readings (`readings_s`). An empty list of
-    windows is the whole time until `now_s`. A scale factor that depends on the speed is left out unless there was one
-    speed.
+    windows is the whole time until `now_s`. A bias is a mean from the first to the last of them, as the result's is. A
+    scale factor that depends on the speed is left out unless there was one speed.
     """
     whole = [(0.0, now_s)]
     document: dict[str, Any] = {"schema": SCHEMA, "simulated": True, "gyroscopes": {}, "accelerometers": {}}
     for name, gyroscope in windows.get("gyroscopes", {}).items():
-        entry = {"bias_rad_s": truth.bias_rad_s(name, gyroscope["averages_s"] or whole).tolist()}
+        entry = {"bias_rad_s": truth.bias_rad_s(name, _span(gyroscope["averages_s"] or whole)).tolist()}
         speeds = gyroscope["speeds_rad_s"]
         if not truth.depends_on_speed(name) or (speeds and max(speeds) <= (1 + ONE_SPEED) * min(speeds)):
             speed_rad_s = float(np.mean(speeds)) if speeds else 1.0
@@ -110,12 +110,15 @@ def truth_document(truth: SimulatedTruth, windows: Mapping[str, Any], now_s: flo
         document["gyroscopes"][name] = entry
     for name, accelerometer in windows.get("accelerometers", {}).items():
         readings_s = accelerometer["readings_s"] or whole
-        span_s = [(min(start_s for start_s, _ in readings_s), max(end_s for _, end_s in readings_s))]
         document["accelerometers"][name] = {
             "scale": truth.acceleration_scale(name, readings_s).tolist(),
-            "bias_m_s2": truth.bias_m_s2(name, span_s).tolist(),
+            "bias_m_s2": truth.bias_m_s2(name, _span(readings_s)).tolist(),
         }
     return document
+
+
+def _span(windows_s: Windows) -> Windows:
+    return [(min(start_s for start_s, _ in windows_s), max(end_s for _, end_s in windows_s))]
 
 
 def _instants(windows_s: Windows) -> np.ndarray:
