@@ -10,6 +10,7 @@ adaptive importance sampling (JCGM 101, 6.4.9).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +18,18 @@ from numpy.typing import NDArray
 from rig.estimation.arrays import Array, bisect
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR, PROBABILITY
 
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
+
 DRAWS, ROUNDS, TAILS = 40, 3, 5.0  # samples of a round of importance sampling; dof of the t that proposes them
 FLOOR, LEAST_POWER = 0.02, 0.05  # of the variance of a proposal; of the power that evens out weights
 STEP = 0.1  # of ln σ, for the curvature at the maximum
 LEAST_CURVATURE = 0.1  # of the negative log-posterior over (ln σ)²: the priors have about this themselves
-RANGE = 30.0  # of ln σ about its prior scale, either way
-TOLERANCE = 1e-3  # of the log-posterior
-MOST_STEPS = 60
+TOLERANCE, MOST_STEPS = 1e-2, 100  # of the log-posterior's gradient; Newton steps
+LONGEST_STEP = 4.0  # of ln σ
+BEYOND, APART = 3.5, 2.0  # of ln σ: one cause exceeds its prior's median, all others fall below theirs
+FIRST_STEPS, CLIMBED = 6, 2  # Newton steps from each of these points, and the number that is climbed to the end
+UNLIKELY = 1e30  # negative log-posterior of what cannot be computed
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +64,7 @@ class MixedModel:
     def __init__(self, mixed: Mixed) -> None:
         self.mixed = mixed
         self._flat = mixed.components.reshape(len(mixed.components), -1)
+        self._last: tuple[Array, tuple[float, Array, Array]] | None = None  # a step's value, before its curvature
 
     def covariance(self, std: Array) -> Array:
         """Return the covariance (m, m) of the errors for standard deviations (k,)."""
@@ -72,19 +79,35 @@ class MixedModel:
         return MixedFit(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
 
     def estimate(self, start: Array | None = None) -> Array:
-        """Return the standard deviations (k,) of maximum posterior probability."""
+        """Return the standard deviations (k,) of maximum posterior probability.
+
+        Few residuals may have several maxima, in which one cause or another explains the largest. Without a `start` the
+        search begins at the priors' medians and at points where one cause exceeds all others.
+        """
+        if start is not None:
+            return np.asarray(np.exp(self._climb(np.log(start)).x), dtype=np.float64)
+        middle = np.log(self.mixed.scales)
+        begun = [self._climb(middle - APART + step, FIRST_STEPS) for step in (BEYOND + APART) * np.eye(len(middle))]
+        begun.sort(key=lambda optimum: float(optimum.fun))
+        optima = [self._climb(point) for point in (middle, *(optimum.x for optimum in begun[:CLIMBED]))]
+        return np.asarray(np.exp(min(optima, key=lambda optimum: float(optimum.fun)).x), dtype=np.float64)
+
+    def _climb(self, logarithms: Array, most_steps: int = MOST_STEPS) -> "OptimizeResult":
+        """Return the maximum of the posterior of ln σ (k,) near a point.
+
+        Newton's method in a trust region, whose curvature is the average information (Gilmour, Thompson and Cullis,
+        Biometrics 51 (1995) 1440): a step to ratios that rounding dominates is taken back and shortened.
+        """
         from scipy.optimize import minimize
 
-        middle = np.log(self.mixed.scales)
-        optimum = minimize(
-            self._evaluate,
-            middle if start is None else np.log(start),
+        return minimize(
+            lambda point: self._evaluate(point)[:2],
+            logarithms,
             jac=True,
-            method="L-BFGS-B",
-            bounds=[(value - RANGE, value + RANGE) for value in middle],
-            options={"ftol": 1e-7, "gtol": 1e-2, "maxiter": MOST_STEPS},
+            hess=lambda point: self._evaluate(point)[2],
+            method="trust-exact",
+            options={"gtol": TOLERANCE, "maxiter": most_steps, "max_trust_radius": LONGEST_STEP},
         )
-        return np.asarray(np.exp(optimum.x), dtype=np.float64)
 
     def causes(self, std: Array, fit: MixedFit) -> list[Array]:
         """Return the parts (p, p) of θ's covariance by C₀, each component, and the prior of θ."""
@@ -142,23 +165,29 @@ class MixedModel:
         relative = logarithms - np.log(self.mixed.scales)
         return float(np.sum(relative - np.logaddexp(0, 2 * relative)))
 
-    def _evaluate(self, logarithms: Array) -> tuple[float, Array]:
-        """Return the negative log-posterior of ln σ (k,) and its gradient."""
-        from scipy.linalg import cho_solve
+    def _evaluate(self, logarithms: Array) -> tuple[float, Array, Array]:
+        """Return the negative log-posterior of ln σ (k,), its gradient and its average information (k, k)."""
+        if self._last is not None and np.array_equal(self._last[0], logarithms):
+            return self._last[1]
+        from scipy.linalg.lapack import dpotri
 
-        std = np.exp(logarithms)
         try:
-            lower, _, _, information, likelihood = self._whiten(std)
+            lower, _, _, information, likelihood = self._whiten(np.exp(logarithms))
         except np.linalg.LinAlgError:  # ratios so large that rounding dominates
-            return 1e30, np.zeros(len(std))
-        inverse = cho_solve((lower, True), np.eye(len(lower)), check_finite=False)
+            return UNLIKELY, np.zeros(len(logarithms)), np.eye(len(logarithms))
+        inverse = np.tril(dpotri(lower, lower=1)[0])
+        inverse += np.tril(inverse, -1).T
         weighted = inverse @ self.mixed.design
         projected = inverse - weighted @ np.linalg.solve(information, weighted.T)
         innovation = projected @ self.mixed.observed
-        change = projected - np.outer(innovation, innovation)
-        relative = logarithms - np.log(self.mixed.scales)
-        gradient = np.square(std) * (self._flat @ change.ravel()) - (1 - 2 / (1 + np.exp(-2 * relative)))
-        return -likelihood - self._log_prior(logarithms), np.asarray(gradient, dtype=np.float64)
+        squares = np.exp(2 * logarithms)
+        shape = np.tanh(logarithms - np.log(self.mixed.scales))
+        parts = squares[:, None] * (self.mixed.components @ innovation)
+        gradient = squares * (self._flat @ projected.ravel()) - parts @ innovation + shape
+        curvature = 2 * parts @ projected @ parts.T + np.diag(1 - shape**2)
+        evaluated = (-likelihood - self._log_prior(logarithms), gradient, curvature)
+        self._last = (logarithms.copy(), evaluated)
+        return evaluated
 
     def _curvature(self, logarithms: Array) -> Array:
         """Return the curvature (k, k) of the negative log-posterior."""
