@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from firmware_host import protocol
+from firmware_host import computer_load, protocol
 from firmware_host.answers import (
     BoardIdentity,
     BoardObservation,
@@ -45,7 +45,7 @@ __all__ = [
 
 # Erasing a flash page takes 22 ms, during which the microcontroller receives nothing: a repeated request is lost.
 _FLASH_TIMEOUT_S = 4.0
-_SILENCE_S = 2.0  # longest time without a frame in a stream
+_SILENCE_S = 2.0  # longest time without a frame in a stream, on a computer that is not crowded
 _ABOUT_THE_BOARD = ("unknown_message", "bad_length", "busy_streaming")  # errors that do not concern a sensor
 
 
@@ -185,7 +185,8 @@ class Board:
             if self._link.frame_count != self._last_check[0]:
                 self._last_check = self._link.frame_count, clock_s
             silent_s = min(silent_s, clock_s - self._last_check[1])
-        if self._streaming and silent_s > min(self._timeout_s, _SILENCE_S):
+        limit_s = min(self._timeout_s, _SILENCE_S)
+        if self._streaming and silent_s > limit_s and silent_s > limit_s * computer_load.crowding():
             raise BoardError(
                 "board_link_lost",
                 f"no readable frame from the board on {self._link.port} for {silent_s:.1f} s while it should stream",

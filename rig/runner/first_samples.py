@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from rig.data.processes import process_silence
+from firmware_host import computer_load
 from rig.errors import Fault
 
 TIMEOUT_S = 2.0
@@ -33,7 +33,7 @@ class FirstSamples:
         waited_s = self._looks * self.look_s
         if clock_s is not None and self._clock_began_s is not None:
             waited_s = min(waited_s, clock_s - self._clock_began_s)
-        if waited_s > TIMEOUT_S and waited_s > TIMEOUT_S * process_silence.crowding():
+        if waited_s > TIMEOUT_S and waited_s > TIMEOUT_S * computer_load.crowding():
             raise Fault(
                 "no_samples",
                 f"no sample from {', '.join(silent)} within {waited_s:.1f} s of the start",

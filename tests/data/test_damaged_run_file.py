@@ -15,8 +15,8 @@ import h5py
 import numpy as np
 import pytest
 
+from firmware_host.computer_load import crowding
 from rig.analysis.analyses import calibrate
-from rig.data.processes.process_silence import crowding
 from rig.data.recording.layout import Contents, lay_out
 from rig.data.recording.layout_keys import SCHEMA, TEXTS
 from rig.data.recording.run_file import read_run

@@ -10,7 +10,8 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from rig.data.processes.process_silence import CROWDED, Silence, crowding
+from firmware_host.computer_load import CROWDED, crowding
+from rig.data.processes.process_silence import Silence
 from support.processes.waiting import wait_for
 
 TICK_S = 0.05

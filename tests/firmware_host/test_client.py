@@ -386,6 +386,7 @@ def test_a_port_that_is_not_there() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_crowd")
 def test_a_port_without_a_board(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].hold.set()
     with pytest.raises(BoardError) as failure:
@@ -395,6 +396,7 @@ def test_a_port_without_a_board(wire: tuple[BoardOnAWire, str]) -> None:
 
 @pytest.mark.slow
 @ON_ONE_WIRE
+@pytest.mark.usefixtures("no_crowd")
 def test_another_baud_rate_makes_noise_of_an_idle_board(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].on_send = lambda data: bytes(byte >> 1 | 0x80 for byte in data)
     with pytest.raises(BoardError) as failure:
@@ -404,11 +406,34 @@ def test_another_baud_rate_makes_noise_of_an_idle_board(wire: tuple[BoardOnAWire
 
 @pytest.mark.slow
 @ON_ONE_WIRE
+@pytest.mark.usefixtures("no_crowd")
 def test_a_board_that_sends_but_does_not_hear(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].board.receive = lambda data: wire[0].board.run()  # type: ignore[method-assign]
     with pytest.raises(BoardError, match="does not answer") as failure:
         Board(wire[1], protocol.BAUD_RATE, ignore, timeout_s=0.7)
     assert failure.value.name == "no_board"
+
+
+@pytest.mark.slow
+@ON_ONE_WIRE
+@pytest.mark.parametrize("crowded", [1.0, 1e9])
+def test_a_board_that_answers_late_is_lost_unless_the_computer_is_crowded(
+    monkeypatch: pytest.MonkeyPatch, wire: tuple[BoardOnAWire, str], crowded: float
+) -> None:
+    monkeypatch.setattr("firmware_host.computer_load.crowding", lambda: crowded)
+    board = wire[0].board
+    receive, heard = board.receive, bytearray()
+
+    def overhear(data: bytes) -> None:
+        heard.extend(data)
+        receive(data if heard.count(0) >= 2 * 5 else b"")  # a frame begins and ends with a zero; four are usual
+
+    board.receive = overhear  # type: ignore[method-assign]
+    if crowded > 1.0:
+        Board(wire[1], protocol.BAUD_RATE, ignore, timeout_s=0.1).close()
+        return
+    with pytest.raises(BoardError, match="no_board"):
+        Board(wire[1], protocol.BAUD_RATE, ignore, timeout_s=0.1)
 
 
 @pytest.mark.slow
@@ -549,6 +574,7 @@ def streaming(wire: tuple[BoardOnAWire, str]) -> Board:
 
 @pytest.mark.one_in(2)
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_crowd")
 def test_a_board_that_falls_silent_while_streaming_is_noticed_after_two_seconds(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:
         board.check()
@@ -559,6 +585,7 @@ def test_a_board_that_falls_silent_while_streaming_is_noticed_after_two_seconds(
 
 @pytest.mark.slow
 @ON_ONE_WIRE
+@pytest.mark.usefixtures("no_crowd")
 def test_noise_instead_of_frames_while_streaming_is_a_lost_link(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:
         wire[0].on_send = lambda data: bytes(byte >> 1 | 0x80 for byte in data)

@@ -1,10 +1,10 @@
 """The silence of another process, counted so that a busy machine does not look like a process that hangs."""
 
-import os
 import time
 from pathlib import Path
 
-CROWDED = 5.0  # largest factor on a limit: the number of runnable programs per processor
+from firmware_host import computer_load
+
 STARVED = 0.5  # of a tick spent waiting for a processor: more, and a silence in it says nothing about the process
 STANDS = 0.05  # … or without having run for more than this, and still ready to run
 HELD_UP = ("R", "D")  # states of a thread: ready to run, or waiting for memory that the system has put away
@@ -54,7 +54,7 @@ class Silence:
         """
         if max(self.ticks, self._all_ticks / self._spared) <= limit:
             return False
-        stretched = limit * (1.0 if self._is_stopped() else crowding())
+        stretched = limit * (1.0 if self._is_stopped() else computer_load.crowding())
         return self.ticks > stretched or self._all_ticks > self._spared * stretched
 
     def _is_stopped(self) -> bool:
@@ -76,24 +76,6 @@ class Silence:
             for thread, (ran_s, waited_s) in self._times.items()
             if thread in before and self._thread in (None, thread)
         )
-
-
-def crowding() -> float:
-    """Return the number of programs per processor of this machine, 1 to CROWDED, by which a delay may be stretched.
-
-    It is the larger of the last minute's mean and the present number, because the mean responds too slowly.
-    """
-    if not hasattr(os, "getloadavg"):  # Windows
-        return 1.0
-    return min(max(max(os.getloadavg()[0], _runnable()) / (os.cpu_count() or 1), 1.0), CROWDED)
-
-
-def _runnable() -> int:
-    """Return the number of threads of the machine that run or are ready to run; 0 without proc(5)."""
-    try:
-        return int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0])
-    except (OSError, ValueError, IndexError):
-        return 0
 
 
 def _times(tasks: Path) -> _Times:

@@ -7,7 +7,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
-from rig.data.processes import process_silence
+from firmware_host import computer_load
 from rig.errors import Fault, Problem, Refused, RigError, refuse
 from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Motion
@@ -265,7 +265,7 @@ class Servo:
     def _thread_problem(self, link: ServoLink) -> Problem | None:
         """Return the problem of a link whose thread has ended."""
         silent_s = self._clock.now_s() - link.turned_s
-        if not link.alive or silent_s < HUNG_S * process_silence.crowding():
+        if not link.alive or silent_s < HUNG_S * computer_load.crowding():
             return None
         return problems.driver_hung(silent_s)
 
@@ -280,7 +280,7 @@ class Servo:
             self._fail(error.problem)
         except Exception as error:
             self._fail(problems.state_not_taken(error))
-        if self._moving and self._clock.now_s() - self._looked_s > UNWATCHED_S * process_silence.crowding():
+        if self._moving and self._clock.now_s() - self._looked_s > UNWATCHED_S * computer_load.crowding():
             self._fail(problems.move_unsupervised(UNWATCHED_S, self._doing))
         with self._changed:
             self._changed.notify_all()

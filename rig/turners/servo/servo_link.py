@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from rig.data.processes import process_silence
+from firmware_host import computer_load
 from rig.errors import Problem
 from rig.turners.servo import problems
 from rig.turners.servo.packet_handler import Bus, BusError, InstructionDenied, PortGone, ReplyLost
@@ -202,7 +202,7 @@ class ServoLink:
         self._lost += 1
         self._damaged += damaged
         silent_s = self._clock.now_s() - self._heard_s
-        if self._lost > LOST_MOST and silent_s > SILENCE_S and silent_s > SILENCE_S * process_silence.crowding():
+        if self._lost > LOST_MOST and silent_s > SILENCE_S and silent_s > SILENCE_S * computer_load.crowding():
             self._fail(problems.silent(silent_s, mostly_damaged=2 * self._damaged > self._lost))
         try:
             self._bus.settle()

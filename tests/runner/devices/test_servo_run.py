@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.data.processes.process_silence import crowding
+from firmware_host.computer_load import crowding
 from rig.data.recording.run_file import read_run
 from rig.turners.servo.servo_link import SILENCE_S
 from support.laboratories.commands import rig, rig_here

@@ -1,0 +1,24 @@
+"""How crowded this computer is: by that a time-out is stretched, so that a starved computer is no lost link."""
+
+import os
+from pathlib import Path
+
+CROWDED = 5.0  # largest factor on a limit: the number of runnable programs per processor
+
+
+def crowding() -> float:
+    """Return the number of programs per processor of this machine, 1 to CROWDED, by which a delay may be stretched.
+
+    In the mean of the last minute, or now: after a quarter of a minute the mean shows only a quarter of a crowd.
+    """
+    if not hasattr(os, "getloadavg"):  # Windows
+        return 1.0
+    return min(max(max(os.getloadavg()[0], _runnable()) / (os.cpu_count() or 1), 1.0), CROWDED)
+
+
+def _runnable() -> int:
+    """Return the number of threads of the machine that run or wait for a processor now; 0 without proc(5)."""
+    try:
+        return int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0])
+    except (OSError, ValueError, IndexError):
+        return 0
