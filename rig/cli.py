@@ -25,8 +25,9 @@ if "numpy" not in sys.modules:
     for _library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
-# Imported modules live as long as the process: to search them for garbage takes a tenth of a short command.
-_GARBAGE_THRESHOLD = 50_000  # container objects
+# Imported modules live as long as the process: to search them for garbage takes a tenth of a short command, which makes
+# 150,000 containers at most.
+_GARBAGE_THRESHOLD = 200_000  # container objects
 
 
 class Command(NamedTuple):

@@ -22,11 +22,12 @@ def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, 
     At least one recording is needed, from a run that just ended or from files. If `drifting`, a bias drift is no
     contradiction. Raise Fault or Refused if the recordings lack something.
     """
-    from rig.analysis import judging
-    from rig.analysis.external import external_outcome as external_judging
-
     if (external := runs[0].external) is not None:
+        from rig.analysis.external import external_outcome as external_judging
+
         return external_judging.calibrate_external(runs, external, estimator)
+    from rig.analysis import judging
+
     return judging.calibrate(runs, estimator, drifting=drifting)
 
 

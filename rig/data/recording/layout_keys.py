@@ -3,6 +3,8 @@
 The process that extracts a file imports nothing else of the rig, because it lives only for a moment.
 """
 
+from typing import Final
+
 import numpy as np
 
 SCHEMA = "rig.run/1"
@@ -12,4 +14,5 @@ TEXTS = {
     SCHEMA: ("config", "settings", "provenance", "turner"),
     SCHEMA_ELSEWHERE: ("config", "settings", "provenance", "elsewhere"),
 }
+NOT_STATED: Final = "not stated"  # the part or serial number of external readings
 EVENTS_DTYPE = np.dtype("u1")

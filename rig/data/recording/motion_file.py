@@ -13,13 +13,13 @@ from rig.config.section import SensorName
 from rig.data.installed_kinds import measured, quantities
 from rig.data.quantity import TEMPERATURE, Quantity
 from rig.data.recording.channel import Channel, sample_dtype
+from rig.data.recording.layout_keys import NOT_STATED
 from rig.data.recording.recorded_sensor import RecordedSensor
 
 MotionKind = Literal["sweeps", "attitudes", "turns"]
 Columns = Mapping[str, NDArray[np.float64]]
 
 LARGEST_NUMBER = 1e12  # either sign, in any SI unit: a larger one is a mistake, and its square might overflow
-NOT_STATED: Final = "not stated"
 ItemWord = Annotated[str, Field(pattern="^[ -~]{1,40}$")]  # plain ASCII, as of sensors on a board
 TIME = "time_s"
 QUATERNION = ("qw", "qx", "qy", "qz")

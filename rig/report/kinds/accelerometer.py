@@ -8,7 +8,6 @@ import numpy as np
 from rig.analysis.outcome import Outcome
 from rig.data.entries.accelerometer import AccelerometerEntry, AlignmentEntry, ValidationEntry
 from rig.data.quantity import ACCELERATION
-from rig.estimation.gyroscope.own_errors import NONLINEARITY
 from rig.report.c_code.c_functions import accelerometer_lines
 from rig.report.entry import counted, entry
 from rig.report.findings.characteristics import ACCELEROMETERS, SECOND_ORDER
@@ -81,6 +80,8 @@ def _validation(held_out: "HeldOut") -> ValidationEntry:
 
 def _lines(finding: Finding[AccelerometerEntry]) -> Iterator[str]:
     """Yield the lines below the table."""
+    from rig.estimation.gyroscope.own_errors import NONLINEARITY
+
     entry = finding.entry
     sweeps = "" if entry.placement is not None else f", {entry.sweeps} sweeps"
     yield f"relative to gravity, {entry.gravity_m_s2:.6g} m/s²; {len(entry.dwells)} attitudes{sweeps}"

@@ -11,7 +11,6 @@ from rig.data.entries.bias_drift import BiasEntry, BiasStepEntry, DriftEntry, Re
 from rig.data.entries.result_types import ErrorEntry, Vector3
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import RATE, Quantity
-from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.report.entries.error import error_entry
@@ -28,6 +27,7 @@ from rig.station.plain_text import plain
 
 if TYPE_CHECKING:
     from rig.analysis.temperature.bias_drift import BiasDrift, ScaleFreeBias
+    from rig.data.recording.recorded_sensor import RecordedSensor
 
 
 def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
@@ -40,7 +40,7 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
     }
 
 
-def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: RecordedSensor) -> DriftEntry:
+def drift_entry(quantity: Quantity, drift: "BiasDrift", sensor: "RecordedSensor") -> DriftEntry:
     """Return the bias of a sensor by repeat, in SI units."""
     from rig.analysis.temperature.bias_drift import SLOPE
     from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM

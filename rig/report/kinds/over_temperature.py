@@ -1,14 +1,13 @@
 """Scale and bias as polynomials of temperature."""
 
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.installed_kinds import quantities
-from rig.data.recording.motion_file import Item
-from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.result_file import ResultDocument
 from rig.report.c_code.temperature import temperature_lines
 from rig.report.findings.characteristics import BIAS_SLOPE_AT_REFERENCE, POLYNOMIALS
@@ -19,6 +18,10 @@ from rig.report.tables import dcc_results
 from rig.report.words.printed_values import plus_minus
 from rig.report.words.temperature_words import about_lines, shown_rows
 from rig.station.plain_text import plain
+
+if TYPE_CHECKING:
+    from rig.data.recording.motion_file import Item
+    from rig.data.recording.recorded_sensor import RecordedSensor
 
 
 def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, OverTemperatureEntry]]:
@@ -33,7 +36,7 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, OverTemperatureEntry
     }
 
 
-def _sensor(outcome: Outcome, name: str) -> RecordedSensor | Item:
+def _sensor(outcome: Outcome, name: str) -> "RecordedSensor | Item":
     if name in outcome.external:
         return outcome.external[name].item
     return outcome.recordings[0].run.sensors[name]

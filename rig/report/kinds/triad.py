@@ -13,7 +13,7 @@ from rig.data.entries.budget import expanded_uncertainties
 from rig.data.entries.magnetometer import ReversalEntry
 from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import Quantity
-from rig.data.recording.motion_file import NOT_STATED
+from rig.data.recording.layout_keys import NOT_STATED
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.report.findings.characteristic import Characteristic

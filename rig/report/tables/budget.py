@@ -6,7 +6,6 @@ from rich.table import Table
 
 from rig.data.entries.budget import BudgetEntry
 from rig.data.quantity import DisplayUnit
-from rig.estimation.gyroscope.budget import NOT_GIVEN
 from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.report.words.printed_budget import Line, lay_out_budget
 from rig.station.plain_text import plain
@@ -24,7 +23,9 @@ def heading_of(factors: Sequence[float]) -> str:
 
 
 def list_assumptions(budget: BudgetEntry) -> Iterator[str]:
-    """Yield the values that are assumed because the configuration does not give them."""
+    """Yield the assumptions for values that the configuration does not give."""
+    from rig.estimation.gyroscope.budget import NOT_GIVEN
+
     for line in budget.contributors:
         if line.half_width is not None and line.source.endswith(NOT_GIVEN):
             yield f"{line.name}: ± {line.half_width:.3g} {line.unit} is assumed: {line.source}"

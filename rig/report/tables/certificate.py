@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.entries.earth_rate import EarthRateEntry
-from rig.data.recording.motion_file import NOT_STATED
+from rig.data.recording.layout_keys import NOT_STATED
 from rig.data.result_file import CheckEntry, GyroscopeEntry, VerificationEntry
 from rig.report.findings.characteristic import Term
 from rig.report.words.expanded_uncertainty import expanded

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rig.data.recording.motion_file import NOT_STATED
+from rig.data.recording.layout_keys import NOT_STATED
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.entries.omission_entries import omitted_lines
 from rig.report.findings.result_kind import AxisValues, DisplayRow

@@ -2,20 +2,23 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-from rig.analysis.consistency.detection_limits import DetectionLimit
 from rig.data.entries.result_types import DetectionLimitEntry
 from rig.report.entry import entry
+
+if TYPE_CHECKING:
+    from rig.analysis.consistency.detection_limits import DetectionLimit
 
 FACTORS = {"1": (100.0, " %"), "rad": (math.degrees(1), "°"), "T": (1e6, " µT")}  # factor and unit in print
 
 
-def detection_limit_field(limits: Sequence[DetectionLimit]) -> dict[str, tuple[DetectionLimitEntry, ...]]:
+def detection_limit_field(limits: "Sequence[DetectionLimit]") -> dict[str, tuple[DetectionLimitEntry, ...]]:
     """Return the field of `result.json`, empty without limits."""
     return {"detection_limits": detection_limit_entries(limits)} if limits else {}
 
 
-def detection_limit_entries(limits: Sequence[DetectionLimit]) -> tuple[DetectionLimitEntry, ...]:
+def detection_limit_entries(limits: "Sequence[DetectionLimit]") -> tuple[DetectionLimitEntry, ...]:
     """Return the entries of `result.json`; the size of an undetectable fault is null."""
     return tuple(
         entry(DetectionLimitEntry, limit, size=limit.size if math.isfinite(limit.size) else None) for limit in limits
