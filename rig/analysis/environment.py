@@ -6,11 +6,12 @@ from math import inf, sqrt
 
 from rig.analysis.clock_comparison import ClockCheck, check_clock
 from rig.data.recording.settings import RunSettings, Site, Uncertainty
-from rig.observation.consistency.arm_clock import state_jitter
+from rig.observation.consistency.arm_clock import find_encoder_noise_rad, state_jitter
 from rig.observation.observed_run import ObservedRun
 
 # Of the jitter of one state, by that of a moment between two: √(f² + (1 − f)²), in the mean over all shares f.
 BETWEEN_TWO = sqrt(2 / 3)
+BY_SPLINE = 0.935  # the same of an angle between two readings, by the cubic spline through all
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +20,7 @@ class Surroundings:
 
     - `clock`: speeds are corrected by it; `clocks`: those of all recordings, for the checks.
     - `extension_m` (3,): the sensors' position from the flange, in its frame.
+    - `reading_noise_rad`: of a joint's angle at any moment, by the noise of its encoder.
     - `finds_earth_rate`: the Earth's rate is estimated, not taken from the site.
     """
 
@@ -30,6 +32,7 @@ class Surroundings:
     finds_earth_rate: bool = False
     state_jitter_dof: float = inf
     clocks: tuple[ClockCheck, ...] = ()
+    reading_noise_rad: float = 0.0
 
 
 def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings:
@@ -52,4 +55,5 @@ def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) ->
         settings.finds_earth_rate,
         jitter.dof,
         clocks,
+        find_encoder_noise_rad(recordings) * BY_SPLINE,
     )

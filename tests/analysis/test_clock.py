@@ -11,7 +11,7 @@ from rig.analysis.check import Check
 from rig.analysis.clock_comparison import check_clock
 from rig.analysis.verdict import clock_checks
 from rig.data.recording.run_file import RunData
-from rig.observation.consistency.arm_clock import state_jitter
+from rig.observation.consistency.arm_clock import find_encoder_noise_rad, state_jitter
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.timebase import NOMINAL_DRIFT
 from support.recordings.synthetic_run import Setup, synthetic_run
@@ -107,6 +107,14 @@ def test_the_jitter_of_the_states_is_measured() -> None:
     assert state_jitter([seen]).std_s == pytest.approx(1e-4, rel=0.1)
     assert state_jitter(exact).std_s < 1e-5
     assert state_jitter([seen, *exact]).std_s == pytest.approx(1e-4 / np.sqrt(2), rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("state_rate_hz", [125.0, 500.0])
+def test_the_noise_of_the_encoders_is_measured_at_the_joints_that_stand(state_rate_hz: float) -> None:
+    for noise_rad in (0.0, 2.4e-5):
+        seen = observe_runs([synthetic_run(Setup(encoder_noise_rad=noise_rad, state_rate_hz=state_rate_hz))])
+        assert find_encoder_noise_rad(seen) == pytest.approx(noise_rad, rel=0.05, abs=2e-6)
 
 
 @pytest.mark.slow

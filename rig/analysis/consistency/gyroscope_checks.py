@@ -34,6 +34,7 @@ from rig.analysis.consistency.residual_tests import (
     chi_square_of,
     find_outliers,
     orthonormal_basis,
+    remaining_directions,
     test_alternatives,
 )
 from rig.analysis.consistency.whitened_segments import (
@@ -47,6 +48,7 @@ from rig.analysis.consistency.whitened_segments import (
 from rig.analysis.gyroscope.segment_table import Segments
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.bias_process import BiasProcess, bias_process, select_by_akaike
+from rig.observation.consistency.raw_readings import REST
 
 DISTURBED_SWEEP = "disturbed_sweep"
 
@@ -100,6 +102,8 @@ def check_gyroscope(
     Faults that persist (`changes`) are tested with the transfers between segments, `differences` without. Each test has
     that false-alarm probability; `matrix` (3, 3) is F.
     """
+    segments = _steady_rates(segments, matrix)
+    allowance = replace(allowance, transfers=_steady_rates(allowance.transfers, matrix))
     axis_rates = segments.rates_rad_s @ matrix.T
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
     bias = _estimate_bias_process(segments, axis_rates, _steady_columns(segments), scatter)
@@ -133,6 +137,18 @@ def check_gyroscope(
     )
 
 
+def _steady_rates(segments: Segments, matrix: Array) -> Segments:
+    """Return segments whose rate is the same throughout a sweep, and whose readings have no more of it either.
+
+    The noise of the encoders is in the rates, and as large in the readings' residuals: columns with noise explain it.
+    """
+    rates = segments.rates_rad_s.copy()
+    for sweep in np.unique(segments.sweep[segments.sweep > REST]):
+        rates[segments.sweep == sweep] = rates[segments.sweep == sweep].mean(axis=0)
+    means = segments.means_rad_s - (segments.rates_rad_s - rates) @ matrix.T
+    return replace(segments, rates_rad_s=rates, means_rad_s=means)
+
+
 def predict_detection_limits(
     segments: Segments, matrix: Array, false_alarm_probability: float, allowance: ErrorPatterns
 ) -> dict[str, float]:
@@ -163,10 +179,15 @@ def _inflate_transfers(segments_only: _Tested, matrix: Array, allowance: ErrorPa
 
 
 def _residual_chi_square(tested: _Tested) -> tuple[float, int]:
-    """Return the χ² of segments with all possible changes in the model, and its degrees of freedom."""
+    """Return the χ² of segments with all possible changes in the model, and its degrees of freedom.
+
+    A change that differs from the model by noise of the rates alone is none: sweeps without transfers have such.
+    """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
-    nuisance = [apply_whitener(tested.model.whitener, columns) for columns in changed if columns is not None]
-    return chi_square_of(tested.model.readings, np.concatenate([tested.model.model, *nuisance], axis=1), None)
+    columns = [apply_whitener(tested.model.whitener, change) for change in changed if change is not None]
+    basis = orthonormal_basis(tested.model.model)
+    possible = remaining_directions(basis, np.concatenate(columns, axis=1))
+    return chi_square_of(tested.model.readings, np.concatenate([basis, possible], axis=1), None)
 
 
 def _whiten_with_transfers(matrix: Array, allowance: ErrorPatterns, bias: BiasProcess) -> _Tested:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.consistency.gyroscope_checks import ErrorPatterns
+from rig.analysis.consistency.state_errors import build_reading_patterns, build_time_patterns
 from rig.analysis.environment import Surroundings
 from rig.analysis.gyroscope.segment_table import Segments
 from rig.analysis.gyroscope.vector_inputs import WAVE_FRACTION, list_uncertainties
@@ -61,6 +62,7 @@ class KnownErrors:
     - encoder_rad: of a joint's angle by its encoder at one mark; zero if all sweeps are whole turns.
     - mount_rad: of an item that was mounted again, about each axis.
     - jitter_s: of the times of the arm's states.
+    - reading_rad: of one reading of a joint's angle.
     - earth_rad_s (3, k): of the Earth's rate in the base's frame, a column for each unknown direction.
     - curve: prior of the sensor's nonlinearity.
     - sensor: the properties by its data sheet, None if unknown.
@@ -73,6 +75,7 @@ class KnownErrors:
     encoder_rad: float
     mount_rad: float
     jitter_s: float
+    reading_rad: float
     earth_rad_s: Array
     curve: NonlinearityPrior
     sensor: KnownSensor | None
@@ -96,6 +99,7 @@ def collect_known_errors(
         finds_curve=explained is not None and explained.nonlinearity is not None,
         arcs=any(observation.arc_rad is not None for observation in result.observations),
         jitter_s=surroundings.state_jitter_s,
+        reading_rad=surroundings.reading_noise_rad,
         earth_rad_s=_earth(surroundings, name, result.earth),
         sensor=None if explained is None else explained.inputs.sensor,
         temperature_times_s=np.zeros(0) if explained is None else explained.inputs.windows_s.mean(axis=1),
@@ -111,6 +115,7 @@ def build_known_errors(
     finds_curve: bool,
     arcs: bool,
     jitter_s: float,
+    reading_rad: float,
     earth_rad_s: Array,
     sensor: KnownSensor | None,
     temperature_times_s: Array,
@@ -125,6 +130,7 @@ def build_known_errors(
         encoder_rad=uncertainty.angle_std_rad if arcs else 0.0,
         mount_rad=float(np.radians(uncertainty.mount_deg) / np.sqrt(3)),
         jitter_s=jitter_s,
+        reading_rad=reading_rad,
         earth_rad_s=earth_rad_s,
         curve=NonlinearityPrior(float(cube / CUBE_MISSED), float(square), full_scale_rad_s, free=finds_curve),
         sensor=sensor,
@@ -171,7 +177,8 @@ def patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> Ar
         [
             _angle_patterns(segments, known_errors),
             _encoder_patterns(segments, known_errors.encoder_rad),
-            _time_patterns(segments, known_errors.jitter_s),
+            build_time_patterns(segments, known_errors.jitter_s),
+            build_reading_patterns(segments, known_errors.reading_rad),
             _stamp_patterns(segments, known_errors.stamp_s),
             *_speed_patterns(segments),
             *_mount_patterns(segments, known_errors.mount_rad),
@@ -283,21 +290,6 @@ def _end_patterns(interval: MotionInterval) -> list[Array]:
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
     moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]
     return [end[:, joint] for joint in moved for end in axes]
-
-
-def _time_patterns(segments: Segments, jitter_s: float) -> Array:
-    """Return the patterns of the times between parts of a sweep: an error lengthens one part and shortens the next."""
-    edges = [
-        (sweep, time_s)
-        for sweep in np.unique(segments.sweep[segments.sweep > REST])
-        for time_s in np.unique(segments.times_s[segments.sweep == sweep].round(6))
-    ]
-    lengths = np.diff(segments.times_s)
-    patterns_by_mark = np.zeros((len(edges), *segments.means_rad_s.shape))
-    for row, (sweep, time_s) in enumerate(edges):
-        start, end = (np.abs(segments.times_s - time_s) < 1e-5).T & (segments.sweep == sweep)
-        patterns_by_mark[row] = jitter_s * (end.astype(np.float64) - start)[:, None] * segments.rates_rad_s / lengths
-    return patterns_by_mark
 
 
 def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:

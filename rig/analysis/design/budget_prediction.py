@@ -19,6 +19,7 @@ from rig.analysis.design.planned_motion import (
     plan_run,
     predict_attitude,
     predict_revolution,
+    predict_state_jitter,
     time_steps_of,
 )
 from rig.analysis.environment import Surroundings
@@ -49,7 +50,6 @@ REMOUNTING_S = 60.0  # between two stages, assumed
 # mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
 MOUNTING_OFFSET_DEG = 5.0
 ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
-STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
 
 
 def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
@@ -65,7 +65,7 @@ def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> di
 def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: str, sensor: SensorSection) -> Budget:
     uncertainty, mounting = run.uncertainty, mounting_matrix(sensor.mounting)
     scatters = turner.reading_std_rad > 0
-    jitter_s = 0.0 if scatters else STATE_JITTER_S  # what scatters tells no jitter beside
+    jitter_s = 0.0 if scatters else predict_state_jitter(run.plan)  # what scatters tells no jitter beside
     surroundings = Surroundings(
         run.site, uncertainty, _clock(uncertainty, on_board=sensor.on_board), jitter_s, run.settings.extension_m
     )

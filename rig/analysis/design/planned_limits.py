@@ -11,7 +11,8 @@ from rig.analysis.consistency.false_alarms import false_alarm_per_check
 from rig.analysis.consistency.gyroscope_checks import predict_detection_limits
 from rig.analysis.consistency.systematic_errors import build_error_patterns, build_known_errors, unknown_earth_rate
 from rig.analysis.design.cut_plan import PlannedSegments, plan_segments
-from rig.analysis.design.planned_motion import PlannedRun, plan_run
+from rig.analysis.design.planned_motion import ENCODER_NOISE_RAD, PlannedRun, plan_run, predict_state_jitter
+from rig.analysis.environment import BY_SPLINE
 from rig.analysis.gyroscope.vector_inputs import describe_sensor
 from rig.config.models import ArmSection, RigConfig
 from rig.config.sensors.sensor_catalogue import PARTS
@@ -42,13 +43,14 @@ def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> 
     kinds = sum(1 + (sensor.acceleration is not None) for sensor in config.to_calibrate.values())
     false_alarm_probability = false_alarm_per_check(kinds + len(config.all_sensors) - len(config.sensors))
     rates: dict[str, tuple[DetectionLimit, ...]] = {}
+    by_arm = isinstance(config.turner, ArmSection)
     if run.plan.sweeps and not run.plan.stages:  # what several mountings tell together is not foretold
         segments = plan_segments(run)
         rates = {
-            name: _gyroscope_limits(run, name, sensor, segments, false_alarm_probability)
+            name: _gyroscope_limits(run, name, sensor, segments, false_alarm_probability, by_arm=by_arm)
             for name, sensor in config.to_calibrate.items()
         }
-    if not (isinstance(config.turner, ArmSection) and run.plan.dwells):
+    if not (by_arm and run.plan.dwells):
         return DetectionLimits(rates, {})
     from rig.analysis.consistency import reference_checks
     from rig.analysis.design.planned_reference import list_accelerometers, predict_readings
@@ -68,7 +70,13 @@ def _one_set(plan: Plan) -> Plan:
 
 
 def _gyroscope_limits(
-    run: PlannedRun, name: str, sensor: SensorSection, segments: PlannedSegments, false_alarm_probability: float
+    run: PlannedRun,
+    name: str,
+    sensor: SensorSection,
+    segments: PlannedSegments,
+    false_alarm_probability: float,
+    *,
+    by_arm: bool,
 ) -> tuple[DetectionLimit, ...]:
     matrix, full_scale_rad_s = mounting_matrix(sensor.mounting), float(np.radians(sensor.range_deg_s))
     readings = segments.read_with(matrix, PARTS[sensor.part].angle_random_walk_rad_sqrt_s, sensor.rate_hz)
@@ -80,7 +88,8 @@ def _gyroscope_limits(
         full_scale_rad_s,
         finds_curve=len(speeds) > 1,
         arcs=run.settings.has_arcs,
-        jitter_s=0.0,
+        jitter_s=predict_state_jitter(run.plan) if by_arm else 0.0,
+        reading_rad=ENCODER_NOISE_RAD * BY_SPLINE if by_arm else 0.0,
         earth_rad_s=unknown_earth_rate(is_known=run.site.earth_rate_rad_s is not None or run.settings.finds_earth_rate),
         sensor=describe_sensor(run.uncertainty, name, full_scale_rad_s, np.zeros(len(times_s)), 0.0),
         temperature_times_s=times_s,

@@ -7,6 +7,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from rig.analysis.environment import BETWEEN_TWO
 from rig.config.models import RigConfig
 from rig.data.recording.settings import RunSettings, Site, Uncertainty, settings_of, site_of, uncertainty_of
 from rig.estimation.arrays import Array
@@ -17,6 +18,8 @@ from rig.observation.motion.arm_motion import ATTITUDES, ArmMotion
 from rig.observation.motion.revolution import Revolution
 
 STATE_RATE_HZ = 125.0
+STATE_JITTER_S = 2e-6  # of the times of an arm's states, as runs with controllers of real time find it
+ENCODER_NOISE_RAD = 2.4e-5  # of one reading of a joint's angle, as in logs of UR arms (docs/simulated-arm.md)
 STANDING_S = 1.0  # before the first step and after the last
 StepT = TypeVar("StepT", Sweep, Dwell)
 StepT_co = TypeVar("StepT_co", bound=Step, covariant=True)
@@ -81,6 +84,12 @@ def time_steps_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
 def measuring_steps(plan: Plan) -> Iterator[Timed[Step]]:
     """Return the plan's sweeps, rests and dwells with their times."""
     return (time_step for time_step in time_steps(plan) if isinstance(time_step.step, (Sweep, Rest, Dwell)))
+
+
+def predict_state_jitter(plan: Plan) -> float:
+    """Return the jitter in s of an arm's states as the sweeps will show it, with the noise of the encoders."""
+    slow_s_rad = np.mean([1 / sweep.speed_rad_s**2 for sweep in plan.sweeps]) if plan.sweeps else 0.0
+    return float(np.sqrt(STATE_JITTER_S**2 + ENCODER_NOISE_RAD**2 * slow_s_rad)) * BETWEEN_TWO
 
 
 def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:

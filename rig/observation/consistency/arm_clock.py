@@ -1,17 +1,20 @@
-"""The controller's clock by the times of its states: its rate against the computer's, and its jitter."""
+"""The arm's states: their clock's rate against the computer's, the jitter of their times, the noise of their angles."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import comb
 
 import numpy as np
 
+from rig.estimation.arrays import Array
+from rig.motion.steps import Sweep
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.coloured_noise import correlation_inflation
 from rig.observation.windows import inside, swept
 
 ORDER = 6
+SQUARED = comb(2 * ORDER, ORDER)  # variance of a difference of this order, by that of one reading
 EVEN_S = 1e-4  # states count as evenly spaced if their time steps differ by less
 
 
@@ -50,20 +53,40 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
     """Return the jitter of the times of the arm's states, from the scatter of the joint angles in all sweeps of a run.
 
     Differences of the sixth order remove the servo's motion, which is slow compared with the states. They keep the
-    times' errors and the encoder's steps. Neighbouring differences share states: n of them have n / Σ ρ² degrees of
-    freedom, with Σ ρ² = C(24, 12) / C(12, 6)² over all lags.
+    times' errors, and the noise and the steps of the encoder. Neighbouring differences share states: n of them have
+    n / Σ ρ² degrees of freedom, with Σ ρ² = C(24, 12) / C(12, 6)² over all lags.
     """
     scatter, count = [], 0
-    sweeps = [(recording, finished) for recording in recordings for finished in swept(recording.run)]
-    for recording, finished in sweeps:
-        motion = recording.motion
-        time_s = motion.time_s[inside(motion.time_s, finished.window)]
-        steps = np.diff(motion.angle(finished.sweep, time_s), n=ORDER)
-        even = np.ptp(np.lib.stride_tricks.sliding_window_view(np.diff(time_s), ORDER), axis=1)
-        steps = steps[even < EVEN_S]
+    for sweep, steps_rad in _difference_sweeps(recordings):
+        steps = steps_rad[:, sweep.joint]
         if len(steps):
-            scatter.append(np.mean(steps**2) / comb(2 * ORDER, ORDER) / finished.sweep.speed_rad_s**2)
+            scatter.append(np.mean(steps**2) / SQUARED / sweep.speed_rad_s**2)
             count += len(steps)
     if not scatter:
         return Jitter(0.0, np.inf)
-    return Jitter(float(np.sqrt(np.mean(scatter))), count * comb(2 * ORDER, ORDER) ** 2 / comb(4 * ORDER, 2 * ORDER))
+    return Jitter(float(np.sqrt(np.mean(scatter))), count * SQUARED**2 / comb(4 * ORDER, 2 * ORDER))
+
+
+def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
+    """Return the noise of one reading of a joint's angle, rad, from the joints that stand while another one sweeps.
+
+    Differences of the sixth order as in `state_jitter`; the steps of the encoders count as noise. Zero for a turner of
+    one shaft, and for one whose single readings scatter.
+    """
+    squares = [
+        np.mean(np.delete(steps_rad, sweep.joint, axis=1) ** 2)
+        for sweep, steps_rad in _difference_sweeps([run for run in recordings if run.motion.tells_parts_of_turns])
+        if steps_rad.shape[0] and steps_rad.shape[1] > 1
+    ]
+    return float(np.sqrt(np.mean(squares) / SQUARED)) if squares else 0.0
+
+
+def _difference_sweeps(recordings: Sequence[ObservedRun]) -> Iterator[tuple[Sweep, Array]]:
+    """Yield each finished sweep with the sixth differences (n, k) of its joint angles, where states are even."""
+    for recording in recordings:
+        motion = recording.motion
+        for finished in swept(recording.run):
+            time_s = motion.time_s[inside(motion.time_s, finished.window)]
+            steps_rad = np.diff(motion.angles(time_s), n=ORDER, axis=0)
+            even = np.ptp(np.lib.stride_tricks.sliding_window_view(np.diff(time_s), ORDER), axis=1)
+            yield finished.sweep, steps_rad[even < EVEN_S]

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.environment import surroundings_of
+from rig.analysis.consistency.state_errors import build_reading_patterns
+from rig.analysis.environment import BY_SPLINE, surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.gyroscope.segment_table import Segments, stack_segments
 from rig.data.recording.run_file import RunData
@@ -21,6 +22,7 @@ SHAKEN = Setup(
     sample_rate_hz=200.0,
     encoder_noise_rad=0.0,  # which adds as much as the sensor's own noise in a second
 )
+NOISE_RAD = 2.4e-5  # of an encoder
 UNSEEN_RAD_S, HERTZ = 0.004, 8.58
 
 
@@ -61,3 +63,21 @@ def test_of_a_vibration_that_no_encoder_sees_a_segment_keeps_no_more_than_is_sta
     variances = segments.variances_rad2_s2[turning]
     assert np.sqrt(np.mean(variances)) < known_rad_s
     assert 0.75 < np.sqrt(np.mean(off**2 / variances)) < 1.25
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("state_rate_hz", [125.0, 500.0])
+def test_what_the_encoders_noise_makes_of_rates_across_the_swept_axis_is_stated(state_rate_hz: float) -> None:
+    """Errors of neighbouring segments have the edge between them in common: over a whole sweep they cancel."""
+    noisy = replace(SHAKEN, encoder_noise_rad=NOISE_RAD, state_rate_hz=state_rate_hz)
+    segments, exact = (segments_of(synthetic_run(setup)) for setup in (noisy, replace(noisy, encoder_noise_rad=0.0)))
+    patterns = build_reading_patterns(segments, BY_SPLINE * NOISE_RAD)
+    turning = segments.sweep >= 0
+    off = (segments.rates_rad_s - exact.rates_rad_s)[turning]
+    across = np.abs(segments.rates_rad_s[turning]) < 0.1
+    variances = (patterns[:, turning] ** 2).sum(axis=0)
+    assert 0.85 < np.sqrt(np.mean(off[across] ** 2) / np.mean(variances[across])) < 1.15
+    sums = np.array([patterns[:, segments.sweep == sweep].sum(axis=1) for sweep in np.unique(segments.sweep[turning])])
+    assert np.mean((sums**2).sum(axis=1)) / np.mean((patterns[:, turning] ** 2).sum(axis=0)) == pytest.approx(
+        1, abs=0.2
+    )

@@ -98,6 +98,17 @@ def test_what_is_as_large_is_told_nearly_always_and_a_quarter_of_it_hardly_ever(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [902, 903])
+def test_a_good_sensor_shows_damage_as_small_whether_or_not_its_encoders_have_noise(seed: int) -> None:
+    """Of an ADIS16465 the noise of a second is no larger than what 24 µrad make of its rate."""
+    exact, noisy = (
+        {limit.what: limit.size for limit in held(drawn(seed, KINDS["ADIS16465"], setup).run).detection_limits["gyro"]}
+        for setup in (Setup(encoder_noise_rad=0.0, state_rate_hz=500.0), Setup(state_rate_hz=500.0))
+    )
+    assert all(noisy[what] < 1.4 * exact[what] for what in exact), (exact, noisy)
+
+
+@pytest.mark.slow
 def test_what_a_plan_says_will_be_told_is_what_its_recording_says() -> None:
     seen = drawn(3, KINDS["quiet LSM9DS1"])
     motion = Motion(Setup(), np.random.default_rng(0))

@@ -1,0 +1,57 @@
+"""The errors of the arm's states in the segments of a recording: of their times, and of the joint angles read in them.
+
+A mean rate is the difference of two angles. So an error at the edge between two segments of a sweep lengthens one and
+shortens the next. Of the joint that turns, the noise of its encoder looks like jitter, and counts as jitter.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.analysis.gyroscope.segment_table import Segments
+from rig.estimation.arrays import Array
+from rig.observation.consistency.raw_readings import REST
+from rig.observation.consistency.transfers import STANDS_RAD
+
+SAME_S = 1e-5  # farther apart, two times are two edges
+
+
+def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
+    """Return the patterns (P, N, 3) rad/s of the times between segments of a sweep."""
+    lengths = np.diff(segments.times_s)
+    by_rate = jitter_s * segments.rates_rad_s / lengths
+    shares = [share for sweep in np.unique(segments.sweep[segments.sweep > REST]) for share in _edges(segments, sweep)]
+    return np.reshape([share[:, None] * by_rate for share in shares], (-1, *segments.means_rad_s.shape))
+
+
+def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
+    """Return the patterns (P, N, 3) rad/s of joint angles read with noise at the edges of sweeps and transfers.
+
+    In sweeps, of the joints that stand. In transfers of all joints, because at their ends none turns. At an edge the
+    independent errors of all joints are as many as they have directions: three at most.
+    """
+    lengths = np.diff(segments.times_s)
+    patterns = []
+    for sweep in np.unique(segments.sweep[(segments.sweep != REST) & (noise_rad > 0)]):
+        rows = np.flatnonzero(segments.sweep == sweep)
+        first, last = segments.intervals[rows[0]], segments.intervals[rows[-1]]
+        q_rad = first.motion.angles(np.array([first.start_s, last.end_s]))
+        counted = np.abs(q_rad[1] - q_rad[0]) < (STANDS_RAD if sweep > REST else np.inf)
+        for share in _edges(segments, sweep):
+            interval = segments.intervals[np.flatnonzero(share)[0]]
+            at_s = interval.end_s if share[share != 0][0] > 0 else interval.start_s
+            directions, sizes, _ = np.linalg.svd(interval.motion.axes(interval.motion.angles(at_s))[:, counted])
+            patterns += [
+                noise_rad * share[:, None] / lengths * axis for axis in (directions[:, : len(sizes)] * sizes).T
+            ]
+    return np.reshape(patterns, (-1, *segments.means_rad_s.shape))
+
+
+def _edges(segments: Segments, sweep: int) -> Iterator[NDArray[np.float64]]:
+    """Yield for each edge of a sweep's segments (N,) 1 of the segment that ends there and −1 of the one that begins."""
+    inside = segments.sweep == sweep
+    times_s = np.sort(segments.times_s[inside].ravel())
+    for time_s in times_s[np.append(True, np.diff(times_s) > SAME_S)]:
+        start, end = (np.abs(segments.times_s - time_s) < SAME_S).T & inside
+        yield end.astype(np.float64) - start
