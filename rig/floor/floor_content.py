@@ -104,5 +104,5 @@ def _read(text: str) -> dict[str, Any]:
     counts = {shorten(state): count for state, count in [*(now.counts or {}).items()][:MOST_STATES]}
     parts = [(shorten(serial), shorten(state)) for serial, state in now.parts[-NEWEST:]]
     words = {name: shorten(getattr(now, name)) for name in ("part", "operator", "work_order", "rig")}
-    own_page = {"verdict": None, "why": "", "truth": "", "sensors": ()}  # details that only the station's own page shows
+    own_page = {"verdict": None, "why": "", "truth": "", "sensors": ()}  # only the station's own page shows them
     return {**asdict(now), **words, **own_page, "doing": now.doing[:LONGEST_DOING], "counts": counts, "parts": parts}

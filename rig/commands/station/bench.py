@@ -163,7 +163,7 @@ class RigBench:
     def _run_repeatedly(
         self, folder: Path, configured: Configured, listener: PartListener, answer: Answer
     ) -> tuple[Outcome, int, str]:
-        """Return the part's outcome, how often refused sweeps were repeated, and how it agrees with a simulated truth."""
+        """Return the part's outcome, the number of repetitions of sweeps, and the agreement with a simulated truth."""
         config = configured.loaded.config
         with log(folder / LOG) as logged, view() as terminal:
             station = Stations(

@@ -10,7 +10,7 @@ adaptive importance sampling (JCGM 101, 6.4.9).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,14 +100,14 @@ class MixedModel:
         """
         from scipy.optimize import minimize
 
-        return minimize(
-            lambda point: self._evaluate(point)[:2],
-            logarithms,
-            jac=True,
-            hess=lambda point: self._evaluate(point)[2],
-            method="trust-exact",
-            options={"gtol": TOLERANCE, "maxiter": most_steps, "max_trust_radius": LONGEST_STEP},
-        )
+        newton: Any = {  # SciPy's types know no gradient beside a value together with these options
+            "method": "trust-exact",
+            "jac": True,
+            "hess": lambda point: self._evaluate(point)[2],
+            "options": {"gtol": TOLERANCE, "maxiter": most_steps, "max_trust_radius": LONGEST_STEP},
+        }
+        optimum: OptimizeResult = minimize(lambda point: self._evaluate(point)[:2], logarithms, **newton)
+        return optimum
 
     def causes(self, std: Array, fit: MixedFit) -> list[Array]:
         """Return the parts (p, p) of θ's covariance by C₀, each component, and the prior of θ."""
