@@ -101,12 +101,13 @@ class MixedModel:
         from scipy.optimize import minimize
 
         newton: Any = {  # SciPy's types know no gradient beside a value together with these options
+            "fun": lambda point: self._evaluate(point)[:2],
             "method": "trust-exact",
             "jac": True,
             "hess": lambda point: self._evaluate(point)[2],
             "options": {"gtol": TOLERANCE, "maxiter": most_steps, "max_trust_radius": LONGEST_STEP},
         }
-        optimum: OptimizeResult = minimize(lambda point: self._evaluate(point)[:2], logarithms, **newton)
+        optimum: OptimizeResult = minimize(x0=logarithms, **newton)
         return optimum
 
     def causes(self, std: Array, fit: MixedFit) -> list[Array]:
