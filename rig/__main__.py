@@ -9,7 +9,7 @@ from typing import Any
 
 def main() -> int:
     """Run `rig` as `rig.cli.main` does; from the first moment on, Ctrl-C prints one line."""
-    signal.signal(signal.SIGINT, _end)  # until `rig.cli.run_guarded` installs its own
+    signal.signal(signal.SIGINT, _exit_at_once)  # until `rig.cli.run_guarded` installs its own
     from rig.cli import main as command
     from rig.errors import INTERRUPTED
 
@@ -21,7 +21,7 @@ def main() -> int:
     return status
 
 
-def _end(*_: Any) -> None:
+def _exit_at_once(*_: Any) -> None:
     """Exit at once: while modules are loaded nothing has begun, and an exception would print a traceback."""
     with suppress(OSError):
         os.write(2, b"rig: interrupted\n")

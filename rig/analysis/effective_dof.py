@@ -30,7 +30,7 @@ def of_angles(result: "SensorResult") -> Array | None:
     solution = explained.solution
     derivative = _to_angles(solution.matrix)
     readings = np.einsum("aij,ijkl,akl->a", derivative, _of_matrix(solution), derivative)
-    walk = np.einsum("aij,ijl,ail->a", derivative, _walk(explained)[:, :3, :3], derivative)
+    walk = np.einsum("aij,ijl,ail->a", derivative, _drift_covariance(explained)[:, :3, :3], derivative)
     return _split(np.diag(solution.angles_covariance_rad2), _of_readings(readings - walk, walk, explained), budget)
 
 
@@ -43,7 +43,7 @@ def of_sensitivity(result: "SensorResult") -> Array | None:
     if covariance is None:
         return None
     whole = np.diag(covariance).reshape(3, 3)
-    walk = np.diagonal(_walk(explained)[:, 4:, 4:], axis1=1, axis2=2)
+    walk = np.diagonal(_drift_covariance(explained)[:, 4:, 4:], axis1=1, axis2=2)
     return _split(whole, _of_readings(whole - walk, walk, explained), budget)
 
 
@@ -129,7 +129,7 @@ def _of_matrix(solution: VectorSolution) -> Array:
     return solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)
 
 
-def _walk(explained: Explained) -> Array:
+def _drift_covariance(explained: Explained) -> Array:
     """Return the bias drift's part (3, p, p) in the covariance of each axis' coefficients F, c (and G)."""
     inputs = explained.inputs
     gravity = None if explained.solution.g_sensitivity is None else inputs.apparent_gravity_m_s2

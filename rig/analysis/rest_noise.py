@@ -83,7 +83,7 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
         attempt_each(
             {
                 quantity: partial(
-                    _summarise,
+                    _summarise_noise,
                     [samples.time_s[interval] for interval in intervals],
                     [fill_missing(readings[interval], sampling.numbers[interval]) for interval in intervals],
                     quantity,
@@ -98,12 +98,12 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
 def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:
     long = [(stream, inside) for stream, inside in intervals if inside.stop - inside.start > 2]
     readings = [_readings(stream, inside, quantity) for stream, inside in long]
-    summary = _summarise([stream.time_s[inside] for stream, inside in long], readings, quantity)
+    summary = _summarise_noise([stream.time_s[inside] for stream, inside in long], readings, quantity)
     temperatures = [_temperatures(stream, inside) for stream, inside in long]
     return replace(summary, temperature_c=(min(low for low, _ in temperatures), max(high for _, high in temperatures)))
 
 
-def _summarise(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
+def _summarise_noise(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
     """Return the noise of readings at rest, by intervals of times (nᵢ,) and readings (nᵢ, 3)."""
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")

@@ -52,7 +52,7 @@ class _LimitSet:
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
         """Return the check of the one of three axes whose value is nearest to its limit, by the decision rule."""
-        check = self.check(what, _largest(values))
+        check = self.check(what, _largest_magnitude(values))
         if uncertainty is None or check.value is None:
             return check
         guards = uncertainty.expanded * (self.rule == "guard_band")
@@ -76,16 +76,16 @@ class _LimitSet:
         """Return the checks of scale and bias, (3,) each, and of their standard deviations (6,)."""
         return (
             self.nearest("scale_deviation", scale - 1, uncertainties[0]),
-            self.check("scale_std", _largest(std[:3])),
+            self.check("scale_std", _largest_magnitude(std[:3])),
             self.nearest("bias", bias, uncertainties[1]),
-            self.check("bias_std", _largest(std[3:])),
+            self.check("bias_std", _largest_magnitude(std[3:])),
         )
 
     def check_expanded(self, **expanded: Array) -> Iterator[Check]:
         """Yield the checks of expanded uncertainties (3,) that have a limit, by their names."""
         for what, uncertainty in expanded.items():
             if limit_of(self.limits, self.quantity, what)[1] is not None:
-                yield self.check(what, _largest(uncertainty))
+                yield self.check(what, _largest_magnitude(uncertainty))
 
 
 def judge(
@@ -106,7 +106,7 @@ def judge(
         checks += limit_set.calibration(solution.scale, solution.bias_rad_s, std, uncertainties)
         expanded = COVERAGE_FACTOR * std if budget is None else budget.expanded
         checks += limit_set.check_expanded(scale_u=expanded[:3], bias_u=expanded[3:])
-        checks.append(limit_set.check("condition", _largest(np.array([solution.condition]))))
+        checks.append(limit_set.check("condition", _largest_magnitude(np.array([solution.condition]))))
     return tuple(checks)
 
 
@@ -118,8 +118,8 @@ def verification_checks(sensor: str, verification: "Verification | None", limits
     """
     rms = mean = verified = None
     if verification is not None:
-        rms = _largest(verification.after.movement.rms_rad_s)
-        mean = _largest(np.array([turn.error_rad_s for turn in verification.after.revolutions]))
+        rms = _largest_magnitude(verification.after.movement.rms_rad_s)
+        mean = _largest_magnitude(np.array([turn.error_rad_s for turn in verification.after.revolutions]))
         verified = verification.reference_error_rad_s
     limit_set, (_, largest) = _LimitSet(sensor, "rate", limits), limit_of(limits, "rate", "verification_mean")
     return (
@@ -183,6 +183,6 @@ def _expand(std: Array, dof: Array) -> ExpandedUncertainty:
     return ExpandedUncertainty(factors * std, factors, dof)
 
 
-def _largest(values: np.ndarray) -> float | None:
+def _largest_magnitude(values: np.ndarray) -> float | None:
     """Return the largest magnitude; None if any of the values is not a number."""
     return float(np.abs(values).max()) if np.isfinite(values).all() else None

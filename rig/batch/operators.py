@@ -92,6 +92,6 @@ def refuse_without_terminal() -> None:
     if not sys.stdin.isatty():
         raise Refused(
             "not_confirmed",
-            "a station asks before the arm moves, and there is no terminal to answer at",
+            "a station asks before the arm moves, but there is no terminal to answer at",
             "Start it in a terminal, or give --series PARTS.csv; on hardware --yes as well",
         )

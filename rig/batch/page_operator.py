@@ -34,7 +34,7 @@ class OnPage:
         sections.put(asked=None)
 
     def hear(self, now: Now) -> None:
-        """Show a change of the station."""
+        """Show a change of the station's state."""
         self._sections.put(now=asdict(now))
 
     def answer(self, question: Question) -> str | None:
@@ -61,7 +61,7 @@ class OnPage:
             return True
 
     def routes(self, door: Door) -> list[Route]:
-        """Return the addresses that act: an answer, and the stop."""
+        """Return the routes for an answer and for the stop."""
 
         async def say(request: Request) -> Response:
             content = await body_of(request)

@@ -67,7 +67,7 @@ class Now:
     truth: str = ""
 
     def json(self) -> str:
-        """Return the text for the history."""
+        """Return the state as JSON for the history."""
         return json.dumps(asdict(self), separators=(",", ":"), ensure_ascii=False)
 
 
@@ -82,11 +82,11 @@ class Present:
     hears: Sequence[Callable[[Now], None]] = field(default=())
 
     def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does."""
+        """Handle an event, as a Listener does."""
         self._becomes(after(self.now, event))
 
     def batch(self, batch: Batch) -> None:
-        """Take a change of the batch."""
+        """Handle a change of the batch."""
         self._becomes(update_by_batch(self.now, batch))
 
     @contextmanager

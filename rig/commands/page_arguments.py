@@ -156,7 +156,7 @@ class _Address:
         self._url: str | None = url
 
     def event(self, event: "RunEvent") -> None:
-        """Take an event, as a Listener does."""
+        """Handle an event, as a Listener does."""
         from rig.station.events import PreflightPassed, Prompt
 
         if self._url is not None and isinstance(event, PreflightPassed | Prompt):

@@ -62,7 +62,7 @@ class ColumnSection(Section):
 
     @model_validator(mode="after")
     def require_one_factor(self) -> Self:
-        """Refuse both ways to state the size of a step."""
+        """Refuse `factor` together with `lsb_per_unit`."""
         if self.factor is not None and self.lsb_per_unit is not None:
             raise ValueError("give factor or lsb_per_unit, not both")
         return self
@@ -78,7 +78,7 @@ class AxisSection(Section):
     """One axis of the table, with the log's columns of its angle and rate."""
 
     along: AxisDirection = Field(
-        description="the axis of the item it lies along where all angles are zero, by the right hand"
+        description="the axis of the item that it is parallel to when all angles are zero, by the right-hand rule"
     )
     angle: ColumnSection
     rate: ColumnSection | None = None
@@ -144,7 +144,7 @@ class ColumnMap(Section):
             if rate_hz is not None and (timed := [name for name in section if name in TIMES]):
                 raise ValueError(f"give the column of {timed[0]} or a rate, not both")
         if self.table is not None and self.motion:
-            raise ValueError("give motion or table: a file tells attitudes, or the angles of axes")
+            raise ValueError("give motion or table: a file contains attitudes, or the angles of axes")
         return self
 
 
@@ -153,11 +153,11 @@ AS_NAMED = ColumnMap()  # every column has the rig's name
 
 def _fit(name: str, column: ColumnSection, wanted: str) -> None:
     if column.wraps_at is not None and wanted != TIME:
-        raise ValueError(f"{name} is {_one(wanted)}, and only a counter of time has wraps_at")
+        raise ValueError(f"{name} is {_add_article(wanted)}, and only a counter of time has wraps_at")
     quantity = wanted if column.unit is None else UNITS[column.unit].quantity
     if quantity != wanted:
-        raise ValueError(f"{name} is {_one(wanted)}, and {column.unit} is the unit of {_one(quantity)}")
+        raise ValueError(f"{name} is {_add_article(wanted)}, and {column.unit} is the unit of {_add_article(quantity)}")
 
 
-def _one(name: str) -> str:
+def _add_article(name: str) -> str:
     return f"an {name}" if name[0] in "aeiou" else f"a {name}"

@@ -202,7 +202,7 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
         short or (name == CARRIED_OUT and "target_uncertainty" in data)
     ):  # a script's name stands there
         if (otherwise := alternative_procedure(layered.document)) is not None:
-            return None, [f"{_where(name_location, layered.places)}: {otherwise}"]
+            return None, [f"{_describe_location(name_location, layered.places)}: {otherwise}"]
         wanted, problems = _validate(
             TargetUncertaintySection, data.get("target_uncertainty", {}), ("procedure", "target_uncertainty"), layered
         )
@@ -212,7 +212,7 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
         name = data["name"]
     if isinstance(name, str) and name in sections:
         return _validate(sections[name], data, ("procedure",), layered)
-    problems = [_where(name_location, layered.places) + _not_allowed(name, [*sections, SHORTEST])]
+    problems = [_describe_location(name_location, layered.places) + _not_allowed(name, [*sections, SHORTEST])]
     nearest = difflib.get_close_matches(str(name)[:100], list(sections), n=1)
     if nearest:
         problems += _validate(sections[nearest[0]], {**data, "name": nearest[0]}, ("procedure",), layered)[1]
@@ -231,16 +231,20 @@ def _validate_turner(
     data = document["turner"]
     kind = data.get("kind") if isinstance(data, dict) else None
     if "arm" in document:
-        problem = _where(("turner",), layered.places) + ": the turner is given twice; give either arm or turner"
+        problem = (
+            _describe_location(("turner",), layered.places) + ": the turner is given twice; give either arm or turner"
+        )
     elif not isinstance(data, dict):
-        problem = _where(("turner",), layered.places) + f": {quote(data)}: must be a section, with the key kind"
+        problem = (
+            _describe_location(("turner",), layered.places) + f": {quote(data)}: must be a section, with the key kind"
+        )
     elif isinstance(kind, str) and kind in kinds:
         keys = {key: value for key, value in data.items() if key != "kind"}
         return _validate(kinds[kind], keys, ("turner",), layered)
     elif turners is None and kind is not None:
         return TurnerSection(), []
     else:
-        problem = _where(("turner", "kind"), layered.places) + _not_allowed(kind, list(kinds))
+        problem = _describe_location(("turner", "kind"), layered.places) + _not_allowed(kind, list(kinds))
     return None, [problem]
 
 
@@ -263,7 +267,7 @@ SHAPES = {
 def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layered) -> str:
     """Return one validation error as a line: path, line number, the fault, the allowed values, the nearest spelling."""
     location: Location = item["loc"]
-    where = _where((*prefix, *location), layered.places)
+    where = _describe_location((*prefix, *location), layered.places)
     kind, value = item["type"], item["input"]
     if kind == "extra_forbidden":
         whole = not prefix and len(location) == 1
@@ -297,7 +301,7 @@ def _hint_at_override(section: Location, layered: Layered) -> str:
     return f"; {dotted_path(section)} is given by --set only, the file has {', '.join(others)}"
 
 
-def _where(location: Location, places: Places) -> str:
+def _describe_location(location: Location, places: Places) -> str:
     source = places.get(location)
     return dotted_path(location) + (f" ({source})" if source else "")
 
@@ -346,7 +350,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     ):
         for name in sorted(set(named) ^ set(simulated)):
             where = f"world.{kind}" if name in named else kind
-            yield f"{where}.{name}: missing; every sensor stands both in {kind} and in world.{kind}"
+            yield f"{where}.{name}: missing; every sensor has a section both in {kind} and in world.{kind}"
     yield from _instruments_fit(config, world)
 
 

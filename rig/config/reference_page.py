@@ -254,7 +254,7 @@ def _range(schema: Schema) -> str:
 
 
 def _describe_default(schema: Schema, required: bool) -> str:
-    """Return the value that applies if the key is left out."""
+    """Return the value of a key that is left out."""
     if "usual" in schema:
         return str(schema["usual"])
     if required:

@@ -19,7 +19,7 @@ def note_run(folder: Path) -> None:
         path = _list()
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         new = str(folder.resolve())
-        earlier = [noted for noted in _noted() if noted != new]
+        earlier = [noted for noted in _read_noted() if noted != new]
         write_new(path, "".join(f"{noted}\n" for noted in [*earlier, new][-KEPT:]))
 
 
@@ -28,7 +28,7 @@ def latest_run() -> Path:
 
     Raise Refused `no_latest_run`.
     """
-    for noted in reversed(_noted()):
+    for noted in reversed(_read_noted()):
         if (folder := Path(noted)).is_dir():
             return folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder
     raise Refused("no_latest_run", "no run folder of yours is known to be there", "Name the run folder")
@@ -42,7 +42,7 @@ def meant_run(path: str | Path) -> Path:
     return latest_run() if str(path) == LATEST and not Path(LATEST).exists() else Path(path)
 
 
-def _noted() -> list[str]:
+def _read_noted() -> list[str]:
     with suppress(OSError, UnfitFile, UnicodeDecodeError, Refused):
         return read_regular_file(_list(), _LIST_MAX_BYTES).decode().splitlines()
     return []

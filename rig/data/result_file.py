@@ -51,7 +51,7 @@ SIZE_MAX_BYTES = 16_000_000  # a run of six sweeps with its verification has 66,
 
 def _check_quantity(quantity: str) -> str:
     if quantity not in quantities():
-        raise ValueError(f"is no quantity that the rig or a package installed here knows: {', '.join(quantities())}")
+        raise ValueError(f"is not a quantity of the rig or of a package installed here:  {', '.join(quantities())}")
     return quantity
 
 
@@ -405,7 +405,7 @@ class ComparisonEntry(Entry):
 
 
 class VerificationEntry(Entry):
-    """A sensor against its reference, in the sensor's frame; `before` is null where only calibrated readings exist."""
+    """A sensor against its reference, in the sensor's frame; `before` is null if only calibrated readings exist."""
 
     reference: str
     reference_scale: Vector3

@@ -62,8 +62,8 @@ def _slopes(step: Array, secants: Array) -> Array:
         return np.concatenate([2 * secants[:1] - middle, middle, 2 * secants[1:] - middle])
     # after s₋ + 2 both s + before s₊ = …; at each end the third derivative does not jump at the knot next to it.
     middle = 3 * (after * secants[:-1] + before * secants[1:])
-    first = _end(step[0], step[1], secants[0], secants[1])
-    last = _end(step[-1], step[-2], secants[-1], secants[-2])
+    first = _end_condition(step[0], step[1], secants[0], secants[1])
+    last = _end_condition(step[-1], step[-2], secants[-1], secants[-2])
     middle[0] -= first
     middle[-1] -= last
     diagonal, lower, upper = 2 * both, after.copy(), before.copy()
@@ -75,7 +75,7 @@ def _slopes(step: Array, secants: Array) -> Array:
     return np.concatenate([begin[None], inner, end[None]])
 
 
-def _end(step: float, following: float, secant: Array, next_secant: Array) -> Array:
+def _end_condition(step: float, following: float, secant: Array, next_secant: Array) -> Array:
     """Return the right side of a not-a-knot end condition: `following` s₀ + (step + following) s₁."""
     both = step + following
     end: Array = ((step + 2 * both) * following * secant + step**2 * next_secant) / both

@@ -26,7 +26,7 @@ def looking(address: HistoryAddress) -> Iterator[Sections]:
     """Keep a feed up to date during the block; the history is only read."""
     feed, over = Sections(), threading.Event()
     feed.put(history={"label": address.label, "silent": None})
-    thread = threading.Thread(target=_look, args=(address, feed, over), name="floor", daemon=True)
+    thread = threading.Thread(target=_watch_history, args=(address, feed, over), name="floor", daemon=True)
     thread.start()
     try:
         yield feed
@@ -35,7 +35,7 @@ def looking(address: HistoryAddress) -> Iterator[Sections]:
         thread.join(LOOK_S)
 
 
-def _look(address: HistoryAddress, feed: Sections, over: threading.Event) -> None:
+def _watch_history(address: HistoryAddress, feed: Sections, over: threading.Event) -> None:
     while not over.is_set():
         try:
             with open_history(address) as history:
@@ -55,11 +55,11 @@ def _follow(history: History, feed: Sections, over: threading.Event) -> None:
         version = today, _count_entries(history)
         if version != before:  # trends of a long history take longer than a second
             before = version
-            feed.put(**_past(history, today))
+            feed.put(**_read_past(history, today))
         over.wait(LOOK_S)
 
 
-def _past(history: History, today: date) -> dict[str, Any]:
+def _read_past(history: History, today: date) -> dict[str, Any]:
     """Return the past calibrations, or only the error if rows cannot be read: the rigs are shown nevertheless."""
     try:
         pasts = history.calibrations()

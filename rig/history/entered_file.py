@@ -84,9 +84,7 @@ def _runs_of(connection: Connection, content: bytes) -> list[int]:
 
 def _unknown(name: str) -> Refused:
     why = f"the history has no file with the bytes of {name}"
-    return Refused(
-        "unknown_to_history", why, "Ask the laboratory which certificate it has issued; see `rig history show`"
-    )
+    return Refused("unknown_to_history", why, "Ask the laboratory which certificate it issued; see `rig history show`")
 
 
 def _not_as_entered(name: str, broken: journal.Broken) -> Refused:

@@ -59,7 +59,7 @@ class Trend:
 
     @property
     def days(self) -> Array:
-        """Days (n,) since the first."""
+        """Times (n,) in days since the first result."""
         return np.array([(time - self.times[0]).total_seconds() / DAY_S for time in self.times])
 
     @property
@@ -74,7 +74,7 @@ class Trend:
 
     @cached_property
     def mean(self) -> Fitted | None:
-        """The mean, and the scatter between runs."""
+        """The mean, with the scatter between runs."""
         return fit(np.ones((self.count, 1)), self.values, self.std) if self.enough else None
 
     @cached_property
@@ -91,7 +91,7 @@ class Trend:
 
     @cached_property
     def chart(self) -> Chart | None:
-        """Shewhart and EWMA charts."""
+        """The Shewhart and EWMA charts."""
         return chart(self.values, self.std) if self.enough else None
 
     @cached_property

@@ -216,7 +216,7 @@ class History:
         with self.engine.connect() as connection:
             numbers = [row.id for row in connection.execute(question.with_only_columns(schema.run.c.id)).all()]
             for number in numbers:
-                yield _kept(connection, number)
+                yield _read_kept(connection, number)
 
     def files(self) -> Iterator[tuple[str, str, str]]:
         """Yield path, name and SHA-256 of all files of runs, at each location of their folders."""
@@ -301,7 +301,7 @@ _ROWS = schema.run.join(schema.calibration).outerjoin(schema.voided)
 _IN_TIME = (_RUN.started_utc, _RUN.id, _CALIBRATION.id)
 
 
-def _kept(connection: Connection, number: int) -> Kept:
+def _read_kept(connection: Connection, number: int) -> Kept:
     places, files, documents = schema.location.c, schema.recording.c, schema.document.c
     row = connection.execute(select(schema.run).where(_RUN.id == number)).mappings().one()
     locations = select(places.computer, places.path).where(places.run_id == number).order_by(places.id.desc())

@@ -25,11 +25,11 @@ def cable_words(plan: Plan, q_rad: Joints, names: Sequence[str]) -> list[str]:
         if max(-low, high) > SLACK_RAD
     ]
     wound = [
-        f"{name} stands {degrees(now - home):+.0f}° from home: its cable may be wound by as much already, and is "
+        f"{name} is {degrees(now - home):+.0f}° from home: its cable may be wound by as much already, and is "
         "unwound on the way."
         for name, now, home in zip(names, q_rad, plan.home_q_rad, strict=True)
         if abs(now - home) > OTHER_TURN_RAD
     ]
     if not travels:
         return wound
-    return [f"The sensor's cable needs slack, from how it hangs now, to turn {', '.join(travels)}.", *wound]
+    return [f"The sensor's cable needs enough slack, from its present position, to turn {', '.join(travels)}.", *wound]

@@ -128,9 +128,9 @@ class Calibration:
 
     def __repr__(self) -> str:
         scale, bias, unit = self.shown.scale, self.shown.numbers, self.shown.unit.name
-        numbers = f"bias {_few(bias.values, '+.5f')} ± {max(bias.expanded):.2g} {unit}"
+        numbers = f"bias {_format_values(bias.values, '+.5f')} ± {max(bias.expanded):.2g} {unit}"
         if scale is not None:
-            numbers = f"scale {_few(scale.values, '.5f')} ± {max(scale.expanded):.2g}, {numbers}"
+            numbers = f"scale {_format_values(scale.values, '.5f')} ± {max(scale.expanded):.2g}, {numbers}"
         return f"<{self.name} by {self.entry.estimator}: {numbers} (U)>"
 
     def _repr_html_(self) -> str:
@@ -148,5 +148,5 @@ def rows(shown: DisplayRow) -> Iterator[tuple[str, ...]]:
         yield f"{shown.name} {label}".rstrip(), *scale, number, width, shown.unit.name
 
 
-def _few(values: Any, form: str) -> str:
+def _format_values(values: Any, form: str) -> str:
     return " ".join(f"{value:{form}}" for value in values)

@@ -38,7 +38,7 @@ class Calibrations(Sequence[Past]):
         units, NaN if a calibration lacks it. Raise Refused `missing_extra`.
         """
         names = dict.fromkeys(name for past in self.pasts for name in past.parameters)
-        columns: dict[str, Any] = {name: [_about(past, name) for past in self.pasts] for name in ABOUT}
+        columns: dict[str, Any] = {name: [_property_of(past, name) for past in self.pasts] for name in ABOUT}
         for name in names:
             parameters = [past.parameters.get(name) for past in self.pasts]
             columns[name] = [float("nan") if p is None else p.value for p in parameters]
@@ -183,7 +183,7 @@ def _titles(sensors: Mapping[Subject, HistoryRecord]) -> str:
     return "; ".join(title_of((*subject, False)) for subject in sensors) or "no sensor"
 
 
-def _about(past: Past, name: str) -> Any:
+def _property_of(past: Past, name: str) -> Any:
     match name:
         case "run":
             return past.run_id

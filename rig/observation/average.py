@@ -58,12 +58,12 @@ class Average:
 
     @property
     def noise_rad2_s2(self) -> Array:
-        """(3,) the noise's part of the variance, (rad/s)²."""
+        """The part (3,) of the variance due to noise, (rad/s)²."""
         return self.variance_rad2_s2 - self.drift_rad2_s2 - self.rounding_rad2_s2
 
     @property
     def mean_std_rad_s(self) -> Array:
-        """(3,) standard deviation of the mean, rad/s."""
+        """The standard deviation (3,) of the mean, rad/s."""
         std: Array = np.sqrt(self.variance_rad2_s2)
         return std
 
@@ -132,7 +132,7 @@ def steps_of(raw: NDArray[Any], sensor: RecordedSensor, quantity: Quantity) -> S
 
 
 def between(stream: Stream, start_s: float, end_s: float) -> slice:
-    """Return the samples taken between two controller times."""
+    """Return the samples between two controller times."""
     return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
 
 

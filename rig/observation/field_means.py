@@ -110,7 +110,7 @@ def _mean(run: RunData, name: str, samples: NDArray[Any], where: str, thresholds
         raise Fault(
             "saturation",
             f"in {where} the field is beyond the magnetometer's range",
-            "Choose a wider range_gauss, or take away the iron beside it",
+            "Choose a wider range_gauss, or remove iron near it",
         )
     return even_mean(channel.values(samples), steps_of(run.samples[name], run.sensors[name], FIELD))
 

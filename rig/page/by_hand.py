@@ -20,7 +20,7 @@ Section = dict[str, Any]
 
 
 def live_section(event: HandSeen) -> Section:
-    """Return the present moment, in degrees."""
+    """Return the page section of the present movement, in degrees."""
     return {
         "doing": event.doing,
         "since_s": round(event.since_s, 1),

@@ -134,7 +134,7 @@ class PageState:
         self._changed.add(name)
 
     def take(self, event: RunEvent) -> None:
-        """Show an event."""
+        """Update the sections by an event."""
         match event:
             case SamplesTaken(sensors):
                 self._newest[SamplesTaken] = event
@@ -217,7 +217,7 @@ class PageState:
                 self._take_ending(event)
 
     def _take_ending(self, event: RunEvent) -> None:
-        """Take an event that comes when nothing moves any more."""
+        """Handle an event that comes after all motion has ended."""
         match event:
             case Checked(check):
                 self._checks.append(check)
@@ -294,7 +294,7 @@ def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, Disp
 
 
 def _values(sensors: tuple[SensorSamples, ...]) -> dict[str, tuple[float, ...]]:
-    """Return the newest readings, by the name of their line."""
+    """Return the newest readings by the names of their curves."""
     return {
         f"{sensor.sensor}.{quantity.named(quantity.name)}": tuple(
             value / unit.size for value in sensor.latest[quantity.name]

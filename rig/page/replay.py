@@ -62,7 +62,7 @@ def moments(run: RunData) -> Iterator[Moment]:
         return
     times_s = run.states["time_s"]
     start_s, end_s = float(times_s[0]), float(times_s[-1])
-    steps = _steps(run, end_s)
+    steps = _list_steps(run, end_s)
     plan = Plan(tuple(done.step for done in steps), _state(run.states[0]).q_rad, run.settings.home_q_rad)
     modes: dict[str, str] = {name: sensor.mode for name, sensor in run.sensors.items()}
     raw = "calibrated" not in modes.values()
@@ -78,7 +78,7 @@ def moments(run: RunData) -> Iterator[Moment]:
             _, event = events.pop(0)
             yield Moment(time_s - start_s, event)
             if raw and isinstance(event, StepFinished) and isinstance(event.step, Sweep | Dwell):
-                yield Moment(time_s - start_s, look_of(so_far([_until(run, time_s)])))
+                yield Moment(time_s - start_s, look_of(so_far([_cut_at(run, time_s)])))
         index = min(int(np.searchsorted(times_s, time_s)), len(run.states) - 1)
         state = _state(run.states[index])
         yield Moment(time_s - start_s, SamplesTaken(samples_until(state.host_time_s)))
@@ -92,13 +92,13 @@ def moments(run: RunData) -> Iterator[Moment]:
 
 
 def ended(result: ResultDocument) -> Iterator[RunEvent]:
-    """Yield the events of a finished run's result."""
+    """Yield the checks and the verdict of a finished run as events."""
     for c in result.checks:
         yield Checked(Check(c.name, c.value, c.limit, c.unit, c.means, c.uncertainty, c.guard_band))
     yield VerdictReached(result.verdict == "pass")
 
 
-def _steps(run: RunData, end_s: float) -> list[_Done]:
+def _list_steps(run: RunData, end_s: float) -> list[_Done]:
     """Return the sweeps, rests and dwells of a recording; those without an end were interrupted."""
     done: list[_Done] = []
     for recorded in run.events:
@@ -137,7 +137,7 @@ def _recorded_events(run: RunData, steps: Sequence[_Done]) -> Iterator[tuple[flo
 _OF_STEPS = (SweepStarted, SweepFinished, RestStarted, RestFinished, DwellStarted, DwellFinished)
 
 
-def _until(run: RunData, time_s: float) -> RunData:
+def _cut_at(run: RunData, time_s: float) -> RunData:
     """Return the recording with the events up to `time_s`, and no later ones."""
     return replace(run, events=tuple(e for e in run.events if (e.controller_time_s or 0.0) <= time_s))
 

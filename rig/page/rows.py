@@ -78,7 +78,7 @@ def _dwell(dwell: QuantityInDwell) -> Row:
 
 
 def look_of(partial: SoFar) -> Look:
-    """Return the rows of a live run."""
+    """Return the page's rows of a run in progress."""
     sensors = partial.gyroscopes
     observations = [row for name, sensor in sensors.items() for row in _sweep_rows(name, sensor.sweeps)]
     observations += _dwell_rows(partial.at_rest)

@@ -88,7 +88,9 @@ def next_instruction(remaining: Open, face: Face | None) -> Instruction | None:
     if (pair := next((candidate for candidate in remaining.pairs if face in candidate), None)) is not None:
         return Instruction("lay", pair[1] if pair[0] == face else pair[0])
     firsts = [pair[0] for pair in remaining.pairs]
-    return Instruction("lay", next(iter([*firsts, *remaining.faces, *(_side(axis) for axis, _ in remaining.turns)])))
+    return Instruction(
+        "lay", next(iter([*firsts, *remaining.faces, *(_positive_side(axis) for axis, _ in remaining.turns)]))
+    )
 
 
 def simulate_session(wanted: WantedMoves) -> Iterator[Instruction]:
@@ -101,6 +103,6 @@ def simulate_session(wanted: WantedMoves) -> Iterator[Instruction]:
         faces_up.append(instruction.face)
 
 
-def _side(axis: str) -> Face:
+def _positive_side(axis: str) -> Face:
     """Return the side of the item in the positive direction of an axis."""
     return next(face for face in FACES if face == f"+{axis}")

@@ -37,7 +37,7 @@ class RecordedRun:
         return self.raw or self.corrected
 
     def only_raw(self) -> "RecordedRun":
-        """Return the calibration alone."""
+        """Return the run's calibration without its verification."""
         return replace(self, corrected=(), alone=True)
 
     def judged_by(self, overrides: Sequence[str]) -> "RecordedRun":

@@ -20,7 +20,7 @@ def document_of(outcome: Outcome) -> ResultDocument:
     """Return the result as plain numbers, texts and tuples, in SI units, by the schema "rig.result/1"."""
     by_kind = {kind.key: kind.entries(outcome) for kind in kinds() if not isinstance(kind.entries, NoOutlet)}
     entries: dict[str, object] = {key: of_kind for key, of_kind in by_kind.items() if of_kind or key in ALWAYS}
-    others = {key: _plain(entries.pop(key)) for key in list(entries) if key not in ResultDocument.model_fields}
+    others = {key: _plain_values(entries.pop(key)) for key in list(entries) if key not in ResultDocument.model_fields}
     clock = {} if outcome.clock is None else {"clock": clock_entry(outcome.clock)}
     return ResultDocument.model_validate(
         {
@@ -45,7 +45,7 @@ def _mount(mount: EstimatedMount) -> MountEntry:
     )
 
 
-def _plain(entries: Any) -> dict[str, Any]:
+def _plain_values(entries: Any) -> dict[str, Any]:
     """Return entries of a kind from a package, in the form of JSON."""
     return {name: sensor_entry.model_dump(mode="json") for name, sensor_entry in entries.items()}
 

@@ -23,7 +23,7 @@ def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
     fields: dict[str, Any] = {}
     for source in reversed(sources):
         fields |= {field: getattr(source, attribute) for field, attribute in _attributes(kind, source).items()}
-    return kind.model_validate({name: _plain(value) for name, value in {**fields, **more}.items()})
+    return kind.model_validate({name: _plain_value(value) for name, value in {**fields, **more}.items()})
 
 
 def counted(dof: Array | None) -> list[Any] | None:
@@ -46,5 +46,5 @@ def _attributes(kind: type[BaseModel], source: object) -> Mapping[str, str]:
     raise TypeError(f"no row of entry_sources.py says what {kind.__name__} takes from {type(source).__name__}")
 
 
-def _plain(value: Any) -> Any:
+def _plain_value(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value

@@ -105,7 +105,7 @@ class Acquisition:
             self.settling.expect(name, sensor)
 
     def on_samples(self, sensor: str, samples: NDArray[Any]) -> None:
-        """Take samples (n,) of a sensor that `counts` contains."""
+        """Store samples (n,) of a sensor that `counts` contains."""
         with self._lock:
             self.counts[sensor].add(samples)
             if self._kept:
@@ -117,7 +117,7 @@ class Acquisition:
             self.recorder.add_samples(sensor, samples)
 
     def on_state(self, state: State) -> None:
-        """Take a state of the turner."""
+        """Store a state of the turner."""
         with self._lock:
             if self._kept:
                 self._kept[-1].states.append(state)

@@ -42,7 +42,7 @@ def announcement(
     - mounted: lines that name the sensors on the turner.
     - early: whether the movement may end before its last repeat.
     """
-    at_most = " at most, until the uncertainty is what is wanted" if early else ""
+    at_most = " at most, until the target uncertainty is reached" if early else ""
     home_rad = find_travel_to_home(plan, report.state.q_rad)
     turns = ", ".join(
         f"{name} {degrees(angle):+.0f}°"

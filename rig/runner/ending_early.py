@@ -115,13 +115,13 @@ class EndingEarly:
                 for index, motion in enumerate(self.plan.motions)
                 if index >= self._motions
                 and isinstance(motion, Transfer)
-                and _same(motion.start_q_rad, pose)
-                and _same(motion.target_q_rad, self.plan.home_q_rad)
+                and _are_equal(motion.start_q_rad, pose)
+                and _are_equal(motion.target_q_rad, self.plan.home_q_rad)
             ),
             None,
         )
-        self._due = self._home is not None or _same(pose, self.plan.home_q_rad)
+        self._due = self._home is not None or _are_equal(pose, self.plan.home_q_rad)
 
 
-def _same(one: Joints, other: Joints) -> bool:
+def _are_equal(one: Joints, other: Joints) -> bool:
     return all(abs(mine - its) < SAME_PLACE_RAD for mine, its in zip(one, other, strict=True))

@@ -113,7 +113,9 @@ def ask_of_other_boards(mounted: Mounted, station: Station) -> None:
     doubtful = mounted.doubtful
     if not doubtful:
         return
-    statements = [_elsewhere(sensor, sensor.other_board) for sensor in doubtful if sensor.other_board is not None]
+    statements = [
+        _describe_other_board(sensor, sensor.other_board) for sensor in doubtful if sensor.other_board is not None
+    ]
     numbers = ", ".join(sensor.serial_number for sensor in doubtful)
     another = (
         "If this is another sensor, its serial number in the configuration is wrong, and this calibration would be "
@@ -135,7 +137,7 @@ def ask_of_other_boards(mounted: Mounted, station: Station) -> None:
         )
 
 
-def _elsewhere(sensor: MountedSensor, last: CalibratedBefore) -> str:
+def _describe_other_board(sensor: MountedSensor, last: CalibratedBefore) -> str:
     return (
         f"{sensor.part} {sensor.serial_number} was last calibrated {last.words} on ANOTHER board, "
         f"{last.board_unique_id}; this one is {sensor.board}."

@@ -72,7 +72,7 @@ def refuse_hanging_otherwise(readings: GyroscopeReadings, stage: Stage, up_flang
     force = readings.sensor.channel(ACCELERATION).values(readings.samples).mean(axis=0)
     stated = np.array(stage.mount) @ up_flange
     measured = readings.mounting.T @ force
-    if _apart(measured, stated) > ASKEW_RAD:
+    if _angle_between_rad(measured, stated) > ASKEW_RAD:
         raise Refused(
             "mounted_otherwise",
             f"by the accelerometer of {readings.name} the item's {nearest_face(measured)} axis points up, "
@@ -97,7 +97,7 @@ def refuse_turning_otherwise(
     )
     if not FRACTIONS[0] < fraction < FRACTIONS[1]:
         how = f"but reads {degrees(np.linalg.norm(measured)):.1f}° of {degrees(np.linalg.norm(stated)):.1f}°"
-    elif _apart(measured, stated) > ASKEW_RAD:
+    elif _angle_between_rad(measured, stated) > ASKEW_RAD:
         how = f"but reads a turn about its {nearest_face(measured)} axis"
     else:
         return
@@ -109,6 +109,6 @@ def remedy(stage: Stage) -> str:
     return f'Mount the item as the stage says ("{stage.instruction}"), or correct its mount in procedure.stages'
 
 
-def _apart(one: Array, other: Array) -> float:
+def _angle_between_rad(one: Array, other: Array) -> float:
     cosine = float(one @ other / (np.linalg.norm(one) * np.linalg.norm(other)))
     return float(np.arccos(np.clip(cosine, -1.0, 1.0)))

@@ -162,7 +162,7 @@ class Run:
             raise Refused(
                 "not_mounted",
                 f"nobody has confirmed that the item is mounted for stage {number + 1}",
-                "Go on when somebody stands there to mount it; --yes cannot confirm it, because somebody's "
+                "Continue when somebody is there to mount it; --yes cannot confirm this, because somebody's "
                 "hands are at the item then",
             )
 

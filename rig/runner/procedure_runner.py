@@ -312,7 +312,7 @@ class Rig:
         self.onboard.observe(sweep, revolutions)
 
     def rest(self, rest: Rest) -> None:
-        """Stand still, in order to measure bias and noise."""
+        """Stand still, to measure bias and noise."""
         if self.early is not None and self.early.ended:
             return
         with self._step(rest):

@@ -73,7 +73,7 @@ class Warming:
             raise Refused(
                 "no_heater",
                 f"procedure.heater_power is {self.section.heater_power:g}, and the firmware "
-                f"{self.heater.identity.firmware} of the board knows no heater",
+                f"{self.heater.identity.firmware} of the board does not support a heater",
                 "Flash the image that comes with this program: `rig board flash`; or set procedure.heater_power to 0",
             ) from error
         self._ramp = Ramp(self._rate_k_s, self.section.heater_power)

@@ -277,7 +277,7 @@ class Checked:
 
 @dataclass(frozen=True, slots=True)
 class VerdictReached:
-    """The run's verdict; its checks came before it."""
+    """The run's verdict, after its checks."""
 
     passed: bool
 

@@ -59,5 +59,5 @@ class Stations:
 
 
 def always_yes(announcement: Sequence[str], to_do: str) -> bool:
-    """Return True, if there is no one to ask."""
+    """Return True, for a run without anybody to ask."""
     return True

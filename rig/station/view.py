@@ -94,7 +94,7 @@ def _bar(fraction: float) -> ProgressBar:
 
 
 def _fraction_of_run(progress: Progress) -> float:
-    """Return which part of the planned time is over."""
+    """Return the elapsed fraction of the planned time."""
     planned_s = progress.elapsed_s + progress.remaining_s
     return progress.elapsed_s / planned_s if planned_s > 0 else progress.fraction
 

@@ -268,5 +268,5 @@ def _draw(rows: list[dict[str, Any]], figure: "Figure") -> None:
         panel.bar(np.arange(len(PARAMETERS)) + offset, covered, 0.4, label=f"{remedies} the remedies")
     panel.axhline(95.45, color="black", linestyle="--", linewidth=0.8)
     panel.set_xticks(range(len(PARAMETERS)), PARAMETERS)
-    panel.set(ylabel="sessions whose truth lies within ± 2 u, %", ylim=(0, 100))
+    panel.set(ylabel="sessions whose true value is within ± 2 u, %", ylim=(0, 100))
     panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)

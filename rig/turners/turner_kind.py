@@ -44,7 +44,7 @@ class Wording:
     beware: str = ""
     stands: str = "stands still"
     clock: str = "the arm controller's clock"
-    axes_source: str = "as its controller or the nominal model tells them"
+    axes_source: str = "as reported by its controller or by the nominal model"
     axes_traceability: str = "not traceable, a contributor of the uncertainty"
 
 

@@ -67,8 +67,8 @@ def test_aliases_that_do_not_multiply_are_read() -> None:
 
 
 def test_an_alias_to_itself_is_refused() -> None:
-    assert "line 1: *a stands inside what it stands for" in refusal("arm: &a {host: *a}\n")
-    assert "*a stands inside what it stands for" in refusal(DEMO_TEXT, "arm=&a [*a]")
+    assert "line 1: *a refers to a value that contains itself" in refusal("arm: &a {host: *a}\n")
+    assert "*a refers to a value that contains itself" in refusal(DEMO_TEXT, "arm=&a [*a]")
 
 
 @pytest.mark.slow

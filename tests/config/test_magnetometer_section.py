@@ -74,7 +74,8 @@ def test_the_link_has_to_carry_it_too() -> None:
 def test_it_stands_in_the_world_as_well() -> None:
     (problem,) = problems_of(COMPASS)
     assert problem == (
-        "world.magnetometers.compass: missing; every sensor stands both in magnetometers and in world.magnetometers"
+        "world.magnetometers.compass: missing; every sensor has a section both in magnetometers and in "
+        "world.magnetometers"
     )
 
 

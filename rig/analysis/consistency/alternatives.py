@@ -47,7 +47,7 @@ def _axis_patterns(columns: Array) -> Array:
 
 
 def _sweep_patterns(means: Means) -> Array:
-    """Return patterns of a change of one axis in one sweep."""
+    """Return the patterns of a change on one axis during one sweep."""
     alone = means.sweeps.T[:, None, :, None] * np.eye(3)[None, :, None, :]
     return np.asarray(alone.reshape(-1, len(means.sweep), 3), dtype=np.float64)
 

@@ -204,7 +204,7 @@ def _longest_run(counts: NDArray[np.int64]) -> int:
 
 
 def _count_repeated(counts: NDArray[np.int64]) -> int:
-    """Count the sequences of readings that occurred before."""
+    """Count the sequences of readings that repeat an earlier one."""
     stretches = np.lib.stride_tricks.sliding_window_view(counts.astype(np.int16), STRETCH, axis=0)
     rows = np.ascontiguousarray(stretches.reshape(len(stretches), -1))
     return len(rows) - len(np.unique(rows.view(f"V{rows.shape[1] * 2}")))

@@ -66,12 +66,12 @@ def segment_columns(model: ReferenceModel, segment: int) -> Array:
 
 
 def bias_drift_columns(model: ReferenceModel) -> Array:
-    """Return columns of a bias that changes steadily."""
+    """Return the columns of a bias that drifts at a constant rate."""
     return per_axis((_time(model) * model.movement.constant())[:, None] * np.ones(3))
 
 
 def _time(model: ReferenceModel) -> Array:
-    """Return the times (K,) of the middles, from −1 to 1."""
+    """Return the normalised times (K,) of the segments' middles, from −1 to 1."""
     middle = repeat_by_segment(model.times_s, model.movement)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
     return time

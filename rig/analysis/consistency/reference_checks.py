@@ -115,7 +115,7 @@ class WhitenedReference:
         return float(chi_square_limit + fraction * max(f_limit - chi_square_limit, 0.0))
 
     def _extend_model(self, nuisance: Sequence[Array]) -> Array:
-        """Return the model with nuisance columns, orthonormal."""
+        """Return an orthonormal basis of the model and the nuisance columns."""
         return orthonormal_basis(np.column_stack([self.model, *(self.rotation @ columns for columns in nuisance)]))
 
     def _estimate_delta(self, model: Array) -> float:
@@ -129,7 +129,7 @@ class WhitenedReference:
         return model_basis, residuals - model_basis @ (model_basis.T @ residuals)
 
     def _chi_square_drop(self, model: Array, columns: Array, delta_rad: float) -> float:
-        """Return the χ² that columns explain beside the model."""
+        """Return the χ² that columns explain in addition to the model."""
         model_basis, residuals = self._whiten_residuals(model, delta_rad)
         projections = (
             remaining_directions(model_basis, columns / np.sqrt(1 + delta_rad**2 * self.growth)[:, None]).T @ residuals

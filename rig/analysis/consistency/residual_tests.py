@@ -103,7 +103,7 @@ def find_outliers(
 
 
 def orthonormal_basis(columns: Array) -> Array:
-    """Return orthonormal columns with the same span."""
+    """Return an orthonormal basis of the span of columns."""
     sizes = np.linalg.norm(columns, axis=0)
     remaining, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
     outliers: Array = remaining[:, singular > 1e-6 * singular[0]]

@@ -136,5 +136,5 @@ def build_whitener(segments: Segments, scatter: Scatter, bias: BiasProcess) -> A
 
 
 def apply_whitener(whitener: Array, columns: Array) -> Array:
-    """Return columns (3, N, k) whitened, as (3 N, k)."""
+    """Return whitened columns, from (3, N, k) to (3 N, k)."""
     return np.asarray(whitener @ columns.reshape(len(whitener), -1), dtype=np.float64)

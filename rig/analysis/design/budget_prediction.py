@@ -69,7 +69,7 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
     surroundings = Surroundings(
         run.site, uncertainty, _clock(uncertainty, on_board=sensor.on_board), jitter_s, run.settings.extension_m
     )
-    parts = [_part(config, stage, sensor, turner) for stage in _stages(run)]
+    parts = [_plan_recording_part(config, stage, sensor, turner) for stage in _stages(run)]
     inputs = combine_recordings(parts, surroundings)
     constant_sensor = describe_sensor(
         uncertainty, name, float(np.radians(sensor.range_deg_s)), np.full(len(inputs.windows_s), ROOM_C), STEP_K
@@ -124,10 +124,13 @@ def _stages(run: PlannedRun) -> Iterator[PlannedRun]:
         clock_offset_s += stage_plan.duration_s + 2 * STANDING_S + REMOUNTING_S
 
 
-def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, turner: TurnerIdentity) -> RecordingPart:
-    """Return the turns and rests of a recording."""
+def _plan_recording_part(
+    config: RigConfig, run: PlannedRun, sensor: SensorSection, turner: TurnerIdentity
+) -> RecordingPart:
+    """Return a recording's revolutions and rests as the estimators take them."""
     turns = [
-        _turn(sweep, run, sensor, _scatter(config, sweep.step, turner)) for sweep in time_steps_of(run.plan, Sweep)
+        _plan_observation(sweep, run, sensor, _scatter(config, sweep.step, turner))
+        for sweep in time_steps_of(run.plan, Sweep)
     ]
     at_rest = [
         replace(
@@ -160,7 +163,7 @@ def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Aver
     )
 
 
-def _turn(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
+def _plan_observation(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
     sweep, turn = timed.step, predict_revolution(timed, run.arm, np.array(run.settings.mount))
     axis, sign = nearest_axis(mounting_matrix(sensor.mounting) @ turn.axis_flange)
     return Observation(

@@ -151,7 +151,7 @@ class Shortest:
 
     @property
     def at_any_length(self) -> ReachedUncertainty:
-        """The smallest U by name, each from any of the runs."""
+        """The smallest U of each name that any run reaches."""
         return ReachedUncertainty(*(getattr(self.least(size).reached, size) for size in SIZES))
 
 

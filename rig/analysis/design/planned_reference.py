@@ -35,7 +35,7 @@ class PlannedAccelerometer:
 
     @property
     def datasheet(self) -> Datasheet:
-        """The errors beside the model that the data sheet allows."""
+        """The sensor errors outside the model, as limited by the data sheet."""
         return read_datasheet(self.run.uncertainty, self.name, self.range_m_s2)
 
 

@@ -207,8 +207,8 @@ def _solve(equations: Equations, method: Method, placements: Placements) -> Tria
         if not placements.left_out or fault.name not in TOO_LITTLE:
             raise
         what = (
-            f"{fault.what}; {placements.left_out} rows in which the body moves are left out, for only rests tell a "
-            f"reference{''.join(f'; {omitted}' for omitted in placements.omitted)}"
+            f"{fault.what}; {placements.left_out} rows in which the body moves are left out, because only rests give "
+            f"a reference{''.join(f'; {omitted}' for omitted in placements.omitted)}"
         )
         raise Fault(fault.name, what, fault.remedy) from None
 

@@ -77,11 +77,11 @@ def _solve(turning: Turning, window_s: float | None) -> InIncrements:
     for _ in range(PASSES):
         solution = solve_known_increments(turning.time_s, turning.readings_rad_s, gathered.fixes, start)
         regathered = gather(turning, window_s, solution.clock_s)
-        if _same(gathered, regathered):
+        if _are_equal(gathered, regathered):
             break
         gathered = regathered
     return InIncrements(solution, gathered.window_s, gathered.left_out, gathered.increments)
 
 
-def _same(one: Gathered, other: Gathered) -> bool:
+def _are_equal(one: Gathered, other: Gathered) -> bool:
     return bool(np.array_equal(one.fixes.joined, other.fixes.joined))

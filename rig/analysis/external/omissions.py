@@ -30,14 +30,14 @@ def list_omitted(
 
 
 def notes_on_reading(read: ReadElsewhere, samples: Samples) -> Iterator[str]:
-    """Yield what was done to the files' times and rows."""
+    """Yield notes on changes made to the files' times and rows."""
     if read.note:
         yield read.note
     yield from samples.notes
     if read.origin_s:
         yield f"times count from {read.origin_s} s of the files' clock"
     if read.other_rows:
-        yield f"{read.other_rows} rows of the samples hold none of these readings, and are left out"
+        yield f"{read.other_rows} rows of the samples do not contain these readings and are left out"
 
 
 def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:

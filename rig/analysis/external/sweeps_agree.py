@@ -46,7 +46,7 @@ def check_agree(solution: VectorSolution, data: ExternalData) -> None:
 
 
 def _name_contradiction(worst: int, data: ExternalData) -> str:
-    """Return which sweep contradicts which, by their rows."""
+    """Describe which sweeps contradict each other, by their rows."""
     axis = data.sweeps[worst].axis_flange
     about = [sweep.sweep for sweep in data.sweeps if abs(sweep.axis_flange @ axis) > SAME_AXIS]
     if len(about) == 2:

@@ -120,8 +120,8 @@ def compare(
         time_s=np.concatenate([part.time_s for part in parts]),
         reading_rad_s=np.concatenate([part.reading for part in parts]),
         reference_rad_s=np.concatenate([part.reference for part in parts]),
-        movement=_summarise([part.error[part.sweeping | part.resting] for part in parts]),
-        sweeps=_summarise([part.error[part.sweeping] for part in parts]),
+        movement=_summarise_errors([part.error[part.sweeping | part.resting] for part in parts]),
+        sweeps=_summarise_errors([part.error[part.sweeping] for part in parts]),
         noise_rad_s=_estimate_noise([part.error[rest] for part in parts for rest in part.still]),
         revolutions=_compare_revolutions(recordings, sensor, reference, rotation, gravity_rad_s),
         delay_s=tuple(part.delay.delay_s for part in parts if part.delay),
@@ -196,7 +196,7 @@ def _interpolate(stream: Stream, reference: Reference, time_s: Array) -> Array:
     return CubicSpline(stream.time_s, rate)(time_s)
 
 
-def _summarise(errors: Sequence[Array]) -> Deviation:
+def _summarise_errors(errors: Sequence[Array]) -> Deviation:
     error = np.concatenate(errors)
     return Deviation(
         samples=len(error),

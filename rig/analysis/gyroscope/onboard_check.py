@@ -137,7 +137,7 @@ def _events(run: RunData, sensor: str) -> Iterator[OfTheBoard]:
 
 
 def _count_missing(sequence: NDArray[np.uint32]) -> int:
-    """Return how many numbers a sequence modulo 2³² lacks."""
+    """Return how many numbers are missing in a sequence modulo 2³²."""
     return int(np.sum(np.diff(sequence).astype(np.int64) - 1))
 
 

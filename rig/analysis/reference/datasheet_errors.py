@@ -155,8 +155,7 @@ def separate_sensor_errors(
 ) -> tuple[Spread, list[Contributor]]:
     """Return the `spread` by noise and arm, and the contributors of the sensor itself in this `movement`.
 
-    The response is that of a solution that estimates all parameters, so the noise of a nonlinear sensor has a larger
-    effect.
+    The spread's response is that of a fit of all parameters, φ too, so a nonlinear sensor has more noise.
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T for shared in (wandering(movement), flickering(movement))

@@ -64,7 +64,7 @@ def _store(options: Namespace) -> int:
             raise Refused(
                 "autopilot_parameter_missing",
                 f"the autopilot at {link.port} has no parameter {', '.join(sorted(missing))}",
-                "See that it has that IMU, and that its firmware is no older than ArduPilot 4.0 or PX4 1.12",
+                "Check that it has that IMU, and that its firmware is not older than ArduPilot 4.0 or PX4 1.12",
             )
         new = {
             name: AutopilotParameter(name, old[name].type, encode_value(value), link.identity.firmware)

@@ -144,7 +144,7 @@ def _fetch_session(
         if name is None:
             raise Refused(
                 "another_sensor",
-                f"the board has calibrated its {part} by hand, and that is none of: {', '.join(among)}",
+                f"the board has calibrated its {part} by hand, but this is not one of: {', '.join(among)}",
                 "Correct --sensor or the configuration, or calibrate this sensor",
             )
         sensor = among[name]

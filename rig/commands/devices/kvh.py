@@ -54,7 +54,7 @@ def run(options: Namespace) -> int:
                 stack.enter_context(simulated_laboratory(loaded.text))
         problems = []
         for name, (port, speed) in ports.items():
-            info = _look(name, port, speed)
+            info = _query_instrument(name, port, speed)
             print_kvh_info(info, as_json=options.json)
             problems += [info.problem] if info.problem is not None else []
     for problem in problems:
@@ -62,7 +62,7 @@ def run(options: Namespace) -> int:
     return 2 if problems else 0
 
 
-def _look(name: str, port: str, baud: int) -> "KvhInfo":
+def _query_instrument(name: str, port: str, baud: int) -> "KvhInfo":
     """Query one instrument. Raise Refused if it does not answer at all."""
     import numpy as np
 

@@ -56,7 +56,7 @@ def run(options: Namespace) -> int:
 
         given_values = StatedProperties(options.serial_number, options.range_deg_s, options.range_g)
         section = look_at_device(options.port, options.baud, options.name, tuple(options.seconds), given_values)
-        _tell('write what is known in place of "?"; rig check refuses the section until then')
+        _tell('replace every "?" by its value; rig check refuses the section until then')
         sys.stdout.write(section)
         return 0
     from rig.commands.devices.configuration_writing import refuse_existing, write_checked
@@ -125,7 +125,7 @@ def look_at_device(
     for reason in layout.reasons:
         _tell(reason)
     for gap in layout.gaps:
-        _tell(f"CANNOT TELL {gap}")
+        _tell(f"UNKNOWN {gap}")
     if user.by_hand and "gx" not in layout.columns:
         still, turned = seconds
         raise Refused(

@@ -54,10 +54,10 @@ def run(options: Namespace) -> int:
     Raise Refused `not_answered`, `bad_option`, `configuration_not_written`.
     """
     refuse_existing(options.file)
-    return write_checked(options.file, _answers(options))
+    return write_checked(options.file, _read_answers(options))
 
 
-def _answers(options: Namespace) -> "Answers":
+def _read_answers(options: Namespace) -> "Answers":
     from rig.config.first_configuration import Answers
     from rig.config.sensors.sensor_catalogue import PARTS
     from rig.config.sensors.sensor_sections import check_serial_number

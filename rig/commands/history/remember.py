@@ -92,7 +92,7 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
         return None
     named = None if loaded is None or history is not None else loaded.config.history.url
     hint = f", or --history {named} if that is yours" if named is not None else ""
-    return f"{address.label} does not know this run; rig history import {folder} enters it{hint}"
+    return f"{address.label} does not contain this run; rig history import {folder} enters it{hint}"
 
 
 def _find_own(folder: Path, history: str | None) -> "tuple[Loaded | None, HistoryAddress | None]":
@@ -142,7 +142,7 @@ def describe_changes(calibrations: Sequence[CalibrationComparison]) -> tuple[str
         before = ", ".join(str(pair.before.id) for pair in same)
         whose = " of the other sensors" if changed else ""
         count = sum(len(pair.changes) for pair in same)
-        lines.append(f"none of {count} values changed since the last calibration{whose} (no. {before})")
+        lines.append(f"no change of {count} values since the last calibration{whose} (no. {before})")
     return tuple(lines)
 
 

@@ -30,7 +30,9 @@ def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[
         return
     host = config.turner.simulated_at or _board_host(config)
     with ExitStack() as stack:
-        free = next((candidate for candidate in (host, *_candidates()) if _take_if_free(candidate, stack)), host)
+        free = next(
+            (candidate for candidate in (host, *_candidate_addresses()) if _take_if_free(candidate, stack)), host
+        )
         if free != host:
             say(f"simulated laboratory: another one is at {host}, so this one is at {free}", file=sys.stderr)
         yield ([] if free == host else [*_move_turner(config, laboratory, free), *_move_ports(config, free)])
@@ -44,7 +46,7 @@ def load_at_own_address(path: Path, overrides: Sequence[str]) -> Iterator[Loaded
         yield load(path, [*overrides, *moved], sections=None) if moved else loaded
 
 
-def _candidates() -> Iterator[str]:
+def _candidate_addresses() -> Iterator[str]:
     """Yield loopback addresses, in a different order for every process."""
     process = os.getpid()
     for number in range(CANDIDATES):

@@ -43,7 +43,7 @@ def carry_out(
     Return 0 if passed, 1 if failed. `moved` are serial numbers of sensors that are declared to be on another board than
     before.
     """
-    with serve_operators_page(page, folder, lambda: _about(folder, configured, page)) as page_of_run:
+    with serve_operators_page(page, folder, lambda: _describe_run(folder, configured, page)) as page_of_run:
         # In a laboratory that this process simulates no person can be hurt, so no operator is asked.
         on_terminal = always_yes if assume_yes or configured.loaded.simulated else ask_operator
         answer = page_of_run.answer if page_of_run.answer is not None and not assume_yes else on_terminal
@@ -82,7 +82,7 @@ def carry_out(
     return 0 if outcome.passed else 1
 
 
-def _about(folder: Path, configured: Configured, page: PageWish | None) -> "About":
+def _describe_run(folder: Path, configured: Configured, page: PageWish | None) -> "About":
     from rig.page.about import About
     from rig.page.arm import built
     from rig.turners.turner_registry import kind_of

@@ -8,7 +8,7 @@ from rig.errors.quoting import quote
 
 
 def address_keys(loaded: Loaded) -> list[str]:
-    """Return the keys of a configuration with an address: of the turner, the board, sensors with their own port."""
+    """Return the keys of the addresses in a configuration: of the turner, the board, sensors with own ports."""
     import yaml
 
     turner = "turner" if "turner" in yaml.safe_load(loaded.text) else "arm"

@@ -53,7 +53,7 @@ class PartListener:
     repeats: bool = False
 
     def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does."""
+        """Handle an event, as a Listener does."""
         match event:
             case BoardConnected(_, identity):
                 self.chip = Chip(identity.unique_id, tuple(part.who_am_i for part in identity.sensors if part.present))

@@ -11,7 +11,7 @@ M_ARENA_MAX = -8  # malloc.h
 
 
 def keep_to_one_arena() -> None:
-    """Make all threads of this process share freed memory (C library glibc); do nothing on others."""
+    """Make all threads of this process share freed memory, if the C library is glibc."""
     if sys.platform == "linux":
         mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
         if mallopt is not None:

@@ -66,7 +66,7 @@ def run(options: Namespace) -> int:
             turner_of(run)
             check_arms_times(run.states)
     result = read_result(folder / RESULT) if (folder / RESULT).exists() else None
-    feed = Feed(PageState(_about(folder, runs)))
+    feed = Feed(PageState(_describe_replay(folder, runs)))
     with serving(feed, Control(may_answer=False), folder, wanted.address()) as url:
         say(f"page: {url}", sys.stderr)
         try:
@@ -81,7 +81,7 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _about(folder: Path, runs: "list[RunData]") -> "About":
+def _describe_replay(folder: Path, runs: "list[RunData]") -> "About":
     from rig.data.recording.provenance import calls_itself_simulated
     from rig.observation.motion.arm_motion import turner_of
     from rig.page.about import About
@@ -129,7 +129,7 @@ def _read_ending(folder: Path, result: "ResultDocument | None") -> "Iterator[Run
 
 
 def read_last_words(folder: Path) -> str:
-    """Return how the log of a run without a result ends."""
+    """Return that a run has no result, with the last message of its log."""
     from rig.data.run_folder import LOG
 
     try:

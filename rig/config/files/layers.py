@@ -77,7 +77,7 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
-    """Return a file and its base files, from the top."""
+    """Return a file followed by the files it is based on."""
     layer, names, files = _layer(text, ""), ["this file"], []
     while BASE in layer.data:
         where, wanted = f"{BASE} ({layer.places[(BASE,)]})", layer.data.pop(BASE)

@@ -43,7 +43,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     part = path.with_name(path.name + PART)
     part.unlink(missing_ok=True)
     try:
-        with open(part, "xb", opener=_alone) as file:
+        with open(part, "xb", opener=_open_without_links) as file:
             yield file
         if (held_back := _held_back.get()) is None:
             part.replace(path)
@@ -73,5 +73,5 @@ def open_to_append(path: str | Path) -> int:
     return descriptor
 
 
-def _alone(path: str, flags: int) -> int:
+def _open_without_links(path: str, flags: int) -> int:
     return os.open(path, flags | NO_LINK, 0o666)

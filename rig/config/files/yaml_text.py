@@ -111,7 +111,7 @@ class _Loader(yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
             anchor = str(event.anchor)
             if anchor in self.anchors and anchor not in self._size_of:
-                raise _refusal(f"*{shorten(anchor)} stands inside what it stands for", event.start_mark)
+                raise _refusal(f"*{shorten(anchor)} refers to a value that contains itself", event.start_mark)
             self._count(self._size_of.get(anchor, 0), event.start_mark)
             return super().compose_node(parent, index)
         if getattr(event, "tag", None) is not None:

@@ -30,7 +30,7 @@ OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
 OfSensors = TypeVar("OfSensors")  # a size that a configuration states of all sensors, a recording of each by its name
 
 
-def _the_parts(what: str, unit: str | None = None) -> Any:
+def _part_default_key(what: str, unit: str | None = None) -> Any:
     """Return the field of a key whose default is the value of the sensor's part in the catalogue."""
     extra: dict[str, Any] | None = None if unit is None else {"unit": unit}
     return Field(default=None, description=f"{what}; if left out, the part's value", json_schema_extra=extra)
@@ -100,8 +100,8 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         default=0.1,
         ge=0,
         le=20,
-        description="of a calibration over temperature: by how much the part's thermometer and what it is beside may "
-        "differ otherwise in use than in the run; the usual value is assumed, for no data sheet states it",
+        description="of a calibration over temperature: by how much the difference between the part's "
+        "thermometer and its sensor may change from the run to the use; a typical value, as no data sheet states it",
         json_schema_extra={"unit": "K"},
     )
     angle_std_deg: float | None = Field(
@@ -132,40 +132,42 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         "half the square of the angle (in rad) that the arm turns in this time",
         json_schema_extra={"unit": "ms"},
     )
-    g_sensitivity_deg_s_g: OfSensors = _the_parts(
+    g_sensitivity_deg_s_g: OfSensors = _part_default_key(
         "change of a reading for 1 g, if attitudes do not determine it", "°/s/g"
     )
-    nonlinearity_percent: OfSensors = _the_parts(
+    nonlinearity_percent: OfSensors = _part_default_key(
         "largest distance of a gyroscope's curve from the best straight line, in per cent of full scale, for the "
         "odd part of the curve and for the even part; used if there is only one speed",
         "%",
     )
-    asymmetry_percent: OfSensors = _the_parts(
+    asymmetry_percent: OfSensors = _part_default_key(
         "even part of a gyroscope's curve, in per cent of full scale, that is allowed although one scale factor is"
         " stated for both directions; more of it fails the check `cw_against_ccw`",
         "%",
     )
-    bias_deg_s_k: OfSensors = _the_parts("change of a gyroscope's bias for 1 K", "°/s/K")
-    scale_ppm_k: OfSensors = _the_parts("change of a gyroscope's scale factor for 1 K", "ppm/K")
-    bias_instability_deg_h: OfSensors = _the_parts(
+    bias_deg_s_k: OfSensors = _part_default_key("change of a gyroscope's bias for 1 K", "°/s/K")
+    scale_ppm_k: OfSensors = _part_default_key("change of a gyroscope's scale factor for 1 K", "ppm/K")
+    bias_instability_deg_h: OfSensors = _part_default_key(
         "smallest Allan deviation of a gyroscope at rest (in-run bias stability): how much its bias wanders, even "
         "with the longest average",
         "°/h",
     )
-    non_orthogonality_deg: OfSensors = _the_parts(
+    non_orthogonality_deg: OfSensors = _part_default_key(
         "how much the angle between two axes of a gyroscope may differ from 90°"
     )
-    acceleration_nonlinearity_percent: OfSensors = _the_parts(
+    acceleration_nonlinearity_percent: OfSensors = _part_default_key(
         "largest distance of an accelerometer's curve from the best straight line, in per cent of "
         "`acceleration_nonlinear_over_g`",
         "%",
     )
-    acceleration_nonlinear_over_g: OfSensors = _the_parts(
+    acceleration_nonlinear_over_g: OfSensors = _part_default_key(
         "acceleration in either direction for which this nonlinearity is stated; 0 means the range that is set", "g"
     )
-    acceleration_bias_mg_k: OfSensors = _the_parts("change of an accelerometer's bias for 1 K", "mg/K")
-    acceleration_scale_ppm_k: OfSensors = _the_parts("change of an accelerometer's scale factor for 1 K", "ppm/K")
-    acceleration_bias_instability_ug: OfSensors = _the_parts(
+    acceleration_bias_mg_k: OfSensors = _part_default_key("change of an accelerometer's bias for 1 K", "mg/K")
+    acceleration_scale_ppm_k: OfSensors = _part_default_key(
+        "change of an accelerometer's scale factor for 1 K", "ppm/K"
+    )
+    acceleration_bias_instability_ug: OfSensors = _part_default_key(
         "smallest Allan deviation of an accelerometer at rest", "µg"
     )
     decision_rule: DecisionRule = Field(

@@ -25,7 +25,7 @@ class SiteSection(Section):
         json_schema_extra={"allowed": "two capital letters (ISO 3166-1)"},
     )
     place: Words | None = Field(
-        default=None, description="where the arm stands: site, room; if left out, a certificate does not state it"
+        default=None, description="location of the arm: site, room; if left out, a certificate does not state it"
     )
     time_reference: Words | None = Field(
         default=None,
@@ -89,7 +89,7 @@ class SiteSection(Section):
     )
     magnetic_field_upwards: bool = Field(
         default=False,
-        description="whether this field points out of the ground, as it does south of the magnetic equator",
+        description="whether this field points out of the ground, as south of the magnetic equator",
     )
     base_up: Vector3 = Field(
         default=(0.0, 0.0, 1.0),

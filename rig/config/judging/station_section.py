@@ -36,7 +36,7 @@ class StationSection(Section):
         default=1,
         ge=0,
         le=5,
-        description="how often refused sweeps are repeated at once, before the verdict stands",
+        description="how often refused sweeps are repeated at once before the verdict is final",
         json_schema_extra=RATIO,
     )
 

@@ -315,7 +315,7 @@ class AttitudesSection(ProcedureSection):
 
     @property
     def accelerometer_order(self) -> AccelerometerOrder:
-        """Order of the accelerometer's model, by the file."""
+        """Order of the accelerometer's model, as the file states it."""
         return 2 if self.second_order else 1
 
     def problems(self, config: RigConfig) -> Iterator[str]:
@@ -359,7 +359,7 @@ class ImuSection(SixSweepsSection, AttitudesSection):
     """Sweeps, then attitudes: gyroscope and accelerometer in one run."""
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of the sweeps and of the attitudes."""
+        """Yield the problems of sweeps and attitudes."""
         yield from SixSweepsSection.problems(self, config)
         yield from AttitudesSection.problems(self, config)
         if self.arc_deg != 360:

@@ -103,6 +103,6 @@ class ServoSixObservationSection(ProcedureSection):
                     f"{sensor.range_deg_s:g}: the range must be at least {SPEED_TO_RANGE} times the speed"
                 )
         if config.magnetometers:
-            yield "magnetometers cannot be calibrated beside a servo's motor: leave them out"
+            yield "magnetometers cannot be calibrated near a servo's motor: leave them out"
         if config.site.latitude_deg is not None and config.site.heading_deg is None:
             yield "site needs latitude_deg and heading_deg, or neither"

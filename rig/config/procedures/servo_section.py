@@ -48,7 +48,7 @@ class ServoSection(TurnerSection):
         default=0.3,
         ge=0.1,
         le=2.0,
-        description="the servo stops by itself if nobody has spoken to it for so long",
+        description="the servo stops by itself if it receives nothing for this long",
     )
 
     @property

@@ -10,7 +10,7 @@ from rig.config.section import RATIO, Section
 SHORTEST = "shortest"
 CARRIED_OUT = "six_observation"
 REPEATS = 16  # at most, where the section says nothing
-IN_ADVANCE = "`rig plan CONFIG --target-uncertainty scale=U --write FILE` writes the shortest run for what is wanted"
+IN_ADVANCE = "`rig plan CONFIG --target-uncertainty scale=U --write FILE` writes the shortest run for the target"
 # What does not end after a repeat, by the kind of turner, and the procedure to name in its place.
 OTHERS: Mapping[str, tuple[str, str]] = {
     "servo": ("with a servo the repeats are made in each mounting, so no run ends early", "servo_six_observation"),

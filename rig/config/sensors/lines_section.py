@@ -111,7 +111,7 @@ class LineTemperatureSection(Section):
 
     @property
     def stated(self) -> StatedTemperatureSection | None:
-        """The stated temperature; None if it is not stated."""
+        """The stated temperature, or None."""
         if self.stated_c is None:
             return None
         return StatedTemperatureSection(stated_c=self.stated_c, stated_within_k=self.stated_within_k)
@@ -133,13 +133,13 @@ class LinesSection(Section):
     columns: tuple[str, ...] = Field(
         min_length=3,
         max_length=40,
-        description="what stands in a line, from left to right; `-` is a number or a text that is not read",
+        description="the contents of a line, from left to right; `-` is a number or a text that is not read",
         json_schema_extra={
             "allowed": "`time`, `sequence`, `gx gy gz`, `ax ay az`, `mx my mz`, `temperature`, names in `scalars`, `-`"
         },
     )
     separator: Literal["comma", "semicolon", "tab", "space"] = Field(
-        default="comma", description="what stands between the numbers; spaces around it do not matter"
+        default="comma", description="the separator between the numbers; spaces around it do not matter"
     )
     prefix: str = Field(
         default="",
@@ -194,7 +194,7 @@ class LinesSection(Section):
         default=None, description="the magnetometer's columns; recorded as the magnetometer `<sensor>_field`"
     )
     temperature: LineTemperatureSection = Field(
-        default=LineTemperatureSection(), description="the thermometer's column, or what is known without one"
+        default=LineTemperatureSection(), description="the thermometer's column, or the temperature stated in its place"
     )
     scalars: dict[ScalarName, LineScalarSection] = Field(
         default={}, max_length=16, description="columns of what has no axes, by their names"

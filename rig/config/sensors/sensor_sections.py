@@ -126,7 +126,7 @@ class ConfiguredSensor(Protocol):
 def check_serial_number(value: str) -> str:
     """Return a serial number that fits the board's record of a calibration. Raise ValueError otherwise."""
     if value == GAP:
-        raise ValueError("nobody but you knows it: write the number of this specimen here")
+        raise ValueError("write the number of this specimen here; it is on the device or its certificate")
     if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
         raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board can store no others")
     return value
@@ -165,7 +165,7 @@ class SensorSection(Section):
         description="full scale, one of the part's ranges; at least 1.5 times the fastest sweep",
         json_schema_extra=OF_THE_PART,
     )
-    mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
+    mounting: MountingSection = Field(default=MountingSection(), description="how it is mounted on the flange")
     correction: Literal["matrix", "diagonal"] = Field(
         default="diagonal",
         description="how the board and `calibration.h` correct readings: `diagonal`, each axis alone, as in the "
@@ -256,7 +256,7 @@ class SensorSection(Section):
             raise ValueError("its accelerometer is to be read: give lines.acceleration, and the columns ax ay az")
         if self.serial is not None:
             if self.part == "kvh1775" and self.serial.baud not in KVH1775_BAUDS:
-                raise ValueError(f"a kvh1775 knows serial.baud {', '.join(map(str, KVH1775_BAUDS))}")
+                raise ValueError(f"a kvh1775 supports serial.baud {', '.join(map(str, KVH1775_BAUDS))}")
             size = KVH1775_MESSAGE_BYTES[self.serial.message] if self.lines is None else self.lines.least_bytes
             problem = sensor_line_over_budget(self.rate_hz, size, self.serial.baud)
             if problem is not None:
@@ -300,4 +300,4 @@ class MagnetometerSection(Section):
             "allowed": list_numbers(MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss),
         },
     )
-    mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
+    mounting: MountingSection = Field(default=MountingSection(), description="how it is mounted on the flange")

@@ -24,7 +24,7 @@ class SimulatedHandSection(Section):
         default=0.3,
         ge=0,
         le=20,
-        description="by how much a face lies otherwise each time; 2 of a bare board",
+        description="how much the attitude on a face varies from one time to the next; 2 for a bare board",
         json_schema_extra={"unit": "mrad"},
     )
     closure_mrad: float = Field(

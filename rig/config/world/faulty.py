@@ -11,9 +11,9 @@ class SimulatedFaultySection(Section):
     """What the sensor's electronics do wrong with its rates, of a sensor with a port of its own."""
 
     frozen_axis: Literal["x", "y", "z"] | None = Field(
-        default=None, description="axis whose rate stands still at what it was; left out, none"
+        default=None, description="axis whose rate freezes at its last value; none if left out"
     )
-    frozen_from_s: float = Field(default=0.0, ge=0, le=1e6, description="time of the world from which it stands still")
+    frozen_from_s: float = Field(default=0.0, ge=0, le=1e6, description="time of the world at which it freezes")
     repeated: float = Field(
         default=0.0,
         ge=0,

@@ -176,7 +176,7 @@ class SimulatedArmSection(Section):
     )
     start_deg: StartAngles | None = Field(
         default=None,
-        description="the joint angles at which it stands when the world begins",
+        description="the joint angles when the world begins",
         json_schema_extra={"usual": "as `arm.home_deg`"},
     )
     remote_control: bool = Field(default=True, description="whether the pendant is switched to remote control")
@@ -431,7 +431,7 @@ class SimulatedSensorSection(Section):
         default=0.0, ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation"
     )
     bias_instability_time_s: float = Field(
-        default=100.0, ge=10, le=10_000, description="averaging time at which that floor lies"
+        default=100.0, ge=10, le=10_000, description="averaging time at which that minimum occurs"
     )
     bias_random_walk_rad_s_per_sqrt_s: float = Field(
         default=0.0,
@@ -474,10 +474,11 @@ class SimulatedSensorSection(Section):
     )
     accelerometer: SimulatedAccelerometerSection = Field(
         default=SimulatedAccelerometerSection(),
-        description="the accelerometer beside it, of a sensor that has `acceleration`",
+        description="the accelerometer of the same device, for a sensor with `acceleration`",
     )
     magnetometer: SimulatedFieldSection = Field(
-        default=SimulatedFieldSection(), description="the magnetometer beside it, of a `kvh1775` that sends format C"
+        default=SimulatedFieldSection(),
+        description="the magnetometer of the same device, for a `kvh1775` that sends format C",
     )
     kvh1775: SimulatedKvhSection | None = Field(default=None, description="the instrument it is in, of a `kvh1775`")
     autopilot: SimulatedAutopilotSection | None = Field(
@@ -539,7 +540,7 @@ class WorldSection(Section):
         description="how the simulated operator truly mounts the item for each of `procedure.stages`",
     )
     tray: dict[PartNumber, SimulatedPartSection] = Field(
-        default={}, max_length=10_000, description="what is special about parts of a series, by their serial numbers"
+        default={}, max_length=10_000, description="peculiarities of parts of a series, by serial number"
     )
 
     def misfits(self, turner: TurnerSection) -> Iterator[str]:

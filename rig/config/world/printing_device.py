@@ -42,16 +42,14 @@ class SimulatedLinesSection(Section):
         description="the number that it prints in a column of `lines.scalars`, by its name; left out, 0",
         json_schema_extra={"unit": "as printed", "allowed": "a number for each name"},
     )
-    trailing_separator: bool = Field(default=False, description="whether a separator stands behind the last column too")
+    trailing_separator: bool = Field(default=False, description="whether a separator follows the last column too")
     texts: tuple[Annotated[str, Field(max_length=40)], ...] = Field(
         default=(),
         max_length=40,
         description="what it prints in the columns `-`, from left to right, such as a date; left out, 0",
         json_schema_extra={"usual": "none", "allowed": "at most 40 texts"},
     )
-    colours: bool = Field(
-        default=False, description="whether codes for colours stand around a line, as of ESP-IDF's log"
-    )
+    colours: bool = Field(default=False, description="whether colour codes surround a line, as in ESP-IDF's log")
     temperature_text: str | None = Field(
         default=None,
         max_length=20,
@@ -63,6 +61,6 @@ class SimulatedLinesSection(Section):
     )
     time_in_single: bool = Field(default=False, description="whether its time is a number in single precision")
     prints: LinesSection | None = Field(
-        default=None, description="what it prints in truth, for tests of what is refused; left out, as the section says"
+        default=None, description="what it really prints, for tests of refusals; if left out, what the section states"
     )
     pty: bool = Field(default=False, description="also offer its port as a pseudo-terminal (POSIX)")

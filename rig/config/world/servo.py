@@ -20,7 +20,7 @@ class SimulatedServoSection(Section):
         json_schema_extra={"usual": "as `turner.model`"},
     )
     firmware: int = Field(default=48, ge=1, le=255, description="version of its firmware", json_schema_extra=RATIO)
-    start_deg: float = Field(default=150.0, ge=0, lt=360, description="where its shaft stands at first")
+    start_deg: float = Field(default=150.0, ge=0, lt=360, description="initial angle of its shaft")
     encoder_once_deg: Error = Field(
         default=1.0, description="amplitude of the encoder's error that comes once per turn"
     )
@@ -40,7 +40,7 @@ class SimulatedServoSection(Section):
     )
     tick_ppm: float = Field(default=3000.0, ge=-20_000, le=20_000, description="how much too fast its own clock runs")
     fall_deg_s: float = Field(
-        default=0.0, ge=-360, le=360, description="how fast the shaft falls with torque off; 0 where it is balanced"
+        default=0.0, ge=-360, le=360, description="how fast the shaft falls with torque off; 0 if it is balanced"
     )
     latency_ms: float = Field(
         default=0.0,

@@ -33,17 +33,17 @@ def _main() -> NoReturn:
             for part in _read(request):
                 out.write(_encode(part))
     except Refused as refused:
-        _end(Status.REFUSED, json.dumps(refused.problem))
+        _exit_at_once(Status.REFUSED, json.dumps(refused.problem))
     except MemoryError:
-        _end(Status.NO_MEMORY)
+        _exit_at_once(Status.NO_MEMORY)
     except Exception as error:  # of any kind: a damaged file may raise anything
         code = error.errno if isinstance(error, OSError) else None
         if code == errno.EFBIG and written_bytes == limits["written_bytes"]:
-            _end(Status.TOO_LONG)
+            _exit_at_once(Status.TOO_LONG)
         if code in (errno.EFBIG, errno.ENOSPC, errno.EDQUOT):
-            _end(Status.NO_ROOM, str(error))
-        _end(Status.UNREADABLE, " ".join(str(error).split()).rstrip(".") or type(error).__name__)
-    _end(Status.READ)
+            _exit_at_once(Status.NO_ROOM, str(error))
+        _exit_at_once(Status.UNREADABLE, " ".join(str(error).split()).rstrip(".") or type(error).__name__)
+    _exit_at_once(Status.READ)
 
 
 def _output() -> BinaryIO:
@@ -100,7 +100,7 @@ def _lower(what: int, limit: int) -> int:
     return limit
 
 
-def _end(status: Status, why: str = "") -> NoReturn:
+def _exit_at_once(status: Status, why: str = "") -> NoReturn:
     """Exit without closing files, because HDF5 may fail to close a file that it failed to open."""
     sys.stderr.write(why + "\n" if why else "")
     sys.stderr.flush()

@@ -158,7 +158,7 @@ class ReadingTask:
             self._process = subprocess.Popen(
                 command, stdin=request_file, stdout=self._out, stderr=subprocess.PIPE, env=environment
             )
-            stack.callback(_end, self._process)
+            stack.callback(_kill, self._process)
             self._ending = stack.pop_all()
 
     def __enter__(self) -> Self:
@@ -180,7 +180,7 @@ class ReadingTask:
         except TimeoutError:
             raise CostlyFile(f"no end of it was found in {self._limits.idle_s:.0f} s") from None
         finally:
-            _end(self._process)
+            _kill(self._process)
         if self._process.returncode == Status.NO_ROOM:
             raise _no_room(self._path, complaint.decode(errors="replace").strip())
         _raise_failure(self._process.returncode, complaint, self._limits)
@@ -209,7 +209,7 @@ def _wait_for(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
     raise TimeoutError
 
 
-def _end(reading: "subprocess.Popen[bytes]") -> None:
+def _kill(reading: "subprocess.Popen[bytes]") -> None:
     """Kill the process, and wait a limited time for its end, because a dead disk may delay that."""
     reading.kill()
     with suppress(subprocess.TimeoutExpired):
@@ -229,7 +229,7 @@ def _raise_failure(status: int, complaint: bytes, limits: ReadingLimits) -> None
     if status == Status.NO_MEMORY:
         raise CostlyFile(f"it takes more than {limits.memory_bytes >> 20} MiB of memory to be read")
     if status == Status.TOO_LONG:
-        raise CostlyFile(f"what is packed in it is longer than {limits.written_bytes // 1_000_000} MB")
+        raise CostlyFile(f"its unpacked content is longer than {limits.written_bytes // 1_000_000} MB")
     if -status == OUT_OF_TIME:
         raise CostlyFile(f"it takes more than {limits.processor_s:.0f} s of a processor to be read")
     raise UnreadableFile(why if len(why) <= LONGEST_REASON else f"{why[:LONGEST_REASON]}…")

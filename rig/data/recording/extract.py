@@ -50,7 +50,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
             raise ValueError(f"it announces {len(group)} sensors")
         samples = {name: _member(group, name, h5py.Dataset) for name in group}
         described = {
-            name: {key: _plain(value) for key, value in dataset.attrs.items()} for name, dataset in samples.items()
+            name: {key: _convert(value) for key, value in dataset.attrs.items()} for name, dataset in samples.items()
         }
         named = ("states", "events", *(TABLES if is_external else ()))
         rows = {f"samples/{name}": dataset for name, dataset in samples.items()}
@@ -81,7 +81,7 @@ def reason(error: Exception) -> str:
     if isinstance(error, MemoryError) or "filter returned failure" in text or "memory allocation failed" in text:
         return "its rows cannot be unpacked: they are damaged, or more than they are said to be"
     if "required filter" in text or "filter plugins disabled" in text:
-        return "its rows are packed by a filter that is none of the HDF5 library's own"
+        return "its rows are packed by a filter that is not one of the HDF5 library's own"
     system = re.search(r"error message = '([^']*)'", text)
     return system[1] if system else text or type(error).__name__
 
@@ -136,7 +136,7 @@ def _count_stored_rows(dataset: Any) -> int:
 
 
 def _text(file: Any, name: str) -> str:
-    value = _plain(file.attrs.get(name))
+    value = _convert(file.attrs.get(name))
     if not isinstance(value, str):
         raise ValueError(f"its {name} is not a text")
     if not value.isascii() and any("\ud800" <= character <= "\udfff" for character in value):
@@ -144,7 +144,7 @@ def _text(file: Any, name: str) -> str:
     return value
 
 
-def _plain(value: Any) -> Any:
+def _convert(value: Any) -> Any:
     """Return an attribute in Python's own types.
 
     Raise ValueError for one that no run file has. `_encode` raises TypeError for types that JSON does not have.

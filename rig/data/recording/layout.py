@@ -93,7 +93,7 @@ def check_rows(contents: Contents) -> None:
 
 
 def table_of(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[Any]:
-    """Return rows (n,) of float columns."""
+    """Return float columns as rows (n,)."""
     table = np.empty(len(next(iter(columns.values()))), table_dtype(tuple(columns)))
     for name, column in columns.items():
         table[name] = column

@@ -202,7 +202,7 @@ def _check_sweep(sweep: Sweep) -> None:
 
 
 def _check_dwell(dwell: Dwell) -> None:
-    """Raise ValueError for a dwell that could not be planned."""
+    """Raise ValueError for a dwell that no plan contains."""
     if not (0 <= dwell.index <= LARGEST and all(abs(number) <= LARGEST for number in (*dwell.q_rad, dwell.duration_s))):
         raise ValueError(f"there is no such dwell as {quote(dwell)}")
 

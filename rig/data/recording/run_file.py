@@ -147,7 +147,7 @@ class RunRecorder:
         self.check()
 
     def _write(self) -> None:
-        """Flush new data several times a second, until closed or failed: the writer thread."""
+        """Run the writer thread: flush new data several times a second, until closed or failed."""
         try:
             closing = False
             while not closing:
@@ -200,7 +200,7 @@ def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask |
     contents = _contents(path, timeout_s, begun)
     try:
         validate(_Named, {"sensors": [*contents.described]}, "samples")
-        external = _elsewhere(contents) if contents.tables else None
+        external = _read_external(contents) if contents.tables else None
         sensors = contents.sensors
         samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
         if external is not None:
@@ -307,7 +307,7 @@ def _turner(contents: Contents, provenance: Provenance) -> RecordedTurner:
     return turner
 
 
-def _elsewhere(contents: Contents) -> ReadElsewhere:
+def _read_external(contents: Contents) -> ReadElsewhere:
     tables = [contents.tables[name] for name in TABLES]
     readings, motion = ({name: rows[name] for name in rows.dtype.names or ()} for rows in tables)
     header = validate(ExternalHeader, parse_json(contents.texts["elsewhere"]), "elsewhere")

@@ -83,7 +83,7 @@ class Site:
 
     @property
     def down_m_s2(self) -> NDArray[np.float64]:
-        """(3,) gravity in the base frame."""
+        """Gravity (3,), m/s², in the base frame."""
         return -self.gravity_m_s2 * np.array(self.up)
 
 

@@ -131,7 +131,7 @@ def _align_vertical(attitude: Array, up: Array) -> Array:
 
 
 def _last_rest(row: Factor) -> int:
-    """Return the last rest that a factor depends on."""
+    """Return the index of the last rest in a factor."""
     return row.index + (row.kind in (MOVE, WALK, CLOSURE))
 
 

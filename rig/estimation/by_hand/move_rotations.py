@@ -56,7 +56,7 @@ def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array
     inverse = np.linalg.inv(matrix)
     rotations, by_theta, by_gravity, by_bends, swept, durations, paths, changes = ([] for _ in range(8))
     for row, move in enumerate(session.moves):
-        inside = _inside(session.time_s, move.start_s, move.end_s)
+        inside = _select_inside(session.time_s, move.start_s, move.end_s)
         times_s = session.time_s[inside]
         corrected = session.rates[inside] - np.column_stack([np.interp(times_s, middles, axis) for axis in biases.T])
         path = track(times_s, corrected, matrix)
@@ -89,7 +89,7 @@ def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array
     )
 
 
-def _inside(time_s: Array, start_s: float, end_s: float) -> slice:
+def _select_inside(time_s: Array, start_s: float, end_s: float) -> slice:
     first, last = np.searchsorted(time_s, (start_s, end_s)).tolist()
     return slice(first, min(last, len(time_s) - 1) + 1)
 

@@ -99,7 +99,7 @@ def _equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
     yield from _move_equations(centre, move)
 
 
-def _up(centre: Array, face: int) -> tuple[Array, Array]:
+def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
     """Return the vertical (3,) in a body that lies on a face, and its derivative (3, 2) by the face's two angles."""
     axis, leans = face // 2, centre[FACES][2 * face : 2 * face + 2]
     up, face_axes = np.zeros(3), np.zeros((3, 2))
@@ -109,7 +109,7 @@ def _up(centre: Array, face: int) -> tuple[Array, Array]:
 
 
 def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Iterator[Equation]:
-    up, _ = _up(centre, rest.face)
+    up, _ = _vertical_on_face(centre, rest.face)
     sensitivity = centre[GRAVITY].reshape(3, 3)
     for axis in range(3):
         row = np.zeros(len(centre))
@@ -121,7 +121,10 @@ def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Itera
 
 def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
     matrix, sensitivity = centre[MATRIX].reshape(3, 3), centre[GRAVITY].reshape(3, 3)
-    (up, up_axes), (after, after_axes) = _up(centre, move.before.face), _up(centre, move.after.face)
+    (up, up_axes), (after, after_axes) = (
+        _vertical_on_face(centre, move.before.face),
+        _vertical_on_face(centre, move.after.face),
+    )
     rates = move.rates - move.before.mean_rad_s
     turned, middles = _attitudes(rates @ matrix.T * move.steps_s[:, None])
     weighted = middles * move.steps_s[:, None, None]

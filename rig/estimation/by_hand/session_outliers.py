@@ -148,7 +148,7 @@ def _much_larger(stds: HandStds, than: HandStds) -> bool:
 
 
 def _minimum_chi_square(rows: Sequence[Factor]) -> float:
-    """Return the chi square of the rows at its minimum."""
+    """Return the least χ² of the rows over all parameters."""
     design, residual = whiten_rows(rows)
     return float(np.sum(np.square(residual + design @ solve_step(rows)[0])))
 
@@ -178,8 +178,8 @@ def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
         return Fault("table_moved", f"from {at_s:.1f} s on the table leans otherwise", "Begin anew, and leave it alone")
     return Fault(
         "not_flat",
-        f"at {at_s:.1f} s the body did not lie flat on its face, as it does at the other rests",
-        "Look for what lies under it, and lay it down again",
+        f"at {at_s:.1f} s the body did not lie flat on its face as at the other rests",
+        "Look for something under it, and lay it down again",
     )
 
 
@@ -190,7 +190,7 @@ def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
     if index == len(rests) - 2:
         what += ", or the body crept in the last rest, which comes then"
         return Fault(
-            "bias_jumped", what, "Let it lie for another rest, which tells them apart; after a fall begin anew"
+            "bias_jumped", what, "Let it lie for another rest, which distinguishes them; after a fall, begin again"
         )
     if index == 0:
         what += f", or the body crept in the first rest, until {rests[0].end_s:.1f} s"
@@ -201,7 +201,7 @@ def _find_excessive_std(fit: GraphFit) -> Fault | None:
     """Return the fault of an impossibly large standard deviation of hand or sensor, or None."""
     stds = fit.stds
     if stds.repeat_rad >= NEARLY * LARGEST.repeat_rad:
-        what = f"the faces do not lie as they lay before, by {1e3 * stds.repeat_rad:.1f} mrad or more"
+        what = f"the faces were not laid down as before: they differ by {1e3 * stds.repeat_rad:.1f} mrad or more"
         return Fault("not_flat", what, _REMEDY)
     if stds.acceleration_m_s2 >= NEARLY * LARGEST.acceleration_m_s2:
         what = f"the accelerometer contradicts the faces by {stds.acceleration_m_s2:.2f} m/s² or more"
@@ -218,4 +218,4 @@ def _find_excessive_std(fit: GraphFit) -> Fault | None:
     return None
 
 
-_REMEDY = "Lay it down on a flat table, each time on the whole of a face, and see that no reading is lost"
+_REMEDY = "Lay it down on a flat table, each time on a complete face, and check that no reading is lost"

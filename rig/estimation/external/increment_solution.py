@@ -129,7 +129,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
         recorded = replace(recorded, fixes=replace(recorded.fixes, joined=joined))
         settled = _settle(recorded, settled.state)
     _check(fixes, recorded.fixes, settled)
-    result = _summarise(settled, _times_s(fixes, fixes.joined & ~recorded.fixes.joined))
+    result = _build_result(settled, _times_s(fixes, fixes.joined & ~recorded.fixes.joined))
     _check_identified(result.matrix, result.covariance)
     return result
 
@@ -241,7 +241,7 @@ def _times_s(fixes: Fixes, increments: NDArray[np.bool_]) -> Array:
     return np.asarray(fixes.at_s[first], dtype=np.float64)
 
 
-def _summarise(settled: _Settled, aside_s: Array) -> KnownIncrements:
+def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
     """Return the result of a converged fit; the bias is the mean over this recording's intervals."""
     solved, state = settled.solved, settled.state
     wanted = np.eye(len(solved.theta))[np.r_[MATRIX, EARTH, BIAS]]

@@ -65,7 +65,7 @@ class Accumulator:
 
     @classmethod
     def empty(cls) -> Self:
-        """Return the sums of no revolution."""
+        """Return the sums before the first revolution."""
         return cls(np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros((3, 3, 7, 7)), np.zeros((7, 7)), 0)
 
     def add(

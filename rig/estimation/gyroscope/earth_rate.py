@@ -232,7 +232,7 @@ def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array 
                 "such a sensitivity",
             )
     refusals.check_conditioning(
-        conditioning, parameters, MAX_CONDITION, "the Earth's rate beside axes and bias", REMEDY
+        conditioning, parameters, MAX_CONDITION, "the Earth's rate in addition to axes and bias", REMEDY
     )
 
 

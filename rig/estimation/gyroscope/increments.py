@@ -79,7 +79,8 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     interval = _find_slopes(time_s, (readings - bias) @ inverse.T)
     blocks = [
-        _integrate_block(interval.part(block), at_s[instants], inverse) for block, instants in _blocks(time_s, at_s)
+        _integrate_block(interval.part(block), at_s[instants], inverse)
+        for block, instants in _split_into_blocks(time_s, at_s)
     ]
     attitude, sensitivity = np.eye(3), np.zeros((3, PARAMETERS))
     attitudes, sensitivities, rates = [], [], []
@@ -112,7 +113,7 @@ def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windo
     return Increments(inverse @ path.attitudes[end], inverse @ (path.sensitivities[end] - path.sensitivities[start]))
 
 
-def _blocks(time_s: Array, at_s: Array) -> Iterator[tuple[slice, slice]]:
+def _split_into_blocks(time_s: Array, at_s: Array) -> Iterator[tuple[slice, slice]]:
     """Yield readings in blocks, each with its instants; a block begins with the last reading of the previous one."""
     first = 0
     for start in range(0, len(time_s) - 1, BLOCK):
@@ -149,7 +150,7 @@ def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[
     attitudes = _running_product(whole.vectors)
     sensitivities = np.zeros((len(interval.time_s), 3, PARAMETERS))
     np.cumsum(whole.sensitivities(attitudes[:-1], inverse), axis=0, out=sensitivities[1:])
-    part, rates = _steps(interval, before, (at_s - interval.time_s[before]) / np.diff(interval.time_s)[before])
+    part, rates = _steps_from(interval, before, (at_s - interval.time_s[before]) / np.diff(interval.time_s)[before])
     c = attitudes[before] @ _matrices(part.vectors)
     s = sensitivities[before] + part.sensitivities(attitudes[before], inverse)
     return np.concatenate([c, attitudes[-1:]]), np.concatenate([s, sensitivities[-1:]]), rates
@@ -185,7 +186,7 @@ def _whole_steps(interval: _Interval) -> _IncrementSteps:
     return _IncrementSteps(turned + h**2 * np.cross(w0, w1) / 12, turned, h)
 
 
-def _steps(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_IncrementSteps, Array]:
+def _steps_from(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_IncrementSteps, Array]:
     """Return steps and their initial rates (k, 3).
 
     Each begins at a reading `start` (k,) and lasts a `fraction` (k,) of an interval.

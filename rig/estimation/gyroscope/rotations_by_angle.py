@@ -213,8 +213,8 @@ def _equate_rotation(
     stated = np.asarray(Rotation.from_rotvec(turn.axis * turn.angle_rad).as_matrix(), dtype=np.float64)
     missed = Rotation.from_matrix(stated @ rotation.T).as_rotvec()
     rate = turn.axis * turn.angle_rad / lasting_s
-    across = _across(state.matrix @ turn.axis).T  # (2, 3)
-    tilt_axes = _across(turn.axis)  # (3, 2)
+    across = _perpendicular_axes(state.matrix @ turn.axis).T  # (2, 3)
+    tilt_axes = _perpendicular_axes(turn.axis)  # (3, 2)
     tilted_rate = np.cross(tilt_axes, rate, axis=0)
     random_walk = gyroscope.random_walk_rad_sqrt_s / np.sqrt(lasting_s)
     ends = turn.angle_std_rad / lasting_s * np.eye(3)
@@ -237,7 +237,7 @@ def _derive(rate: Array, rows: Array) -> Array:
     return np.hstack([np.kron(rows, rate), rows])
 
 
-def _across(axis: Array) -> Array:
+def _perpendicular_axes(axis: Array) -> Array:
     """Return unit vectors (3, 2) at right angles to an axis (3,) and to each other."""
     return np.asarray(np.linalg.svd(axis[None])[2][1:].T, dtype=np.float64)
 

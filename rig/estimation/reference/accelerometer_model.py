@@ -74,7 +74,7 @@ class Sweeps:
     stations: NDArray[np.intp]
 
     def alone(self) -> "Sweeps":
-        """Return the sweeps with a separate station for each."""
+        """Return the sweeps as if each had a station of its own."""
         return replace(self, stations=np.arange(len(self.stations)))
 
 
@@ -110,7 +110,7 @@ class Movement:
     own_share: float = OWN_SHARE
 
     def without(self, dwell: int) -> "Movement":
-        """Return the movement with all but one dwell."""
+        """Return the movement without one dwell."""
         remaining = np.arange(len(self.dwells.readings_m_s2)) != dwell
         dwells, columns = self.dwells, np.arange(OWN_ERRORS * dwell, OWN_ERRORS * (dwell + 1))
         return replace(
@@ -219,7 +219,7 @@ def _differentiate_delay(theta: Array, movement: Movement) -> Array:
     """Return the derivative (K, 3) of the specific force by the delay."""
     sweeps = movement.sweeps
     evenly = replace(movement, sweeps=replace(sweeps, turning_rad2_s2=np.zeros_like(sweeps.turning_rad2_s2)))
-    waves = _waves(project_reference(theta[DELAY], evenly) @ theta[REFERENCE], movement)
+    waves = _harmonics_of_sweeps(project_reference(theta[DELAY], evenly) @ theta[REFERENCE], movement)
     speeds = sweeps.speeds_rad_s[:, None]
     even = np.stack([np.zeros_like(waves[:, 0]), -speeds * waves[:, 2], speeds * waves[:, 1]], axis=1)
     uneven = _differentiate_lag(waves, sweeps) + theta[DELAY] * _differentiate_lag(even, sweeps)
@@ -316,8 +316,8 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 def _product(one: Array, other: Array, movement: Movement) -> Array:
     """Return the elementwise product (K, 3, …). For sweeps it is the product of two harmonics, without higher ones."""
     count = len(movement.dwells.readings_m_s2)
-    mean, cos, sin = np.moveaxis(_waves(one, movement), 1, 0)
-    others = np.moveaxis(_waves(other, movement), 1, 0)
+    mean, cos, sin = np.moveaxis(_harmonics_of_sweeps(one, movement), 1, 0)
+    others = np.moveaxis(_harmonics_of_sweeps(other, movement), 1, 0)
     waves = np.stack(
         [
             mean * others[0] + (cos * others[1] + sin * others[2]) / 2,
@@ -329,7 +329,7 @@ def _product(one: Array, other: Array, movement: Movement) -> Array:
     return np.concatenate([one[:count] * other[:count], waves.reshape(-1, *waves.shape[2:])])
 
 
-def _waves(vectors: Array, movement: Movement) -> Array:
+def _harmonics_of_sweeps(vectors: Array, movement: Movement) -> Array:
     """Return the mean, cosine and sine (M, 3, …) of the sweeps from the rows (K, …) of dwells and sweeps."""
     return vectors[len(movement.dwells.readings_m_s2) :].reshape(-1, 3, *vectors.shape[1:])
 

@@ -59,7 +59,7 @@ class Placed:
     norm_known: bool
 
     def without(self, attitude: int) -> "Placed":
-        """Return the readings in all attitudes but one."""
+        """Return the readings without one attitude."""
         remaining = np.arange(len(self.readings)) != attitude
         return Placed(
             self.readings[remaining],
@@ -140,7 +140,7 @@ def find_whiteners(variances: Array, rotations: Array, std_rad: Array) -> Array:
 
 
 def _estimate_std(theta: Array, placed: Placed) -> float:
-    """Return the δ of restricted maximum likelihood."""
+    """Return the restricted-maximum-likelihood estimate of δ."""
     r, v_bar = placed.attitudes, placed.v_bar
     rotations = effects(theta, r, v_bar)
     whiteners = find_whiteners(placed.variances, rotations, placed.attitude_std_rad)

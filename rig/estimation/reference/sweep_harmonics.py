@@ -77,7 +77,7 @@ def first_harmonic(
     check_finite(time=t, readings=m, angle=angle, speed=speed)
     mean_speed = _mean_speed(t, angle)
     uneven = _smooth(t, speed, mean_speed)
-    columns = np.hstack([_waves(angle, WAVES), _list_vibration(uneven, angle, mean_speed)])
+    columns = np.hstack([_fourier_columns(angle, WAVES), _list_vibration(uneven, angle, mean_speed)])
     columns = np.hstack([columns, swings(_regression(columns, m)[1])])
     inverse, residuals = _regression(columns, m)
     size = np.linalg.norm(columns, axis=0)
@@ -94,7 +94,7 @@ def first_harmonic(
         dof=count - int(rank),
         residuals_m_s2=residuals,
         vibration_m_s2=np.sqrt(np.mean(vibration**2, axis=0)),
-        turning_rad2_s2=_turning(uneven, angle, mean_speed) @ gain.T,
+        turning_rad2_s2=_motion_terms(uneven, angle, mean_speed) @ gain.T,
     )
 
 
@@ -138,7 +138,7 @@ def _mean_speed(time_s: Array, angle_rad: Array) -> float:
     return float(travel / (time_s[-1] - time_s[0]))
 
 
-def _waves(angle_rad: Array, count: int) -> Array:
+def _fourier_columns(angle_rad: Array, count: int) -> Array:
     """Return 1, cos θ, sin θ, cos 2θ, … (n, 1 + 2 count)."""
     multiples = angle_rad[:, None] * np.arange(1, count + 1)
     waves = np.stack([np.cos(multiples), np.sin(multiples)], axis=-1).reshape(len(angle_rad), -1)
@@ -164,7 +164,7 @@ def _smooth(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Unev
     Differences of encoder steps are noise, so the speed is smoothed by harmonics of the revolution and then
     differentiated.
     """
-    waves = _waves(mean_speed_rad_s * (time_s - time_s[0]), min(VIBRATION_WAVES, len(time_s) // 4))
+    waves = _fourier_columns(mean_speed_rad_s * (time_s - time_s[0]), min(VIBRATION_WAVES, len(time_s) // 4))
     normal = waves.T @ waves  # nearly diagonal: over a turn the waves are orthogonal
     excess = np.asarray(np.linalg.solve(normal, waves.T @ (speed_rad_s - mean_speed_rad_s)), dtype=np.float64)
     fast = excess.copy()
@@ -177,7 +177,7 @@ def _smooth(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Unev
     return _Uneven(waves @ excess, waves @ acceleration, waves @ jerk, np.array(derivatives) @ waves.T)
 
 
-def _turning(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:
+def _motion_terms(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:
     """Return the terms (6, n) of the joint's motion in the specific force; see `FirstHarmonic.turning_rad2_s2`."""
     rate = mean_speed_rad_s + uneven.rate
     return np.stack(
@@ -200,7 +200,7 @@ def _list_vibration(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) 
 
 
 def _differentiate(coefficients: Array) -> Array:
-    """Return the derivative (1 + 2 k,) of a sum of waves."""
+    """Return the derivative (1 + 2 k,) of a Fourier series."""
     cos, sin = coefficients[1::2], coefficients[2::2]
     times = np.arange(1, len(cos) + 1)
     return np.concatenate([[0.0], np.stack([times * sin, -times * cos], axis=-1).ravel()])

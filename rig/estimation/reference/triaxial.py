@@ -236,10 +236,10 @@ def _check_attitudes(start: Array, placed: Placed, fit: AttitudeWeighted) -> Non
 
 
 def check_trustworthy(error_rad: float, furthest: Callable[[], tuple[int, float, float]], *, enough: bool) -> None:
-    """Raise Fault `attitude_untrustworthy` if `error_rad`, that of all attitudes, or of the worst one is too large.
+    """Raise Fault `attitude_untrustworthy` for large attitude errors: of all attitudes, or of the worst one.
 
-    `furthest` returns the worst one's index, its error in rad relative to the others, and the others' own. It is called
-    if `enough` others remain.
+    `error_rad` is the error of all. `furthest` returns the worst one's index, its error in rad relative to the others,
+    and the others' own. It is called if `enough` others remain.
     """
     message = f"the readings say that the attitudes are off by {1e3 * error_rad:.2g} mrad each"
     if error_rad > SUSPICIOUS_RAD and enough:

@@ -145,9 +145,9 @@ def _count_fractions(axis: Array, unit: float) -> Array:
 def _bound_zero_error(steps: Steps, axis: int, readings: Array) -> float:
     """Return the standard uncertainty, in units, that readings of zero cause in a mean of truncated readings (n,).
 
-    Within a unit of zero the density of readings decreases as between zero's neighbours, three units apart: if s is the
-    slope of its logarithm, their mean is s · 2²/12 from zero. If no neighbour shows s, the mean may be anywhere in
-    between.
+    A truncated reading of zero is anywhere within a unit of zero. If the density of readings there decreases as between
+    zero's neighbours, which are three units apart, and s is the slope of its logarithm, the mean of such readings is s
+    · 2²/12 from zero. If no neighbour shows s, the mean may be anywhere in between.
     """
     zeros = steps.reads_zero(axis, readings)
     if zeros.all():

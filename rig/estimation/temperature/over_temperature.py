@@ -142,7 +142,7 @@ def check_inside(range_c: tuple[float, float], temperature_c: float) -> None:
         raise Fault(
             "temperature_outside",
             f"the polynomials hold from {low:.1f} to {high:.1f} °C, and {temperature_c:.1f} °C is asked for",
-            "Ask for a temperature of that range, or measure over a wider one",
+            "Request a temperature in that range, or measure over a wider one",
         )
 
 

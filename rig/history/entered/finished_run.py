@@ -139,7 +139,7 @@ def recording_of(file: Path) -> EnteredRecording:
 
 
 def compact(document: Any) -> str:
-    """Return JSON without white space."""
+    """Return JSON text without white space."""
     return json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 

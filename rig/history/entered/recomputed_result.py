@@ -75,7 +75,7 @@ def _differences(claimed: object, recomputed: object, where: str, scale: float =
         if len(claimed) != len(recomputed):
             yield where.rstrip(".")
             return
-        largest = scale or _largest(recomputed)
+        largest = scale or _largest_number(recomputed)
         for number, (item, other) in enumerate(zip(claimed, recomputed, strict=True)):
             yield from _differences(item, other, f"{where}{number}.", largest)
     elif isinstance(claimed, float | int) and isinstance(recomputed, float | int):
@@ -85,10 +85,10 @@ def _differences(claimed: object, recomputed: object, where: str, scale: float =
         yield where.rstrip(".")
 
 
-def _largest(numbers: object) -> float:
+def _largest_number(numbers: object) -> float:
     """Return the largest absolute value in a list or a matrix."""
     if isinstance(numbers, float | int):
         return abs(numbers)
     if isinstance(numbers, Sequence) and not isinstance(numbers, str):
-        return max(map(_largest, numbers), default=0.0)
+        return max(map(_largest_number, numbers), default=0.0)
     return 0.0

@@ -88,7 +88,7 @@ def again_page(outcome: RecomputeOutcome, question: RecomputeQuestion, history: 
 
 
 def counts(outcome: RecomputeOutcome) -> Iterator[str]:
-    """Yield the numbers in two or three lines."""
+    """Yield lines with the numbers of results."""
     unsolved = [f"{count} {STATE_WORDS[state]}" for state, count in sorted(outcome.unsolved.items())]
     unsolved += [f"{outcome.unreached} not reached"] if outcome.unreached else []
     yield f"{len(outcome.compared)} results: {', '.join([f'{outcome.solved} solved', *unsolved])}"
@@ -123,7 +123,7 @@ def _lines(outcome: RecomputeOutcome) -> Iterator[dict[str, str]]:
 
 
 def _line(compared: Compared, past: Past | None) -> dict[str, str]:
-    """Return the texts of one calibration."""
+    """Return the cells of one calibration."""
     move = _most_moved(compared, past)
     has_moved = past is not None and past.id in compared.moved
     return {

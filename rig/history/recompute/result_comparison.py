@@ -87,7 +87,7 @@ class ParameterMove:
 
     @property
     def size(self) -> float:
-        """The larger of both."""
+        """The larger of shift and growth."""
         return max(self.shift, self.growth)
 
 

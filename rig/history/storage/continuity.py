@@ -53,7 +53,7 @@ def refuse_unlike(before: FileIdentity | None, file: Path, label: str) -> None:
     """Raise Refused `history_gone`, `history_exchanged` for a file whose identity differs from the earlier one."""
     now = file_identity(file)
     if now is None and before is not None:
-        raise _gone(label)
+        raise _history_gone(label)
     if now != before:
         raise _history_exchanged(label)
 
@@ -61,7 +61,7 @@ def refuse_unlike(before: FileIdentity | None, file: Path, label: str) -> None:
 def refuse_anew(address: HistoryAddress) -> None:
     """Raise Refused `history_gone` for a history that had tables before and has none now."""
     if address.where in _identities:
-        raise _gone(address.label)
+        raise _history_gone(address.label)
 
 
 def refuse_another(address: HistoryAddress, connection: Connection) -> None:
@@ -73,7 +73,7 @@ def refuse_another(address: HistoryAddress, connection: Connection) -> None:
     _identities[address.where] = _Identity(file, created_utc, journal.head(connection))
 
 
-def _gone(label: str) -> Refused:
+def _history_gone(label: str) -> Refused:
     return Refused("history_gone", f"the history {label} existed before and is gone", REMEDY)
 
 

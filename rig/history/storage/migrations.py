@@ -41,7 +41,7 @@ def version_of(connection: Connection, label: str) -> int:
     if int(version) > schema.VERSION:
         raise Refused(
             "history_too_new",
-            f"{label} is of version {version}, made by a newer program; this one knows version {schema.VERSION}",
+            f"{label} is of version {version}, made by a newer program; this one supports version {schema.VERSION}",
             "Install the newer program here as well; the history was not changed",
         )
     return int(version)

@@ -16,7 +16,7 @@ def next_number(connection: Connection, table: Table) -> int:
 
 
 def gaps(connection: Connection) -> Iterator[Broken]:
-    """Yield missing numbers."""
+    """Yield the missing row numbers."""
     for table in NUMBERED:
         before = 0
         for number in connection.scalars(select(table.c.id).order_by(table.c.id)):

@@ -32,7 +32,7 @@ def history_is_there(file: Path) -> bool:
         return False
     try:
         _refuse_unfit(status)
-        _look(file)
+        _check_without_locks(file)
     except UnfitFile as error:
         raise _not_a_history(file, str(error)) from error
     return True
@@ -84,7 +84,7 @@ def _refuse_unfit(status: os.stat_result) -> None:
         raise UnfitFile("it is an empty file; a new history needs a name that does not exist yet")
 
 
-def _look(file: Path) -> None:
+def _check_without_locks(file: Path) -> None:
     """Read a file without locking or writing. Raise UnfitFile if it is not a history, Refused `history_too_old`."""
     try:
         with closing(sqlite3.connect(address_of(file, "mode=ro&immutable=1"), uri=True)) as connection:

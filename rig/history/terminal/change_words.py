@@ -36,7 +36,7 @@ def change_in_short(change: Change) -> str:
     """Return the change of one parameter as a short phrase; U is the uncertainty of the difference."""
     name = name_in_words(change.name).removeprefix("the ")
     times = f"{change.normalised_error:.{1 if change.normalised_error < 10 else 0}f}"
-    return f"{name} changed by {_size(change)}, {times} U"
+    return f"{name} changed by {_size_words(change)}, {times} U"
 
 
 def name_in_words(name: str) -> str:
@@ -48,7 +48,7 @@ def name_in_words(name: str) -> str:
     return next((row.parameters[name] for row in every_characteristic() if name in row.parameters), name)
 
 
-def _size(change: Change) -> str:
+def _size_words(change: Change) -> str:
     """Return the size of a change with its sign: relative for a scale factor, else in the unit of screens."""
     difference = change.now.value - change.before.value
     if is_scale(change.name):

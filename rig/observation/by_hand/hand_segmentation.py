@@ -41,7 +41,7 @@ def segment_session(
     gaps = _find_gaps(time_s, rates)
     moves = []
     for first, second in pairwise(windows):
-        start_s, end_s = first.end_s - _margin(first), second.start_s + _margin(second)
+        start_s, end_s = first.end_s - _margin_s(first), second.start_s + _margin_s(second)
         inside = (time_s >= start_s) & (time_s <= end_s)
         peak = float(np.abs(rates[inside]).max())
         moves.append(Move(start_s, end_s, peak, bool(gaps[inside].any()), bool(top[inside].any())))
@@ -63,12 +63,12 @@ def _began_still(time_s: Array, rates: Array) -> bool:
     return bool(len(first) > 1 and first.std(axis=0).max() < STILL_RAD_S)
 
 
-def _margin(window: Window) -> float:
+def _margin_s(window: Window) -> float:
     return min(MARGIN_S, (window.end_s - window.start_s) / 4)
 
 
 def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window) -> HandRest:
-    start_s, end_s = window.start_s + _margin(window), window.end_s - _margin(window)
+    start_s, end_s = window.start_s + _margin_s(window), window.end_s - _margin_s(window)
     inside = (time_s >= start_s) & (time_s <= end_s)
     forces = None if acceleration is None else acceleration[inside]
     return HandRest(

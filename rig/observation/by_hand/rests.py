@@ -69,7 +69,7 @@ def find_rests(
     follows = (times[1:, 0] - times[:-1, -1] <= gap_s) & (np.abs(np.diff(means, axis=0)) <= tolerance).all(axis=1)
     pairs = still[:-1] & still[1:] & follows
     if quantity == RATE and still.any():
-        still &= _find_unturned(means, _find_steady_blocks(still, pairs), tolerance, _within(times, lying))
+        still &= _find_unturned(means, _find_steady_blocks(still, pairs), tolerance, _mask_blocks(times, lying))
         pairs &= still[:-1] & still[1:]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], pairs, [False]]).astype(np.int8))).reshape(-1, 2)
     return tuple(Window(float(times[first, 0]), float(times[last, -1])) for first, last in edges.tolist())
@@ -95,7 +95,7 @@ def _find_steady_blocks(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> N
     return steady if steady.any() else still
 
 
-def _within(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
+def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
     """Return which blocks (count,), by the times (count, width) of their readings, lie in one of the windows."""
     mask = np.zeros(len(times), dtype=np.bool_)
     for window in windows:

@@ -86,7 +86,7 @@ class NotCounted:
         """Return the session without these rests: each becomes a pause of the move through it."""
         rests, moves, through = list[HandRest](), list[Move](), list[Move]()
         for index, rest in enumerate(session.rests):
-            if _middle(rest) < self.from_s:
+            if _middle_s(rest) < self.from_s:
                 continue
             if rests:
                 through.append(self._mark_move(session.moves[index - 1]))
@@ -100,15 +100,15 @@ class NotCounted:
 
     def _mark_move(self, move: Move) -> Move:
         crosses = any(move.start_s <= seam_s <= move.end_s for seam_s in self.seams)
-        return replace(move, left_out=True) if crosses or _within(move, self.moves) else move
+        return replace(move, left_out=True) if crosses or _is_within(move, self.moves) else move
 
 
-def _middle(part: HandRest | Move) -> float:
+def _middle_s(part: HandRest | Move) -> float:
     return (part.start_s + part.end_s) / 2
 
 
-def _within(part: HandRest | Move, spans: Sequence[tuple[float, float]]) -> bool:
-    return any(start_s <= _middle(part) <= end_s for start_s, end_s in spans)
+def _is_within(part: HandRest | Move, spans: Sequence[tuple[float, float]]) -> bool:
+    return any(start_s <= _middle_s(part) <= end_s for start_s, end_s in spans)
 
 
 def replay_runs(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted, float]:

@@ -52,7 +52,7 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
     of_turn, of_board = slice(*(edges - first).tolist()), slice(*(boards - first).tolist())
     time_s = stream.time_s[first:last]
     rates = recording.motion.rates_at_samples(time_s)
-    passing = _passing(time_s, turn, rates @ axis)
+    passing = _nuisance_columns(time_s, turn, rates @ axis)
     residuals = (stream.readings_rad_s[first:last] - zero - rates @ by_rate.T)[of_turn]
     columns = np.column_stack([np.ones(len(residuals)), passing[of_turn]])
     line_means = passing[of_board].mean(axis=0) @ fit_columns(columns, residuals)[1:]
@@ -60,7 +60,7 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
     return float(np.max(np.abs(deviation) / average.mean_std_rad_s))
 
 
-def _passing(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
+def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
     """Return columns (n, k) whose effect the computer's mean excludes, at times (n,) with rates (n,) about the axis.
 
     They are the first two harmonics of the turn, spectral lines, and the effect of a slow ripple on a sensor with a

@@ -25,16 +25,17 @@ def mask_movement(run: RunData, time_s: Array) -> MovementMasks:
     """Return the masks of samples at controller times (n,), in a recording that holds a sweep."""
     sweeps, rests = [finished.window for finished in swept(run)], list(rested(run))
     return MovementMasks(
-        moving=_within(time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests]))),
-        sweeping=_within(time_s, *sweeps),
-        resting=_within(time_s, *rests),
+        moving=_mask_windows(time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests]))),
+        sweeping=_mask_windows(time_s, *sweeps),
+        resting=_mask_windows(time_s, *rests),
         still=tuple(
-            _within(time_s, Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)) for rest in rests
+            _mask_windows(time_s, Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S))
+            for rest in rests
         ),
     )
 
 
-def _within(time_s: Array, *windows: Window) -> NDArray[np.bool_]:
+def _mask_windows(time_s: Array, *windows: Window) -> NDArray[np.bool_]:
     """Return which times (n,) lie in any of the windows."""
     inside = np.zeros(len(time_s), dtype=np.bool_)
     for window in windows:

@@ -34,7 +34,7 @@ class RawDwell:
 
     @property
     def still_counts(self) -> Array:
-        """(n, 3) counts of an arm that does not oscillate."""
+        """The counts (n, 3) with the arm's oscillation subtracted."""
         return np.subtract(self.counts, self.swing_counts, dtype=np.float64)
 
     @property
@@ -58,7 +58,7 @@ def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) ->
 
 
 def raw_acceleration_sweeps(name: str, recording: ObservedRun) -> list[RawReadings]:
-    """Return a sensor's raw accelerations in its revolutions, each with its index among the recording's."""
+    """Return a sensor's raw accelerations in its revolutions, each with its number in the recording."""
     stream, sweeps = recording.stream(name), []
     for index, turn in enumerate(recording.sensors[name].revolutions):
         if turn.acceleration is not None:

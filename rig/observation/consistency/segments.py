@@ -123,7 +123,7 @@ class _Division:
 
     @property
     def averages(self) -> Array:
-        """(p, m) weights of the even means of the segments."""
+        """The weights (p, m) of an unweighted mean of each segment."""
         return mean_weights(self.groups, self.groups[:, :0])
 
     def subtract_means(self, values: Array, weights: Array) -> Array:

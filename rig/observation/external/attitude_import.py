@@ -148,7 +148,7 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
             Turning(time_s, readings[RATE], rows_found.rows_s, rows_found.attitudes, rows_found.std_rad), rates
         )
         time_s = clock.controller_time_s(time_s)
-        rows_found = rows_found.select(np.flatnonzero(_within(rows_found.rows_s, time_s)))
+        rows_found = rows_found.select(np.flatnonzero(_is_covered(rows_found.rows_s, time_s)))
     if not rows_found.windows:
         raise clocks_apart(time_s, windows)
     check_overlap(time_s, rows_found.windows)
@@ -157,7 +157,7 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     counts = np.diff(np.searchsorted(time_s, rows_found.rows_s), axis=1)[:, 0]
     mostly = (counts > 0) & (counts >= MOSTLY * expected - 1)
     sampled = rows_found.select(np.flatnonzero(mostly))
-    covered = rows_found.select(np.flatnonzero(mostly | _within(rows_found.rows_s, time_s)))
+    covered = rows_found.select(np.flatnonzero(mostly | _is_covered(rows_found.rows_s, time_s)))
     whole = rows_found.select(_find_complete(rows_found, counts, expected))
     rate = readings.get(RATE)
     placement_rows = AttitudeRows(sampled.windows, sampled.attitudes, sampled.numbers, sampled.std_rad)
@@ -196,7 +196,7 @@ class _ReferenceRows:
         return _ReferenceRows([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
 
 
-def _within(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
+def _is_covered(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
     """Return which of the rows (N, 2) lie within a recording with samples at `time_s` (n,)."""
     within: NDArray[np.bool_] = (rows_s[:, 0] >= time_s[0]) & (rows_s[:, 1] <= time_s[-1])
     return within

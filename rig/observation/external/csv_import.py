@@ -106,7 +106,7 @@ def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
     if by_angle.hiding:
         first = next(sweep for sweep in data.sweeps if sweep.sweep in by_angle.hiding)
         where = f"row {first.sweep}, from {first.average.start_s:.10g} s"
-        reason = "lost_samples: what is missing in them may hide a part of the turn"
+        reason = "lost_samples: the missing readings may contain a part of the turn"
         yield Omitted("rows", len(by_angle.hiding), len(data.sweeps), reason, where)
 
 
@@ -159,7 +159,7 @@ def _list_omitted(rows: Sequence[RowGaps], windows: Sequence[Window]) -> Iterato
     if lost:
         number, row = lost[0]
         start_s = windows[number - 1].start_s if row.first_s is None else row.first_s
-        reason = "lost_samples: what is missing in them may hide a change of the rate"
+        reason = "lost_samples: the missing readings may contain a change of the rate"
         yield Omitted("rows", len(lost), len(rows), reason, f"row {number}, at {start_s:.10g} s")
     usable = [(number, row) for number, row in enumerate(rows, start=1) if row.is_usable]
     if missing := sum(row.missing for _, row in usable):

@@ -138,7 +138,7 @@ def _drop_blanks(
         kept = read[wanted[0]]
     for quantity in wanted:
         if (read[quantity] != kept).any():
-            raise _apart(path, quantity, wanted, read)
+            raise _refuse_separate_rows(path, quantity, wanted, read)
     for quantity in read:
         if not read[quantity][kept].all():  # it was read in other rows, and is not wanted
             for name in quantity.columns:
@@ -155,7 +155,7 @@ def _drop_blanks(
     return SampleTable({name: column[kept] for name, column in columns.items()}, table.origin_s, int((~kept).sum()))
 
 
-def _apart(
+def _refuse_separate_rows(
     path: Path, quantity: Quantity, wanted: Sequence[Quantity], read: Mapping[Quantity, NDArray[np.bool_]]
 ) -> Refused:
     other = wanted[0]

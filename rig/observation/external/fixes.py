@@ -135,7 +135,7 @@ def _find_joined(
     joined = np.ones(count - 1, dtype=np.bool_)
     hidden = np.zeros(count - 1)
     left_out = []
-    for name, steps, hidden_rad in _blind(turning):
+    for name, steps, hidden_rad in _find_unknown_steps(turning):
         begins, ends = turning.time_s[steps], turning.time_s[steps + 1]
         from_step, to_step = np.searchsorted(ends, first_s[:-1], side="right"), np.searchsorted(begins, last_s[1:])
         squares = np.concatenate([[0.0], np.cumsum(np.square(hidden_rad))])
@@ -149,7 +149,7 @@ def _find_joined(
     return joined, np.sqrt(hidden), tuple(left_out)
 
 
-def _blind(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
+def _find_unknown_steps(turning: Turning) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
     """Yield, by reason, the steps between readings in which the motion is unknown, by the first reading's index.
 
     Each comes with the standard deviation of the rotation that it hides.

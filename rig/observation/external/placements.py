@@ -46,7 +46,7 @@ class Rested:
     samples: tuple[int, ...]
 
     def mean(self, quantity: Quantity, rest: int) -> Mean:
-        """Return the mean reading in one of them."""
+        """Return the mean reading of one rest."""
         variance, samples = self.variances[quantity][rest], self.samples[rest]
         noise = np.sqrt(variance * samples)
         return Mean(self.means[quantity][rest], variance, noise, samples, self.dof[quantity][rest])
@@ -104,7 +104,7 @@ def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: Att
         near = slice(*(int(np.searchsorted(*windows)) for windows in ((ends, window.start_s), (starts, window.end_s))))
         matches.append(_find_rest(time_s, window, rests[near]))
     rest, cuts = np.array([number for number, _ in matches]), [cut for _, cut in matches]
-    groups = _groups(rest, rows.attitudes)
+    groups = _group_by_placement(rest, rows.attitudes)
     account = Account(time_s, rows, rest, cuts, dwells)
     account.check_mostly_at_rest()
     covered = [np.unique(np.concatenate([cuts[row] for row in group])) for group in groups]
@@ -180,13 +180,13 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
     return (number, cut) if overlap_s >= MOSTLY * lasts_s else (-1, nothing)
 
 
-def _groups(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
+def _group_by_placement(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
     """Return the rows of each placement."""
     groups: list[list[int]] = []
     last: dict[int, list[int]] = {}
     for row in np.flatnonzero(rest >= 0).tolist():
         before = last.get(int(rest[row]))
-        if before is not None and _apart(attitudes[before[0]], attitudes[row]) <= TURNED_RAD:
+        if before is not None and _angle_between_rad(attitudes[before[0]], attitudes[row]) <= TURNED_RAD:
             before.append(row)
             continue
         groups.append([row])
@@ -194,8 +194,8 @@ def _groups(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
     return [np.array(group) for group in groups]
 
 
-def _apart(one: Array, other: Array) -> float:
-    """Return the angle between two rotations (3, 3), rad."""
+def _angle_between_rad(one: Array, other: Array) -> float:
+    """Return the angle, rad, between two attitudes (3, 3)."""
     return float(np.arccos(np.clip((np.trace(one.T @ other) - 1) / 2, -1, 1)))
 
 

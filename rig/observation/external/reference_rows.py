@@ -34,7 +34,7 @@ class Turning:
     std_rad: Array | None = None
 
     def select(self, rows: NDArray[np.intp]) -> "Turning":
-        """Return it with some of the rows, by index."""
+        """Return the readings with only some rows, by index."""
         std_rad = None if self.std_rad is None else self.std_rad[rows]
         return replace(self, rows_s=self.rows_s[rows], attitudes=self.attitudes[rows], std_rad=std_rad)
 

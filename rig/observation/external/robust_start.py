@@ -84,14 +84,14 @@ def _find_pairs(turning: Turning) -> _Pairs:
     if not near.any():
         return _Pairs(np.zeros(0), np.zeros(0), np.zeros((0, 3)))
     moving = near & (angles >= max(MOVING * float(np.quantile(angles[near], 0.9)), LEAST_RAD))
-    chosen = np.concatenate([_spread(np.flatnonzero(part)) for part in (moving, near & ~moving)])
+    chosen = np.concatenate([_select_evenly(np.flatnonzero(part)) for part in (moving, near & ~moving)])
     if moving.sum() < FEWEST:
         chosen = np.zeros(0, dtype=np.intp)
     return _Pairs(middles_s[first[chosen]], middles_s[last[chosen]], rotations[chosen])
 
 
-def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return at most `PAIRS` of the indices, spread evenly."""
+def _select_evenly(indices: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return at most `PAIRS` indices, evenly spaced among those given."""
     return indices if len(indices) <= PAIRS else indices[np.linspace(0, len(indices) - 1, PAIRS).astype(np.intp)]
 
 

@@ -128,7 +128,7 @@ def _find_column(path: Path, headings: Sequence[str], width: int, name: str, col
     if len(named) != 1:
         numbers = " and ".join(str(index + 1) for index in named[:5])
         how = f"{len(named)} times, as columns {numbers}" if named else "nowhere"
-        remedy = f"Name one of its columns: {shorten(', '.join(headings))}; or say how many lines stand before them"
+        remedy = f"Name one of its columns: {shorten(', '.join(headings))}; or state how many lines precede them"
         raise Refused(
             "wrong_columns",
             f"{path} has the column {quote(column)} {how}, which is to be {name}",
@@ -149,7 +149,7 @@ def check_headings(path: Path, headings: Sequence[str]) -> None:
             "wrong_columns",
             f"{path} {what}",
             "Write the columns' names into the first row, divided as all rows are, by commas, semicolons or tabs; "
-            "or say with --columns how many lines stand before it, or the columns by their numbers; "
+            "or state with --columns how many lines precede it, or the columns by their numbers; "
             "rig look FILE shows what is in it",
         )
 
@@ -161,9 +161,9 @@ def _check_columns(path: Path, names: Sequence[str], header: Header) -> None:
     problems = [*_list_missing(names, header), *_find_unexpected(names, header)]
     if problems:
         wanted = ", ".join(header.needed) + (f" and one of {', '.join(header.one_of)}" if header.one_of else "")
-        more = "".join(f"; {', '.join(group)} may stand there too" for group in header.optional)
+        more = "".join(f"; {', '.join(group)} are allowed too" for group in header.optional)
         remedy = (
-            f"Its first row must name {wanted}{more}; or say with --columns which of its columns is what: "
+            f"Its first row must name {wanted}{more}; or state with --columns what its columns are: "
             "rig look FILE --write columns.yaml writes it"
         )
         raise Refused("wrong_columns", f"{path} {', '.join(problems)}", remedy)
@@ -185,7 +185,7 @@ def _check_unit(path: Path, name: str, names: Sequence[str], header: Header) -> 
 
 
 def _list_missing(names: Sequence[str], header: Header) -> list[str]:
-    """Return what a file lacks."""
+    """Return the columns that a file lacks, in words."""
     groups = [group for group in header.optional if set(group) & set(names)]
     needed = [*header.needed, *(name for group in groups for name in group)]
     return [f"lacks {name}" for name in needed if name not in names]

@@ -203,7 +203,7 @@ class _Wanted:
             raise Refused(
                 "wrong_columns",
                 f"{self.path}, line {line} has {len(row)} cells, and the heading names {self.width} columns: "
-                "nobody can say which cell is what",
+                "so the cells cannot be assigned to columns",
                 "Write a name for every column into the heading (col.names=NA in R's write.table), or a decimal point "
                 "where a comma divides the columns",
             )

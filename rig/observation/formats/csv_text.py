@@ -52,7 +52,7 @@ def is_harmless(path: Path, largest_mb: int) -> bool:
     Raise Refused `no_file`, also if it is too large.
     """
     with _raise_no_file(path), open_regular_file(path, largest_mb * 1_000_000) as file:
-        return os.fstat(file.fileno()).st_size <= HARMLESS_BYTES and not _beginning(file).startswith(GZIP)
+        return os.fstat(file.fileno()).st_size <= HARMLESS_BYTES and not _read_beginning(file).startswith(GZIP)
 
 
 @contextmanager
@@ -70,9 +70,9 @@ def _text(file: BinaryIO) -> TextIOWrapper:
     Raise UnfitFile if it is not text. Loggers' headings such as "°/s" and "µT", if not in UTF-8, are mostly in the
     encoding of Windows.
     """
-    if _beginning(file).startswith(GZIP):
+    if _read_beginning(file).startswith(GZIP):
         file = GzipFile(fileobj=file)  # type: ignore[assignment]
-    begin = _beginning(file)
+    begin = _read_beginning(file)
     if begin.startswith(UTF_16):
         return TextIOWrapper(file, encoding="utf-16", newline="")
     if b"\0" in begin:
@@ -84,7 +84,7 @@ def _text(file: BinaryIO) -> TextIOWrapper:
     return TextIOWrapper(file, encoding="utf-8-sig", newline="")
 
 
-def _beginning(file: BinaryIO) -> bytes:
+def _read_beginning(file: BinaryIO) -> bytes:
     begin = file.read(LONGEST_LINE)
     file.seek(0)
     return begin

@@ -106,10 +106,10 @@ def _read_classic(path: Path, objects: list[str]) -> Iterator[tuple[str, Array]]
     contents: dict[str, Any] = loadmat(str(path), appendmat=False)
     for name, value in contents.items():
         if not name.startswith("__"):
-            yield from _walk(name, value, objects)
+            yield from _find_matrices(name, value, objects)
 
 
-def _walk(name: str, value: Any, objects: list[str], depth: int = 0) -> Iterator[tuple[str, Array]]:
+def _find_matrices(name: str, value: Any, objects: list[str], depth: int = 0) -> Iterator[tuple[str, Array]]:
     fields = value.dtype.names if isinstance(value, np.ndarray) else None
     if fields is None:
         if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim == 2 and value.size > 1:
@@ -118,7 +118,7 @@ def _walk(name: str, value: Any, objects: list[str], depth: int = 0) -> Iterator
         objects.append(str(value["s0"].flat[0].decode()) if name == "None" else name)
     elif value.size == 1 and depth < DEEPEST:
         for field in fields:
-            yield from _walk(f"{name}.{field}", value[field].flat[0], objects, depth + 1)
+            yield from _find_matrices(f"{name}.{field}", value[field].flat[0], objects, depth + 1)
 
 
 def _read_hdf5(path: Path, objects: list[str]) -> Iterator[tuple[str, Array]]:

@@ -139,7 +139,7 @@ def _read(form: Format, reader: str, path: Path) -> FormatColumns:
     """Return the columns, ordered by time. Raise Refused as `readings_in`."""
     source = form.reads(whole(path))
     parts = parts_read_apart(
-        reader, source, {"inside": _inside(path)}, else_=f"is no {form.name} that can be read", remedy=form.remedy
+        reader, source, {"inside": _part_inside(path)}, else_=f"is no {form.name} that can be read", remedy=form.remedy
     )
     columns = columns_of(parts)
     time_s = columns[TIME]
@@ -153,5 +153,5 @@ def _format(path: Path) -> Format | None:
     return next((form for form in FORMATS if form.is_one(whole(path))), None)
 
 
-def _inside(path: Path) -> str | None:
+def _part_inside(path: Path) -> str | None:
     return str(path).partition(INSIDE)[2] or None

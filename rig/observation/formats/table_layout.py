@@ -156,7 +156,7 @@ def _describe(  # noqa: PLR0917
         "skip_lines": skip,
         "headings": headings,
         "units": stated,
-        "numbers": [index for index in numbers if index == time or _largest(columns[index]) < LARGEST_NUMBER],
+        "numbers": [index for index in numbers if index == time or _largest_number(columns[index]) < LARGEST_NUMBER],
         "texts": [index for index, column in enumerate(columns) if column and index not in {*numbers, time}],
         "time": time,
         "time_unit": time_unit,
@@ -187,7 +187,7 @@ def unit_in(heading: str) -> str:
     return ""
 
 
-def _largest(column: Sequence[str]) -> float:
+def _largest_number(column: Sequence[str]) -> float:
     return max(abs(float(cell)) for cell in column)
 
 

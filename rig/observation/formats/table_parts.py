@@ -38,7 +38,7 @@ def in_blocks(
 
 
 def columns_of(parts: Iterable[Part]) -> dict[str, Array]:
-    """Return the columns (n,) by name that such parts hold."""
+    """Return the columns (n,) in parts, by name."""
     *blocks, last = parts
     arrays, names = cast("list[Array]", blocks), cast("dict[str, Any]", last)["columns"]
     return {

@@ -20,7 +20,7 @@ class KnownMotion(Protocol):
 
     @property
     def time_s(self) -> Array:
-        """(m,) rising: times of the recorded states."""
+        """The rising times (m,) of the recorded states."""
         ...
 
     def rate(self, time_s: Array, derivative: int = 0, /) -> Array:

@@ -92,7 +92,7 @@ def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThr
     where, (low, high) = describe(sweep), sweep.revolution_rad
     time_s, angle = states["time_s"], states["q_rad"][:, sweep.joint]
     travelled = angle - low if sweep.direction == "ccw" else high - angle
-    first, last = _inside(travelled, high - low, sweep)
+    first, last = _find_inner_states(travelled, high - low, sweep)
     turning = states[first : last + 1]
     gap = float(np.diff(time_s[first - 1 : last + 2]).max())
     if gap > MAX_STATE_GAP_S:
@@ -100,7 +100,7 @@ def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThr
     _check_slider(turning, where)
     _check_speed(time_s[first : last + 1], travelled[first : last + 1], where, settings)
     _check_other_joints(turning, sweep.joint, where)
-    return Ends(*_ends(time_s, travelled, first, last, high - low), turning["time_s"])
+    return Ends(*_find_ends(time_s, travelled, first, last, high - low), turning["time_s"])
 
 
 def describe(sweep: Sweep) -> str:
@@ -117,7 +117,7 @@ def arm_states_lost(where: str, extent: str) -> Fault:
     )
 
 
-def _inside(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
+def _find_inner_states(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
     """Return the indices of the first and last state within the revolution. There are states before and after it."""
     entries = np.flatnonzero((travelled[:-1] < 0) & (travelled[1:] >= 0)) + 1
     exits = np.flatnonzero((travelled[:-1] < turn_rad) & (travelled[1:] >= turn_rad))
@@ -126,16 +126,16 @@ def _inside(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
     angle_rad = float(np.ptp(travelled)) if len(travelled) else 0.0
     raise Fault(
         "incomplete_revolution",
-        f"in {describe(sweep)} the joint turned {np.degrees(angle_rad):.0f}° and not {_extent(sweep)}",
+        f"in {describe(sweep)} the joint turned {np.degrees(angle_rad):.0f}° and not {_describe_extent(sweep)}",
         "Repeat the sweep; resume the run if it was interrupted",
     )
 
 
-def _extent(sweep: Sweep) -> str:
+def _describe_extent(sweep: Sweep) -> str:
     return "the whole revolution" if sweep.angle_rad == TURN_RAD else turn_words(sweep.angle_rad)
 
 
-def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
+def _find_ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
     """Return the start and end of the revolution, and the standard deviation of the time between, s.
 
     The angle is interpolated between two neighbouring states. If states are missing there, the joint might already be
@@ -180,7 +180,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean, as in a halt, unlike in vibration."""
+    """Raise Fault `speed_not_constant` if the smoothed rate strays from its mean: vibration does not, a halt does."""
     middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
     behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)

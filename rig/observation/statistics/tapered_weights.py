@@ -25,11 +25,13 @@ FEWEST_BINS = 16
 
 def vibrates(readings: Array) -> bool:
     """Return whether most of the scatter of readings (n, 3) at rest is a vibration, on any axis."""
-    return len(readings) > 2 * _highest(len(readings)) and any(fit_noise_factor(axis) < PREVAILS for axis in readings.T)
+    return len(readings) > 2 * _count_low_bins(len(readings)) and any(
+        fit_noise_factor(axis) < PREVAILS for axis in readings.T
+    )
 
 
 def flank_s(duration_s: float) -> float:
-    """Return the duration of the weights' flanks."""
+    """Return the duration of a rising or falling flank of the weights."""
     return min(FLANK_S, FLANK_SHARE * duration_s)
 
 
@@ -47,7 +49,7 @@ def noise_at_zero(readings: Array, low: float = LOW) -> Array:
     It is the median over low frequencies, which lines do not shift, divided by the median of χ² with two degrees of
     freedom. Low is up to a fraction `low` of the data rate, but never fewer bins than `FEWEST_BINS`.
     """
-    powers = np.abs(np.fft.rfft(apply_window(readings), axis=0)[MAIN_LOBE : _highest(len(readings), low)]) ** 2
+    powers = np.abs(np.fft.rfft(apply_window(readings), axis=0)[MAIN_LOBE : _count_low_bins(len(readings), low)]) ** 2
     medians: Array = np.median(powers, axis=0) / np.log(2)
     return medians
 
@@ -72,9 +74,9 @@ def dof_at_zero(count: int) -> float:
 
     Its relative variance is 1 / (m ln² 2), and ν is two over that (JCGM 100, G.4.2).
     """
-    return float(2 * np.log(2) ** 2 * (_highest(count) - MAIN_LOBE) / NOISE_BINS)
+    return float(2 * np.log(2) ** 2 * (_count_low_bins(count) - MAIN_LOBE) / NOISE_BINS)
 
 
-def _highest(count: int, low: float = LOW) -> int:
-    """Return the bin at which low frequencies end."""
+def _count_low_bins(count: int, low: float = LOW) -> int:
+    """Return the number of frequency bins that count as low."""
     return max(round(low * count), MAIN_LOBE + FEWEST_BINS)

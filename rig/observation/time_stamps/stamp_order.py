@@ -93,7 +93,7 @@ class _UnorderedLog:
         return _UnorderedLog(self.rows[kept], self.stamps_s[kept], self.readings[kept], (*self.findings, finding))
 
     def restamp(self, stamps_s: Array, changed: NDArray[np.bool_], reason: str) -> "_UnorderedLog":
-        """Return the log with other stamps of some rows."""
+        """Return the log with new stamps for some rows."""
         finding = self._describe(changed, reason, left_out=False)
         return replace(self, stamps_s=stamps_s, findings=(*self.findings, finding))
 

@@ -39,7 +39,7 @@ class Connections:
         self._limit(client, transport)
 
     def lost(self, client: Client) -> None:
-        """Remove a client that is gone."""
+        """Remove a client that has gone."""
         self._strangers.pop(client, None)
         self._trusted.pop(client, None)
         if (deadline := self._deadlines.pop(client, None)) is not None:

@@ -48,7 +48,7 @@ class Control:
             signal.signal(STOP_SIGNAL, before)
 
     def stop(self) -> bool:
-        """End the run; return False if there is none to end."""
+        """End the run; return False if no run can be ended."""
         with self._changed:
             if self._stop is None:
                 return False

@@ -56,7 +56,7 @@ class Door:
     def may_act(self, headers: Mapping[str, str]) -> bool:
         """Return whether a request has the token. A cookie does not count, because browsers send it unasked."""
         scheme, _, token = headers.get("authorization", "").partition(" ")
-        return scheme == "Bearer" and _same(token, self.token)
+        return scheme == "Bearer" and _are_equal(token, self.token)
 
     def may_look(self, headers: Mapping[str, str]) -> bool:
         """Return whether a request may read the page."""
@@ -64,7 +64,7 @@ class Door:
 
     def may_open(self, headers: Mapping[str, str], cookies: Mapping[str, str]) -> bool:
         """Return whether a request may read the certificate, which a link without headers opens."""
-        return self.may_look(headers) or _same(cookies.get(COOKIE, ""), self.pass_to_look)
+        return self.may_look(headers) or _are_equal(cookies.get(COOKIE, ""), self.pass_to_look)
 
     def refusal(self, path: str, headers: Mapping[bytes, bytes]) -> tuple[int, str] | None:
         """Return status and reason for a request that is refused; None for a permitted one."""
@@ -79,7 +79,7 @@ class Door:
         return None
 
 
-def _same(one: str, other: str) -> bool:
+def _are_equal(one: str, other: str) -> bool:
     return compare_digest(one.encode(), other.encode())
 
 

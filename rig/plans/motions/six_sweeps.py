@@ -128,9 +128,10 @@ def _order_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, 
 
 
 def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -> tuple[SweepPose, ...]:
-    """Return the sweep poses in the order of the wrists; wrist 1's poses with other wrists turned follow its own.
+    """Return the sweep poses in the order of the wrists.
 
-    Wrist 2 is turned by 45° so that the flange moves away from the forearm.
+    Wrist 1 has further poses after its own, with the other wrists turned. Wrist 2 is turned by 45° so that the flange
+    moves away from the forearm.
     """
     tilt_rad = math.radians(-45 if math.sin(home[WRIST_2]) > 0 else 45)
     offsets = ((tilt_rad, 0.0), (tilt_rad, math.pi / 2), (0.0, math.pi / 4)) if procedure.axes == 6 else ()
@@ -166,13 +167,13 @@ def _sweeps(order: Order, procedure: SixSweepsSection, repeats: int) -> list[Swe
         profile = Profile(averaged_rad, even_rad, pace_of(speed_deg_s, procedure.acceleration_deg_s2))
         for station, directions in zip(order.stations, order.directions, strict=True):
             for direction in directions[::-1] if order.alternates and turn % 2 else directions:
-                axis = _axis(station, 1 if direction == "ccw" else -1)
+                axis = _flange_axis(station, 1 if direction == "ccw" else -1)
                 sweeps.append(sweep_about(len(sweeps), station, direction, axis, profile))
     return sweeps
 
 
 @lru_cache(maxsize=64)
-def _axis(station: SweepPose, sign: int) -> Vector3:
+def _flange_axis(station: SweepPose, sign: int) -> Vector3:
     """Return the joint's axis in the flange's frame, reversed if the sign is -1."""
     x, y, z = (sign * axis for axis in flange_axes(station.pose_q_rad)[:, station.joint].tolist())
     return x, y, z

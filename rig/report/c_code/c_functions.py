@@ -28,7 +28,7 @@ def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Ar
     axes = "its own axes" if entry.alignment is None else "its gyroscope"
     omission = "" if entry.second_order_s2_m is None else "\n * The second order that result.json has is left out."
     about = f"{entry.part}, serial number {entry.serial_number}{_warm(entry.temperature_c)}"
-    return _subtracting(finding, entry.bias_m_s2, entry.correction_matrix, "force_m_s2", (
+    return _subtraction_lines(finding, entry.bias_m_s2, entry.correction_matrix, "force_m_s2", (
         f"/* Accelerometer of {_comment(about)}: s = M (a - b), specific force: at rest it points up.",
         f" * In the right-angled frame of {axes}, relative to gravity, {entry.gravity_m_s2:g} m/s^2.{omission} */",
     ))  # fmt: skip
@@ -37,7 +37,7 @@ def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Ar
 def magnetometer_lines(finding: Finding[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
     """Yield C source for a magnetometer in its mounting."""
     entry = finding.entry
-    return _subtracting(finding, entry.bias_t, entry.correction_matrix, "field_t", (
+    return _subtraction_lines(finding, entry.bias_t, entry.correction_matrix, "field_t", (
         f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",
         f" * In the right-angled frame of its own axes, as mounted, relative to a field of {entry.field_t:g} T. */",
     ))  # fmt: skip
@@ -93,7 +93,7 @@ def _without_gravity(prefix: str, sensitivity: Array) -> Iterator[str]:
     )
 
 
-def _subtracting(
+def _subtraction_lines(
     finding: Finding[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
 ) -> Iterator[str]:
     """Yield bias, matrix and function of a sensor whose bias is subtracted from its reading.
@@ -120,7 +120,7 @@ def _subtracting(
 
 
 def c_rows(matrix: Iterable[Iterable[float]]) -> str:
-    """Return a matrix as an initializer of C."""
+    """Return a matrix as an initializer in C."""
     return "{" + ", ".join(_array(row) for row in matrix) + "}"
 
 

@@ -67,7 +67,7 @@ def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
 
 
 def drift_rows(entry: DriftEntry) -> list[DriftRow]:
-    """Return the rows of a drift in its own unit, with U."""
+    """Return a row for each axis of a bias drift, in its unit of drift, with U."""
     bias, std = (np.array([getattr(repeat.scale_fixed, name) for repeat in entry.repeats]) for name in ("bias", "std"))
     total = np.hypot(std, entry.common_std)  # the common part cancels in a change
     change_std, slope = largest_change_std(bias, std), entry.temperature_slope

@@ -66,7 +66,7 @@ def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Se
 
     def points(temperatures: Sequence[float], heights: Array) -> str:
         return " ".join(
-            f"{_across(t, low, high)},{_height(y, unit, reach)}" for t, y in zip(temperatures, heights, strict=True)
+            f"{_x_pixel(t, low, high)},{_height(y, unit, reach)}" for t, y in zip(temperatures, heights, strict=True)
         )
 
     warm_c = [row.temperature_c for row in entry.table]
@@ -83,11 +83,11 @@ def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Se
     ticks = tuple(
         (_height(y * unit.size, unit, reach), f"{y:g}".replace("-", "−")) for y in (-reach / 1.1, 0.0, reach / 1.1)
     )
-    marks = tuple((_across(row.temperature_c, low, high), f"{row.temperature_c:.1f} °C") for row in shown_rows(entry))
+    marks = tuple((_x_pixel(row.temperature_c, low, high), f"{row.temperature_c:.1f} °C") for row in shown_rows(entry))
     return Curves(axes, ticks, marks, unit.name)
 
 
-def _across(temperature_c: float, low: float, high: float) -> float:
+def _x_pixel(temperature_c: float, low: float, high: float) -> float:
     return round(LEFT_MARGIN + 12 + (WIDTH - LEFT_MARGIN - RIGHT_MARGIN - 30) * (temperature_c - low) / (high - low), 1)
 
 

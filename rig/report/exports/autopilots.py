@@ -145,18 +145,18 @@ def _ardupilot_gyroscope(number: int, gyroscope: Corrected) -> Parameters:
 
 
 def _ardupilot_accelerometer(number: int, accelerometer: Corrected) -> Parameters:
-    yield from _axis_parameters(f"INS_ACC{_nth(number)}OFFS_{{}}", accelerometer.offset)
-    yield from _axis_parameters(f"INS_ACC{_nth(number)}SCAL_{{}}", accelerometer.scale)
+    yield from _axis_parameters(f"INS_ACC{_instance_suffix(number)}OFFS_{{}}", accelerometer.offset)
+    yield from _axis_parameters(f"INS_ACC{_instance_suffix(number)}SCAL_{{}}", accelerometer.scale)
 
 
 def _ardupilot_magnetometer(number: int, magnetometer: Corrected) -> Parameters:
     diagonal, off_diagonal = _ellipsoid(magnetometer)
-    yield from _axis_parameters(f"COMPASS_OFS{_nth(number)}_{{}}", -magnetometer.offset / MILLIGAUSS_T)
-    yield from _axis_parameters(f"COMPASS_DIA{_nth(number)}_{{}}", diagonal)
-    yield from _axis_parameters(f"COMPASS_ODI{_nth(number)}_{{}}", off_diagonal)
+    yield from _axis_parameters(f"COMPASS_OFS{_instance_suffix(number)}_{{}}", -magnetometer.offset / MILLIGAUSS_T)
+    yield from _axis_parameters(f"COMPASS_DIA{_instance_suffix(number)}_{{}}", diagonal)
+    yield from _axis_parameters(f"COMPASS_ODI{_instance_suffix(number)}_{{}}", off_diagonal)
 
 
-def _nth(number: int) -> str:
+def _instance_suffix(number: int) -> str:
     """Return the sensor's number in a parameter's name; empty for the first sensor."""
     return str(number + 1) if number else ""
 

@@ -40,7 +40,7 @@ class Exported(Protocol):
 
     @property
     def clock(self) -> str:
-        """The clock of the times, in words."""
+        """The name of the clock of the times, in words."""
         ...
 
     def time_s(self, sensor: str) -> Array:
@@ -108,8 +108,8 @@ class WithMotion:
 
     def _sweeps(self, name: str) -> dict[str, Array]:
         observations = self.observed.sensors[name]
-        rows = [(*_span(turn.average), *turn.axis_flange, turn.angle_rad) for turn in observations.revolutions]
-        rows += [(*_span(rest), 0.0, 0.0, 0.0, 0.0) for rest in observations.rests]
+        rows = [(*_interval_of(turn.average), *turn.axis_flange, turn.angle_rad) for turn in observations.revolutions]
+        rows += [(*_interval_of(rest), 0.0, 0.0, 0.0, 0.0) for rest in observations.rests]
         names = ("start_s", "end_s", "axis_x", "axis_y", "axis_z", "angle_rad")
         return split(names, np.array(sorted(rows), dtype=np.float64).reshape(-1, len(names)))
 
@@ -122,7 +122,7 @@ class ReadingsAlone:
 
     @property
     def clock(self) -> str:
-        """The clock of the times, in words."""
+        """The name of the clock of the times, in words."""
         return "the clock that stamped the readings"
 
     def time_s(self, sensor: str) -> Array:
@@ -140,7 +140,7 @@ class ReadingsAlone:
         return time_s - time_s[:1]
 
     def noise(self, sensor: str, quantity: Quantity) -> Sequence[Array]:
-        """Return no noise: the times at rest are unknown."""
+        """Return no noise, because the times at rest are unknown."""
         return ()
 
     def tables(self) -> Iterator[ExportTable]:
@@ -173,5 +173,5 @@ def exported(runs: Sequence[RunData]) -> tuple[Exported, ...]:
     return recordings
 
 
-def _span(average: Average) -> tuple[float, float]:
+def _interval_of(average: Average) -> tuple[float, float]:
     return average.start_s, average.end_s

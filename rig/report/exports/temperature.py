@@ -38,7 +38,7 @@ def at_temperature(
 
 
 def _change(drift: ResultDocument, sensor: Corrected, to_c: float) -> Array:
-    """Return the change (3,) of the reading's bias."""
+    """Return the change (3,) of the bias in a reading."""
     name, quantity, from_c = sensor.sensor, sensor.quantity.name, sensor.temperature_c
     if from_c is None:
         raise Refused(

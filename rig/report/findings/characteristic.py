@@ -153,7 +153,7 @@ def _flat(numbers: Any) -> list[Any]:
     return list(np.ravel(numbers).tolist())
 
 
-def always(si: str, d_si: str, shown: DisplayUnit | None = None) -> Callable[[Quantity], Units]:
+def same_units(si: str, d_si: str, shown: DisplayUnit | None = None) -> Callable[[Quantity], Units]:
     """Return a function that gives the same units for every quantity; `shown` is by default the SI unit."""
     units = Units(si, d_si, shown or DisplayUnit(si, 1.0))
     return lambda _: units

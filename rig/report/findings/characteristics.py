@@ -20,8 +20,8 @@ from rig.report.findings.characteristic import (
     Series,
     UncertainNumbers,
     Units,
-    always,
     read_fields,
+    same_units,
 )
 
 AXES, ANGLES = ("x", "y", "z"), ("yz", "zx", "xy")
@@ -88,7 +88,7 @@ SLOPES: Final = Series("s", "the slope over temperature of the bias of {}", draw
 NON_ORTHOGONALITY: Final = Characteristic(
     "angles between the axes less a right one",
     ANGLES,
-    always("rad", r"\radian", DisplayUnit("°", pi / 180)),
+    same_units("rad", r"\radian", DisplayUnit("°", pi / 180)),
     read_fields("non_orthogonality", "rad"),
     Series("nonorth_", "the angle between {} and {}"),  # nonorth_yz, nonorth_zx, nonorth_xy
     {"terminal": LINES, "certificate": BLOCK, "page": NO_ROW, "exports": "it is in the matrix of the readings"},
@@ -96,7 +96,7 @@ NON_ORTHOGONALITY: Final = Characteristic(
 G_SENSITIVITY: Final = Characteristic(
     "g-sensitivity",
     [axis + other for axis in AXES for other in AXES],
-    always("rad/s per m/s²", r"\radian\second\metre\tothe{-1}"),
+    same_units("rad/s per m/s²", r"\radian\second\metre\tothe{-1}"),
     read_fields("g_sensitivity", "rad_s_per_m_s2", sign=-1),  # gravity points down, force at rest up
     Series("g", "g-sensitivity {0}/{1}", opposite=True),
     {"terminal": "nine numbers with U need a table, which the certificate has", "certificate": BLOCK, "page": NO_ROW,
@@ -107,7 +107,7 @@ G_SENSITIVITY: Final = Characteristic(
 SECOND_ORDER: Final = Characteristic(
     "second order",
     AXES,
-    always("s²/m", r"\second\tothe{2}\metre\tothe{-1}"),
+    same_units("s²/m", r"\second\tothe{2}\metre\tothe{-1}"),
     read_fields("second_order", "s2_m"),
     None,
     {"terminal": LINES, "certificate": BLOCK, "page": NO_ROW, "history": "results with it are entered without it",
@@ -143,7 +143,7 @@ BIAS_SLOPE_AT_REFERENCE: Final = Characteristic(
 SCALE_SLOPE_AT_REFERENCE: Final = Characteristic(
     "change of the scale factor per kelvin",
     AXES,
-    always("1/K", r"\kelvin\tothe{-1}"),
+    same_units("1/K", r"\kelvin\tothe{-1}"),
     _slope_of("scale", SCALE_SLOPE),
     Series("t", "the slope over temperature of the scale factor of {}", drawn=True),
     {"terminal": LINES, "certificate": BLOCK, "page": NO_ROW, "digital certificate": OWN_RESULT,

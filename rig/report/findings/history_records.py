@@ -129,7 +129,7 @@ def scale_and_bias(
 
 
 def parameters(characteristics: "Iterable[Term]") -> Iterator[Parameter]:
-    """Yield the parameters of characteristics, with their standard deviations and degrees of freedom."""
+    """Yield each number of the sensor's characteristics as a parameter, with std and degrees of freedom."""
     for term in characteristics:
         numbers = term.numbers
         sign = -1 if term.characteristic.opposite else 1

@@ -79,7 +79,7 @@ def _validation(held_out: "HeldOut") -> ValidationEntry:
 
 
 def _lines(finding: Finding[AccelerometerEntry]) -> Iterator[str]:
-    """Yield the lines below the table."""
+    """Yield the lines below the table of scale and bias."""
     from rig.estimation.gyroscope.own_errors import NONLINEARITY
 
     entry = finding.entry

@@ -110,7 +110,7 @@ def _render(finding: Finding[DriftEntry]) -> Iterator[Table | str]:
 
 
 def _build_row(finding: Finding[DriftEntry]) -> DisplayRow:
-    """Return the largest change of the bias."""
+    """Return the row of the bias's largest change."""
     return row_of(LARGEST_CHANGE.term_of(finding), finding.quantity.full_label(finding.sensor))
 
 
@@ -164,7 +164,7 @@ def drift_table(name: str, quantity: Quantity, entry: DriftEntry) -> Table:
 
 
 def _lines(finding: Finding[DriftEntry]) -> Iterator[str]:
-    """Yield the lines below the table."""
+    """Yield the lines below the table of biases."""
     entry, quantity, shown = finding.entry, finding.quantity, finding.quantity.drift
     unit, size = shown.name, shown.size
     if entry.steps:

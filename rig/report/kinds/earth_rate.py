@@ -14,7 +14,7 @@ from rig.report.tables import dcc_results
 
 
 def _find(document: ResultDocument) -> Iterator[Finding[GyroscopeEntry]]:
-    """Yield the sensors that measured it."""
+    """Yield the sensors that measured the Earth's rate."""
     for name, sensor in document.gyroscopes.items():
         if isinstance(sensor.earth_rate, EarthRateEntry):
             yield Finding(name, RATE, sensor)
@@ -28,7 +28,7 @@ def _rate_of(finding: Finding[GyroscopeEntry]) -> EarthRateEntry:
 
 
 def _build_row(finding: Finding[GyroscopeEntry]) -> DisplayRow:
-    """Return the Earth's rate in the axes of the arm's base."""
+    """Return the row of the Earth's rate in the axes of the arm's base."""
     return row_of(EARTH_RATE.term_of(finding))
 
 

@@ -142,7 +142,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
             yield f"{name}: {other.error}"
         elif other.estimator != sensor.estimator:
             yield f"{name}: k {triple(other.scale, scale)}, b {triple(other.bias_rad_s, bias)} rad/s"
-            yield from _differs(sensor, other)
+            yield from _describe_difference(sensor, other)
     if sensor.board is not None:
         yield from _board_lines(sensor.board)
     if not isinstance(vector, ErrorEntry):
@@ -154,7 +154,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
         yield from (f"warning: {warning}" for warning in vector.warnings)
 
 
-def _differs(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
+def _describe_difference(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
     """Yield a sentence on which of two estimators to prefer, if they differ by more than U."""
     expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*solution.scale, *solution.bias_rad_s) for solution in (sensor, other))

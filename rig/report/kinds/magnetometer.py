@@ -63,7 +63,7 @@ def _entry(outcome: Outcome, name: str, result: "MagnetometerResult") -> Magneto
 
 
 def _lines(finding: Finding[MagnetometerEntry]) -> Iterator[str]:
-    """Yield the lines below the table."""
+    """Yield the lines below the table of scale and bias."""
     entry = finding.entry
     field_ut = entry.field_t / FIELD.bias.size
     yield f"relative to a field of {field_ut:g} µT; {len(entry.dwells)} attitudes; it has no limits"
@@ -76,14 +76,14 @@ def _lines(finding: Finding[MagnetometerEntry]) -> Iterator[str]:
     if entry.arm_field_in_bias:
         base = "arm's base"
         yield "the bias includes the arm's own field; runs with the sensor turned over separate it: rig reversal"
-        yield from _tests(entry)
+        yield from _field_test_lines(entry)
     yield f"field in the {base}: {triple(np.divide(entry.field_base_t, FIELD.bias.size), '+.3f')} µT"
     yield from attitude_lines(finding)
     yield from method_lines(entry, FIELD)
     yield from (f"warning: {warning}" for warning in entry.warnings)
 
 
-def _tests(entry: MagnetometerEntry) -> Iterator[str]:
+def _field_test_lines(entry: MagnetometerEntry) -> Iterator[str]:
     """Yield lines on the tests of whether the field was uniform and constant."""
     if (uniformity := entry.uniformity) is not None:
         yield f"uniform field: χ² of the residuals {uniformity.chi_square:.1f}, at most {uniformity.limit:.1f}"

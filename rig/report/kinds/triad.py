@@ -49,7 +49,7 @@ def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
 
 
 def shown_of(finding: Finding[Any]) -> DisplayRow:
-    """Return the row of page and notebook."""
+    """Return the row of such a sensor for page and notebook."""
     quantity, entry = finding.quantity, finding.entry
     expanded, size = expanded_uncertainties(entry.budget, entry.covariance), quantity.bias.size
     count = len(entry.scale)
@@ -62,7 +62,7 @@ def shown_of(finding: Finding[Any]) -> DisplayRow:
 
 
 def followed_of(finding: Finding[Any], document: ResultDocument) -> HistoryRecord:
-    """Return scale and bias as a history stores them."""
+    """Return a history's record of scale and bias."""
     quantity, entry = finding.quantity, finding.entry
     parameters = [*scale_and_bias(finding.sensor, quantity, entry, bias_of(quantity, entry), document)]
     full_scale: float = getattr(entry, quantity.named("range")) or 0.0

@@ -74,16 +74,16 @@ def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
     by = {
         "version": "v1",
         "sid": cms.SignerIdentifier("issuer_and_serial_number", cms.IssuerAndSerialNumber(who)),
-        "digest_algorithm": _plain(digest),
+        "digest_algorithm": _drop_parameters(digest),
         "signed_attrs": info["signed_attrs"],
-        "signature_algorithm": _plain(info["signature_algorithm"]),
+        "signature_algorithm": _drop_parameters(info["signature_algorithm"]),
         "signature": info["signature"],
     }
     if info["unsigned_attrs"]:
         by["unsigned_attrs"] = info["unsigned_attrs"]
     signed = {
         "version": version,
-        "digest_algorithms": list(map(_plain, digests)),
+        "digest_algorithms": list(map(_drop_parameters, digests)),
         "encap_content_info": {"content_type": "data"} if version == DATA else container["encap_content_info"],
         "certificates": container["certificates"],
         "signer_infos": [cms.SignerInfo(by)],
@@ -91,7 +91,7 @@ def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
     return cms.ContentInfo({"content_type": "signed_data", "content": cms.SignedData(signed)})
 
 
-def _plain(algorithm: Any) -> Any:
+def _drop_parameters(algorithm: Any) -> Any:
     """Return the algorithm with no parameters other than NULL."""
     name = algorithm["algorithm"].native
     if name == WITH_PARAMETERS:

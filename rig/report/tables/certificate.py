@@ -51,7 +51,7 @@ class CheckRow:
 
 
 def kind(part: str) -> str:
-    """Return the maker's name of a part."""
+    """Return a part's name in the maker's spelling."""
     return part if part == NOT_STATED else part.removesuffix("_magnetometer").upper()
 
 

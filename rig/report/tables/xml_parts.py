@@ -24,7 +24,7 @@ def dcc(name: str, *parts: Part, **attributes: str) -> Element:
 
 
 def si(name: str, *parts: Part) -> Element:
-    """Return an element of a quantity."""
+    """Return the element `name` of the D-SI schema with its parts."""
     return _extend(Element(f"{{{SI}}}{name}"), parts)
 
 
@@ -36,18 +36,18 @@ def _extend(element: Element, parts: Iterable[Part]) -> Element:
 def words(name: str, text: str | date | None) -> Element:
     """Return an element with a text; an unknown text reads "not stated"."""
     element = dcc(name)
-    element.text = _plain(text)
+    element.text = _printable(text)
     return element
 
 
 def text(name: str, statement: str | None) -> Element:
     """Return an element with a text that the schema requires to have a language."""
     content = dcc("content", lang="en")
-    content.text = _plain(statement)
+    content.text = _printable(statement)
     return dcc(name, content)
 
 
-def _plain(statement: str | date | None) -> str:
+def _printable(statement: str | date | None) -> str:
     """Return printable text, since XML allows no control characters, with one space for any white space."""
     return UNSAID if statement is None else printable(" ".join(str(statement).split())) or UNSAID
 
@@ -60,7 +60,7 @@ def values(name: str, numbers: Iterable[object]) -> Element:
 
 
 def real(value: float, unit: str) -> Element:
-    """Return one value without an uncertainty."""
+    """Return the element of one value without an uncertainty."""
     return si("real", values("value", [value]), values("unit", [unit]))
 
 
@@ -81,10 +81,10 @@ def real_list(
         uncertainty = si(
             "expandedUncXMLList",
             values("uncertaintyXMLList", expanded.widths),
-            values("coverageFactorXMLList", _shortest(expanded.factors)),
+            values("coverageFactorXMLList", _merge_equal(expanded.factors)),
             values(
                 "coverageProbabilityXMLList",
-                _shortest([round(p, DIGITS) for p in expanded.probabilities]),
+                _merge_equal([round(p, DIGITS) for p in expanded.probabilities]),
             ),
         )
     if region is not None:
@@ -105,8 +105,8 @@ def real_list(
     )
 
 
-def _shortest(numbers: Sequence[float]) -> Sequence[float]:
-    """Return one number if all are the same."""
+def _merge_equal(numbers: Sequence[float]) -> Sequence[float]:
+    """Return one number if all are equal, else all of them."""
     return numbers[:1] if len(set(numbers)) == 1 else numbers
 
 

@@ -60,7 +60,7 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
     if guess.others:
         yield _row("not read", shorten(" ".join(guess.others)))
     for gap in guess.gaps:
-        yield _row("CANNOT TELL", gap)
+        yield _row("UNKNOWN", gap)
     if layout.missing:
         yield _row("missing", f"values are written as {' '.join(layout.missing)}")
 

@@ -32,7 +32,7 @@ def profile(plan: Plan) -> list[ProfilePoint]:
     for index, step in enumerate(plan.steps):
         if isinstance(step, Sweep):
             after = plan.steps[index + 1] if index + 1 < len(plan.steps) else None
-            by_axis.setdefault(_axis(step.axis_flange), []).append(
+            by_axis.setdefault(_name_axis(step.axis_flange), []).append(
                 (step, after.duration_s if isinstance(after, Rest) else 0.0)
             )
     return [point for axis, sweeps in by_axis.items() for point in _corners(axis, sweeps)]
@@ -56,7 +56,7 @@ def _corners(axis: str, sweeps: list[tuple[Sweep, float]]) -> Iterator[ProfilePo
         at_s += rest_s
 
 
-def _axis(axis: Vector3) -> str:
+def _name_axis(axis: Vector3) -> str:
     """Return the name of an axis for both directions: `x`, `y`, `z`, or a direction in the frame of the flange."""
     leading = _leading_component(axis)
     upright = [component / math.copysign(1.0, leading) for component in axis]

@@ -59,24 +59,24 @@ def ending(
         return sum(len([*_wrap(text, max(width, LEAST_WIDTH))]) for text in texts)
 
     room = (ONE_SENSOR if len(items) == 1 else MANY) - len([*_values(items, max(width, LEAST_WIDTH))])
-    room -= lines_of(*_first(broken, 1), summary, *needed[0], *needed[1]) + len(files) + 1
+    room -= lines_of(*_first_failures(broken, 1), summary, *needed[0], *needed[1]) + len(files) + 1
     spare = []
     for text in (*in_short, *farthest_off(result), *_name_near(result)):
         if lines_of(text) <= room:
             spare.append(text)
             room -= lines_of(text)
-    room += lines_of(*_first(broken, 1))
-    count = next((n for n in range(len(broken), 1, -1) if lines_of(*_first(broken, n)) <= room), 1)
+    room += lines_of(*_first_failures(broken, 1))
+    count = next((n for n in range(len(broken), 1, -1) if lines_of(*_first_failures(broken, n)) <= room), 1)
     brief = [text for text in in_short if text in spare]
     yield from _values(items, width)
-    for text in (*_first(broken, count), summary, *brief, *needed[0], *spare[len(brief) :], *needed[1]):
+    for text in (*_first_failures(broken, count), summary, *brief, *needed[0], *spare[len(brief) :], *needed[1]):
         yield from _wrap(text, width)
     yield from files
     yield f"verdict: {result.verdict.upper()}"
 
 
 def _values(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
-    return _one(items[0], width) if len(items) == 1 else _several(items, width)
+    return _list_axes(items[0], width) if len(items) == 1 else _list_sensors(items, width)
 
 
 def _items(result: ResultDocument) -> Iterator[_SensorValues]:
@@ -89,8 +89,8 @@ def _items(result: ResultDocument) -> Iterator[_SensorValues]:
         yield _SensorValues(kind.name, label, finding.entry, show(finding))
 
 
-def _one(item: _SensorValues, width: int) -> Iterator[str]:
-    """Yield one sensor's values, one line for each axis."""
+def _list_axes(item: _SensorValues, width: int) -> Iterator[str]:
+    """Yield the values of a single sensor, one line for each axis."""
     shown, part = item.shown, getattr(item.entry, "part", None)
     columns = [[_heading(item), *_plus_minus(shown.numbers)]]
     if shown.scale is not None:
@@ -107,7 +107,7 @@ def _one(item: _SensorValues, width: int) -> Iterator[str]:
         yield f"{INDENT}{axis:{first - len(INDENT)}}{cells}"
 
 
-def _several(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
+def _list_sensors(items: Sequence[_SensorValues], width: int) -> Iterator[str]:
     """Yield the values of many sensors, kind by kind, in one line each, or two on a narrow screen."""
     table = _tabulate(items)
     if not table:
@@ -182,7 +182,7 @@ def _explain_failures(result: ResultDocument, folder: Path | None) -> list[tuple
 
     Checks without a value come last: most have none because another check failed.
     """
-    failed = sorted((check for check in result.checks if not check.passed), key=_over, reverse=True)
+    failed = sorted((check for check in result.checks if not check.passed), key=_ratio_to_limit, reverse=True)
     failed.sort(key=lambda check: (check.value is None, check.means.what not in CAUSES))
     words = [what_failed(check, folder) for check in failed]
     return [
@@ -191,7 +191,7 @@ def _explain_failures(result: ResultDocument, folder: Path | None) -> list[tuple
     ]
 
 
-def _first(broken: Sequence[tuple[str, str]], count: int) -> Iterator[str]:
+def _first_failures(broken: Sequence[tuple[str, str]], count: int) -> Iterator[str]:
     """Yield the first `count` failures; a last line states how many more there are."""
     more = len(broken[count:])
     for number, (measured, words) in enumerate(broken[:count], 1):
@@ -199,8 +199,12 @@ def _first(broken: Sequence[tuple[str, str]], count: int) -> Iterator[str]:
 
 
 def _name_near(result: ResultDocument) -> Iterator[str]:
-    """Yield passed checks that are near their limits."""
-    near = sorted((check for check in result.checks if check.passed and _over(check) >= NEAR), key=_over, reverse=True)
+    """Yield the names of passed checks that are near their limits."""
+    near = sorted(
+        (check for check in result.checks if check.passed and _ratio_to_limit(check) >= NEAR),
+        key=_ratio_to_limit,
+        reverse=True,
+    )
     for check in near[:MOST_NEAR]:
         words = words_of(check)
         yield f"near its limit: {_value_and_limit(check)}" + ("" if words is None else f" (beyond it: {words.means})")
@@ -214,7 +218,7 @@ def _value_and_limit(check: CheckEntry) -> str:
     )
 
 
-def _over(check: CheckEntry) -> float:
+def _ratio_to_limit(check: CheckEntry) -> float:
     """Return the value divided by its limit; infinite if either is missing."""
     if check.value is None or check.limit is None:
         return float("inf")

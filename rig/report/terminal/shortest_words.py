@@ -69,7 +69,7 @@ def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bo
     if shown is not None:
         console.print(_tabulate_plans(shortest, shown, section))
         console.print(_limits("Main contributors, as fractions of the variance:", shown.budgets))
-    console.print(plain(_floor(shortest)))
+    console.print(plain(_describe_floor(shortest)))
     if shortest.directions is not None:
         console.print(_optimality(shortest.directions))
     console.print(plain(f"{shortest.tried} of {shortest.candidates_count} plans were compared. {ASSUMED}"))
@@ -184,7 +184,7 @@ def _fraction(part: float, whole: float) -> float:
     return float((part / whole) ** 2) if whole > 0 else 0.0
 
 
-def _floor(shortest: Shortest) -> str:
+def _describe_floor(shortest: Shortest) -> str:
     """Return a sentence on the smallest uncertainties that this kind of run can reach, with their contributors."""
     parts = []
     for index, (size, (unit, what)) in enumerate(SHOWN.items()):
@@ -195,7 +195,7 @@ def _floor(shortest: Shortest) -> str:
         value = getattr(least.reached, size)
         if value > 0:
             parts.append(f"U = {value:.2g}{unit} of {what} ({', '.join(largest)})")
-    return f"Whatever its duration, no run of this kind gets below {' and '.join(parts)}."
+    return f"However long it lasts, no run of this kind gets below {' and '.join(parts)}."
 
 
 def _efficiencies(directions: "Array") -> dict[str, dict[str, float]]:

@@ -14,7 +14,7 @@ def truth_tables(rows: Sequence[TruthRow], sensor: str | None = None) -> Iterato
     for row in rows:
         if sensor not in (None, row.row.sensor):
             continue
-        title = f"{row.row.name} beside its simulated truth, d = (result − truth)/U"
+        title = f"{row.row.name} with its simulated truth, d = (result − truth)/U"
         table = Table(title=plain(title, "table.title"), title_justify="left")
         columns = [("scale factor", row.scale), (f"{row.row.noun} {row.row.unit.name}", row.bias)]
         table.add_column("axis")

@@ -25,7 +25,7 @@ class Word:
 
     @property
     def synonyms(self) -> tuple[str, ...]:
-        """The separate names: for `coverage factor, k = 2` also the letter."""
+        """The names one by one: `coverage factor, k = 2` gives also `k`."""
         return tuple(name.partition(" = ")[0] for name in self.names.split(", "))
 
     @property

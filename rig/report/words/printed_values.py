@@ -62,7 +62,7 @@ def plus_minus(value: float, uncertainty: float) -> str:
 
 
 def small(value: float) -> str:
-    """Return two digits and a power of ten."""
+    """Return a small number as two digits and a power of ten."""
     if value == 0:
         return "0"
     mantissa, exponent = f"{value:.1e}".split("e")
@@ -76,12 +76,12 @@ def figures(value: float) -> str:
 
 
 def power_of_ten(exponent: int) -> str:
-    """Return 10 with its exponent raised."""
+    """Return 10 with a superscript exponent."""
     return f"10{str(exponent).translate(RAISED)}"
 
 
 def percent(fraction: float) -> str:
-    """Return a fraction of the variance in percent."""
+    """Return a fraction of the variance as a percentage."""
     return "<\u00a00.1\u00a0%" if fraction < 0.001 else f"{100 * fraction:.1f}\u00a0%"
 
 

@@ -121,7 +121,7 @@ class HandSession:
         return still_open(WantedMoves(self.settings.flips, self.settings.turns), self._accepted, self._lay)
 
     def _feed(self, batches: Sequence[NDArray[Any]]) -> None:
-        """Take the readings that have arrived."""
+        """Process the readings that have arrived."""
         if not batches:
             return
         samples = np.concatenate(batches)
@@ -148,7 +148,9 @@ class HandSession:
         wrong = now.fault_of_last or self._not_closed(now)
         read = now.faces[-1] if now.faces else None
         if read is None:
-            wrong = wrong or Fault("not_flat", "it lies on none of its six sides", "Lay it down on a side, and let go")
+            wrong = wrong or Fault(
+                "not_flat", "it does not lie on any of its six sides", "Lay it down on a side, and let go"
+            )
         counts = wrong is None or self._wrong(wrong, move, rest)
         face = None if read is None else self._face(read)
         if face is None or not counts:
@@ -182,7 +184,7 @@ class HandSession:
         if missed_rad is None or abs(missed_rad) <= MISSED * self.settings.closure_rad:
             return None
         what = f"that turn ended {abs(np.degrees(missed_rad)):.1f}° from where it began"
-        return Fault("turn_not_closed", what, "Lay it back against the rule, and turn again")
+        return Fault("turn_not_closed", what, "Lay it against the ruler, and turn again")
 
     def _next(self, now: SessionProgress, face: Face | None) -> Instruction | None:
         """Return the next instruction; None once the session has enough moves."""
@@ -191,7 +193,7 @@ class HandSession:
         return None if enough else next_instruction(self._open, face)
 
     def _take(self, move: Move, now: SessionProgress, face: Face) -> None:
-        """Count a move, unless it took too long."""
+        """Accept a move, unless it took too long."""
         self._refused = 0
         if now.moves[-1].kind == "omitted":
             return
@@ -239,7 +241,7 @@ class HandSession:
         self._reminded = in_hand
 
     def _ask(self, instruction: Instruction | None, wrong: Fault | None = None) -> None:
-        """Ask the operator for a move; None ends the session."""
+        """Ask the operator for a move; None announces the end of the session."""
         self._request = None
         if instruction is not None:
             again, why = (None, "") if wrong is None else (wrong.name, f"{wrong.what}. {wrong.remedy}"[:500])

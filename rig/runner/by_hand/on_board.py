@@ -33,11 +33,11 @@ LOOK_S = 0.05
 AGAIN = {  # the board's term: the error's name, what, what to do
     "clipped": ("clipping", "it was turned faster than the sensor's range", "Turn more slowly"),
     "lost": ("lost_in_move", "readings are missing", "Make the move again"),
-    "no_face": ("not_flat", "it lies on none of its six sides", "Lay it down on a side, and let go"),
+    "no_face": ("not_flat", "it does not lie on any of its six sides", "Lay it down on a side, and let go"),
     "contradicts": (
         "lost_in_move",
         "the move is not what all the others say",
-        "Lay it down on the whole of a side; a turn ends where it began",
+        "Lay it down flat on a side; a turn must end where it began",
     ),
 }
 
@@ -169,7 +169,7 @@ def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
     if not sensor.measures(ACCELERATION):
         raise Refused(
             "first_face_not_told",
-            f"the board reads from accelerations which side is up, and sensors.{name} asks for none",
+            f"the board determines from accelerations which side is up, but sensors.{name} asks for none",
             f"Add acceleration: {{}} to sensors.{name}",
         )
     if not follows_crystal(board):
@@ -182,7 +182,7 @@ def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
 
 
 def _follow(source: BoardSource, session: FollowedSession) -> None:
-    """Follow the session to its end. Raise Fault, for ten refused moves in a row that of the last."""
+    """Follow the session to its end. After ten refused moves in a row, raise the Fault of the last."""
     while True:
         report = source.board.hand_report()
         session.take(report)

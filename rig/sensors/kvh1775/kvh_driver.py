@@ -70,7 +70,7 @@ class Kvh1775:
                     "kvh_setting_not_kept",
                     f"sensors.{self._sensor}: the KVH 1775 was set to {name},{value} and reads back "
                     f"{self.settings[name]}",
-                    "Switch it off and on, then try again; if it stays, ask its maker",
+                    "Switch it off and on, then try again; if the problem persists, ask its maker",
                 )
 
     def run(self) -> None:

@@ -285,7 +285,9 @@ def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[
     rad_s = float(np.sum(by_rate * change)) / size if size > 0 else 0.0
     residual = float(np.sum((change - rad_s * by_rate) ** 2) / max(np.sum(change**2), 1e-12))
     if residual > 0.3 or rad_s <= 0:
-        guess.gaps.append("how the gyroscope's axes lie to the accelerometer's: gravity did not go round as it read")
+        guess.gaps.append(
+            "the orientation of the gyroscope's axes relative to the accelerometer's: gravity did not rotate as it read"
+        )
         return None
     for unit, one in (("rad/s", 1.0), ("deg/s", np.pi / 180), ("mdeg/s", np.pi / 180e3), ("mrad/s", 1e-3)):
         if abs(rad_s / one - 1) < TOLERANCE:

@@ -64,7 +64,7 @@ def _find_speed(port: str, tell: Callable[[str], None]) -> int:
         raise _silent(port)
     raise SensorError(
         "lines_wrong_baud_rate",
-        f"what comes from {port} is text at none of {', '.join(map(str, USUAL))} Bd",
+        f"the data from {port} is text at none of {', '.join(map(str, USUAL))} Bd",
         "Give the speed that the device's program sets with --baud; it may print no lines but binary messages",
     )
 

@@ -111,7 +111,7 @@ def refusals(sensor: str, names: ParameterNames, parameters: Mapping[str, float]
         yield SensorError(
             "autopilot_parameter_missing",
             f"{sensor}: the autopilot has no parameter {', '.join(missing)}",
-            "See that it has that IMU, and that its firmware is no older than ArduPilot 4.0 or PX4 1.12",
+            "Check that it has that IMU, and that its firmware is not older than ArduPilot 4.0 or PX4 1.12",
         )
         return
     for name in names.must_be_zero:
@@ -133,7 +133,7 @@ def refusals(sensor: str, names: ParameterNames, parameters: Mapping[str, float]
             yield SensorError(
                 "autopilot_filter_slow",
                 f"{sensor}: {name} is {parameters[name]:g} Hz, too slow to have settled when a turn is measured",
-                f"Set {name} to {LEAST_CUTOFF_HZ:g} or more; 20 is what ArduPilot comes with",
+                f"Set {name} to {LEAST_CUTOFF_HZ:g} or more; ArduPilot's default is 20",
             )
     if names.identity is not None and parameters[names.identity] == 0.0:
         yield SensorError(

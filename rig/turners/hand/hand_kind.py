@@ -105,7 +105,7 @@ def _connect(section: HandSection, on_state: OnState, log: Path) -> Iterator[Tur
     yield Hand()
 
 
-def _look(section: HandSection) -> HandReport:
+def _make_report(section: HandSection) -> HandReport:
     return Hand().report()
 
 
@@ -131,7 +131,7 @@ HAND = TurnerKind(
     name="hand",
     section=HandSection,
     connect=_connect,
-    look=_look,
+    look=_make_report,
     stance=_stance,
     problems=_problems,
     describe_configured=lambda section: RECORDED,

@@ -88,7 +88,7 @@ def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
     if model is None:
         raise Refused(
             "other_servo",
-            f"the servo at {port} has the model number {number}, which the rig does not know",
+            f"the servo at {port} has the model number {number}, which the rig does not support",
             "Use an XL430-W250, XM430-W350 or XM430-W210",
         )
     (firmware,) = bus.look_up(FIRMWARE)

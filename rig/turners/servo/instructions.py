@@ -31,7 +31,7 @@ def make_ready(bus: Bus, watchdog: int) -> None:
             bus.write(register, wanted)
             _read_back(bus, register, wanted)
     bus.write(WATCHDOG, 0)  # also clears an earlier stop, in which goals are refused
-    _stay(bus)
+    _hold_position(bus)
     bus.write(TORQUE, 1)
     bus.write(WATCHDOG, watchdog)
     if (readback := bus.look_up(WATCHDOG)) != (watchdog,):
@@ -57,7 +57,7 @@ def go(bus: Bus, move: ProfileMove) -> None:
 
 def brake(bus: Bus) -> None:
     """Stop the shaft with a short ramp, and hold its position. Raise BusError."""
-    _stay(bus)
+    _hold_position(bus)
 
 
 def disarm(bus: Bus) -> None:
@@ -65,7 +65,7 @@ def disarm(bus: Bus) -> None:
     bus.write(WATCHDOG, 0)
 
 
-def _stay(bus: Bus) -> None:
+def _hold_position(bus: Bus) -> None:
     bus.write(PROFILE, BRAKE_RAMP_MS, BRAKE_MS)
     bus.write(GOAL, *bus.look_up(POSITION))
 

@@ -15,7 +15,7 @@ def port_lost(error: PortGone) -> Problem:
 
 
 def silent(silent_s: float, mostly_damaged: bool) -> Problem:
-    """Describe a servo without a valid reply for `silent_s`."""
+    """Describe a servo that has sent no valid reply for `silent_s`."""
     if mostly_damaged:
         return Problem(
             "servo_replies_damaged",
@@ -76,10 +76,10 @@ def state_not_taken(error: Exception) -> Problem:
 
 
 def move_unsupervised(for_s: float, doing: str) -> Problem:
-    """Describe a move without supervision for `for_s`."""
+    """Describe a move that was unsupervised for `for_s`."""
     return Problem(
         "servo_unwatched",
-        f"nobody has looked at the servo for {for_s:.0f} s during {doing}",
+        f"nobody has supervised the servo for {for_s:.0f} s during {doing}",
         "See the log for what delayed the program, then start again",
     )
 

@@ -40,7 +40,7 @@ def _connect(section: ServoSection, on_state: OnState, log: Path) -> AbstractCon
     )
 
 
-def _look(section: ServoSection) -> ServoReport:
+def _read_report(section: ServoSection) -> ServoReport:
     from rig.turners.servo.first_contact import look_at
     from rig.turners.servo.packet_handler import Bus
 
@@ -103,7 +103,7 @@ SERVO = TurnerKind(
     name="servo",
     section=ServoSection,
     connect=_connect,
-    look=_look,
+    look=_read_report,
     stance=_stance,
     problems=_problems,
     describe_configured=_make_nominal,
@@ -120,9 +120,9 @@ SERVO = TurnerKind(
         beware="The servo has no brake and no emergency stop: only the switch of its supply is sure. "
         "Have it within reach.",
         stands="stands still and holds its shaft as long as it has its supply",
-        clock="this computer's oscillator, by a clock that nobody sets",
+        clock="this computer's oscillator, by a clock that is never set",
         axes_source="as the stages of the procedure say",
-        axes_traceability="not traceable; the six-observation solution knows speeds alone and does without them",
+        axes_traceability="not traceable; the six-observation solution uses speeds alone and does not need them",
     ),
     fields=SERVO_FIELDS,
 )

@@ -34,7 +34,7 @@ class Port:
         self._deadline_s = 0.0
 
     def close(self) -> None:
-        """Close the port; one that is gone already is no problem."""
+        """Close the port, if it is still open."""
         sock = getattr(self.serial, "_socket", None)  # pyserial leaves it open if the far end has closed it first
         with suppress(OSError):
             self.serial.close()

@@ -71,12 +71,12 @@ class ShaftStop:
         refusal = f" ({answer})" if refused else ""
         if stands and self._lets_go():
             remedy = "Hold the board: nothing else may"
-            return StopOutcome(True, f"the shaft stands, but its motor is off{refusal}", remedy)
+            return StopOutcome(True, f"the shaft is at rest, but its motor is off{refusal}", remedy)
         if stands:
-            return StopOutcome(True, f"the shaft stands, and the servo holds it{refusal}")
+            return StopOutcome(True, f"the shaft is at rest, and the servo holds it{refusal}")
         return StopOutcome(
             False,
-            f"{answer}, and no state shows that the shaft stands",
+            f"{answer}, and no state shows that the shaft is at rest",
             f"Look at the shaft: its watchdog stops it {self._watchdog_s:.1f} s after the last instruction, but {SURE}",
         )
 

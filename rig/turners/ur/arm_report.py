@@ -52,7 +52,7 @@ class ArmReport:
 
     @property
     def software(self) -> str:
-        """The controller's software in its own words."""
+        """The controller's software version, in its own words."""
         return self.polyscope
 
     @property

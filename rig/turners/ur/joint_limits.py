@@ -39,13 +39,13 @@ def _position_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | 
                     "joint_limit",
                     f"{motion.name} takes {name} from {math.degrees(low):.1f}° to {math.degrees(high):.1f}°, beyond "
                     f"{beyond if narrow else f'±{math.degrees(most):g}°'}",
-                    f"{_nearer(motion, joint, (-least, greatest))}{WIDER if narrow else ''}",
+                    f"{_describe_remedy(motion, joint, (-least, greatest))}{WIDER if narrow else ''}",
                 )
             )
     return problems
 
 
-def _nearer(motion: Motion, joint: int, within_rad: tuple[float, float]) -> str:
+def _describe_remedy(motion: Motion, joint: int, within_rad: tuple[float, float]) -> str:
     """Return the remedy for a motion beyond a joint's range, by the motion's start and kind."""
     name, (low, high) = JOINT_NAMES[joint], within_rad
     if not low <= motion.start_q_rad[joint] <= high and not isinstance(motion, Sweep):

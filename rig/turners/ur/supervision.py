@@ -9,8 +9,8 @@ from rig.turners.ur.condition import FULL_SPEED_FRACTION, program_interruption, 
 INTERRUPTION_S = 0.05  # wait after a stopped program for the safety bits that explain it
 LIMITED_S = 0.1  # a reduced speed of this duration in a movement is not a ramp of the controller
 FIELDBUS = (
-    "See that nobody uses the pendant; look whether a fieldbus (EtherNet/IP, PROFINET) without a connection is set to "
-    "stop or pause programs, in the installation under Fieldbus; then start again"
+    "Make sure that nobody uses the pendant; check whether a fieldbus (EtherNet/IP, PROFINET) without a connection is "
+    "set to stop or pause programs, in the installation under Fieldbus; then start again"
 )
 
 

@@ -27,7 +27,7 @@ def _connect(section: ArmSection, on_state: OnState, log: Path) -> AbstractConte
     return arm_driver.Arm(section.host, on_state, rate_hz, log, robot_api_port=section.robot_api_port)
 
 
-def _look(section: ArmSection) -> "ArmReport":
+def _read_report(section: ArmSection) -> "ArmReport":
     from rig.turners.ur import arm_driver
 
     return arm_driver.look(section.host, section.robot_api_port)
@@ -63,7 +63,7 @@ UR = TurnerKind(
     name="ur",
     section=ArmSection,
     connect=_connect,
-    look=_look,
+    look=_read_report,
     stance=_stance,
     problems=_problems,
     describe_configured=_make_nominal,

@@ -68,7 +68,7 @@ class SensorTruth:
         return self.accelerometer is not None or bool(self.gyro.g_sensitivity_rad_s_per_g)
 
     def rotate_rate(self, flange_rate: Components) -> Components:
-        """Return the flange's angular rate in the sensor's axes."""
+        """Return the flange's angular rate in the axes of the sensor."""
         (a, b, c), (d, e, f), (g, h, i) = self._rows
         u, v, w = flange_rate
         return a * u + b * v + c * w, d * u + e * v + f * w, g * u + h * v + i * w

@@ -51,7 +51,7 @@ class Drive:
         self._turns_rad = 0.0
 
     def start(self, time_s: float) -> None:
-        """Start as after power-up."""
+        """Reset the drive to its state after power-up."""
         self._began_s = self.fed_s = time_s
         self.torque, self._strained_s = False, inf
         self.forget_turns(time_s)

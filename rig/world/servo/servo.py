@@ -84,7 +84,7 @@ class SimulatedServo:
         self._powered = on
 
     def advance(self, time_s: float) -> None:
-        """Simulate until `time_s` without instructions."""
+        """Simulate until `time_s`, with no new instruction."""
         if self._powered:
             self.drive.advance(time_s)
 
@@ -119,7 +119,7 @@ class SimulatedServo:
 
     # -- instructions --------------------------------------------------------------------------------------------
     def _answer(self, packet: ServoPacket, time_s: float) -> tuple[int, bytes]:
-        """Return error number and data."""
+        """Return the error number and the data of the answer."""
         answers: dict[int, Callable[[bytes, float], tuple[int, bytes]]] = {
             PING: self._ping,
             READ: self._read,
@@ -216,7 +216,7 @@ class SimulatedServo:
 
     # -- states --------------------------------------------------------------------------------------------------
     def _start(self, time_s: float) -> None:
-        """Start as after power-up."""
+        """Reset the servo to its state after power-up."""
         self.memory.forget()
         self._awake_s, self._registered = time_s, None
         self.drive.start(time_s)

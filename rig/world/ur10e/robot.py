@@ -143,7 +143,7 @@ class Robot:
 
     @property
     def reported_time_s(self) -> float:
-        """The time stamp of its states and messages, s."""
+        """The time stamp in its states and messages, s."""
         return self.time_s + self.faults.clock_step_s
 
     def step(self) -> None:

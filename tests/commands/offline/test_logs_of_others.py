@@ -140,7 +140,7 @@ def test_rows_of_other_sensors_are_left_alone(tmp_path: Path, capsys: pytest.Cap
     found = solved(capsys, *others(tmp_path, "t,gx,gy,gz,p", mixed))
     assert (off_and_u(found)[0] < 1.6).all()
     assert found["notes"]["imu"] == [
-        f"{len(mixed) - len(rows)} rows of the samples hold none of these readings, and are left out"
+        f"{len(mixed) - len(rows)} rows of the samples do not contain these readings and are left out"
     ]
 
 
@@ -374,7 +374,7 @@ def test_the_allan_deviation_of_rounded_stamps_is_that_of_even_ones(
     [
         (((520, 17),), "17 of 3495 readings, lost_samples: they are missing; the first after 4.99 s, in row 2"),
         (((50, 17), (520, 17), (560, 17), (1600, 17)), "68 of 3495 readings, lost_samples: they are missing"),
-        (((450, 156),), "1 of 12 rows, lost_samples: what is missing in them may hide a change of the rate"),
+        (((450, 156),), "1 of 12 rows, lost_samples: the missing readings may contain a change of the rate"),
     ],
 )
 def test_a_gap_costs_what_it_hides_and_is_named(

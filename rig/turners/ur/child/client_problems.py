@@ -51,7 +51,7 @@ def payload_changed(ours: StatePacket, theirs: StatePacket) -> Problem:
 
     return Problem(
         "payload_changed",
-        f"the controller reckons with a payload of {show(theirs)} instead of {show(ours)}: somebody has set another",
+        f"the controller uses a payload of {show(theirs)} instead of {show(ours)}: another program has set it",
         "Find what sets it (a URCap of a gripper, another client, the pendant) and end it, then start again",
     )
 

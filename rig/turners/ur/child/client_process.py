@@ -299,10 +299,10 @@ class _Child:
             if not order.await_program_end():
                 print(f"{order.words}; the client brakes", file=sys.stderr)
                 self._brake(BRAKE_RAD_S2)
-        _leave(1)
+        _exit_at_once(1)
 
 
-def _leave(status: int) -> NoReturn:
+def _exit_at_once(status: int) -> NoReturn:
     """Exit at once, because the client's destructors may block or abort; the system closes sockets."""
     sys.stderr.flush()
     os._exit(status)

@@ -59,7 +59,7 @@ class PrimaryStop:
                 self._greeted = True
             remaining_s = deadline_s - time.monotonic()
             if remaining_s <= 0.0:
-                raise TimeoutError("the primary interface does not tell in time whether a program runs")
+                raise TimeoutError("the primary interface does not report in time whether a program runs")
             self._socket.settimeout(remaining_s)
             data = self._socket.recv(65536)
             if not data:

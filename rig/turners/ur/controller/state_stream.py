@@ -182,7 +182,7 @@ class StateStream:
         is_supported = self._ask("V", struct.pack(">H", VERSION)) == b"\1"
         version = self._ask("v", b"")
         if len(version) != CONTROLLER_VERSION.size:
-            raise ConnectionError("it does not tell its version")
+            raise ConnectionError("it does not report its version")
         self.version = CONTROLLER_VERSION.unpack(version)
         if not is_supported:
             raise NotSupported(f"version {VERSION} of RTDE", self.version)

@@ -113,7 +113,7 @@ class RtdeSession:
         return answer
 
     def tick(self) -> bytes:
-        """Return the data package of this tick, or nothing."""
+        """Return the data package of this tick; empty if none is due."""
         if self._started and self._output is not None and self._output.is_due():
             return self._output.pack(self._robot)
         return b""
@@ -142,7 +142,7 @@ class RtdeSession:
             payload = payload[8:]
         names = _names(payload)
         kinds = [find_output_type(self._robot, name) for name in names]
-        if (size := _size(kinds)) > DATA_BYTES:
+        if (size := _size_bytes(kinds)) > DATA_BYTES:
             self._output = None
             refusal = build_package("O", b"\0" if self._version == 2 else b"")
             return self._say(f"a recipe of values of {size} bytes, the most is {DATA_BYTES}") + refusal
@@ -201,7 +201,7 @@ class RtdeSession:
         return b""
 
     def _message(self, payload: bytes) -> bytes:
-        """Log a client's text message."""
+        """Log a text message from a client."""
         length = payload[0] if payload else 0
         self._robot.messages.say(payload[1 : 1 + length].decode(errors="replace"))
         return b""
@@ -215,8 +215,8 @@ class RtdeSession:
         return build_package("M", bytes([len(words)]) + words + bytes([len(source)]) + source + bytes([error]))
 
 
-def _size(kinds: list[str]) -> int:
-    """Return the size of the values of these types, or of the list of types if this is longer."""
+def _size_bytes(kinds: list[str]) -> int:
+    """Return the size in bytes of values of these types, at least that of the list of types."""
     return max(struct.calcsize(">" + "".join(TYPES[kind][0] for kind in kinds if kind in TYPES)), len(",".join(kinds)))
 
 

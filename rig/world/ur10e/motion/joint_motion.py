@@ -121,7 +121,7 @@ class JointMotion:
 
     @property
     def qdd_rad_s2(self) -> Joints:
-        """Accelerations at the end of the last tick."""
+        """Accelerations of the joints at the end of the last tick."""
         return ZERO if self.still else self.state_at(self._end_s)[2]
 
     @property
@@ -279,7 +279,7 @@ class JointMotion:
         self._play(plan_speed_change(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
 
     def stop(self, deceleration_rad_s2: float) -> None:
-        """Bring the joints to rest along their present direction."""
+        """Slow the joints down to rest along their present direction."""
         if self.moving:
             stopping = plan_speed_change(self.now.target_q_rad, self.now.target_qd_rad_s, ZERO, deceleration_rad_s2)
             self._play(stopping, scaled=False)

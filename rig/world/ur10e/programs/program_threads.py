@@ -54,7 +54,7 @@ class Threads:
 
     @property
     def any(self) -> bool:
-        """Whether there are threads other than the main one."""
+        """Whether any thread runs besides the main one."""
         return bool(self._threads)
 
     def is_running(self, name: str) -> bool:
@@ -103,7 +103,7 @@ class Threads:
         self.let_go(name)
 
     def stopj(self, name: str, deceleration_rad_s2: float) -> Steps:
-        """Bring the joints to rest."""
+        """Slow the joints down to rest."""
         self.take(name)
         if not self.robot.motion.standing:
             self.robot.motion.stop(max(deceleration_rad_s2, 0.01))
