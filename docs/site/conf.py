@@ -28,7 +28,7 @@ exclude_patterns = [".venv", "build", "runs", "docs/site"]
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
-nb_execution_timeout = 120
+nb_execution_timeout = 1800  # s of a cell: for a hang only, however slow the computer is
 nb_execution_raise_on_error = True
 
 autodoc_member_order = "bysource"

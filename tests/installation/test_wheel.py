@@ -12,6 +12,7 @@ import pytest
 
 from support.laboratories.demo_runs import compute_normalised_errors
 from support.paths import ROOT
+from support.processes.other_systems import run_without_linux_modules
 from support.processes.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow
@@ -62,3 +63,8 @@ def test_the_demonstration_runs_from_the_wheel_and_finds_the_truth(installed: Pa
     print(f"errors of {np.round(errors, 2)} σ")
     assert np.abs(errors).max() < 4
     assert {file.name for file in (tmp_path / "run").iterdir()} >= {"certificate.html", "calibration.h", "result.json"}
+
+
+@pytest.mark.thorough
+def test_what_needs_no_arm_works_from_the_wheel_without_the_modules_of_linux(installed: Path, tmp_path: Path) -> None:
+    assert run_without_linux_modules(installed / "bin" / "python", tmp_path).startswith(str(installed))

@@ -1,0 +1,69 @@
+"""What needs no arm, run by an interpreter that lacks the modules which only Linux has."""
+
+import os
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from support.external.handled_body import TWELVE, handle, write
+from support.paths import RECORDINGS
+from support.processes.waiting import PATIENCE_S
+
+HIDDEN = """
+import os, signal, sys
+for name in ("fcntl", "grp", "pty", "pwd", "readline", "resource", "syslog", "termios", "tty"):
+    sys.modules[name] = None
+del os.getloadavg, os.O_NOFOLLOW, os.O_NONBLOCK, os.setsid
+for name in ("SIGHUP", "SIGQUIT", "SIGTSTP", "SIGUSR1", "SIGALRM", "SIGRTMIN", "pthread_kill", "setitimer"):
+    delattr(signal, name)
+"""
+COMMANDS = """
+import sys
+import rig
+from rig.cli import main
+frozen, by_hand, folder = sys.argv[1:]
+certificate = f"{folder}/certificate.html"
+statuses = {}
+for words in (
+    ["solve", frozen],
+    ["show", frozen, "--all"],
+    ["solve", by_hand, "--turns", "--clock-ppm", "50"],
+    ["history", "import", frozen],
+    ["history"],
+    ["report", frozen, "--out", folder],
+    ["verify", certificate, "--history", f"{folder}/history.sqlite"],
+):
+    statuses[" ".join(words[:2])] = main(words)
+result = rig.solve(rig.load(frozen))
+assert result["gyro"].scale.shape == (3,) and "gyro" in result._repr_html_()
+assert sys.modules["fcntl"] is None
+print(rig.__file__)
+print(*statuses.values(), file=sys.stderr)
+"""
+
+
+def run_without_linux_modules(interpreter: str | Path, folder: Path, paths: Sequence[Path] = ()) -> str:
+    """Solve, show, verify and enter in the new `folder`; assert that all succeeds, and return the file of `rig`.
+
+    `paths` are where the interpreter finds what is not installed in it.
+    """
+    (folder / "sitecustomize.py").write_text(HIDDEN, encoding="utf-8")
+    by_hand = write(folder / "samples.csv", handle(TWELVE, 1))
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(map(str, (folder, *paths))),
+        "RIG_HISTORY": str(folder / "history.sqlite"),
+    }
+    words = [interpreter, "-c", COMMANDS, RECORDINGS / "six_observation", by_hand, folder]
+    done = subprocess.run(
+        [*map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+        env=environment,
+        cwd=folder,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.splitlines()[-1] == "0 0 0 0 0 0 0", done.stdout + done.stderr
+    return done.stdout.splitlines()[-1]
