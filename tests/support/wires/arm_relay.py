@@ -8,20 +8,30 @@ from contextlib import contextmanager, suppress
 from support.laboratories.worlds import fresh_host
 
 PORTS = (29999, 30001, 30003, 30004, 8077)  # the last: a Robot API, where the tests have one
+PACKET_BYTES, SLOW_S = 256, 0.02  # a slowed connection is soon far behind
 
 
 class ArmRelay:
-    """Passes on what comes at `host`. While `stalled` is set it takes nothing more in, either way."""
+    """Passes on what comes at `host`. While `stalled` is set it takes nothing more in, either way.
+
+    While `slow` is set, the connections that were open at `slow_down` pass on less than comes.
+    """
 
     def __init__(self, far_host: str, host: str | None = None) -> None:
         self.host = host or fresh_host()
-        self.stalled = threading.Event()
+        self.stalled, self.slow = threading.Event(), threading.Event()
+        self._slowed: list[socket.socket] = []
         self._far_host = far_host
         self._sockets: list[socket.socket] = []
         for port in PORTS:
             listener = socket.create_server((self.host, port))
             self._sockets.append(listener)
             threading.Thread(target=self._accept, args=(listener, port), daemon=True).start()
+
+    def slow_down(self) -> None:
+        """Pass on less than comes over the connections that are open now, until `slow` is cleared."""
+        self._slowed = [*self._sockets]
+        self.slow.set()
 
     def _accept(self, listener: socket.socket, port: int) -> None:
         with suppress(OSError):
@@ -35,7 +45,9 @@ class ArmRelay:
 
     def _pass_on(self, source: socket.socket, sink: socket.socket) -> None:
         with suppress(OSError):
-            while data := source.recv(65536):
+            while data := source.recv(PACKET_BYTES):
+                if self.slow.is_set() and source in self._slowed:
+                    threading.Event().wait(SLOW_S)
                 while self.stalled.is_set():
                     threading.Event().wait(0.005)
                 sink.sendall(data)

@@ -32,7 +32,7 @@ from rig.turners.ur.arm_preflight import arm_problems
 from rig.turners.ur.child.child_link import FROZEN_TICKS, TICK_S
 from support.laboratories.worlds import World, WorldHandle, merge
 from support.processes.waiting import PATIENCE_S, wait_for
-from support.wires.arm_relay import relay
+from support.wires.arm_relay import ArmRelay, relay
 from support.wires.rtde_reader import RtdeReader
 from support.wires.ur10e import plan_problems
 
@@ -41,6 +41,7 @@ pytestmark = pytest.mark.slow
 PAYLOAD = FlangeLoad(0.35, (0.0, 0.0, 0.025))
 WRIST_3 = 5
 SLOW = 0.5  # … of a real laboratory's pace
+LATE_S, BEHIND_S = 4.0, 5.0  # how long states come slowly, and how late they are then, by the controller's clock
 
 
 # One that no register ends, as the client's own is by what the client has left there.
@@ -640,6 +641,26 @@ def test_a_payload_the_controller_does_not_take_is_refused(laboratory: WorldHand
     assert refused.value.name == "payload_not_set"
     assert "20 kg" in refused.value.what
     assert stands(laboratory)
+
+
+@pytest.mark.thorough
+def test_states_that_are_read_late_are_no_refusal_of_the_payload(laboratory: WorldHandle) -> None:
+    """As on a busy machine: what the driver reads is more than a second older than what the controller has taken."""
+
+    def catch_up(wire: ArmRelay) -> None:
+        wait_for(lambda: laboratory.state()["program_running"], "the program has begun")
+        time.sleep(LATE_S)
+        wire.slow.clear()
+
+    laboratory.control({"do": "pace", "time_scale": 12})
+    with relay(laboratory.host) as wire, Arm(wire.host) as arm:
+        wire.slow_down()
+        wait_for(lambda: laboratory.state()["time_s"] > arm.latest.time_s + BEHIND_S, "states wait to be read")
+        later = threading.Thread(target=catch_up, args=(wire,))
+        later.start()
+        arm.take_control(PAYLOAD)
+        later.join()
+        assert laboratory.state()["payload_kg"] == pytest.approx(PAYLOAD.payload_kg)
 
 
 def test_a_speed_slider_below_full_is_refused_in_preflight(laboratory: WorldHandle) -> None:

@@ -57,6 +57,7 @@ PARENT_TICKS = 20  # 2 s without a sign of the parent's life
 PARENT_SPARED = 2  # factor on that limit while the parent gets no processor
 ABANDON_S = 5.0  # time for the last stop, over the controller's own ports or else over the client
 PAYLOAD_S = 1.0  # the payload shows in the states within this, by the controller's clock and by this machine's
+PAYLOAD_TRIES = 3  # the client gives up after 4 s in which its script is not ready
 PAYLOAD_TOLERANCE_KG, CENTRE_TOLERANCE_M = 0.01, 0.001
 REGISTERS_S = 2.0  # time for the controller to report its free registers
 SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
@@ -224,21 +225,38 @@ class _Child:
                 self._link_problem(silent=silent) or control_failure(self._host, self._states.version, str(error))
             )
         self.send(ScriptStarted())
-        self._control.setPayload(request.carried.payload_kg, list(request.carried.centre_m))
+        for _ in range(PAYLOAD_TRIES):
+            if self._control.setPayload(request.carried.payload_kg, list(request.carried.centre_m)):
+                break
         return self._await_payload(request.carried.payload_kg)
 
     def _await_payload(self, wanted_kg: float) -> Message:
-        """Wait until the states show the payload; the parent judges everything else in the states."""
+        """Wait until the states show the payload; the parent judges everything else in the states.
+
+        Older states may still wait to be read: the client's constructor held the interpreter, or this process got
+        no processor. So what counts as refused is what the first state on a new connection shows.
+        """
         host_s, arm_s = time.monotonic(), self._latest.state.time_s
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
             if (lost := self._link_problem()) is not None:
                 return RequestFailed(lost)
             if min(time.monotonic() - host_s, latest.state.time_s - arm_s) > PAYLOAD_S:
-                self._let_parent_see()
-                return RequestFailed(payload_failure(latest.payload_kg, wanted_kg))
+                try:
+                    reported_kg = self._read_payload_kg()
+                except OSError as error:
+                    return RequestFailed(connection_failure(self._host, error))
+                if abs(reported_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
+                    self._let_parent_see()
+                    return RequestFailed(payload_failure(reported_kg, wanted_kg))
+                host_s = time.monotonic()
             time.sleep(HEARTBEAT_S)
         self._carried = latest
         return ControlTaken()
+
+    def _read_payload_kg(self) -> float:
+        """Return the payload that the controller uses now."""
+        with StateStream(self._host, self._state_rate_hz, FIRST_PACKET_S) as states:
+            return states.first.payload_kg
 
     def _link_problem(self, *, silent: bool = False) -> Problem | None:
         """Return the problem of a lost link, if any; its consequences would else be reported as the arm's faults."""
