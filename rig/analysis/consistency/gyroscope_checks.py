@@ -70,11 +70,13 @@ MOST, TRIED = 16.0, 7  # largest variance inflation by a synchronous ripple; fac
 class ErrorPatterns:
     """The known errors of segments, one pattern of one standard deviation each: `patterns_rad_s` (P, N, 3).
 
-    `transfers` are the same segments with the transfers between them, `transfer_patterns_rad_s` (Q, M, 3) their
-    patterns; `instability_rad_s` is the sensor's bias instability.
+    `encoders_rad_s` (E, N, 3) are those among them that the encoders make in arcs. `transfers` are the same segments
+    with the transfers between them, `transfer_patterns_rad_s` (Q, M, 3) their patterns; `instability_rad_s` is the
+    sensor's bias instability.
     """
 
     patterns_rad_s: Array
+    encoders_rad_s: Array
     transfers: Segments
     transfer_patterns_rad_s: Array
     instability_rad_s: float = 0.0
@@ -106,15 +108,19 @@ def check_gyroscope(
     allowance = replace(allowance, transfers=_steady_rates(allowance.transfers, matrix))
     axis_rates = segments.rates_rad_s @ matrix.T
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
-    bias = _estimate_bias_process(segments, axis_rates, _steady_columns(segments), scatter)
+    # Encoders that err more than stated would else be taken for a bias that drifts as much, and go unnoticed.
+    encoders = np.moveaxis(allowance.encoders_rad_s, 0, -1)
+    beside_them = orthonormal_basis(np.column_stack([_steady_columns(segments), encoders.reshape(len(encoders), -1)]))
+    bias = _estimate_bias_process(segments, axis_rates, beside_them, scatter)
     segments_only = _Tested(segments, axis_rates, whiten_segments(segments, scatter, bias))
     with_transfers = _inflate_transfers(segments_only, matrix, allowance, bias)
+    sweeps_alone = repeat_per_axis(segments_only.means.sweeps)
     statistics = test_alternatives(
         with_transfers.model, changes(with_transfers.segments, with_transfers.axis_rates), false_alarm_probability
     )
     statistics |= test_alternatives(
         segments_only.model,
-        differences(segments, axis_rates, repeat_per_axis(segments_only.means.sweeps)),
+        differences(segments, axis_rates, np.concatenate([sweeps_alone, encoders.swapaxes(0, 1)], axis=2)),
         false_alarm_probability,
     )
     if explain_step := with_transfers.model.test_single_columns(

@@ -151,6 +151,7 @@ def build_error_patterns(
     instability_rad_s = 0.0 if known_errors.sensor is None else known_errors.sensor.instability_rad_s
     return ErrorPatterns(
         patterns(segments, matrix, known_errors),
+        _encoder_patterns(segments, known_errors.encoder_rad) @ matrix.T,
         transfers,
         patterns(transfers, matrix, on_transfers),
         instability_rad_s,

@@ -11,7 +11,6 @@ from support.recordings.drawn_recording import KINDS, Drawn, drawn
 from support.recordings.synthetic_run import Setup, synthetic_run, truth
 
 STD_DEG = 0.05
-MISSED = 10  # of 20: three differences of cw and ccw are all there is to tell, and a sound run fails once in a thousand
 
 
 def arcs(arc_deg: float, *, std_deg: float = STD_DEG, **more: object) -> Setup:
@@ -107,9 +106,8 @@ def test_of_whole_turns_the_encoders_err_by_nothing() -> None:
 @pytest.mark.slow
 @pytest.mark.proof
 def test_encoders_that_err_as_stated_fail_nothing_and_ten_times_that_is_told(thorough: bool) -> None:
-    """By what cw says of ccw, and the parts of a sweep of each other."""
-    kind, passed = KINDS["quiet LSM9DS1"], 0
+    """Where cw and ccw pass the same angle, the parts of both sweeps err alike; a bias that drifts does not."""
+    kind = KINDS["quiet LSM9DS1"]
     for seed in range(700, 720 if thorough else 704):
         assert list_failed(check_run(drawn(seed, kind, arcs(180)).run)) == set()
-        passed += not list_failed(check_run(drawn(seed, kind, arcs(180, encoders_err=10.0)).run))
-    assert passed <= (MISSED if thorough else 2)
+        assert "residuals" in list_failed(check_run(drawn(seed, kind, arcs(180, encoders_err=10.0)).run))
