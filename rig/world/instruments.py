@@ -1,8 +1,13 @@
 """The interface that all instruments with a port of their own share with the laboratory and its sockets."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
+from rig.config.models import RigConfig
+from rig.config.world.laboratory import WorldSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensing_element import MotionAt
 from rig.world.board.sensor_truth import SensorTruth
@@ -23,27 +28,43 @@ class SimulatedInstrument(Device, Protocol):
         """A function that sets the instrument's faults by keyword; omitted faults keep their value."""
 
 
-class InstrumentMount(Protocol):
-    """The socket of an instrument, with the state that it keeps without power.
+@dataclass(slots=True)
+class InstrumentMount:
+    """The socket of an instrument.
 
-    `kind`: its name in control requests; `pty`: whether its port is also a pseudo-terminal. Initially `bit_error_rate`
-    is the fraction of wrong bits on its line, and `stolen` the fraction of bytes that another program reads.
+    - kind: its name in control requests.
+    - build: returns the instrument with power, at a virtual time in s. What it keeps without power is bound in `build`.
+    - pty: whether its port is also a pseudo-terminal.
+    - bit_error_rate: at first, the fraction of wrong bits on its line.
+    - stolen: at first, the fraction of its bytes that another program on the port reads.
+    - instrument: None without power.
     """
 
-    @property
-    def kind(self) -> str: ...
-    @property
-    def pty(self) -> bool: ...
-    @property
-    def bit_error_rate(self) -> float: ...
-    @property
-    def stolen(self) -> float: ...
-    @property
-    def instrument(self) -> SimulatedInstrument | None:
-        """The instrument; None without power."""
+    kind: str
+    build: Callable[[MotionOf, FieldOf, float], SimulatedInstrument]
+    pty: bool = False
+    bit_error_rate: float = 0.0
+    stolen: float = 0.0
+    instrument: SimulatedInstrument | None = None
 
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
         """Switch the instrument on at the virtual time `time_s`, s, unless it is on."""
+        if self.instrument is None:
+            self.instrument = self.build(motion_of, field_of, time_s)
 
     def switch_off(self) -> None:
         """Switch the instrument off."""
+        self.instrument = None
+
+
+def sensor_seed(world: WorldSection, name: str, *more: int) -> np.random.SeedSequence:
+    """Return the seed of the noise and drift of the sensor `name`, or of one of several (`more`) that bear its name."""
+    return np.random.SeedSequence([world.seed, sorted(world.sensors).index(name), *more])
+
+
+def mount_magnetometer(config: RigConfig, world: WorldSection, name: str) -> MountedMagnetometer:
+    """Return the magnetometer inside the instrument that is the sensor `name`."""
+    simulated = world.sensors[name]
+    return MountedMagnetometer(
+        config.sensors[name].mounting, simulated.magnetometer, simulated.mounting_error_deg, simulated.offset_mm
+    )
