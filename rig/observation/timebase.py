@@ -33,6 +33,7 @@ TURNED_RAD_S = 0.05  # RMS over a recording, of an axis that was turned
 NO_TURNING = 1e-12  # of the square of the fastest: a body that turns about one axis has only rounding about others
 SETTLED, UNDERWAY = 1e-3, 0.1  # standard deviations; an offset may turn back, standing still, while the drift goes on
 FINE_STEPS = 400  # if the arm vibrates and hardly turns, a step may be nearly as long as the last
+WEIGHED_STEPS = 60  # after which weights stay: noise that seems correlated at one step and not at the next has no end
 SLOW_S, FINE_S = 0.1, 0.02  # over which rates are averaged, first and second
 AVERAGED, EVERY = 10, 2  # rates in one average; stride of the averages that the spline takes
 LEAST_GAP = 0.5  # of the time between samples
@@ -325,10 +326,11 @@ def _list_stages(
 
 
 def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    moved = np.zeros(2)
+    moved, inflation = np.zeros(2), None
     for number in range(1, FINE_STEPS + 1):
         before, last = clock, moved
-        clock = _refine_clock(clock, board_time_s, readings, motion)
+        settled = inflation if number > WEIGHED_STEPS else None
+        clock, inflation = _refine_clock(clock, board_time_s, readings, motion, settled)
         moved = np.array([clock.offset_s - before.offset_s, clock.drift - before.drift])
         if abs(moved[0]) < SETTLED * clock.offset_std_s and abs(moved[1]) < UNDERWAY * clock.drift_std:
             return clock
@@ -343,10 +345,13 @@ def _remaining_steps(ratio: float) -> float:
     return min(ratio / (1 - ratio), FARTHEST) if 0 < ratio < 1 else 0.0
 
 
-def _refine_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Return the clock after one Gauss–Newton step.
+def _refine_clock(
+    clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion, inflation: Array | None = None
+) -> tuple[TimeBase, Array]:
+    """Return the clock after one Gauss–Newton step, and the inflation (3,) of each axis' variance by correlation.
 
-    Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are fitted too.
+    Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are fitted too. Without
+    `inflation` it is that of the residuals.
     """
     t, since = clock.controller_time_s(board_time_s), board_time_s - clock.reference_s
     columns = np.column_stack([motion.rate(t), np.ones(len(t))])
@@ -356,19 +361,21 @@ def _refine_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion:
     by_offset = motion.rate(t, 1) @ fitted[:3]
     by_clock = np.hstack([by_offset, by_offset * since[:, None]])
     by_clock -= columns @ (inverse @ by_clock)
-    inflation = np.array([correlation_inflation(noise) for noise in residual.T])
+    if inflation is None:
+        inflation = np.array([correlation_inflation(noise) for noise in residual.T])
     weights = 1 / (np.einsum("na,na->a", residual, residual) / len(t) * inflation + np.finfo(np.float64).tiny)
     normal = np.einsum("iaja,a->ij", (by_clock.T @ by_clock).reshape(2, 3, 2, 3), weights)
     right = np.einsum("iaa,a->i", (by_clock.T @ residual).reshape(2, 3, 3), weights)
     covariance = np.asarray(np.linalg.pinv(normal, hermitian=True), dtype=np.float64)
     step = covariance @ right
-    return TimeBase(
+    refined = TimeBase(
         clock.offset_s + float(step[0]),
         clock.drift + float(step[1]),
         clock.reference_s,
         covariance,
         np.asarray(fitted[3], dtype=np.float64),
     )
+    return refined, inflation
 
 
 def _triple(values: Array) -> str:
