@@ -1,15 +1,21 @@
 """What a signal becomes: one interrupt, in a place where no lock is left taken by it."""
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from types import FrameType
 
 import pytest
 
-from rig.data.processes.ending_signals import Interrupts
+from rig.data.processes.ending_signals import ENDING_SIGNALS, Interrupts
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGUSR1"), reason="a signal of POSIX")
+
+
+# No program can handle the first two, crashes are the next, and the last do nothing, or wait for a terminal.
+OTHERS = ("KILL", "STOP", "SEGV", "ABRT", "BUS", "FPE", "ILL", "TRAP", "SYS", "PIPE", "XFSZ", "TTIN", "TTOU", "CHLD",
+          "CONT", "WINCH", "URG")  # fmt: skip
 
 
 @pytest.fixture
@@ -39,6 +45,11 @@ class Signalling:
 
     def __exit__(self, *_: object) -> None:
         self._lock.release()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="which signals there are")
+def test_every_signal_that_would_end_or_suspend_a_program_is_an_interrupt() -> None:
+    assert set(ENDING_SIGNALS) == signal.valid_signals() - {getattr(signal, f"SIG{name}") for name in OTHERS}
 
 
 def test_no_signal_leaves_a_lock_taken(interrupts: Interrupts) -> None:

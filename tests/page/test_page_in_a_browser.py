@@ -49,7 +49,7 @@ def page(tmp_path: Path) -> Iterator[Callable[..., tuple["subprocess.Popen[str]"
 def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     driver: Chrome, tmp_path: Path, world: World, page: Any
 ) -> None:
-    laboratory = world({"procedure": {"speed_deg_s": 150, "rest_s": 0.5}, "world": {"time_scale": 2}})
+    laboratory = world({"procedure": {"speed_deg_s": 150, "rest_s": 0.5}, "world": {"time_scale": 4}})
     out = tmp_path / "run"
     config = hardware(laboratory.config_path, tmp_path)
     process, url = page("run", config, "--out", out, "--page", "--confirm-on-page")
@@ -75,7 +75,7 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     assert process.wait(PATIENCE_S) == 130
     assert (out / "log.txt").read_text(encoding="utf-8").count("done: sweep") <= swept + 1
     wait_for(lambda: max(map(abs, laboratory.state()["qd_rad_s"])) < REST_SPEED_RAD_S, "an arm at rest")
-    laboratory.control({"do": "pace", "time_scale": 2.0})
+    laboratory.control({"do": "pace", "time_scale": 12.0})
     wait_for(lambda: kind(driver) == "stopped", "that it was stopped")
     assert "stopped from the page" in text(driver, "state-text") and "rig resume" in text(driver, "state-text")
     picture(driver, "run-stopped")

@@ -60,8 +60,9 @@ def sensor(result: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.slow
-# Both are read in tests/sensors; in a run they differ by one line of the configuration.
-@pytest.mark.parametrize("message", [pytest.param("A", marks=[pytest.mark.proof, pytest.mark.thorough]), "B"])
+@pytest.mark.proof
+@pytest.mark.thorough  # test_own_ports.py has B; tests/sensors reads both
+@pytest.mark.parametrize("message", ["A", "B"])
 def test_without_a_board(message: str, tmp_path: Path) -> None:
     serial = {"sensors": {"kvh": {"serial": {"message": message}}}}
     done = rig("run", configuration(tmp_path, serial), "--out", tmp_path / "run")

@@ -8,19 +8,13 @@ import numpy as np
 import pytest
 import yaml
 
-from rig.data.quantity import PRESSURE, TEMPERATURE
 from rig.data.recording.run_file import read_run
-from rig.notebook.runs import load
 from support.laboratories.commands import rig
 from support.laboratories.worlds import fresh_host, merge
 from support.paths import CONFIGS
 
 JITTER_MS = 40.0  # of when a line arrives that a shared computer simulates
 LINES = CONFIGS / "own_port" / "lines.yaml"
-QUICK: dict[str, Any] = {
-    "procedure": {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
-    "limits": {"scale_std": 0.01, "bias_std_rad_s": 0.05},
-}
 TRUTH = np.array([1.011, 0.993, 1.006, 0.012, -0.02, 0.007])
 
 
@@ -58,31 +52,6 @@ def by_noise(entry: dict[str, Any]) -> np.ndarray:
     (noise,) = (contributor for contributor in entry["budget"]["contributors"] if contributor["name"] == "noise")
     found: np.ndarray = (np.array(entry["scale"] + entry["bias_rad_s"]) - TRUTH) / noise["std"]
     return found
-
-
-@pytest.mark.slow
-def test_a_device_that_prints_lines_is_calibrated_on_the_arm_and_its_barometer_recorded(tmp_path: Path) -> None:
-    """So is its thermometer of the room: named in the configuration, both come out of every way out."""
-    scalars = {"air": {"unit": "hPa"}, "room": {"unit": "K"}}
-    columns = ["time", "gx", "gy", "gz", "ax", "ay", "az", "temperature", "air", "room"]
-    printed = {"lines": {"scalars": {"air": 964.8, "room": 294.65}}}
-    changes = {"sensors": {"imu": {"lines": {"columns": columns, "scalars": scalars}}}}
-    assert np.abs(off(calibrated(tmp_path, QUICK, changes, {"world": {"sensors": {"imu": printed}}}))).max() < 4
-    folder = tmp_path / "run"
-    run = read_run(folder / "run.h5")
-    assert {name: sensor.channels[0].measures for name, sensor in run.sensors.items() if not sensor.has_axes} == {
-        "imu_air": PRESSURE,
-        "imu_room": TEMPERATURE,
-    }
-    assert run.sensors["imu_air"].channel(PRESSURE).values(run.samples["imu_air"]) == pytest.approx(96_480)
-    shown = rig("show", folder, "--sensor", "imu_air")
-    assert "pressure mean 964.80, 964.80 to 964.80 hPa" in shown.stdout, shown.stderr
-    assert rig("export", folder, "--format", "csv", "--out", tmp_path / "tables").returncode == 0
-    header, first, *_ = (tmp_path / "tables" / "imu_room.csv").read_text(encoding="utf-8").splitlines()
-    assert header == "time_s,temperature_c" and float(first.split(",")[1]) == pytest.approx(21.5)
-    frame = load(folder)["imu_air"].to_frame()
-    assert frame["pressure_pa"].iloc[0] == pytest.approx(96_480)
-    assert frame.index[0] == pytest.approx(load(folder)["imu"].to_frame().index[0], abs=1e-6), "on one clock"
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Accelerometers from end to end: attitudes and sweeps, real clients, real firmware, simulated laboratory."""
+"""Accelerometers from end to end in attitudes alone; test_magnetometers.py has the run with sweeps."""
 
 import json
 import re
@@ -21,7 +21,6 @@ from rig.errors import Fault
 from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 from support.laboratories.worlds import merge
 from support.processes.waiting import PATIENCE_S
-from support.recordings.stated import find_differences
 
 ACCELEROMETER: dict[str, Any] = {
     "scale": [1.02, 0.985, 1.01],
@@ -52,7 +51,6 @@ LABORATORY: dict[str, Any] = {
 NINE = [[0, -90, 0], [-90, -90, 0], [-90, -90, 90], [-180, -90, 45], [90, -90, -45], [45, -90, 90], [-45, -90, -90]]
 NINE += [[-135, -90, 135], [0, -90, -135]]
 ATTITUDES = {"name": "static_attitudes", "attitudes": NINE, "dwell_s": 0.6, "acceleration_deg_s2": 700}
-IMU = {**ATTITUDES, "name": "imu", "axes": 3, "speed_deg_s": 150, "rest_s": 0.5}
 
 pytestmark = pytest.mark.slow
 
@@ -73,11 +71,6 @@ def finished(folder: Path, procedure: dict[str, Any]) -> Finished:
 @pytest.fixture(scope="module")
 def in_attitudes(tmp_path_factory: pytest.TempPathFactory) -> Finished:
     return finished(tmp_path_factory.mktemp("attitudes"), {**ATTITUDES, "repeats": 2})
-
-
-@pytest.fixture(scope="module")
-def imu(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return finished(tmp_path_factory.mktemp("imu"), IMU)
 
 
 def over_std(result: dict[str, Any], world: dict[str, Any]) -> np.ndarray:
@@ -110,49 +103,6 @@ def test_attitudes_alone_calibrate_the_accelerometer(in_attitudes: Finished) -> 
     assert "uncertainty budget" in printed
     for suffix in (".png", ".svg"):
         assert (out / f"accelerometer_gyro{suffix}").stat().st_size > 10_000
-
-
-def test_a_worse_limit_fails_the_verdict(imu: Finished) -> None:
-    out, *_ = imu
-    judged = rig_here("solve", out, "--set", "limits.acceleration_bias_m_s2=1e-6", "--json")
-    failed = [check["name"] for check in json.loads(judged.stdout)["checks"] if not check["passed"]]
-    assert judged.returncode == 1 and failed == ["gyro.acceleration_bias"]
-
-
-def test_one_run_calibrates_gyroscope_and_accelerometer(imu: Finished) -> None:
-    """Where it sits, how late it is, and how its axes lie to the gyroscope's: that takes sweeps."""
-    _, result, world, printed = imu
-    assert np.abs(over_std(result, world)).max() < 4
-    found, gyro = result["accelerometers"]["gyro"], result["gyroscopes"]["gyro"]
-    assert found["sweeps"] == 6 and len(gyro["rests"]) >= 9, "a dwell is a rest for the gyroscope"
-    lever = np.array(found["lever_arm_m"]) - 1e-3 * np.array(world["offset_mm"])
-    assert np.all(np.abs(lever) < 4 * np.array(found["lever_arm_std_m"]))
-    assert abs(found["delay_s"] - 3e-3) < 4 * found["delay_std_s"] < 1e-3
-    # Both triads are square but for the accelerometer's own skew, of which half turns the frame nearest to its axes.
-    turned = np.array(found["alignment"]["rotation_rad"])
-    assert np.abs(turned).max() < np.radians(0.3) and "rotation against its gyroscope" in printed
-
-
-def test_solving_the_recording_equals_the_run(imu: Finished) -> None:
-    out, *_ = imu
-    assert find_differences(out, rig_here("solve", out, "--json").stdout) == []
-
-
-def test_the_header_corrects_readings_as_the_result_says(imu: Finished, tmp_path: Path) -> None:
-    """By a C compiler; the force comes out in the frame of the corrected rates."""
-    out, result, *_ = imu
-    source = tmp_path / "try.c"
-    source.write_text(
-        '#include <stdio.h>\n#include "calibration.h"\nint main(void) { float m[3] = {1.0f, -2.0f, 9.0f}, s[3];\n'
-        'gyro_calibrate_acceleration(m, s); printf("%.9g %.9g %.9g\\n", s[0], s[1], s[2]); return 0; }\n',
-        encoding="utf-8",
-    )
-    program = tmp_path / "try"
-    subprocess.run(["gcc", "-Wall", "-Werror", f"-I{out}", source, "-o", program], check=True, timeout=PATIENCE_S)
-    said = subprocess.run([program], capture_output=True, text=True, check=True, timeout=PATIENCE_S).stdout
-    found = result["accelerometers"]["gyro"]
-    expected = np.array(found["correction_matrix"]) @ (np.array([1.0, -2.0, 9.0]) - found["bias_m_s2"])
-    assert np.array(said.split(), dtype=np.float64) == pytest.approx(expected, rel=1e-5)
 
 
 Damage = Callable[[RunData], RunData]

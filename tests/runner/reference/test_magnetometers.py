@@ -1,6 +1,7 @@
-"""A magnetometer beside the gyroscopes from end to end: real clients, real firmware, simulated laboratory."""
+"""All triads of one part from end to end: sweeps and attitudes, real clients, real firmware, simulated laboratory."""
 
 import json
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from rig.data.quantity import FIELD, RATE
 from rig.data.recording.run_file import RunData, read_run
 from support.laboratories.commands import configuration, rig, rig_here
 from support.laboratories.worlds import merge
+from support.processes.waiting import PATIENCE_S
 from support.recordings.stated import find_differences
 
 SITE: dict[str, Any] = {"magnetic_field_ut": 50.0}
@@ -37,6 +39,14 @@ ATTITUDES = {
     "field_test_s": 4.0,
     "acceleration_deg_s2": 700,
 }
+IMU = {**ATTITUDES, "name": "imu", "axes": 3, "speed_deg_s": 150, "rest_s": 0.5}
+ACCELEROMETER: dict[str, Any] = {
+    "scale": [1.02, 0.985, 1.01],
+    "bias_m_s2": [0.3, -0.2, 0.4],
+    "noise_m_s2": 0.015,
+    "non_orthogonality_deg": [0.3, -0.2, 0.1],
+    "delay_ms": 3.0,
+}
 # Along the axis of wrist 3, where no residual shows it; 0.36 m from the sensor, which feels 1.3 µT of it.
 IRON = {"carried_by": "wrist_2", "position_mm": [0, 0, 56.55], "moment_a_m2": [0, 0, 0.3]}
 ARM_FIELD_UT = 0.2 * 0.3 / 0.36**3
@@ -47,6 +57,8 @@ LABORATORY: dict[str, Any] = {
     "magnetometers": {"compass": COMPASS},
     "site": SITE,
     "limits": {
+        "scale_std": 1,
+        "bias_std_rad_s": 1,
         "acceleration_scale_deviation": 0.1,
         "acceleration_scale_std": 0.01,
         "acceleration_bias_m_s2": 1,
@@ -57,6 +69,7 @@ LABORATORY: dict[str, Any] = {
         "site": {"magnetic_field_ut": 50.0, "magnetic_dip_deg": 60, "magnetic_declination_deg": 30},
         "arm": {"iron": {"housing": IRON}},
         "magnetometers": {"compass": TRUTH},
+        "sensors": {"gyro": {"noise_rad_s": 0.005, "offset_mm": [20, -15, 30], "accelerometer": ACCELEROMETER}},
     },
 }
 
@@ -65,12 +78,12 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any], str]:
-    """The run folder, result.json, and everything that `rig show` prints on a wide terminal."""
+    """The folder of a run with sweeps, result.json, and everything that `rig show` prints on a wide terminal."""
     folder = tmp_path_factory.mktemp("compass")
     out = folder / "run"
     with pytest.MonkeyPatch.context() as wide:
         wide.setenv("COLUMNS", "200")
-        done = rig("run", configuration(folder, LABORATORY, ATTITUDES), "--out", out)
+        done = rig("run", configuration(folder, LABORATORY, IMU), "--out", out)
         shown = rig_here("show", out, "--all").stdout
     assert done.returncode == 0, done.stdout + done.stderr
     return out, json.loads((out / "result.json").read_text(encoding="utf-8")), shown
@@ -148,6 +161,47 @@ def test_solving_the_recording_equals_the_run(finished: tuple[Path, dict[str, An
     assert find_differences(out, rig_here("solve", out, "--json").stdout) == []
 
 
+def test_a_worse_limit_fails_the_verdict(finished: tuple[Path, dict[str, Any], str]) -> None:
+    out, *_ = finished
+    judged = rig_here("solve", out, "--set", "limits.acceleration_bias_m_s2=1e-6", "--json")
+    failed = [check["name"] for check in json.loads(judged.stdout)["checks"] if not check["passed"]]
+    assert judged.returncode == 1 and failed == ["gyro.acceleration_bias"]
+
+
+def test_one_run_calibrates_gyroscope_and_accelerometer(finished: tuple[Path, dict[str, Any], str]) -> None:
+    """Where it sits, how late it is, and how its axes lie to the gyroscope's: that takes sweeps."""
+    _, result, printed = finished
+    found, gyro = result["accelerometers"]["gyro"], result["gyroscopes"]["gyro"]
+    off = np.subtract(found["scale"] + found["bias_m_s2"], ACCELEROMETER["scale"] + ACCELEROMETER["bias_m_s2"])
+    assert np.all(np.abs(off) < 4 * np.sqrt(np.diag(found["covariance"])))
+    assert found["sweeps"] == 6 and len(gyro["rests"]) >= 11, "a dwell is a rest for the gyroscope"
+    lever = np.array(found["lever_arm_m"]) - 1e-3 * np.array([20, -15, 30])
+    assert np.all(np.abs(lever) < 4 * np.array(found["lever_arm_std_m"]))
+    assert abs(found["delay_s"] - 3e-3) < 4 * found["delay_std_s"] < 1e-3
+    # Both triads are square but for the accelerometer's own skew, of which half turns the frame nearest to its axes.
+    turned = np.array(found["alignment"]["rotation_rad"])
+    assert np.abs(turned).max() < np.radians(0.3) and "rotation against its gyroscope" in printed
+
+
+def test_the_header_corrects_readings_as_the_result_says(
+    finished: tuple[Path, dict[str, Any], str], tmp_path: Path
+) -> None:
+    """By a C compiler; the force comes out in the frame of the corrected rates."""
+    out, result, _ = finished
+    source = tmp_path / "try.c"
+    source.write_text(
+        '#include <stdio.h>\n#include "calibration.h"\nint main(void) { float m[3] = {1.0f, -2.0f, 9.0f}, s[3];\n'
+        'gyro_calibrate_acceleration(m, s); printf("%.9g %.9g %.9g\\n", s[0], s[1], s[2]); return 0; }\n',
+        encoding="utf-8",
+    )
+    program = tmp_path / "try"
+    subprocess.run(["gcc", "-Wall", "-Werror", f"-I{out}", source, "-o", program], check=True, timeout=PATIENCE_S)
+    said = subprocess.run([program], capture_output=True, text=True, check=True, timeout=PATIENCE_S).stdout
+    found = result["accelerometers"]["gyro"]
+    expected = np.array(found["correction_matrix"]) @ (np.array([1.0, -2.0, 9.0]) - found["bias_m_s2"])
+    assert np.array(said.split(), dtype=np.float64) == pytest.approx(expected, rel=1e-5)
+
+
 @pytest.mark.proof
 @pytest.mark.thorough
 def test_turning_it_over_tells_its_own_bias_from_the_arms_field(
@@ -155,7 +209,7 @@ def test_turning_it_over_tells_its_own_bias_from_the_arms_field(
 ) -> None:
     turned = {"sensors": {"gyro": {"mounting": OVER}}, "magnetometers": {"compass": {"mounting": OVER}}}
     over = tmp_path / "over"
-    done = rig("run", configuration(tmp_path, merge(LABORATORY, turned), ATTITUDES), "--out", over)
+    done = rig("run", configuration(tmp_path, merge(LABORATORY, turned), IMU), "--out", over)
     assert done.returncode == 0, done.stdout + done.stderr
     told = rig("reversal", finished[0], over, "--json", "--out", tmp_path / "reversal.json")
     assert told.returncode == 0, told.stderr

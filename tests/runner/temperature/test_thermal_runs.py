@@ -229,7 +229,7 @@ def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
     assert 6 * len(first) in finished_sweeps(again), "one that was interrupted is, from its beginning"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough  # the image goes off by itself, in tests/firmware_host/emulator/test_emulated_heater.py
 def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tmp_path: Path, world: World) -> None:
     laboratory = world(merge(LABORATORY, {"procedure": {"order": None, "directions": None, **PROCEDURE}}))
     config = hardware(laboratory.config_path, tmp_path)
