@@ -217,10 +217,13 @@ class World:
     def run(self, alive: Callable[[], None] = lambda: None) -> None:
         """Serve until `end`. A tick ends when its bytes have been delivered to the clients, which set the pace.
 
+        While nobody is connected, it goes no faster than a real laboratory: it would only take processor time.
         `alive` is called after every tick, and whenever none is due.
         """
         polled_s = 0.0
         while not self._is_ended:
+            if not (self.network.connections or self._ptys):  # nobody waits for what is to come
+                self.clock.dialogue()
             wait_s = self.clock.wait_s()
             due = wait_s <= 0.0
             behind_s = self.network.deliver(idle=not due, patient=self.clock.time_scale > 1.0)

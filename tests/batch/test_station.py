@@ -10,7 +10,8 @@ import pytest
 
 from support.laboratories.commands import configuration, rig, wait_for_log
 
-TRAY = {"G-003": {"plugged_in": False}}
+CHIP = {"unique_id": "0123456789abcdef01234567"}
+TRAY = {"G-003": {"plugged_in": False}, "G-001": CHIP, "G-005": CHIP}
 pytestmark = pytest.mark.slow
 
 

@@ -8,16 +8,20 @@ import sys
 import threading
 import time
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
+from rig.config.load import load
 from rig.motion.carried import FlangeLoad
 from rig.motion.steps import Transfer, trapezoid_duration
+from rig.turners.turner_registry import sections
 from rig.turners.ur.arm_driver import Arm
-from rig.world import network
+from rig.world import network, world_process
 from rig.world.clock import DIALOGUE_S, TICK_S, WorldClock
 from rig.world.wire import EARNED, FIRST_PATIENCE_S, IN_PACE_S, PATIENCE_S, Wire
 from rig.world.world_process import ARM_LAG_S
+from support.laboratories.commands import configuration
 from support.laboratories.worlds import World, fresh_host
 from support.processes.waiting import wait_for
 from support.wires.arm_relay import relay
@@ -341,3 +345,15 @@ def test_a_gathering_port_hands_on_in_one_go_what_came_about_while_ticks_were_du
                 client.recv(64)
     finally:
         ports.close()
+
+
+@pytest.mark.slow
+def test_while_nobody_is_connected_it_goes_no_faster_than_a_real_laboratory(tmp_path: Path) -> None:
+    """It would take a processor from those who have something to do."""
+    world = world_process.World(load(configuration(tmp_path, FAST), turners=sections()))
+    began_s = time.monotonic()
+    try:
+        world.run(lambda: world.end() if time.monotonic() > began_s + 0.05 else None)
+    finally:
+        world.close()
+    assert world.clock.time_s <= time.monotonic() - began_s + TICK_S
