@@ -15,7 +15,7 @@ from support.history.past_runs import enter_many, finish_run
 from support.history.postgres import postgresql
 from support.processes.forked import find_fork_server
 
-PROCESSES, ENTRIES, FEW = 8, 250, 5
+PROCESSES, ENTRIES, FEW = 8, 250, 5  # `make test`: half of the processes, few entries
 pytestmark = pytest.mark.slow
 
 
@@ -29,23 +29,23 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
 
 
 @pytest.mark.proof
-def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(url: str, thorough: bool) -> None:
+def test_of_what_several_processes_enter_nothing_is_lost_and_nothing_stands_twice(url: str, thorough: bool) -> None:
     """The tables are made by whoever comes first."""
-    entries = ENTRIES if thorough else FEW
-    with find_fork_server().Pool(PROCESSES) as pool:
-        new = pool.starmap(enter_many, [(url, worker, entries) for worker in range(PROCESSES)])
-        assert new == [entries] * PROCESSES
-        again = pool.starmap(enter_many, [(url, worker % 2, FEW) for worker in range(PROCESSES)])
-        assert again == [0] * PROCESSES
+    processes, entries = (PROCESSES, ENTRIES) if thorough else (PROCESSES // 2, FEW)
+    with find_fork_server().Pool(processes) as pool:
+        new = pool.starmap(enter_many, [(url, worker, entries) for worker in range(processes)])
+        assert new == [entries] * processes
+        again = pool.starmap(enter_many, [(url, worker % 2, FEW) for worker in range(processes)])
+        assert again == [0] * processes
     with open_history(url) as history:
         with history.engine.connect() as connection:
             runs, calibrations, parameters = (
                 connection.execute(text(f"SELECT count(*) FROM {table}")).scalar_one()
                 for table in ("run", "calibration", "parameter")
             )
-        assert (runs, calibrations, parameters) == (PROCESSES * entries, PROCESSES * entries, PROCESSES * entries * 10)
+        assert (runs, calibrations, parameters) == (processes * entries, processes * entries, processes * entries * 10)
         assert list(history.broken()) == []
-        assert len({calibration.started_utc for calibration in history.calibrations()}) == PROCESSES * entries
+        assert len({calibration.started_utc for calibration in history.calibrations()}) == processes * entries
 
 
 def test_a_later_version_has_one_place_for_its_migration(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
