@@ -72,7 +72,8 @@ def test_every_command_of_a_block_is_run_somewhere() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [*ON_A_RUN, *NOT_SHOWN])
 def test_what_needs_no_arm_works_as_shown(command: str, run_folder: Path, tmp_path: Path) -> None:
-    assert rig_here(*NEW.split()).returncode == 0
+    if "my.yaml" in command:
+        assert rig_here(*NEW.split()).returncode == 0
     arguments = [word.replace("OUT", str(tmp_path / "out")) for word in shlex.split(command)[1:]]
     done = rig_here(*arguments)
     assert done.returncode == 0, done.stderr

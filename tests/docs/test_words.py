@@ -1,6 +1,7 @@
 """The code has the words of rig/report/words/words.toml, and names and docstrings as CONTRIBUTING.md asks."""
 
 import ast
+import gc
 import re
 import tomllib
 from collections import defaultdict
@@ -23,6 +24,15 @@ NOT_PARTICIPLES = {"feed", "speed", "seed", "need", "read", "embed"}
 RELATIVE_CLAUSE = re.compile(
     r"(\([^)]*\)[,:]? ?)?(what|whether|how|where|who|whom|which|when|why|that)\b", re.IGNORECASE
 )
+SHAPE = re.compile(r"\([^)]*\)[,:]? ?")  # "(3,) biases" begins with the biases
+POINTS_ELSEWHERE = (
+    *("it", "its", "they", "them", "their", "this", "that", "these", "those", "both", "none", "nothing", "all but one"),
+    *("the same", "as", "or", "and", "but", "also", "always", "never", "only", "not", "all of it", "all of them"),
+    *("of", "by", "in", "into", "on", "at", "to", "for", "with", "without", "between", "until", "before", "after"),
+    *("out of", "inside", "since", "while", "unless", "under", "around", "along", "less", "just", "from now on"),
+    *(".", ","),
+)
+WITHOUT_SUBJECT = re.compile(rf"({'|'.join(map(re.escape, POINTS_ELSEWHERE))})(\W|$)|$", re.IGNORECASE)
 WIDE, IN_PROSE = 8, 10  # fields of a class, and names in the prose of its docstring
 CAPABILITIES = frozenset(WORDS["capabilities"])
 DOCUMENTED = ast.FunctionDef | ast.AsyncFunctionDef
@@ -31,8 +41,8 @@ DOCUMENTED = ast.FunctionDef | ast.AsyncFunctionDef
 def test_a_name_says_what_it_is_bound_to() -> None:
     assert [
         f"{file}:{node.lineno}: {name}: {term_for(name)}"
-        for file, tree in modules()
-        for node, name, owner in bindings(tree)
+        for file, nodes in modules()
+        for node, name, owner in bindings(nodes)
         if name.strip("_").lower() in NEVER_BOUND and (owner, name) not in PUBLIC_KEYS
     ] == []
 
@@ -41,8 +51,8 @@ def test_no_docstring_of_a_function_opens_with_a_relative_clause() -> None:
     """PEP 257: a verb first."""
     assert [
         f'{file}:{node.lineno}: "{text.splitlines()[0]}": begin with a verb, such as Return or Yield'
-        for file, tree in modules()
-        for node in ast.walk(tree)
+        for file, nodes in modules()
+        for node in nodes
         if isinstance(node, DOCUMENTED) and not is_property(node)
         if (text := ast.get_docstring(node)) and RELATIVE_CLAUSE.match(text)
     ] == []
@@ -50,8 +60,8 @@ def test_no_docstring_of_a_function_opens_with_a_relative_clause() -> None:
 
 def test_a_class_has_a_name_of_its_own() -> None:
     files = defaultdict(set)
-    for file, tree in modules():
-        for node in ast.walk(tree):
+    for file, nodes in modules():
+        for node in nodes:
             if isinstance(node, ast.ClassDef):
                 files[node.name.lstrip("_")].add(file)
     assert {name: files[name] for name in files if len(files[name]) > 1 and name not in SHARED_CLASSES} == {}
@@ -60,8 +70,8 @@ def test_a_class_has_a_name_of_its_own() -> None:
 def test_the_name_of_a_function_begins_with_a_verb() -> None:
     without = [
         f"{file}:{node.lineno}: {node.name}: begin with a verb, such as find, fit or average; {term_for(node.name)}"
-        for file, tree in modules()
-        for node in ast.walk(tree)
+        for file, nodes in modules()
+        for node in nodes
         if isinstance(node, DOCUMENTED) and not is_property(node) and not begins_with_verb(node.name)
     ]
     assert len(without) <= NAMES_WITHOUT_VERB, without
@@ -84,8 +94,8 @@ def test_a_wide_class_lists_its_fields() -> None:
     """A line each: "- name (shape): meaning". Names in a running sentence are in backticks, so these are counted."""
     assert [
         f"{file}:{node.lineno}: {node.name} has {fields} fields in running sentences: one line a field, - name: meaning"
-        for file, tree in modules()
-        for node in ast.walk(tree)
+        for file, nodes in modules()
+        for node in nodes
         if isinstance(node, ast.ClassDef)
         if (fields := sum(isinstance(item, ast.AnnAssign) for item in node.body)) >= WIDE
         if len(re.findall(r"`\w+`", ast.get_docstring(node) or "")) >= IN_PROSE
@@ -96,10 +106,22 @@ def test_the_summary_of_a_docstring_is_one_line() -> None:
     """PEP 257."""
     assert [
         f'{file}:{getattr(node, "lineno", 1)}: "{summary[0]}" goes on: end the sentence, then a blank line'
-        for file, tree in modules()
-        for node in ast.walk(tree)
+        for file, nodes in modules()
+        for node in nodes
         if isinstance(node, DOCUMENTED | ast.ClassDef | ast.Module)
         if len(summary := (ast.get_docstring(node) or "").split("\n\n")[0].splitlines()) > 1
+    ] == []
+
+
+def test_every_docstring_begins_with_what_it_is_about() -> None:
+    """`help()` of one module, class or function alone tells what it is."""
+    assert [
+        f"{file}:{getattr(node, 'lineno', 1)}: {text.splitlines()[0]}"
+        for file, nodes in (*modules(), *modules("firmware_host"))
+        for node in nodes
+        if isinstance(node, DOCUMENTED | ast.ClassDef | ast.Module)
+        if (text := ast.get_docstring(node)) is not None
+        if WITHOUT_SUBJECT.match(SHAPE.sub("", text, count=1) if text[0] == "(" else text)
     ] == []
 
 
@@ -120,10 +142,18 @@ def term_for(name: str) -> str:
 
 
 @cache
-def modules() -> tuple[tuple[str, ast.Module], ...]:
-    """Return every module of rig as its file's name and its tree."""
-    files = sorted((REPOSITORY / "rig").rglob("*.py"))
-    return tuple((file.relative_to(REPOSITORY).as_posix(), ast.parse(file.read_text("utf-8"))) for file in files)
+def modules(package: str = "rig") -> tuple[tuple[str, list[ast.AST]], ...]:
+    """Return every module of a package as its file's name and the nodes that have a name or a docstring."""
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef, ast.Name)
+    files = sorted((REPOSITORY / package).rglob("*.py"))
+    gc.disable()  # which would look through a million nodes again and again
+    try:
+        trees = {file.relative_to(REPOSITORY).as_posix(): ast.parse(file.read_text("utf-8")) for file in files}
+        return tuple(
+            (file, [node for node in ast.walk(tree) if isinstance(node, kinds)]) for file, tree in trees.items()
+        )
+    finally:
+        gc.enable()
 
 
 def begins_with_verb(name: str) -> bool:
@@ -138,16 +168,16 @@ def is_property(function: DOCUMENTED) -> bool:
     return any(getattr(decorator, "id", "") in ("property", "cached_property") for decorator in function.decorator_list)
 
 
-def bindings(tree: ast.Module) -> Iterator[tuple[ast.stmt | ast.expr | ast.arg, str, str]]:
-    """Yield every name that a module binds, with its node and the class whose field it is ("" otherwise)."""
+def bindings(nodes: list[ast.AST]) -> Iterator[tuple[ast.stmt | ast.expr | ast.arg, str, str]]:
+    """Yield every name that a module's nodes bind, with its node and the class whose field it is ("" otherwise)."""
     fields = {
         item.target: definition.name
-        for definition in ast.walk(tree)
+        for definition in nodes
         if isinstance(definition, ast.ClassDef)
         for item in definition.body
         if isinstance(item, ast.AnnAssign)
     }
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, DOCUMENTED):
             yield node, node.name, ""
             for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs):

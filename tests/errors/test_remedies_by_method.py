@@ -1,11 +1,13 @@
 """What to do about an error by the way in use: every row is of an error that there is, and says what can be done."""
 
+from argparse import Namespace
 from pathlib import Path
 from typing import get_args
 
 import pytest
 
 from rig.cli import main
+from rig.commands.documents import explain
 from rig.data.latest_run import note_run
 from rig.errors.catalogue import catalogue
 from rig.errors.remedies_by_method import TABLE, CalibrationMethod, remedies_by_method
@@ -45,7 +47,7 @@ def test_the_way_of_the_latest_run_comes_first(
 
 def test_no_answer_ends_with_two_stops(capsys: pytest.CaptureFixture[str]) -> None:
     for entry in catalogue():
-        main(["explain", entry.name])
+        explain.run(Namespace(name=[entry.name]))
     main(["explain", "ac"])
     said = capsys.readouterr()
     assert ".." not in said.out + said.err and "?." not in said.out + said.err

@@ -8,12 +8,13 @@ import os
 import signal
 import socket
 import subprocess
-import sys
+from pathlib import Path
 
 import pytest
 
 from support.laboratories.worlds import World, WorldHandle, fresh_host
 from support.processes.waiting import PATIENCE_S, wait_for
+from support.processes.warm import start_module
 from support.wires.arm_client import client
 
 pytestmark = pytest.mark.slow
@@ -280,29 +281,24 @@ def test_wrong_requests_to_the_control_channel_are_answered(world: World) -> Non
         running.control({"please": "dance"})
 
 
+def refused(config: str | Path) -> tuple[int, str]:
+    """Return the exit status and the errors of a world that cannot start."""
+    process = start_module(config, module="rig.world", stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    return process.returncode, errors
+
+
 def test_a_taken_port_is_a_clear_error(world: World) -> None:
     running = world()
-    second = subprocess.run(
-        [sys.executable, "-m", "rig.world", str(running.config_path)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
-    assert second.returncode == 2
-    assert f"cannot listen on {running.host}:29999" in second.stderr and "Traceback" not in second.stderr
-    assert len(second.stderr.strip().splitlines()) == 1
+    status, errors = refused(running.config_path)
+    assert status == 2
+    assert f"cannot listen on {running.host}:29999" in errors and "Traceback" not in errors
+    assert len(errors.strip().splitlines()) == 1
 
 
 def test_a_configuration_without_a_world_is_refused() -> None:
-    result = subprocess.run(
-        [sys.executable, "-m", "rig.world", "configs/ur10e_lsm9ds1.yaml"],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
-    assert result.returncode == 2 and "Traceback" not in result.stderr
+    status, errors = refused("configs/ur10e_lsm9ds1.yaml")
+    assert status == 2 and "Traceback" not in errors
 
 
 def test_the_world_ends_with_its_input_and_ignores_the_terminals_interrupt(world: World) -> None:
@@ -320,11 +316,7 @@ def test_ctrl_c_ends_a_world_in_the_foreground(world: World, inherited: signal.H
     running.config_path.write_text(text)
     before = signal.signal(signal.SIGINT, inherited)
     try:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "rig.world", str(running.config_path)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        )
+        process = start_module(running.config_path, module="rig.world", stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     finally:
         signal.signal(signal.SIGINT, before)
     assert process.stdout is not None and process.stdout.readline()

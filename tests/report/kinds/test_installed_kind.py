@@ -15,11 +15,22 @@ from support.paths import ROOT
 from support.processes.waiting import PATIENCE_S
 
 SCALE, BIAS_RAD = (1.02, 0.97), (0.004, -0.007)
-SHOWN = """
-import json, sys, rig
+# One process for all commands: each would take a second to import the same. What they print, then what Python has.
+IN_TURN = """
+import io, json, sys
+from contextlib import redirect_stdout
+import rig
+from rig.cli import main
 from rig.page.rows import parameter_rows
-result = rig.solve(rig.load(sys.argv[1]))
-print(json.dumps([result["imu"].scale.tolist(), result["imu"].bias.tolist(), parameter_rows(result.document)]))
+run, *commands = json.loads(sys.argv[1])
+printed = []
+for command in commands:
+    with redirect_stdout(io.StringIO()) as output:
+        assert main(command) == 0, command
+    printed.append(output.getvalue())
+result = rig.solve(rig.load(run))
+rows = parameter_rows(result.document)
+print(json.dumps([*printed, result["imu"].scale.tolist(), result["imu"].bias.tolist(), rows]))
 """
 
 
@@ -71,11 +82,19 @@ def ran(environment: dict[str, str], *command: str) -> str:
 def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path, installed: dict[str, str]) -> None:
     run, history = str(tmp_path / "run"), str(tmp_path / "history.sqlite")
     keeping = ["--out", run, "--history", history, "--serial-number", "I-1", "--part", "tilt2"]
-    said = ran(installed, "-m", "rig", "solve", *files(tmp_path), *keeping)
-    assert said.startswith("inclinometer imu I-1, tilt2") and said.splitlines()[-1] == "verdict: PASS"
-    whole = ran(installed, "-m", "rig", "show", run, "--all")
+    commands = (
+        ["solve", *files(tmp_path), *keeping],
+        ["show", run, "--all"],
+        ["explain", "imu.inclination_residuals"],
+        ["report", run, "--dcc", "--set", "site.country=DE", "--history", history],
+        ["history", "list", "--history", history],
+    )
+    solved, whole, explained, _, listed, scale, bias, rows = json.loads(
+        ran(installed, "-c", IN_TURN, json.dumps([run, *commands]))
+    )
+    assert solved.startswith("inclinometer imu I-1, tilt2") and solved.splitlines()[-1] == "verdict: PASS"
     assert "imu: inclinometer, m = φ / k + b" in whole and "inclination_residuals" in whole
-    assert ran(installed, "-m", "rig", "explain", "imu.inclination_residuals").startswith("residuals: a check of the ")
+    assert explained.startswith("residuals: a check of the ")
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     entry = result["others"]["inclinometers"]["imu"]
     std = np.sqrt(np.diag(entry["covariance"]))
@@ -84,11 +103,9 @@ def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path
     page = (tmp_path / "run" / "certificate.html").read_text(encoding="utf-8")
     assert "Inclinometer TILT2, serial number I-1" in page
     assert "imu_inclination_scale[2]" in (tmp_path / "run" / "calibration.h").read_text(encoding="utf-8")
-    ran(installed, "-m", "rig", "report", run, "--dcc", "--set", "site.country=DE", "--history", history)
     assert "calibration of inclinometer" in (tmp_path / "run" / "certificate.xml").read_text(encoding="utf-8")
     assert "the only standard of an inclinometer's scale" in unescape(page) and "NOT A CERT" not in page.upper()
-    assert "inclination" in ran(installed, "-m", "rig", "history", "list", "--history", history)
-    scale, bias, rows = json.loads(ran(installed, "-c", SHOWN, run))
+    assert "inclination" in listed
     assert (scale, bias) == (entry["scale"], entry["bias_rad"])
     assert rows[0]["sensor"] == "imu, inclinometer" and rows[0]["unit"] == "mrad" and len(rows[0]["bias"]) == 2
 
