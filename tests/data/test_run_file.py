@@ -233,8 +233,8 @@ def reports(pipe: Connection) -> list[tuple[float, int]]:
 @pytest.mark.proof
 def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path, thorough: bool) -> None:
     processes = find_fork_server()
-    lives = np.random.default_rng(50).uniform(0.0, 2.5, 48 if thorough else 6)
-    for batch, batch_lives in enumerate(np.array_split(lives, len(lives) // 6)):
+    lives = np.random.default_rng(50).uniform(0.0, 2.5, 48 if thorough else 3)
+    for batch, batch_lives in enumerate(np.array_split(lives, max(1, len(lives) // 6))):
         writers = []
         for number in range(len(batch_lives)):
             ours, theirs = processes.Pipe(duplex=False)

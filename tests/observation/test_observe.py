@@ -507,7 +507,7 @@ def thinned(run: RunData, seed: int) -> RunData:
 @pytest.mark.proof
 def test_holes_between_arm_states_cost_certainty_not_truth(thorough: bool) -> None:
     errors, clocks, stds = [], [], []
-    for seed in range(24 if thorough else 10):
+    for seed in range(24 if thorough else 4):
         setup = Setup(seed=seed, rest_s=1.0, vibration=0.05, orders=ROUGH_ORDERS)
         result = solve_runs([thinned(synthetic_run(setup), seed)])["gyro"]
         found = np.concatenate([result.solution.scale, result.solution.bias_rad_s])
@@ -519,18 +519,20 @@ def test_holes_between_arm_states_cost_certainty_not_truth(thorough: bool) -> No
         clock = result.time_bases[0]
         offset, drift = clock_errors(Setup(), clock)
         clocks.append((offset / clock.offset_std_s, drift / clock.drift_std))
-    assert 0.8 < np.sqrt(np.mean(np.square(errors))) < 1.2
-    assert 0.7 < np.sqrt(np.mean(np.square(clocks))) < 1.3
+    least, most = (0.8, 1.2) if thorough else (0.65, 1.4)
+    assert least < np.sqrt(np.mean(np.square(errors))) < most
+    assert least - 0.1 < np.sqrt(np.mean(np.square(clocks))) < most + 0.1
     assert max(stds) > 1e-4
     assert np.median(stds) < 3e-5
 
 
 @pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.parametrize("holes", [False, True])
-def test_few_samples_a_turn_do_not_take_vibration_for_speed(holes: bool) -> None:
+def test_few_samples_a_turn_do_not_take_vibration_for_speed(holes: bool, thorough: bool) -> None:
     """At 14.9 Hz a turn has 33 samples, and the ripple's 31 cycles look like two: the plain mean would be 20 σ off."""
     errors = []
-    for seed in range(6):
+    for seed in range(6 if thorough else 2):
         setup = Setup(seed=seed, sample_rate_hz=14.9, noise_rad_s=0.001, speed_deg_s=163.0)
         run = synthetic_run(setup)
         solution = solve_runs([thinned(run, seed) if holes else run])["gyro"].solution

@@ -45,7 +45,7 @@ def solved_in_a_notebook(folder: Path) -> None:
     assert public.solve(public.load(folder))["gyro"].scale[0] > 1
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)  # all open it alike
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "read",
@@ -70,10 +70,11 @@ def test_nothing_that_reads_a_run_executes_its_script(
 
 @pytest.mark.slow
 def test_a_run_by_anothers_script_is_solved_without_it_and_says_so(foreign: Path) -> None:
-    done, before = rig_here("solve", foreign, "--json"), rig_here("solve", RECORDINGS / "six_observation", "--json")
-    assert done.returncode == 0 and "recorded by the script theirs.py" in done.stderr and before.stderr == ""
-    numbers, expected = json.loads(done.stdout)["gyroscopes"]["gyro"], json.loads(before.stdout)["gyroscopes"]["gyro"]
-    assert numbers["scale"] == expected["scale"]
+    done = rig_here("solve", foreign, "--json")
+    assert done.returncode == 0 and "recorded by the script theirs.py" in done.stderr
+    numbers = json.loads(done.stdout)["gyroscopes"]["gyro"]
+    expected = json.loads((RECORDINGS / "six_observation" / "result.json").read_text(encoding="utf-8"))
+    assert numbers["scale"] == pytest.approx(expected["gyroscopes"]["gyro"]["scale"], rel=1e-9)
 
 
 @pytest.mark.slow

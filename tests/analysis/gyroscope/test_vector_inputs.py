@@ -12,6 +12,7 @@ from support.recordings.synthetic_run import Setup, synthetic_run, truth
 SETUP = Setup(noise_rad_s=0.005)
 
 
+@pytest.mark.one_in(2)  # earlier than the first, and while it was recorded
 @pytest.mark.slow
 @pytest.mark.parametrize("later_s", [-3600, 0, 20, 7200])
 def test_a_resumed_recording_begins_after_the_last_one_ended_whatever_the_computers_clock_says(later_s: int) -> None:

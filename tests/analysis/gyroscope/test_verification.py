@@ -107,15 +107,16 @@ def departure(found: Array) -> Array:
     return vector
 
 
-def test_how_the_two_sensors_sit_to_each_other_is_found_within_its_uncertainty() -> None:
+@pytest.mark.proof
+def test_how_the_two_sensors_sit_to_each_other_is_found_within_its_uncertainty(thorough: bool) -> None:
     deviations = []
-    for seed in range(6):
+    for seed in range(6 if thorough else 3):
         setup = replace(QUIET, seed=seed, noise_rad_s=0.02, rest_s=0.5, speed_deg_s=120.0)
         run = recording(setup, stored=TRUTH)
         found = verify("gyro", KNOWN, observe_runs([run])).rotation
         deviations.append(departure(found.matrix) / found.std_rad)
         assert np.linalg.norm(found.vector_rad) == pytest.approx(np.linalg.norm(found.from_nominal_rad))
-    assert 0.6 < np.sqrt(np.mean(np.square(deviations))) < 1.5
+    assert (0.6 if thorough else 0.4) < np.sqrt(np.mean(np.square(deviations))) < (1.5 if thorough else 1.8)
     assert np.abs(deviations).max() < 4
 
 

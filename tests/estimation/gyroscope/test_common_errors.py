@@ -16,7 +16,7 @@ from rig.plans.motions.six_sweeps import plan_six_observation
 AXIS_STD_RAD = 1e-3
 MATRIX = np.array([[0.85, 0.04, -0.03], [-0.05, 0.87, 0.02], [0.02, -0.03, 0.88]])
 BIAS = np.array([0.0077, -0.0100, -0.0051])
-DRAWS = 200
+DRAWS, FEW = 200, 60  # in `make proof`, and in `make test` with wider limits
 
 
 def movement(axes: int) -> tuple[Array, Array]:
@@ -34,14 +34,15 @@ def _sign(sweep: Sweep) -> int:
 
 
 @pytest.mark.slow
+@pytest.mark.proof
 @pytest.mark.parametrize(("axes", "most_deg"), [(3, 0.12), (6, 0.01)])
-def test_the_angles_stated_uncertainty_holds_the_arms_errors(axes: int, most_deg: float) -> None:
+def test_the_angles_stated_uncertainty_holds_the_arms_errors(axes: int, most_deg: float, thorough: bool) -> None:
     rates, off = movement(axes)
     rng = np.random.default_rng(axes)
     variances = np.full(rates.shape, 7e-5**2)  # an MPU-9250 over six seconds
     none, unit = np.zeros(len(rates)), MATRIX / np.linalg.norm(MATRIX, axis=1, keepdims=True)
     drawn, stated = [], []
-    for _ in range(DRAWS):
+    for _ in range(DRAWS if thorough else FEW):
         true = rates + np.einsum("p,pni->ni", rng.standard_normal(len(off)), off)
         means = true @ MATRIX.T - BIAS + np.sqrt(variances) * rng.standard_normal(rates.shape)
         found, _ = solve_with_common_errors(means, rates, variances, lambda f: off @ f.T, speed_std_rad_s=none)
@@ -49,7 +50,8 @@ def test_the_angles_stated_uncertainty_holds_the_arms_errors(axes: int, most_deg
         stated.append(np.sqrt(np.diag(found.angles_covariance_rad2))[:3])
     assert np.degrees(np.max(stated)) < most_deg
     ratio = np.sqrt(np.mean(np.square(drawn), axis=0)) / np.mean(stated, axis=0)
-    assert np.all((ratio > 0.85) & (ratio < 1.15)), ratio
+    most = 0.15 if thorough else 0.3
+    assert np.all((ratio > 1 - most) & (ratio < 1 + most)), ratio
 
 
 def test_what_the_observations_do_not_tell_leaves_the_solution_as_it_is() -> None:

@@ -20,7 +20,7 @@ AT_LATITUDE = replace(SENSITIVE, latitude_rad=LATITUDE_RAD)
 STRAIGHT = np.eye(3)
 FELT = Session(g_sensitivity_rad_s_g=tuple((np.random.default_rng(3).normal(size=9) * DEG_H).tolist()))
 VIBRATING = Session(vibration_rad_s=2e-3)
-SEEDS = 20
+SEEDS, FEW = 20, 6  # in `make proof`, and in `make test` with wider limits
 
 
 @cache
@@ -126,27 +126,28 @@ def test_the_papers_matrix_and_bias_come_back() -> None:
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize("axes", [3, 6])
-def test_over_many_arms_and_headings_it_is_as_good_as_stated(axes: int) -> None:
+def test_over_many_arms_and_headings_it_is_as_good_as_stated(axes: int, thorough: bool) -> None:
     """The paper is 0.36 °/h off."""
-    session = Session(axes=axes)
-    pairs = [found(session, seed) for seed in range(SEEDS)]
+    session, wider = Session(axes=axes), 0.0 if thorough else 0.25
+    pairs = [found(session, seed) for seed in range(SEEDS if thorough else FEW)]
     off = np.array([earth.norm_rad_s - EARTH_RATE_RAD_S for earth, _ in pairs])
     stated = np.array([earth.norm_std_rad_s for earth, _ in pairs])
     ratio = rms(off / stated)
     print(f"{axes} axes: norm {rms(off) / DEG_H:.4f} deg/h, over σ {ratio:.2f}")
     assert rms(off) < 0.1 * DEG_H
-    assert 0.6 < ratio < 1.4, "twenty of them: within four of its own deviations of 0.8 to 1.3"
+    assert 0.6 - wider < ratio < 1.4 + wider, "twenty of them: within four of its own deviations of 0.8 to 1.3"
     each = np.array([e.rate_rad_s - t.earth_rad_s for e, t in pairs])
     std = np.array([np.sqrt(np.diag(e.covariance_rad2_s2)) for e, _ in pairs])
     print(f"components {rms(each) / DEG_H:.4f} deg/h, over σ {rms(each / std):.2f}")
-    assert 0.8 < rms(each / std) < 1.3
+    assert 0.8 - wider < rms(each / std) < 1.3 + wider
 
 
 @pytest.mark.slow
 @pytest.mark.proof
-def test_on_an_arm_that_vibrates_it_is_as_good_as_stated() -> None:
+def test_on_an_arm_that_vibrates_it_is_as_good_as_stated(thorough: bool) -> None:
     """2 mrad/s at 14 Hz, which nothing tells of but the readings."""
-    pairs = [found(VIBRATING, seed) for seed in range(SEEDS)]
+    wider = 0.0 if thorough else 0.25
+    pairs = [found(VIBRATING, seed) for seed in range(SEEDS if thorough else FEW)]
     off = np.array([earth.norm_rad_s - EARTH_RATE_RAD_S for earth, _ in pairs])
     stated = np.array([earth.norm_std_rad_s for earth, _ in pairs])
     each = np.array([e.rate_rad_s - t.earth_rad_s for e, t in pairs])
@@ -154,19 +155,22 @@ def test_on_an_arm_that_vibrates_it_is_as_good_as_stated() -> None:
     print(f"norm {rms(off) / DEG_H:.4f} deg/h, over σ {rms(off / stated):.2f}")
     print(f"components {rms(each) / DEG_H:.4f} deg/h, over σ {rms(each / std):.2f}")
     assert rms(off) < 0.1 * DEG_H
-    assert 0.6 < rms(off / stated) < 1.4, "twenty of them: within four of its own deviations of 0.8 to 1.3"
-    assert 0.8 < rms(each / std) < 1.3
+    assert 0.6 - wider < rms(off / stated) < 1.4 + wider, (
+        "twenty of them: within four of its own deviations of 0.8 to 1.3"
+    )
+    assert 0.8 - wider < rms(each / std) < 1.3 + wider
 
 
 @pytest.mark.slow
 @pytest.mark.proof
-def test_with_a_latitude_and_a_sensitivity_it_is_as_good_as_stated() -> None:
-    pairs = [found(FELT, seed, "at latitude") for seed in range(SEEDS)]
+def test_with_a_latitude_and_a_sensitivity_it_is_as_good_as_stated(thorough: bool) -> None:
+    wider = 0.0 if thorough else 0.25
+    pairs = [found(FELT, seed, "at latitude") for seed in range(SEEDS if thorough else FEW)]
     each = np.array([(e.rate_rad_s - t.earth_rad_s)[:2] for e, t in pairs])
     std = np.array([np.sqrt(np.diag(e.covariance_rad2_s2))[:2] for e, _ in pairs])
     print(f"level components {rms(each) / DEG_H:.4f} deg/h, over σ {rms(each / std):.2f}")
     assert rms(each) < 0.1 * DEG_H
-    assert 0.75 < rms(each / std) < 1.3
+    assert 0.75 - wider < rms(each / std) < 1.3 + wider
 
 
 @pytest.mark.thorough
