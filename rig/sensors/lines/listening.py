@@ -25,8 +25,8 @@ def listen(
     """
     speed = baud or _find_speed(port, tell)
     still_s, turned_s = seconds
-    tell(f"lay it down and leave it alone for {still_s:g} s")
     serial = open_device_port(port, speed)
+    tell(f"lay it down and leave it alone for {still_s:g} s")
     lines: list[TimedLine] = []
     rest, began_s, is_moving = b"", time.monotonic(), False
     try:
