@@ -135,7 +135,7 @@ def test_a_file_reaches_no_other(recording: Path, structure: str) -> None:
 def test_rows_that_unpack_without_end_take_no_memory(recording: Path, chunk: int) -> None:
     with h5py.File(recording, "r+") as file:
         swollen(file, chunk)
-    command = [sys.executable, "-c", READ_AND_TELL, recording, str(TIMEOUT_S)]
+    command = [sys.executable, "-c", READ_AND_TELL, str(recording), str(TIMEOUT_S)]
     took = subprocess.run(command, capture_output=True, text=True, check=True)
     peak_kib, _, refusal = took.stdout.partition(" ")
     assert int(peak_kib) * 1024 < MEMORY_BYTES

@@ -120,8 +120,8 @@ class Kvh1775Source:
                 "kvh_axis_invalid",
                 f"sensors.{self._name}: the KVH 1775 has called its readings invalid for {INVALID_S:g} s, status "
                 f"0x{int(messages['status'][-1]):02x} where 0x77 is good",
-                "Wait until it is warm, look at its built-in test with `rig kvh info`; if the problem persists, ask its "
-                "maker",
+                "Wait until it is warm, look at its built-in test with `rig kvh info`; if the problem persists, ask "
+                "its maker",
             )
 
     def _temperatures_c(self, messages: NDArray[Any]) -> Array:
