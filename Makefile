@@ -37,9 +37,11 @@ AT_A_TIME := 2
 DIST := worksteal
 
 # Linear algebra rounds by its kernel, which is chosen by the processor: what is reckoned is tested by another's too, that
-# of every processor without AVX-512, and in `make proof` by that of one without AVX, of before 2011.
-NUMERIC := -n 0 -m "kernels or not (slow or proof)" tests/estimation $(wildcard tests/*/test_recordings*.py) tests/notebook \
-  tests/history/test_store.py
+# of every processor without AVX-512, and in `make proof` by that of one without AVX, of before 2011. `make test` has one
+# recording for each kind of fit, and leaves out what only reads the numbers of others.
+NUMERIC := -n 0 -m "kernels or not (slow or proof)" tests/estimation $(wildcard tests/*/test_recordings*.py)
+EACH_FIT := six_observation or earth_rate or imu or thermal or by_hand
+ALL_NUMERIC := $(NUMERIC) tests/notebook tests/history/test_store.py
 
 system:
 	requirements/system.sh test
@@ -68,12 +70,13 @@ whole: build/collected.txt $(VENV)/dev.installed
 	$(MAKE) -C firmware_host/firmware coverage_table COVERED=$(CURDIR)/build/coverage PYTHON=$(CURDIR)/$(BIN)/python
 
 kernels: lint build/collected.txt
-	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(NUMERIC)
+	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(NUMERIC) -k "not frozen_recording or $(EACH_FIT)"
 
 proof: AT_A_TIME := 4
 proof: system $(VENV)/dev.installed
 	$(PYTEST) -m "proof or thorough or one_in" --proof -rP
-	OPENBLAS_CORETYPE=Prescott $(PYTEST) $(NUMERIC)
+	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(ALL_NUMERIC)
+	OPENBLAS_CORETYPE=Prescott $(PYTEST) $(ALL_NUMERIC)
 
 lint: $(VENV)/dev.installed
 	$(BIN)/ruff check .

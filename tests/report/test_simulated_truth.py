@@ -126,6 +126,7 @@ def test_the_truth_of_a_scale_factor_is_that_at_the_speed_and_of_a_bias_that_ove
     assert document["gyroscopes"]["gyro"]["bias_rad_s"] == pytest.approx(truth.bias_rad_s("gyro", late))
 
 
+@pytest.mark.thorough  # that a run ends with its truth, tests/runner/test_run.py
 @pytest.mark.slow
 def test_a_simulated_run_ends_with_its_truth_and_a_resumed_one_without(tmp_path: Path) -> None:
     folder = tmp_path / "run"

@@ -180,13 +180,29 @@ def maximise_likelihood(
         return float(0.5 * (chi_square - np.log(weights).sum()) + np.log(np.diag(lower)[:count]).sum())
 
     grid = np.linspace(np.log(SMALLEST_RAD), np.log(LARGEST_RAD), GRID)
-    values = [negative_log(log_delta) for log_delta in grid]
+    try:
+        values = _negative_logs(grid, growth, projected, basis, count)
+    except np.linalg.LinAlgError:
+        values = np.array([negative_log(log_delta) for log_delta in grid])
     best = int(np.argmin(values))
     if best == 0 or values[0] - values[best] < 1e-6:
         return 0.0, negative_log(-np.inf)  # exact attitudes are as likely
     bounds = grid[best - 1], grid[min(best + 1, GRID - 1)]
     minimum = minimize_scalar(negative_log, bounds=bounds, method="bounded", options={"xatol": 1e-5})
     return float(np.exp(minimum.x)), float(minimum.fun)
+
+
+def _negative_logs(grid: Array, growth: Array, projected: Array, basis: Array, count: int) -> Array:
+    """Return the negative log-likelihoods (G,) at all log δ of a grid (G,), which takes a tenth of one after another.
+
+    Raise LinAlgError if one of them has no Cholesky decomposition.
+    """
+    weights = 1 / (1 + np.exp(2 * grid)[:, None] * growth)
+    lower = np.linalg.cholesky((basis.T * weights[:, None, :]) @ basis)
+    explained = np.linalg.solve(lower, ((projected * weights) @ basis)[..., None])[..., 0]
+    chi_square = weights @ projected**2 - np.sum(explained**2, axis=1)
+    log_determinant = np.log(np.diagonal(lower, axis1=1, axis2=2)[:, :count]).sum(axis=1)
+    return np.asarray(0.5 * (chi_square - np.log(weights).sum(axis=1)) + log_determinant)
 
 
 def _find_uncertainty(delta: float, fit: Array, rotations: Array) -> float:

@@ -129,6 +129,7 @@ def test_the_notebook_and_rig_solve_find_the_same_numbers(
     assert again == first
 
 
+@pytest.mark.one_in(3)  # each format has its own tests
 @pytest.mark.parametrize("name", ["px4", "ardupilot", "imucal", "kalibr", "csv", "parquet", "mat", "ros2"])
 def test_it_is_exported_or_refused_by_name(
     name: str, kept: tuple[Example, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]

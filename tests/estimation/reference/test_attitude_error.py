@@ -85,13 +85,13 @@ def errors(arm: Arm, std: float, method: Method, runs: int, joints: Array = JOIN
     return Errors(rms[0], rms[1], rms[2], rms[3], np.array(found))
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("arm", "std", "better"),
     [
-        pytest.param(independent(1e-3), KVH_10_S, 8, id="KVH"),
-        pytest.param(geometry(1e-3), KVH_10_S, 8, id="KVH, geometry"),
         pytest.param(geometry(1e-3), MPU_3_S, 2.5, id="MPU-9250, geometry"),
+        pytest.param(geometry(1e-3), KVH_10_S, 8, id="KVH, geometry"),
+        pytest.param(independent(1e-3), KVH_10_S, 8, id="KVH"),
         pytest.param(geometry(1e-3), ADIS_3_S, 15, id="ADIS16465, geometry"),
     ],
 )
@@ -130,13 +130,14 @@ def test_exact_attitudes_are_found_exact_and_cost_nothing() -> None:
     assert weighted.scale < 1.03 * alike.scale and 0.85 < weighted.over_stated < 1.2
 
 
-def test_the_uncertainty_of_the_attitude_error_is_its_scatter() -> None:
+@pytest.mark.proof
+def test_the_uncertainty_of_the_attitude_error_is_its_scatter(thorough: bool) -> None:
     found = [solve(recorded(independent(1e-3), KVH_10_S, seed), KVH_10_S, "attitude_weighted", attitudes_of(JOINTS))
-             for seed in range(60)]  # fmt: skip
+             for seed in range(60 if thorough else 30)]  # fmt: skip
     told = [each.attitude_error for each in found]
     std = np.std([each.std_rad for each in told if each is not None])
     stated = np.mean([each.uncertainty_rad for each in told if each is not None])
-    assert stated == pytest.approx(std, rel=0.3)
+    assert stated == pytest.approx(std, rel=0.3 if thorough else 0.4)
 
 
 def test_faces_alone_lose_the_angles_between_the_axes_on_a_real_arm() -> None:

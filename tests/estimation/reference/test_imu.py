@@ -284,6 +284,7 @@ def test_the_uncertainty_of_the_attitude_error_is_its_scatter() -> None:
     )
 
 
+@pytest.mark.thorough  # of what an arm errs by alike, test_the_effects_of_an_arm_s_errors_are_those_of_such_an_arm
 @pytest.mark.slow
 def test_points_of_a_turn_that_are_taken_for_independent_state_too_little() -> None:
     """The same turns cut into 12 dwells each: what an arm errs by is alike in all of them."""

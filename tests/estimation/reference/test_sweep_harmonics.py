@@ -83,9 +83,9 @@ def test_a_speed_that_changes_slowly_takes_nothing_from_gravity(vibration: float
     assert np.abs(expected.harmonic_m_s2).max() > 9
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 @pytest.mark.slow
-@pytest.mark.parametrize("cycles", [(1,), (2,), (3,), (1, 4)])
+@pytest.mark.parametrize("cycles", [(1, 4), (1,), (2,), (3,)])
 def test_what_a_slow_ripple_adds_is_what_the_model_makes_of_the_same_weights(cycles: tuple[int, ...]) -> None:
     """Centripetal, Euler and, by the lag, gravity: 5 % of the speed once a turn is felt as 20 mm/s²."""
     rippled, even = (
@@ -119,8 +119,9 @@ def test_the_model_s_derivatives_are_those_of_its_readings_in_an_uneven_turn() -
 
 
 @pytest.mark.slow
-def test_the_stated_covariance_is_the_scatter() -> None:
-    found = [reduced(revolution(seed, 300.0)) for seed in range(40)]
+@pytest.mark.proof
+def test_the_stated_covariance_is_the_scatter(thorough: bool) -> None:
+    found = [reduced(revolution(seed, 300.0)) for seed in range(40 if thorough else 16)]
     scatter = np.std([each.harmonic_m_s2.ravel() for each in found], axis=0)
     stated = np.sqrt(np.mean([np.diag(each.covariance_m2_s4) for each in found], axis=0))
     assert np.sqrt(np.mean((scatter / stated) ** 2)) == pytest.approx(1.0, abs=0.15)
@@ -135,12 +136,12 @@ def test_coloured_noise_widens_the_covariance() -> None:
 
 
 @pytest.mark.slow
-def test_a_vibration_in_one_direction_says_nothing_of_the_noise_across_it() -> None:
+def test_a_vibration_in_one_direction_says_nothing_of_the_noise_across_it(thorough: bool) -> None:
     """2.4 mg at 14 Hz that no encoder sees: in x and z nearly all that is read, and of a turn's mean hardly any."""
     rng = np.random.default_rng(4)
     still = reduced(revolution(0, 0.0)).harmonic_m_s2
     squares = []
-    for seed in range(40):
+    for seed in range(40 if thorough else 15):
         samples = revolution(seed, 23.0)
         wave = 2400 * MICRO_G * np.sin(2 * np.pi * (14.0 * samples.time_s + rng.uniform()))
         shaken = samples.readings_m_s2 + wave[:, None] * np.array([0.65, 0.0, -0.76])
@@ -148,7 +149,7 @@ def test_a_vibration_in_one_direction_says_nothing_of_the_noise_across_it() -> N
         off = (found.harmonic_m_s2 - still).ravel()
         squares.append(off @ np.linalg.solve(found.covariance_m2_s4, off) / 9)
         np.testing.assert_allclose(found.noise_m_s2, sampling(23.0).noise_m_s2, rtol=0.15)
-    assert 0.7 < np.mean(squares) < 1.4
+    assert (0.7 if thorough else 0.55) < np.mean(squares) < (1.4 if thorough else 1.7)
 
 
 @pytest.mark.thorough
