@@ -155,7 +155,7 @@ def first_of_its_kind(name: str) -> bool:
     return name == next(each for each, (names, _) in DAMAGES.items() if names == DAMAGES[name][0])
 
 
-@pytest.mark.one_in(8)  # each check alone is asserted by its own unit test
+@pytest.mark.one_in(8)  # spikes, stuck bits and a turn on the flange have tests of their own, here and beside
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize(
