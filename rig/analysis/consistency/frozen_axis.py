@@ -26,8 +26,9 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
     for axis in range(3):
         ends = np.append(np.flatnonzero(np.diff(counts[:, axis])), len(counts) - 1)
         starts = np.append(0, ends[:-1] + 1)
-        for start, end in zip(starts, ends, strict=True):
-            if end - start + 1 > max(longest, FEWEST):
+        long = ends - starts + 1 > FEWEST
+        for start, end in zip(starts[long], ends[long], strict=True):
+            if end - start + 1 > longest:
                 time_s = stream.time_s[start : end + 1]
                 inside = (time_s > time_s[0] + LAG_S) & (time_s < time_s[-1] - LAG_S)
                 if _rate_change(recording, time_s[inside], axes[axis]) > least_rad_s[axis]:

@@ -86,15 +86,16 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
     (N, 3). Negligible errors are omitted.
     """
     roundings = np.broadcast_to(roundings_rad_s, means_rad_s.shape)
+    matters = roundings**2 > NEGLIGIBLE * variances_rad2_s2
     patterns = []
-    for axis in range(3):
+    for axis in np.flatnonzero(matters.any(axis=0)):
         half_widths = np.sqrt(3) * roundings[:, axis]
         order = np.argsort(means_rad_s[:, axis])
         apart = np.diff(means_rad_s[order, axis]) > half_widths[order][1:] + half_widths[order][:-1]
         for group in np.split(order, np.flatnonzero(apart) + 1):
-            size = np.zeros(means_rad_s.shape)
-            size[group, axis] = roundings[group, axis]
-            if np.any(size[group, axis] ** 2 > NEGLIGIBLE * variances_rad2_s2[group, axis]):
+            if matters[group, axis].any():
+                size = np.zeros(means_rad_s.shape)
+                size[group, axis] = roundings[group, axis]
                 patterns.append(np.sqrt(3) * size)
     if patterns:
         largest = float(np.degrees(np.max(patterns)))
