@@ -57,11 +57,13 @@ def contradictions(
     settings: RunSettings,
     *,
     false_alarms: float = FALSE_ALARMS,
+    has_limits: bool = True,
 ) -> ConsistencyChecks:
     """Return the checks of these sensors' results against contradictions.
 
     `surroundings` are those of the recordings, `false_alarms` is the fraction of undamaged runs that may fail. The
-    check of a disturbed sweep has its index in its name, `gyro.disturbed_sweep.3`, and in its meaning.
+    check of a disturbed sweep has its index in its name, `gyro.disturbed_sweep.3`, and in its meaning. `has_limits`:
+    whether the detection limits are computed too, which takes a third of the time.
     """
     checks: list[Check] = []
     detection_limits: dict[str, tuple[DetectionLimit, ...]] = {}
@@ -101,9 +103,9 @@ def contradictions(
         stated_deg = surroundings.uncertainty.stated_size("non_orthogonality_deg", name)
         non_orthogonality = _non_orthogonality_deg(explained.solution, stated_deg, false_alarm_probability)
         checks.append(fitness(name, "rate", NON_ORTHOGONALITY, *non_orthogonality, unit="°"))
-        detection_limits[name] = tuple(
-            find_gyroscope_limits(tested.detection_limits, name, results[name], surroundings)
-        )
+        if has_limits:
+            limits = find_gyroscope_limits(tested.detection_limits, name, results[name], surroundings)
+            detection_limits[name] = tuple(limits)
     return ConsistencyChecks(tuple(checks), detection_limits)
 
 
@@ -192,7 +194,9 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
         chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
         surroundings = surroundings_of(recordings, settings)
         results = solve_observed(chosen, recordings, surroundings)
-        disturbed = contradictions(recordings, results, settings.to_calibrate, surroundings, settings).disturbed
+        disturbed = contradictions(
+            recordings, results, settings.to_calibrate, surroundings, settings, has_limits=False
+        ).disturbed
         accelerometers = calibrate_accelerometers(recordings, settings, results)
         disturbed |= check_references(recordings, accelerometers, {}, settings).disturbed
     return disturbed

@@ -27,7 +27,13 @@ def checks_of(inputs: Solved, rate: float = RATE) -> tuple[Check, ...]:
     """Check with limits that undamaged recordings exceed with this probability each."""
     recordings, results, surroundings = inputs
     return contradictions(
-        recordings, results, ["gyro"], surroundings, recordings[0].run.settings, false_alarms=rate * STATISTICS
+        recordings,
+        results,
+        ["gyro"],
+        surroundings,
+        recordings[0].run.settings,
+        false_alarms=rate * STATISTICS,
+        has_limits=False,
     ).checks
 
 
