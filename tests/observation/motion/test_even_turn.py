@@ -32,9 +32,8 @@ def test_the_time_of_a_turn_is_known_to_a_few_hundred_thousandths(drawn: Drawn) 
 
 
 @pytest.mark.slow
-def test_what_turned_the_encoder_wrong_is_not_in_the_speed() -> None:
+def test_what_turned_the_encoder_wrong_is_not_in_the_speed(drawn: Drawn) -> None:
     """The drive turns by 2π where its encoder says so, a servo's time between: T by the truth is what is found."""
-    drawn = drawn_servo(8)
     run = drawn.runs[0]
     motion, sweep = motion_of(run), next(swept(run))
     turn = motion.turn(sweep.sweep, sweep.window, run.settings.observation)
