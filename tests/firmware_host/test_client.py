@@ -585,6 +585,22 @@ def test_a_board_that_falls_silent_while_streaming_is_noticed_after_two_seconds(
 
 @pytest.mark.slow
 @ON_ONE_WIRE
+def test_a_board_that_falls_silent_while_streaming_is_not_lost_on_a_computer_that_is_crowded_enough(
+    monkeypatch: pytest.MonkeyPatch, wire: tuple[BoardOnAWire, str]
+) -> None:
+    monkeypatch.setattr("firmware_host.computer_load.crowding", lambda: 1e9)
+    with Board(wire[1], protocol.BAUD_RATE, ignore, timeout_s=0.1) as board:
+        board.configure(0, 238, 245)
+        board.start()
+        wire[0].hold.set()
+        end_s = time.monotonic() + 0.5
+        while time.monotonic() < end_s:
+            board.check()
+        wire[0].hold.clear()
+
+
+@pytest.mark.slow
+@ON_ONE_WIRE
 @pytest.mark.usefixtures("no_crowd")
 def test_noise_instead_of_frames_while_streaming_is_a_lost_link(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 PATIENCE_S = 900.0  # of wall time, after which what is waited for has failed: no busy computer takes as long
-LOOK_S = 0.005
+LOOK_S = 0.005  # until the second look: each takes longer than the one before …
+LONGEST_LOOK_S, LONGER = 0.02, 1.25  # … as it may take a processor from those who are waited for
 
 Error = TypeVar("Error", bound=Exception)
 
@@ -22,11 +23,12 @@ def wait_for(
 
     `meanwhile` is done again and again: it raises what makes waiting vain.
     """
-    end_s = time.monotonic() + limit_s
+    end_s, look_s = time.monotonic() + limit_s, LOOK_S
     while not (answer := condition()):
         meanwhile()
         assert time.monotonic() < end_s, f"waited {limit_s} s for: {what}"
-        time.sleep(LOOK_S)
+        time.sleep(look_s)
+        look_s = min(LONGER * look_s, LONGEST_LOOK_S)
     return answer
 
 
