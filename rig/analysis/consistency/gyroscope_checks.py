@@ -110,8 +110,8 @@ def check_gyroscope(
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
     # Encoders that err more than stated would else be taken for a bias that drifts as much, and go unnoticed.
     encoders = np.moveaxis(allowance.encoders_rad_s, 0, -1)
-    beside_them = orthonormal_basis(np.column_stack([_steady_columns(segments), encoders.reshape(len(encoders), -1)]))
-    bias = _estimate_bias_process(segments, axis_rates, beside_them, scatter)
+    steady_columns = _steady_columns(segments, encoders.reshape(len(encoders), -1))
+    bias = _estimate_bias_process(segments, axis_rates, steady_columns, scatter)
     segments_only = _Tested(segments, axis_rates, whiten_segments(segments, scatter, bias))
     with_transfers = _inflate_transfers(segments_only, matrix, allowance, bias)
     sweeps_alone = repeat_per_axis(segments_only.means.sweeps)
@@ -309,7 +309,7 @@ def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPa
     return Scatter(segments.variances_rad2_s2, patterns_rad_s, allowance.instability_rad_s)
 
 
-def _steady_columns(segments: Segments) -> Array:
-    """Return orthonormal columns (N, k): a free level of each sweep and of all rests, gravity, a steady drift."""
+def _steady_columns(segments: Segments, *more: Array) -> Array:
+    """Return orthonormal columns (N, k): a level of each sweep and of all rests, gravity, a steady drift, `more`."""
     segment_sets = [segments.sweep == sweep for sweep in np.unique(segments.sweep)]
-    return orthonormal_basis(np.column_stack([*segment_sets, segments.gravity_m_s2, normalised_time(segments)]))
+    return orthonormal_basis(np.column_stack([*segment_sets, segments.gravity_m_s2, normalised_time(segments), *more]))
