@@ -12,7 +12,9 @@ from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.reference.reversal import Reversal, separate
 
-ALIKE = "Give runs of one magnetometer on one arm, in the same attitudes and at the same place, turned over in between"
+ALIKE = (
+    "Give runs of one magnetometer on one arm, in the same attitudes and at the same position, turned over in between"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,6 @@ def _list_common(run: AsMounted) -> dict[str, object]:
         "the magnetometer": (sensor.part, sensor.serial_number),
         "the arm": run.outcome.provenance.recorded.arm_serial_number,
         "the attitudes": settings.planned_dwells,
-        "where it sits on the flange (arm.extension_mm)": run.result.extension_m,
+        "its position on the flange (arm.extension_mm)": run.result.extension_m,
         "the size of the field (site.magnetic_field_ut)": run.result.field_t,
     }

@@ -41,6 +41,6 @@ def following(numbers: Sequence[str], done: Sequence[str]) -> str | None:
         raise Refused(
             "another_series",
             f"the batch has run {', '.join(done)}, and the list begins differently",
-            "Give the list with which the batch was begun, or another folder with --out",
+            "Give the list that the batch began with, or another folder with --out",
         )
     return numbers[len(done)] if len(done) < len(numbers) else None

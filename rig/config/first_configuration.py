@@ -71,7 +71,7 @@ def configuration_text(answers: Answers, schema: str, name: str) -> str:
         _procedure(answers),
         _uncertainty(answers),
         _limits(answers),
-        ["output:", "  folder: runs             # each run gets a folder of its own in it"],
+        ["output:", "  folder: runs             # each run has a folder of its own in it"],
     )
     return "\n\n".join("\n".join(section) for section in map(list, sections) if section) + "\n"
 

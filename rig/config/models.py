@@ -111,7 +111,7 @@ class ArmSection(TurnerSection):
     )
     kinematics: Literal["controller", "nominal"] = Field(
         default="controller",
-        description="where the arm's geometry comes from: `controller`, as the factory measured this arm; "
+        description="source of the arm's geometry: `controller`, as the factory measured this arm; "
         "`nominal`, the drawing of every arm of its model (the controller must still say that it drives one)",
     )
 
@@ -206,7 +206,7 @@ class OutputSection(Section):
     """Where results go."""
 
     folder: str = Field(
-        default="runs", min_length=1, max_length=1000, description="folder in which each run gets a folder of its own"
+        default="runs", min_length=1, max_length=1000, description="folder that contains a folder for each run"
     )
 
 
@@ -259,7 +259,7 @@ class SensorsConfig(Section):
             sensor_at[source] = name
         bundled = _bundled_names(sensors)
         if both := sorted({name for name in bundled if name in sensors or bundled.count(name) > 1}):
-            raise ValueError(f"{', '.join(both)} is already the name of a sensor that comes by another sensor's port")
+            raise ValueError(f"{', '.join(both)} is already the name of a sensor at another sensor's port")
         if problem := autopilots_over_budget({name: (s.mavlink, s.rate_hz) for name, s in sensors.items()}):
             raise ValueError(problem)
         references = [name for name, sensor in sensors.items() if sensor.role == "reference"]

@@ -114,7 +114,7 @@ def script_identity(folder: Path) -> ScriptIdentity:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused(
             "another_script",
-            f"{path} does not say with which script the run was begun ({why})",
+            f"{path} does not state which script the run began with ({why})",
             "Start a new run with `rig run`",
         ) from error
 

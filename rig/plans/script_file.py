@@ -98,7 +98,7 @@ def another_script(what: str) -> Refused:
     """Return the refusal of a script other than the one that began the run."""
     return Refused(
         "another_script",
-        f"{what} is not the script with which the run was begun",
+        f"{what} is not the script that the run began with",
         "Undo the change in it, or start a new run with `rig run`",
     )
 

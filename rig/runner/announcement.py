@@ -52,7 +52,7 @@ def announcement(
     lines = [
         *mounted,
         f"The {words.short} at {report.host} will move for {duration_words(plan.duration_s)}{at_most}.",
-        f"First it goes home: {turns or 'it is there already'}.",
+        f"First it goes home: {turns or 'it is already there'}.",
     ]
     if plan.sweeps:
         lines.append(f"Then {len(plan.sweeps)} sweeps turn {words.turned} by more than {_farthest(plan)} each.")

@@ -394,7 +394,7 @@ class Rig:
         if self.hand is None:
             raise Refused(
                 "other_turner",
-                "the script lets a hand turn the item, and the procedure is none by hand",
+                "the script lets a hand turn the item, but the procedure is not one by hand",
                 "Use the section of the procedure by_hand",
             )
         self.hand.carry_out(self._check_along)

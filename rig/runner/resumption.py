@@ -38,7 +38,7 @@ class Resumption:
                     raise Refused(
                         "another_board" if what == "board" else "another_arm",
                         f"the run was begun with the {what} {before}, this is {now}",
-                        f"Connect the {what} with which the run was begun, or start a new run with `rig run`",
+                        f"Connect the {what} that the run began with, or start a new run with `rig run`",
                     )
             if run.sensors != sensors:
                 raise Refused(
@@ -58,7 +58,7 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
         if run.provenance.script_sha256 != script.sha256:
             raise Refused(
                 "another_script",
-                f"{script.name} in the run folder is not the script with which the run was begun",
+                f"{script.name} in the run folder is not the script that the run began with",
                 "Undo the change in it, or start a new run with `rig run`",
             )
         if run.settings.movement != settings.movement:

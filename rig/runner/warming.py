@@ -182,8 +182,8 @@ class Warming:
             raise Fault(
                 "too_fast",
                 f"the temperature of {name} changes by {k_per_min:+.1f} K/min, and at most "
-                f"{self.section.max_rate_k_per_min:g} K/min are allowed: what its thermometer says is then another "
-                "temperature than that of what moves in it",
+                f"{self.section.max_rate_k_per_min:g} K/min are allowed: its thermometer then has another temperature "
+                "than its sensing element",
                 "Heat or cool more slowly, or allow more (procedure.max_rate_k_per_min), then resume",
             )
 

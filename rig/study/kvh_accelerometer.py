@@ -58,7 +58,9 @@ def study(settings: Settings) -> StudyReport:
         StudyFinding(
             "RMS error of the drifting bias, F and reference held", rt.rms_drift_error(drift, "held", "mg"), "mg"
         ),
-        StudyFinding("RMS error of the drifting bias, everything anew", rt.rms_drift_error(drift, "free", "mg"), "mg"),
+        StudyFinding(
+            "RMS error of the drifting bias, all parameters estimated", rt.rms_drift_error(drift, "free", "mg"), "mg"
+        ),
     )
     return StudyReport(table(rows), findings, partial(_draw, rows, drift), (12.0, 5.0))
 

@@ -62,7 +62,9 @@ def study(settings: Settings) -> StudyReport:
             "RMS error of the drifting bias, F and reference held", rt.rms_drift_error(drift, "held", "deg_h"), "deg/h"
         ),
         StudyFinding(
-            "RMS error of the drifting bias, everything anew", rt.rms_drift_error(drift, "free", "deg_h"), "deg/h"
+            "RMS error of the drifting bias, all parameters estimated",
+            rt.rms_drift_error(drift, "free", "deg_h"),
+            "deg/h",
         ),
     ]
     return StudyReport(table(rows), tuple(findings), partial(_draw, rows, drift), (12.0, 5.0))

@@ -41,7 +41,7 @@ STUDIES = {
     "averaging": StudyEntry("averaging before squaring against squaring before averaging", "averaging:study", 1),
     "estimators": StudyEntry("every estimator's mean squared error over its Cramér–Rao bound", "estimators:study"),
     "misalignment": StudyEntry("error against mounting error and non-orthogonality", "misalignment:study"),
-    "budget": StudyEntry("whether the stated uncertainty holds where everything may be wrong", "budget:study"),
+    "budget": StudyEntry("coverage of the stated uncertainty when all effects occur", "budget:study"),
     "kvh-gyro": StudyEntry(
         "TRIAX III-A: fiber-optic gyroscope on a rate table, bias drift of Fig. 4", "kvh_gyro:study"
     ),

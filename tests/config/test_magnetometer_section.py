@@ -54,7 +54,7 @@ def test_the_magnetometer_of_a_kvh_has_a_name_too() -> None:
     board = "board.port=socket://127.0.0.8:7321"
     parse(kvh, "kvh.yaml", [taken, told, board])
     with pytest.raises(
-        ConfigurationRefused, match="kvh_field is already the name of a sensor that comes by another sensor's port"
+        ConfigurationRefused, match="kvh_field is already the name of a sensor at another sensor's port"
     ):
         parse(kvh, "kvh.yaml", [taken, told, board, "sensors.kvh.serial.message=C"])
 

@@ -33,7 +33,7 @@ def test_a_wrist_that_stands_a_whole_turn_away_unwinds_to_one_side() -> None:
     assert high == 0.0 and abs(low - (low_home - TURN)) < 1e-9
     words = cable_words(plan(), away, JOINT_NAMES)
     assert f"wrist_3 by {degrees(-low):.0f}° one way (-) and 0° the other (+)" in words[0]
-    assert words[1].startswith("wrist_3 stands +360° from home")
+    assert words[1].startswith("wrist_3 is +360° from home")
     assert not [word for word in cable_words(plan(), home, JOINT_NAMES) if "from home" in word]
 
 
@@ -43,4 +43,4 @@ def test_it_is_said_before_the_operator_agrees() -> None:
         seen = report((*home[:5], home[5] + turns * TURN))
         lines = announcement(plan(), seen, UR.words, None, []).announcement
         assert any("one way (-)" in line for line in lines)
-        assert any("wrist_3 stands -360° from home" in line for line in lines) == told
+        assert any("wrist_3 is -360° from home" in line for line in lines) == told

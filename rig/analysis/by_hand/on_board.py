@@ -52,7 +52,7 @@ def compare_with_board(
     """
     host = solve_like_board(tuple(_moves(readings, reports)))
     if (used := sum(report.outcome == "taken" for report in reports)) != solved.taken:
-        raise _unverified_fault(f"it has taken {solved.taken} moves, of which {used} were seen here")
+        raise _unverified_fault(f"it has taken {solved.taken} moves, of which this computer received {used}")
     matrix = float(np.max(np.abs(np.array(solved.matrix) - host.matrix)))
     bias = float(np.max(np.abs(np.array(solved.bias_rad_s) - host.bias_rad_s)))
     if not (matrix <= SCALE_LIMIT and bias <= BIAS_LIMIT_RAD_S):
@@ -60,7 +60,7 @@ def compare_with_board(
             "board_disagrees",
             f"from the same readings the board finds a matrix that differs by {matrix:.1g}, and biases by "
             f"{bias:.1g} rad/s, from those of double precision",
-            "Calibrate again; if it comes back, keep the readings (rig record) and report it",
+            "Calibrate again; if the error recurs, keep the readings (rig record) and report it",
         )
     return HandAgreement(host, matrix, bias)
 

@@ -187,8 +187,8 @@ def _check_not_sole(
     window = placements.read.windows[placement]
     raise Fault(
         "too_few_observations",
-        f"the scale factor of {quantity.sensor} {quantity.axes[axis]} hangs on one attitude, from {window.start_s:.4g} "
-        f"to {window.end_s:.4g} s: no other would contradict it if it were wrong",
+        f"the scale factor of {quantity.sensor} {quantity.axes[axis]} depends on one attitude, from "
+        f"{window.start_s:.4g} to {window.end_s:.4g} s: if that is wrong, no other attitude shows it",
         "Let the body lie still in more attitudes: with each axis up, down and aslant",
     )
 

@@ -16,7 +16,7 @@ SCHEMA = "docs/config.schema.json"
 def refuse_existing(path: Path) -> None:
     """Raise Refused `configuration_not_written` if the file exists."""
     if path.exists() or path.is_symlink():
-        raise _not_written(path, "it is there already")
+        raise _not_written(path, "it is already there")
 
 
 def write_checked(path: Path, answers: "Answers") -> int:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from rig.runner.by_hand.on_board import CalibratedByBoard
 
 MOVES = range(8, 201)
-UNCHECKED = "the board's own result: its readings are gone, so double precision cannot check it"
+UNCHECKED = "the board's own result: its readings are not stored, so double precision cannot check it"
 
 
 def hand(options: Namespace) -> int:

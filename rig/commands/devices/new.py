@@ -116,7 +116,7 @@ def _lines_answers(options: Namespace, port: str, *, by_hand: bool) -> dict[str,
         try:
             return {"sensors": look_at_device(port, None, "imu", SECONDS, user_values)}
         except RigError as error:
-            say(f"{error}\nThe file gets an example in its place; `rig lines {port}` writes it later.", sys.stderr)
+            say(f"{error}\nThe file contains an example in its place; `rig lines {port}` writes it later.", sys.stderr)
     stated_here = {key: getattr(user_values, key) for key in ("serial_number", "range_deg_s", "range_g")}
     return {key: value for key, value in stated_here.items() if value is not None}
 

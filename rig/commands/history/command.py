@@ -94,7 +94,7 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("recomputed"),
         metavar="DIR",
-        help="folder of report and journal; the same command with the same folder goes on (default: recomputed)",
+        help="folder of report and journal; the same command with the same folder continues (default: recomputed)",
     )
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument("--jobs", type=int, default=1, metavar="N", help="processes on this computer (default: 1)")

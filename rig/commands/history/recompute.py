@@ -100,7 +100,7 @@ def _solve_all(
     except Fault as lost:
         return lost
     except KeyboardInterrupt:
-        raise KeyboardInterrupt("interrupted; the solved results are kept, and the same command goes on") from None
+        raise KeyboardInterrupt("interrupted; the solved results are kept, and the same command continues") from None
     return None
 
 

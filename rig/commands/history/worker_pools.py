@@ -165,7 +165,7 @@ def _new_process() -> ProcessPoolExecutor:
 def _read_answer(future: Any) -> Answer:
     """Return the answer of a finished future, of a process or of Dask. Raise Fault `cluster_lost` if cancelled."""
     if future.cancelled():
-        raise _cluster_lost("the scheduler has gone away with its unfinished tasks")
+        raise _cluster_lost("the scheduler has ended with unfinished tasks")
     error = future.exception()
     if error is None:
         answer: Answer = future.result()
@@ -180,7 +180,7 @@ def _describe_defect(error: BaseException) -> Unsolved:
 
 
 def _cluster_lost(what: str) -> Fault:
-    return Fault("cluster_lost", what, "Start it again; the same command then goes on with the remaining recordings")
+    return Fault("cluster_lost", what, "Start it again; the same command then continues with the remaining recordings")
 
 
 def _ignore_interrupts() -> None:

@@ -53,7 +53,7 @@ def run(options: Namespace) -> int:
     if not (folder / SCRIPT).exists():
         raise Refused(
             "another_script",
-            f"{folder} contains no {SCRIPT}, so the script with which it was begun is not known",
+            f"{folder} contains no {SCRIPT}, so the script that it began with is unknown",
             "Start a new run with `rig run`",
         )
     refuse_links(*folder.iterdir())

@@ -51,7 +51,9 @@ def print_shortest_run(options: Namespace) -> int:
     target = parse_target(options.target_uncertainty, options.max_duration_s)
     if options.table or options.script is not None:
         raise Refused(
-            "bad_option", "--target-uncertainty goes with no --table and no --script", "Write the configuration first"
+            "bad_option",
+            "--target-uncertainty cannot be combined with --table or --script",
+            "Write the configuration first",
         )
     if options.write is not None and options.write.exists():
         raise _not_written(options.write, "it exists already")

@@ -93,8 +93,8 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         default=0.005,
         ge=0,
         le=5,
-        description="how much the arm's angle differs when it comes back to the same place; the usual value is 87 "
-        "µrad, as for an arm of this size (Slamani, Nubiola and Bonev, 2012)",
+        description="how much the arm's angle differs when it returns to the same angle; the default is 87 µrad, "
+        "as for an arm of this size (Slamani, Nubiola and Bonev, 2012)",
     )
     thermometer_gradient_k: float = Field(
         default=0.1,

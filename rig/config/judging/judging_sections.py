@@ -81,11 +81,11 @@ class SiteSection(Section):
     )
     gravity_reference: Words | None = Field(
         default=None,
-        description="where gravity_m_s2 comes from, such as a gravimeter with its certificate or a gravity map; for "
+        description="source of gravity_m_s2, such as a gravimeter with its certificate or a gravity map; for "
         "certificates",
     )
     magnetic_field_reference: Words | None = Field(
-        default=None, description="instrument with which magnetic_field_ut was measured; for certificates"
+        default=None, description="instrument that measured magnetic_field_ut; for certificates"
     )
     magnetic_field_upwards: bool = Field(
         default=False,

@@ -175,7 +175,7 @@ class SixObservationSection(SixSweepsSection):
     stages: tuple[StageSection, ...] = Field(
         default=(),
         max_length=12,
-        description="mountings of the item, gone through one after the other",
+        description="mountings of the item, one after the other",
     )
     target_scale_u: float | None = Field(
         default=None,
@@ -344,7 +344,7 @@ class BiasDriftSection(AttitudesSection):
         default=10,
         ge=2,
         le=100,
-        description="how many times the arm goes through all attitudes",
+        description="how many times the arm visits all attitudes",
         json_schema_extra=RATIO,
     )
 
@@ -475,7 +475,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         if config.magnetometers:
             yield f"magnetometers.{', '.join(config.magnetometers)} cannot be calibrated over temperature; leave it out"
         if self.heater_power > 0 and not config.on_board:
-            yield "procedure.heater_power: the heater hangs on the board, and no sensor is on one"
+            yield "procedure.heater_power: the heater is on the board, and no sensor is on a board"
         if self.heater_power > 0 and self.to_c > HOTTEST_HEATED_C:
             yield (
                 f"procedure.to_c {self.to_c:g} is too hot for the heater, which the board switches off at 70: at most "

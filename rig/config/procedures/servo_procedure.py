@@ -50,7 +50,7 @@ class ServoSixObservationSection(ProcedureSection):
         default=THREE_MOUNTINGS,
         min_length=1,
         max_length=12,
-        description="mountings of the item, gone through one after the other; the shaft must point along three "
+        description="mountings of the item, one after the other; the shaft must point along three "
         "different directions of the item",
         json_schema_extra={"usual": "x, y and z along the shaft"},
     )

@@ -160,7 +160,7 @@ class LinesSection(Section):
         default="#",
         max_length=4,
         pattern=PRINTABLE,
-        description="text with which lines begin that are no samples",
+        description="beginning of lines that are no samples",
         json_schema_extra={"allowed": "at most 4 plain characters"},
     )
     checksum: Literal["none", "nmea"] = Field(
@@ -170,7 +170,7 @@ class LinesSection(Section):
     )
     clock: Literal["device", "counted", "arrival"] = Field(
         default="device",
-        description="what times the samples: `device`, the column `time`; `counted`, the column `sequence`, of a "
+        description="clock of the samples: `device`, the column `time`; `counted`, the column `sequence`, of a "
         "device that samples by a timer; `arrival`, the computer's clock when a line arrives, which has a line of "
         "its own in the budget",
     )
@@ -197,7 +197,7 @@ class LinesSection(Section):
         default=LineTemperatureSection(), description="the thermometer's column, or the temperature stated in its place"
     )
     scalars: dict[ScalarName, LineScalarSection] = Field(
-        default={}, max_length=16, description="columns of what has no axes, by their names"
+        default={}, max_length=16, description="columns of quantities without axes, by their names"
     )
 
     @field_validator("columns")

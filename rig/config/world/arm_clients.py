@@ -22,7 +22,7 @@ class SimulatedFieldbusSection(Section):
 class SimulatedPoseLogSection(Section):
     """The tool's attitudes as a logger writes them, for `rig solve --attitudes`; `unmodelled` has their errors."""
 
-    path: Path = Field(description="the file, CSV, which is written anew")
+    path: Path = Field(description="the CSV file, which is replaced")
     rate_hz: float = Field(default=14.0, gt=0, le=500, description="rows a second")
     latency_ms: float = Field(
         default=80.0,

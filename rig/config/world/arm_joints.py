@@ -21,7 +21,7 @@ SECOND_SQUARED: dict[str, Any] = {"unit": "s²"}
 class DriveRippleSection(Section):
     """One order of the ripple of the joints' rates. Its size hardly depends on the speed."""
 
-    cycles_per_turn: Cycles = Field(description="how many times it comes in one turn of the joint")
+    cycles_per_turn: Cycles = Field(description="its number of periods in one turn of the joint")
     rms_rad_s: RippleRates = Field(
         description="its RMS in each joint, base first; below 0.1 rad/s it shrinks with the square of the speed"
     )
@@ -48,15 +48,15 @@ class SimulatedDriveSection(Section):
         default=1.5e-4,
         ge=0,
         le=0.01,
-        description="how far a joint stays behind per acceleration of its target. When a move ends with 1 rad/s², the "
-        "joint comes back with 11 mrad/s; 10 to 13 were measured",
+        description="lag of a joint per acceleration of its target. When a move ends with 1 rad/s², the joint recovers "
+        "with 11 mrad/s; 10 to 13 were measured",
         json_schema_extra=SECOND_SQUARED,
     )
     yield_time_s: float = Field(
         default=3.5e-3,
         gt=0,
         le=0.1,
-        description="time constant with which it comes back, critically damped; after 24 to 32 ms it had come back",
+        description="time constant of the recovery, critically damped; it was complete after 24 to 32 ms",
     )
     crosstalk: float = Field(
         default=0.08,

@@ -11,7 +11,7 @@ from rig.config.section import RATIO, Section
 class SimulatedAutopilotSection(Section):
     """The simulated autopilot around its IMUs: its firmware, its clock, its parameters."""
 
-    firmware: Literal["ardupilot", "px4"] = Field(default="ardupilot", description="whose rules it goes by")
+    firmware: Literal["ardupilot", "px4"] = Field(default="ardupilot", description="the firmware that it simulates")
     uid: str = Field(
         default="1c003f000f51383238353439",
         pattern=r"^([0-9a-f]{2}){4,12}$",
@@ -33,7 +33,7 @@ class SimulatedAutopilotSection(Section):
     )
     parameter_file: Path | None = Field(
         default=None,
-        description="file that keeps the parameters from one run to the next; without it, they begin anew",
+        description="file that keeps the parameters from one run to the next; without it, they are the factory's",
     )
     lost: float = Field(
         default=0.0, ge=0, lt=1, description="fraction of messages that get lost", json_schema_extra=RATIO
@@ -45,11 +45,11 @@ class SimulatedAutopilotSection(Section):
         default=0.0,
         ge=0,
         lt=1,
-        description="share of what it sends that another program reads, which has opened the same port",
+        description="fraction of its bytes that another program with the same port reads",
         json_schema_extra=RATIO,
     )
     provides_temperature: bool = Field(
-        default=True, description="whether its messages hold a temperature, or say that there is none"
+        default=True, description="whether its messages contain a temperature, or state that there is none"
     )
     mavlink_version: Literal[1, 2] = Field(
         default=2,

@@ -49,7 +49,7 @@ class SimulatedHandSection(Section):
     )
     mistakes: dict[Mistaken, Probability] = Field(
         default={},
-        description="with which probability an action is done with this mistake: "
+        description="probability of this mistake in an action: "
         + ", ".join(f"`{mistake}`" for mistake in get_args(Mistaken)),
         json_schema_extra={"unit": "1", "allowed": "mistakes with a number 0 to 1 each", "usual": "`{}`"},
     )

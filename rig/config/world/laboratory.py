@@ -115,16 +115,16 @@ class ResidueSection(Section):
         "zeros nobody has set (a public data set with an ABB arm)",
     )
     encoder_once_rad: float = Field(
-        default=0.0, ge=0, le=0.01, description="amplitude of each encoder's error that comes once per turn"
+        default=0.0, ge=0, le=0.01, description="amplitude of each encoder's error with one period per turn"
     )
     encoder_twice_rad: float = Field(
-        default=0.0, ge=0, le=0.01, description="amplitude of each encoder's error that comes twice per turn"
+        default=0.0, ge=0, le=0.01, description="amplitude of each encoder's error with two periods per turn"
     )
     hysteresis_rad: float = Field(
         default=0.0,
         ge=0,
         le=0.001,
-        description="difference between a joint's angles when it comes from one side and from the other",
+        description="difference between a joint's angles when it arrives from one side and from the other",
     )
 
 
@@ -196,7 +196,7 @@ class SimulatedArmSection(Section):
         json_schema_extra={**RATIO, "usual": "`0.0`; of `joints: rough` `0.05`"},
     )
     vibration_cycles_per_turn: tuple[Cycles, ...] = Field(
-        default=(18, 31, 50), max_length=100, description="how many times each part of that ripple comes in one turn"
+        default=(18, 31, 50), max_length=100, description="periods of each part of that ripple in one turn"
     )
     encoder_step_rad: float | None = Field(
         default=None,
@@ -229,7 +229,7 @@ class SimulatedArmSection(Section):
     )
     vibration_hz: VibrationFrequency = Field(default=10.0, description="its frequency")
     vibration_further_hz: tuple[VibrationFrequency, ...] = Field(
-        default=(), max_length=20, description="further frequencies of it, each of which is as strong as the first"
+        default=(), max_length=20, description="further frequencies of it, each as strong as the first"
     )
     vibration_measured_rms_rad_s: float = Field(
         default=0.0,
@@ -313,7 +313,7 @@ Delay = Annotated[
 ScalePerK = Annotated[
     Vector3,
     Field(
-        description="by which fraction the scale factor of each axis grows with temperature",
+        description="relative growth of each axis' scale factor with temperature",
         json_schema_extra={"unit": "1/K"},
     ),
 ]
@@ -410,9 +410,9 @@ class SimulatedSensorSection(Section):
         default=None,
         ge=-40,
         le=85,
-        description="reading of its thermometer when it gets power; without it, the sensor is warm at once",
+        description="reading of its thermometer when it is switched on; without it, the sensor is warm at once",
     )
-    warm_up_s: float = Field(default=300.0, ge=1, le=100_000, description="time constant with which it warms up")
+    warm_up_s: float = Field(default=300.0, ge=1, le=100_000, description="time constant of its warming up")
     bias_rad_s_per_k: Vector3 = Field(
         default=NO_ROW, description="by how much b of each axis grows with temperature", json_schema_extra=RATE_PER_K
     )
@@ -454,14 +454,14 @@ class SimulatedSensorSection(Section):
         default=0.0,
         ge=-0.1,
         le=0.1,
-        description="by which fraction a reading grows with its rate",
+        description="relative growth of a reading with its rate",
         json_schema_extra=PER_RATE,
     )
     nonlinearity_odd_per_rad_s: float = Field(
         default=0.0,
         ge=-0.1,
         le=0.1,
-        description="by which fraction a reading grows with its rate's magnitude",
+        description="relative growth of a reading with the magnitude of its rate",
         json_schema_extra=PER_RATE,
     )
     bandwidth_hz: Bandwidth = None

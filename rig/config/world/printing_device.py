@@ -18,11 +18,14 @@ class SimulatedLinesSection(Section):
     boot_text: tuple[Annotated[str, Field(max_length=200)], ...] = Field(
         default=("ets Jul 29 2019 12:21:46", "rst:0x1 (POWERON_RESET)", "gyro ok, 1000 dps"),
         max_length=20,
-        description="lines that it prints when it gets power",
+        description="lines that it prints when it is switched on",
         json_schema_extra={"usual": "three lines", "allowed": "at most 20 lines"},
     )
     comment_every: int = Field(
-        default=0, ge=0, description="after so many samples it prints a comment; `0`: never", json_schema_extra=RATIO
+        default=0,
+        ge=0,
+        description="number of samples after which it prints a comment; `0`: never",
+        json_schema_extra=RATIO,
     )
     lost_fraction: float = Field(
         default=0.0, ge=0, le=0.5, description="share of the samples that it does not print", json_schema_extra=RATIO
@@ -31,7 +34,7 @@ class SimulatedLinesSection(Section):
         default=0.0,
         ge=0,
         lt=1,
-        description="share of what it prints that another program reads, which has opened the same port",
+        description="fraction of its bytes that another program with the same port reads",
         json_schema_extra=RATIO,
     )
     bit_error_rate: float = Field(

@@ -22,10 +22,10 @@ class SimulatedServoSection(Section):
     firmware: int = Field(default=48, ge=1, le=255, description="version of its firmware", json_schema_extra=RATIO)
     start_deg: float = Field(default=150.0, ge=0, lt=360, description="initial angle of its shaft")
     encoder_once_deg: Error = Field(
-        default=1.0, description="amplitude of the encoder's error that comes once per turn"
+        default=1.0, description="amplitude of the encoder's error with one period per turn"
     )
     encoder_twice_deg: Error = Field(
-        default=0.3, description="amplitude of the encoder's error that comes twice per turn"
+        default=0.3, description="amplitude of the encoder's error with two periods per turn"
     )
     encoder_noise_deg: Error = Field(default=0.06, description="standard deviation of one reading")
     backlash_deg: Error = Field(default=0.25, description="play of the gear")
@@ -33,7 +33,7 @@ class SimulatedServoSection(Section):
         default=0.07, ge=0, lt=0.5, description="amplitude of the gear's ripple over the rate", json_schema_extra=RATIO
     )
     ripple_per_turn: int = Field(
-        default=20, ge=1, le=200, description="how many times the ripple comes in one turn", json_schema_extra=RATIO
+        default=20, ge=1, le=200, description="periods of the ripple in one turn", json_schema_extra=RATIO
     )
     lag_ms: float = Field(
         default=15.0, ge=0, le=200, description="how late the shaft follows", json_schema_extra=MILLISECONDS

@@ -33,7 +33,7 @@ class SimulatedThermalSection(Section):
         default=0.05,
         gt=0,
         le=1e3,
-        description="power that goes into the air for each kelvin between body and air",
+        description="power lost to the air per kelvin between body and air",
         json_schema_extra={"unit": "W/K"},
     )
     own_w: float = Field(
@@ -47,10 +47,10 @@ class SimulatedThermalSection(Section):
         default=0.0, ge=0, le=1e4, description="power of the heater at its pin", json_schema_extra={"unit": "W"}
     )
     thermometer_lag_s: float = Field(
-        default=0.5, gt=0, le=1e4, description="time constant with which a part's thermometer follows the body"
+        default=0.5, gt=0, le=1e4, description="time constant of a part's thermometer behind the body"
     )
     element_lag_s: float = Field(
-        default=0.5, gt=0, le=1e4, description="time constant with which what moves in a part follows its thermometer"
+        default=0.5, gt=0, le=1e4, description="time constant of a part's sensing element behind its thermometer"
     )
     gradient_k_w: float = Field(
         default=0.0,

@@ -175,7 +175,9 @@ def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
     if hypothesis.name == "bias_jumped":
         return _describe_jump(hypothesis.index, rests)
     if hypothesis.name == "table_moved":
-        return Fault("table_moved", f"from {at_s:.1f} s on the table leans otherwise", "Begin anew, and leave it alone")
+        return Fault(
+            "table_moved", f"from {at_s:.1f} s on the table leans otherwise", "Begin again, and leave it alone"
+        )
     return Fault(
         "not_flat",
         f"at {at_s:.1f} s the body did not lie flat on its face as at the other rests",
@@ -194,7 +196,7 @@ def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
         )
     if index == 0:
         what += f", or the body crept in the first rest, until {rests[0].end_s:.1f} s"
-    return Fault("bias_jumped", what, "Handle it gently: a fall or a knock does that; begin anew")
+    return Fault("bias_jumped", what, "Handle it gently: a fall or a knock causes this; begin again")
 
 
 def _find_excessive_std(fit: GraphFit) -> Fault | None:
@@ -213,7 +215,7 @@ def _find_excessive_std(fit: GraphFit) -> Fault | None:
         what = f"the moves contradict each other by {100 * stds.of_angle:.2f} % of a quarter turn or more"
         return Fault("lost_in_move", what, _REMEDY)
     if stds.walk_rad_s_sqrt_s >= NEARLY * LARGEST.walk_rad_s_sqrt_s:
-        what = f"the bias goes by {stds.walk_rad_s_sqrt_s:.1g} rad/s within a second"
+        what = f"the bias changes by {stds.walk_rad_s_sqrt_s:.1g} rad/s within a second"
         return Fault("bias_jumped", what, "Let it warm up, and handle it gently")
     return None
 

@@ -205,8 +205,8 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _Settled) -> None:
         std_s = float(np.sqrt(settled.solved.covariance[CLOCK, CLOCK]))
         raise Fault(
             "clocks_apart",
-            f"the attitudes' clock comes out {1e3 * settled.state.clock_s:+.0f} ± {2e3 * std_s:.0f} ms off the "
-            f"readings', and {1e3 * MOST_CLOCK * CLOCK_STD_S:.0f} ms is the most that is allowed for",
+            f"the estimated offset of the attitudes' clock is {1e3 * settled.state.clock_s:+.0f} ± {2e3 * std_s:.0f} "
+            f"ms, and {1e3 * MOST_CLOCK * CLOCK_STD_S:.0f} ms is the largest allowed offset",
             "Write both files by one clock, or let --estimate-clock-offset find the difference",
         )
     if len(outliers) > _limit_outliers(fixes):

@@ -67,9 +67,10 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
     if chi_square > limit:
         raise Fault(
             "reversal_contradicts",
-            "the runs do not agree in what must stay the same when the sensor is turned over: "
+            "the runs do not agree in the parameters that must stay the same when the sensor is turned over: "
             f"χ² is {chi_square:.3g}, at most {limit:.3g} by noise",
-            "See that the sensor sits in the same place in all runs and the field did not change between them; repeat",
+            "Make sure that the sensor is in the same place in all runs and that the field did not change between "
+            "them; then repeat",
         )
     to_axes = np.block([[np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), mountings[0]]])
     covariance = to_axes @ (inverse @ inverse.T) @ to_axes.T

@@ -194,7 +194,7 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
         TemperatureLine(ORDER, "A", "normal", "weights of the other orders", np.inf, fits.rescale(among_orders)),
     ]
     if loop is not None:
-        source = "half of what warming and cooling differ by"
+        source = "half of the difference between warming and cooling"
         covariance = fits.rescale(_loop_covariance(*loop))
         lines.append(TemperatureLine(HYSTERESIS, "A", "rectangular", source, np.inf, covariance))
     fitted = OverTemperature(

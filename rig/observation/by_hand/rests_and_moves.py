@@ -153,8 +153,7 @@ def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: Record
     if by_hand is None or uncertainty is None or (sensor.on_board and not provenance.board_follows_crystal):
         raise Refused(
             "clock_unknown",
-            "the board's clock does not follow its crystal, so it may be a per cent off, and nothing in a session by "
-            "hand can show that",
+            "the board's clock does not follow its crystal, so it may be 1 % off, which a session by hand cannot show",
             "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
         )
     first = None if sensor.measures(ACCELERATION) else rotate_face(FACES[0], np.array(sensor.mounting))

@@ -91,7 +91,7 @@ def read_table(
             "origin_s": origin_s,
         }
         reader = "rig.observation.formats.csv_table:csv_parts"
-        remedy = "Save it anew from MATLAB" if is_mat(path) else "Give a CSV file"
+        remedy = "Save it again from MATLAB" if is_mat(path) else "Give a CSV file"
         parts = parts_read_apart(reader, path, arguments, else_="cannot be read", remedy=remedy)
     *rows, last = parts
     columns = columns_of(rows)

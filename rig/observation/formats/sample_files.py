@@ -51,7 +51,7 @@ FORMATS = (
         "rig.observation.formats.bag_samples:bag_attitudes",
         bag_of,
     ),
-    Format("log", is_ulog, "Copy it anew from the card", "rig.observation.formats.ulog_samples:ulog_readings"),
+    Format("log", is_ulog, "Copy it again from the card", "rig.observation.formats.ulog_samples:ulog_readings"),
 )
 
 

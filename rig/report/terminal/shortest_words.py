@@ -119,7 +119,7 @@ def _verdict(shortest: Shortest) -> str:
         return f"The shortest run for {wish} takes {shortest.best.candidate.duration_s:.1f} s."
     if shortest.unreachable:
         return f"No run of this kind reaches {wish}, of any duration."
-    return f"No examined plan reaches {wish}{within}; this one comes nearest."
+    return f"No examined plan reaches {wish}{within}; this one is nearest."
 
 
 def wish_words(wanted: TargetUncertainty) -> str:
@@ -195,7 +195,7 @@ def _describe_floor(shortest: Shortest) -> str:
         value = getattr(least.reached, size)
         if value > 0:
             parts.append(f"U = {value:.2g}{unit} of {what} ({', '.join(largest)})")
-    return f"However long it lasts, no run of this kind gets below {' and '.join(parts)}."
+    return f"However long it lasts, no run of this kind achieves less than {' and '.join(parts)}."
 
 
 def _efficiencies(directions: "Array") -> dict[str, dict[str, float]]:

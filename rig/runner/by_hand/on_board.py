@@ -175,8 +175,7 @@ def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
     if not follows_crystal(board):
         raise Refused(
             "clock_unknown",
-            "the board's clock does not follow its crystal, so it may be a per cent off, and nothing in a session by "
-            "hand can show that",
+            "the board's clock does not follow its crystal, so it may be 1 % off, which a session by hand cannot show",
             "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
         )
 

@@ -163,7 +163,7 @@ def _set_time(guess: Guess, index: int, column: Array, unit: str) -> None:
     steps = np.diff(column)
     rate_hz = TIMES[unit] / float(np.mean(steps[steps >= 0]))
     guess.rate_hz = rate_hz
-    guess.reasons.append(f"column {index + 1} is the time in {unit}: it goes on as the computer's clock does")
+    guess.reasons.append(f"column {index + 1} is the time in {unit}: it advances like the computer's clock")
 
 
 def _increases(column: Array) -> bool:

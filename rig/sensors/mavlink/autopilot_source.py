@@ -178,7 +178,7 @@ class MavlinkSource:
             if abs(measured_hz / requested_hz - 1.0) > RATE_TOLERANCE:
                 raise SensorError(
                     "autopilot_rate",
-                    f"sensors.{imu.name}: {imu.line.imu} was asked for {requested_hz:g} times a second and comes "
+                    f"sensors.{imu.name}: {imu.line.imu} was requested {requested_hz:g} times a second and comes "
                     f"{measured_hz:.1f} times",
                     "Lower rate_hz: the autopilot sends no faster than its main loop and its line allow",
                 )

@@ -95,7 +95,9 @@ class Servo:
         self._wait(lambda: bool(self._states) or self._clock.now_s() > ends_s)
         if not self._states:
             raise Refused(
-                "servo_silent", f"no state comes from the servo at {self._port}", "Look at its cable, then start again"
+                "servo_silent",
+                f"no state arrives from the servo at {self._port}",
+                "Look at its cable, then start again",
             )
 
     @property

@@ -66,7 +66,7 @@ def _settings(report: ServoReport) -> list[Problem]:
             Problem(
                 "servo_starts_by_itself",
                 f"the servo's Startup Configuration is {report.startup}: it switches its torque on, or restores goals, "
-                "whenever it gets power",
+                "at every power-up",
                 "Set Startup Configuration (60) to 0",
             )
         )
@@ -82,7 +82,7 @@ def _settings(report: ServoReport) -> list[Problem]:
         problems.append(
             Problem(
                 "servo_secondary_id",
-                f"the servo also obeys the ID {report.secondary_id}, which may be meant for another",
+                f"the servo also responds to the ID {report.secondary_id}, which may be meant for another",
                 "Set Secondary ID (12) to 255",
             )
         )

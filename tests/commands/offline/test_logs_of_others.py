@@ -338,7 +338,7 @@ def test_poses_ahead_of_the_readings_end_by_name(
     attitudes = write_table(tmp_path / "attitudes.csv", ["start_s", "end_s", "qw", "qx", "qy", "qz"], rows)
     if lead_s > 0.15:
         said = refused(capsys, samples, "--attitudes", attitudes)
-        assert "clocks_apart: the attitudes' clock comes out +400" in said and "acceleration: " in said
+        assert "clocks_apart: the estimated offset of the attitudes' clock is +400" in said and "acceleration: " in said
     else:
         found = solved(capsys, samples, "--attitudes", attitudes, status=1)
         assert found["gyroscopes"]["imu"]["scale"] == pytest.approx([1, 1, 1], abs=1e-3)

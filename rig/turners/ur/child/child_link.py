@@ -155,7 +155,7 @@ class ChildLink:
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
             frozen = self._frozen.lasts_over(PATIENT_TICKS if self._patient else FROZEN_TICKS)
             if frozen or (self._is_remote and not self._patient and self._silent_s > LINK_S):
-                return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")
+                return self._give_up("arm_link_lost", f"no new state arrives from the arm at {self._host}")
         return None
 
     def _say_alive(self) -> None:

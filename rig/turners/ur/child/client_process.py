@@ -262,7 +262,7 @@ class _Child:
         """Return the problem of a lost link, if any; its consequences would else be reported as the arm's faults."""
         if self._states.problem is not None or not (self._states.closed or silent):
             return self._states.problem
-        return link_lost(f"no new state comes from the arm at {self._host}")
+        return link_lost(f"no new state arrives from the arm at {self._host}")
 
     def _let_parent_see(self) -> None:
         """Wait until the parent has been sent all states so far."""
