@@ -135,7 +135,7 @@ def check_reads(matrix: Array) -> None:
 
 
 def check_unit(scale: Array) -> None:
-    """Raise Fault `wrong_unit` for a scale factor (3,) beyond 4 or 1/4, with the likely unit if there is one."""
+    """Raise Fault `wrong_unit` for a scale factor (3,) above 4 or below 1/4; name the likely unit if there is one."""
     if not _is_plausible(scale):
         typical = float(np.exp(np.mean(np.log(scale))))
         raise _wrong_unit(f"the scale factors come out near {typical:.3g}", 1 / typical)

@@ -51,7 +51,7 @@ def find_averaged_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[in
 
 
 def find_board_averages(earlier: Sequence[RunData], sensor: str, done: Collection[int]) -> dict[int, BoardObserved]:
-    """Return the board's averages of a sensor in earlier recordings, by sweep: the newest of each sweep in `done`."""
+    """Return the board's averages of a sensor from earlier recordings, the newest for each sweep in `done`."""
     return {
         event.sweep: event
         for run in earlier

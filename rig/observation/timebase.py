@@ -125,7 +125,7 @@ def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) ->
 
 
 def _turns_every_axis(motion: KnownMotion) -> bool:
-    """Return whether the motion turned every possible axis; one that does not turn may repeat its reading."""
+    """Return whether the motion turns every sensor axis in any mounting; if not, one may repeat its reading."""
     rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
     return bool(np.linalg.eigvalsh(rates.T @ rates).min() > TURNED_RAD_S**2 * len(rates))
 

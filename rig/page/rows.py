@@ -52,7 +52,7 @@ def observation_row(sensor: str, observation: Observation) -> Row:
 
 
 def projection(axis_flange: Sequence[float] | Array) -> float:
-    """Return the component of a unit vector (3,) along the nearest axis of a sensor mounted along the flange."""
+    """Return the component of a unit vector (3,), flange's frame, along the sensor axis that is nearest to it."""
     return float(np.max(np.abs(axis_flange)))
 
 

@@ -68,8 +68,8 @@ def study(settings: Settings) -> StudyReport:
 def _calibrate(rng: np.random.Generator, _: int) -> tuple[Array, Array, Array]:
     """Return θ (18,), its standard deviations (18,), and residuals (3,) in m/s².
 
-    The residuals are the largest standard deviation of corrected samples, and the largest mean of an attitude with and
-    without second-order terms.
+    The residuals are the largest standard deviation of corrected samples, and the largest mean in any attitude, with
+    and without second-order terms.
     """
     attitudes = rt.draw_attitudes(STILL)
     force = rt.project(attitudes, rt.ACCELEROMETER_REFERENCE_M_S2)

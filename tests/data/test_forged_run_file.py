@@ -146,7 +146,7 @@ def test_rows_that_unpack_without_end_take_no_memory(recording: Path, chunk: int
 def test_no_plugin_is_loaded_to_read_a_file(recording: Path) -> None:
     with h5py.File(recording, "r+") as file:
         packed_by_a_plugin(file, recording)
-    with pytest.raises(Refused, match="packed by a filter that is none of the HDF5 library's own"):
+    with pytest.raises(Refused, match="packed by a filter that is not one of the HDF5 library's own"):
         read_run(recording)
 
 

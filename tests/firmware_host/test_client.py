@@ -760,6 +760,6 @@ def test_a_board_that_knows_no_heater_is_refused_by_name(wire: tuple[BoardOnAWir
     section = ThermalSection(from_c=20, to_c=40, heater_power=1)
     with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
         warming = Warming(section, Acquisition(), print, (), board, 40.0, TemperatureCourse(20, 40, 5, True))
-        with pytest.raises(Refused, match="of the board knows no heater") as refused:
+        with pytest.raises(Refused, match="of the board does not support a heater") as refused:
             warming.prepare()
     assert refused.value.name == "no_heater"

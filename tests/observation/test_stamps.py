@@ -153,7 +153,7 @@ def test_counters_that_wrap_go_on(unit_s: float, period: float) -> None:
     counter = np.mod(time_s / unit_s + period - 20 / unit_s, period)
     found = ordered(unit_s * (counter if unit_s == 1 else np.floor(counter)))
     assert not found.sampling.missing.any() and np.ptp(found.time_s) == pytest.approx(np.ptp(time_s), abs=2e-3)
-    assert all("begins anew" in finding.reason and not finding.left_out for finding in found.findings)
+    assert all("restarts" in finding.reason and not finding.left_out for finding in found.findings)
 
 
 @pytest.mark.parametrize("nothing", [0.0, np.nan])

@@ -75,10 +75,10 @@ class MotionErrors:
         return _median(self.rate**2, self.weights), _median(self.axis_rad**2, self.weights)
 
     def expanded(self, fixed: Array, of_rate: Array, of_axis: Array) -> Array:
-        """Return the expanded uncertainty U (q,) of values at 95.45 %.
+        """Return the expanded uncertainty U (q,) of values at 95.45 %, over all sizes of the motion errors.
 
-        For given motion errors the values are normal. `fixed` (q,) are the variances that do not depend on the motion
-        errors' sizes, `of_rate` and `of_axis` (q,) those per squared size.
+        For given sizes the values have a normal distribution. `fixed` (q,) are the variances that do not depend on the
+        sizes, `of_rate` and `of_axis` (q,) those per squared size.
         """
         from scipy.special import ndtr
 

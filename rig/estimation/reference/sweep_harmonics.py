@@ -99,7 +99,7 @@ def first_harmonic(
 
 
 def evenly_turning(speed_rad_s: float) -> Array:
-    """Return `FirstHarmonic.turning_rad2_s2` (6, 3) of a joint at constant speed."""
+    """Return the motion terms (6, 3), `FirstHarmonic.turning_rad2_s2`, of a joint at constant speed."""
     turning = np.zeros((6, 3))
     turning[0, 0] = speed_rad_s**2
     return turning

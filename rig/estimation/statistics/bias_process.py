@@ -126,9 +126,9 @@ def average_walks(sizes: Array, likelihood: Array) -> Array:
     """Return the root-mean-square posterior sizes (2,) of (K, 2), with a uniform prior of the walk.
 
     The scatter has the prior of `average_posterior`. This is for parameters over a long time, such as slopes over
-    temperature: their uncertainty may come mostly from a walk that the averages hardly show. So the prior takes a walk
-    for certain and uniform (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean. Sizes
-    are on a geometric grid, so the prior of one is proportional to the step to the next.
+    temperature: their uncertainty may come mostly from a walk that the averages hardly show. So a walk is assumed to
+    exist, with a uniform prior (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the posterior mean.
+    Sizes are on a geometric grid, so the prior of one is proportional to the step to the next.
     """
     log_posterior = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
     weights = sizes[:, 0] * np.exp(log_posterior - log_posterior.max())

@@ -65,7 +65,7 @@ def refuse_anew(address: HistoryAddress) -> None:
 
 
 def refuse_another(address: HistoryAddress, connection: Connection) -> None:
-    """Raise Refused `history_exchanged` for a history that lacks its earlier entries; store its identity."""
+    """Raise Refused `history_exchanged` for a history that lacks its earlier entries, else store its identity."""
     identity, created_utc = _identities.get(address.where), _read_created_utc(connection)
     if identity is not None and (identity.created_utc != created_utc or not journal.has(connection, identity.head)):
         raise _history_exchanged(address.label)

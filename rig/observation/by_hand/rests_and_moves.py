@@ -83,7 +83,7 @@ class NotCounted:
         return shift_s + self.microsecond_s * begin_us, shift_s + self.microsecond_s * end_us
 
     def filter_session(self, session: HandRecording) -> HandRecording:
-        """Return the session without these rests: each becomes a pause of the move through it."""
+        """Return the session without these rests; the moves before and after each become one, with a pause."""
         rests, moves, through = list[HandRest](), list[Move](), list[Move]()
         for index, rest in enumerate(session.rests):
             if _middle_s(rest) < self.from_s:

@@ -97,5 +97,5 @@ def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
         if len(line) == LONGEST_LINE:
             raise UnfitFile(f"a line is longer than {LONGEST_LINE} characters")
         if most < 0:
-            raise UnfitFile("what is packed in it is too long")
+            raise UnfitFile("its unpacked content is too long")
         yield line

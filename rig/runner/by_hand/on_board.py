@@ -101,7 +101,7 @@ class FollowedSession:
         self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
 
     def _ask(self, wrong: Fault | None) -> None:
-        """Request the next move of the list, which begins again until the board has enough."""
+        """Request the next move of the list; after its last move the list begins again until the board has enough."""
         flips = self.moves
         while (remaining := still_open(WantedMoves(flips, 0), self._accepted, self._lay)).done:
             flips += len(ROUND)

@@ -241,7 +241,7 @@ def _are_in_lines(
 
 
 def _markers(keys: tuple[str, ...]) -> Mapping[bytes, bytes]:
-    """Return a marker of each key's length, longer keys first, because they may contain shorter ones."""
+    """Return for each key a marker of its length. Longer keys come first, as they may contain shorter ones."""
     by_length = sorted(enumerate(keys), key=lambda indexed_key: -len(indexed_key[1]))
     return MappingProxyType({key.encode(): bytes([_KEYS + index]) + b" " * (len(key) - 1) for index, key in by_length})
 

@@ -185,7 +185,7 @@ def test_an_interrupted_one_is_gone_on_with(history: History) -> None:
     parser = argparse.ArgumentParser()
     history_command.add(parser)
     options = parser.parse_args(["recompute"])
-    with pytest.raises(KeyboardInterrupt, match="goes on"):
+    with pytest.raises(KeyboardInterrupt, match="continues"):
         recompute_history(options, solve)
     assert recompute_history(options, solve) == 0
     asked.remove("interrupted")

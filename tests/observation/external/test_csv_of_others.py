@@ -93,5 +93,5 @@ def test_what_cannot_be_read_says_what_is_the_matter(tmp_path: Path, content: by
 def test_a_packed_file_is_as_long_as_what_it_holds(tmp_path: Path) -> None:
     packed = gzip.compress((PLAIN + "3,0,0,0\n" * 200_000).encode(), mtime=0)
     assert len(packed) < 10_000
-    with pytest.raises(Refused, match=r"no_file: .*what is packed in it is too long"):
+    with pytest.raises(Refused, match=r"no_file: .*its unpacked content is too long"):
         read_columns(written(tmp_path, packed), Header(tuple(HEAD)), 1)

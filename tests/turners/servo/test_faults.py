@@ -123,7 +123,7 @@ def test_a_falling_board_is_told_where_torque_is_gone() -> None:
             watch = act_at_speed(wire, lambda: wire.do("fault", "temperature_c", 85.0))
             servo.move(turn(servo.latest.q_rad[0], 300.0), watch)
         assert fault.value.name == "servo_overheated"
-        assert "no state shows that the shaft stands" in fault.value.what
+        assert "no state shows that the shaft is at rest" in fault.value.what
         assert "only the switch of its supply is sure" in fault.value.remedy
 
 

@@ -128,7 +128,7 @@ def test_ctrl_c_stops_the_shaft_and_the_last_line_says_how_it_was_left() -> None
             watch = act_at_speed(wire, lambda: signal.raise_signal(signal.SIGINT))
             servo.move(turn(servo.latest.q_rad[0], 300.0), watch)
         assert abs(wire.rate_rad_s) < STANDS_RAD_S
-        assert "the shaft stands" in interrupt.value.__notes__[0]
+        assert "the shaft is at rest" in interrupt.value.__notes__[0]
 
 
 @pytest.mark.slow
