@@ -148,7 +148,7 @@ def test_the_page_of_checks_is_made_of_the_table() -> None:
         ("u", "standard uncertainty, u: the uncertainty as one standard deviation"),
         ("k", "coverage factor, k = 2: the factor between u and U"),
         ("E_n", "Above 1 a single value has changed"),
-        ("scale factor", "the factor that makes a reading right"),
+        ("scale factor", "the factor that corrects a reading"),
         ("budget", "the list of everything that contributes"),
         ("Sweep", "one joint turning through one revolution"),
         ("revolution", "its mean rate is 2π/T"),
