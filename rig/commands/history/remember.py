@@ -142,7 +142,7 @@ def describe_changes(calibrations: Sequence[CalibrationComparison]) -> tuple[str
         before = ", ".join(str(pair.before.id) for pair in same)
         whose = " of the other sensors" if changed else ""
         count = sum(len(pair.changes) for pair in same)
-        lines.append(f"no change of {count} values since the last calibration{whose} (no. {before})")
+        lines.append(f"none of {count} values changed since the last calibration{whose} (no. {before})")
     return tuple(lines)
 
 

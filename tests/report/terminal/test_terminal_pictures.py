@@ -31,7 +31,7 @@ STATUS = {"pass": 0, "fail": 0, "stopped": 3, "refused": 2}
 
 def verdict(result: ResultDocument) -> Callable[[], int]:
     def command() -> int:
-        print_kept(RUN, result, ["no change of 19 values since the last calibration (no. 7)"])
+        print_kept(RUN, result, ["none of 19 values changed since the last calibration (no. 7)"])
         return 0
 
     return command
