@@ -30,7 +30,7 @@ EARTH_PRECISION = 3 / EARTH_RATE_RAD_S**2  # its norm is known, its direction is
 INTERVALS = 6  # of a recording, over which a bias is alike
 FIELD, VISIT = "error with attitude", "error with attitude, of each visit"
 NEW_AT_REST, NEW_IN_MOTION = "error of each rest", "error of each fix in motion"
-JITTER = "jitter of the stamps"
+JITTER, LOSSES = "jitter of the stamps", "times between the readings"
 MATRIX_CHANGES, BIAS_CHANGES, WALK = "changes of F", "changes of b", "random walk"
 SCALES = {  # medians of the half-Cauchy priors: rad, s, 1, rad/s, rad/√s
     FIELD: 5e-3,
@@ -38,11 +38,13 @@ SCALES = {  # medians of the half-Cauchy priors: rad, s, 1, rad/s, rad/√s
     NEW_AT_REST: 1e-3,
     NEW_IN_MOTION: 3e-3,
     JITTER: 3e-3,
+    LOSSES: 1e-3,
     MATRIX_CHANGES: 5e-4,
     BIAS_CHANGES: 5e-5,
     WALK: 3e-4,
 }
 REACH = 1.5  # rad: over which an error with attitude is alike
+FEWEST_S = 0.5  # of rests, whose mean is the bias
 VISIT_S = 5.0  # over which what an attitude does not tell of an arm is alike: its elbow, its load
 WANDER = 0.1  # of the variance of the jitter: that which a fix's samples have in common
 LOOKS_AT = np.array([0.0, 0.34, 0.67])  # of a fix's samples, at which its error with attitude is averaged
@@ -60,6 +62,8 @@ class Fixes:
     - `joined` (N − 1,): True if the gyroscope's readings are complete from one fix to the next.
     - `std_rad` (k,): the stated standard deviation of each sample, None if none is stated.
     - `blind_rad` (N − 1,): standard deviation of the rotation that missing readings hide, None if none are missing.
+    - `walk`: sum of squares in rad²/s, and dof, of the gyroscope's random walk at rest; zeros without rests.
+    - `on_arrival`: the readings' times are evened stamps of arrival, so that single lost readings are not noticed.
     """
 
     at_s: Array
@@ -69,6 +73,8 @@ class Fixes:
     joined: NDArray[np.bool_]
     std_rad: Array | None = None
     blind_rad: Array | None = None
+    walk: tuple[float, float] = (0.0, 0.0)
+    on_arrival: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +200,9 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
     errors = {
         **_list_errors(averaged, fixes, correlation, step),
         MATRIX_CHANGES: _find_matrix_changes(sensitivities, nearby),
-        BIAS_CHANGES: _find_bias_changes(sensitivities, nearby, between @ averaged.middles_s),
+        BIAS_CHANGES: _find_bias_changes(
+            sensitivities, nearby, between @ averaged.middles_s, _weigh_bias(averaged, fixes)
+        ),
         WALK: _expand_axes(step @ walk_covariance(averaged.windows_s) @ step.T),
     }
     causes = tuple(name for name in SCALES if name in errors and errors[name].any())
@@ -203,6 +211,7 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
         stated = float(np.median(fixes.std_rad[fixes.std_rad > 0]))
         scales = np.where(np.isin(causes, (NEW_AT_REST, NEW_IN_MOTION)), stated, scales)
     blind = np.zeros(increments) if fixes.blind_rad is None else fixes.blind_rad[joined]
+    alone = np.array([fixes.walk if cause == WALK else (0.0, 0.0) for cause in causes])
     mixed = Mixed(
         observed.reshape(-1),
         design.reshape(-1, COMMON),
@@ -210,12 +219,13 @@ def drift_model(averaged: FixedAttitudes, fixes: Fixes) -> DriftModel:
         np.array([errors[name] for name in causes]),
         precision,
         scales,
+        alone,
     )
     return DriftModel(mixed, causes)
 
 
 def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, step: Array) -> dict[str, Array]:
-    """Return the covariance (3n, 3n) of the increments by a unit error of each cause in the reference."""
+    """Return the covariances (3n, 3n) of the increments by unit errors of the reference and of the times, by cause."""
     count = len(fixes.placement)
     first = np.searchsorted(fixes.fix, np.arange(count))
     ratio = _relative(fixes)[first]
@@ -223,8 +233,13 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
     at_rest = fixes.placement < 0
     late = np.zeros((count, 3, 3))
     np.add.at(late, fixes.fix, averaged.rates[:, :, None] * averaged.rates[:, None, :])
-    late /= (np.bincount(fixes.fix).astype(np.float64) ** 2)[:, None, None]
-    apart = np.sqrt(3) * np.abs(averaged.middles_s[:, None] - averaged.middles_s) / VISIT_S
+    late /= np.bincount(fixes.fix).astype(np.float64)[:, None, None]
+    elapsed_s = (step @ averaged.middles_s)[:, None, None]
+    hastened = elapsed_s * np.tensordot(np.abs(step) / 2, late, 1)
+    late /= np.bincount(fixes.fix).astype(np.float64)[:, None, None]
+    _, rest = np.unique(fixes.placement, return_inverse=True)  # the error does not change while the body lies still
+    at_s = (np.bincount(rest, weights=averaged.middles_s) / np.bincount(rest))[rest]
+    apart = np.sqrt(3) * np.abs(at_s[:, None] - at_s) / VISIT_S
     together = averaged.turning[:, :, None] * averaged.turning[:, None, :]
     return {
         FIELD: _expand_axes(step @ correlation @ step.T),
@@ -232,6 +247,7 @@ def _list_errors(averaged: FixedAttitudes, fixes: Fixes, correlation: Array, ste
         NEW_AT_REST: _expand_axes(step @ (same * at_rest * at_rest[:, None]) @ step.T),
         NEW_IN_MOTION: _expand_axes(step @ (same * ~at_rest * ~at_rest[:, None]) @ step.T),
         JITTER: _combine_blocks(step, late + WANDER * together),
+        LOSSES: fixes.on_arrival * _combine_blocks(np.eye(len(step)), hastened),
     }
 
 
@@ -262,14 +278,30 @@ def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
     return np.asarray((flat @ flat.T) * np.kron(nearby, np.ones((3, 3))), dtype=np.float64)
 
 
-def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array) -> Array:
-    """Return the covariance (3n, 3n) of the increments if the bias b varies with attitude and time by one unit.
+def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
+    """Return the weights (n,) of the increments in the mean bias, that of the rests: their durations.
 
-    `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times.
+    A gyroscope's bias is its reading at rest. Without rests it is the mean over the whole recording.
+    """
+    joined = np.flatnonzero(fixes.joined)
+    lasts_s = np.diff(averaged.middles_s)[joined]
+    resting = fixes.placement[joined] == fixes.placement[joined + 1]
+    if lasts_s[resting].sum() >= FEWEST_S:
+        lasts_s = lasts_s * resting
+    return np.asarray(lasts_s / lasts_s.sum(), dtype=np.float64)
+
+
+def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, weights: Array) -> Array:
+    """Return the covariance (3n, 3n) of the increments by unit changes of b with attitude and time.
+
+    `nearby` (n, n) is the correlation by attitude, `middles_s` (n,) are the increments' middle times. b is their mean
+    with `weights` (n,), and changes count from this mean: its distance from the mean of all recordings is no error.
     """
     apart = np.abs(middles_s[:, None] - middles_s) / (np.ptp(middles_s) / INTERVALS + 1e-9)
+    from_mean = np.eye(len(weights)) - weights
+    changes = from_mean @ (nearby + np.exp(-apart)) @ from_mean.T / 2
     flat = sensitivities[..., BIAS].reshape(-1, 3)
-    return np.asarray((flat @ flat.T) * np.kron((nearby + np.exp(-apart)) / 2, np.ones((3, 3))), dtype=np.float64)
+    return np.asarray((flat @ flat.T) * np.kron(changes, np.ones((3, 3))), dtype=np.float64)
 
 
 def _expand_axes(covariance: Array) -> Array:

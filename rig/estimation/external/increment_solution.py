@@ -26,6 +26,7 @@ from rig.estimation.external.attitude_drift import (
     EARTH_PRECISION,
     FIELD,
     JITTER,
+    LOSSES,
     MATRIX,
     MATRIX_CHANGES,
     MATRIX_PRECISION,
@@ -270,7 +271,7 @@ def _build_result(settled: _Settled, aside_s: Array) -> KnownIncrements:
 
 OF_CAUSES = {
     ATTITUDES: (FIELD, VISIT, NEW_AT_REST, NEW_IN_MOTION),
-    DELAY: (JITTER,),
+    DELAY: (JITTER, LOSSES),
     STRETCHES: (MATRIX_CHANGES, BIAS_CHANGES),
     NOISE: (WALK,),
 }

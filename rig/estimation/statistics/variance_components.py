@@ -28,6 +28,7 @@ LEAST_CURVATURE = 0.1  # of the negative log-posterior over (ln σ)²: the prior
 TOLERANCE, MOST_STEPS = 1e-2, 100  # of the log-posterior's gradient; Newton steps
 LONGEST_STEP = 4.0  # of ln σ
 BEYOND, APART = 3.5, 2.0  # of ln σ: one cause exceeds its prior's median, all others fall below theirs
+FEW = 240  # residuals: more of them have one maximum
 FIRST_STEPS, CLIMBED = 6, 2  # Newton steps from each of these points, and the number that is climbed to the end
 UNLIKELY = 1e30  # negative log-posterior of what cannot be computed
 
@@ -37,7 +38,8 @@ class Mixed:
     """`observed` (m,), `design` (m, p), C₀ `fixed` (m, m) and A_k `components` (k, m, m).
 
     `precision` (p,): the prior precision of each column's coefficient, 0 if none. `scales` (k,): the medians of the
-    half-Cauchy priors of σ.
+    half-Cauchy priors of σ. `alone` (k, 2): sum of squares and dof of residuals that one cause alone makes, measured
+    apart from y; 0 if there are none.
     """
 
     observed: Array
@@ -46,6 +48,7 @@ class Mixed:
     components: Array
     precision: Array
     scales: Array
+    alone: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +90,8 @@ class MixedModel:
         if start is not None:
             return np.asarray(np.exp(self._climb(np.log(start)).x), dtype=np.float64)
         middle = np.log(self.mixed.scales)
+        if len(self.mixed.observed) > FEW:
+            return np.asarray(np.exp(self._climb(middle).x), dtype=np.float64)
         begun = [self._climb(middle - APART + step, FIRST_STEPS) for step in (BEYOND + APART) * np.eye(len(middle))]
         begun.sort(key=lambda optimum: float(optimum.fun))
         optima = [self._climb(point) for point in (middle, *(optimum.x for optimum in begun[:CLIMBED]))]
@@ -162,9 +167,11 @@ class MixedModel:
         return lower, design, observed, information, -0.5 * (determinant + square)
 
     def _log_prior(self, logarithms: Array) -> float:
-        """Return the log-density of ln σ for half-Cauchy σ, up to a constant."""
+        """Return the log-density of ln σ for half-Cauchy σ and the squares measured alone, but for a constant."""
         relative = logarithms - np.log(self.mixed.scales)
-        return float(np.sum(relative - np.logaddexp(0, 2 * relative)))
+        squares, dof = self.mixed.alone.T
+        measured = dof * logarithms + squares / 2 * np.exp(-2 * logarithms)
+        return float(np.sum(relative - np.logaddexp(0, 2 * relative) - measured))
 
     def _evaluate(self, logarithms: Array) -> tuple[float, Array, Array]:
         """Return the negative log-posterior of ln σ (k,), its gradient and its average information (k, k)."""
@@ -184,8 +191,9 @@ class MixedModel:
         squares = np.exp(2 * logarithms)
         shape = np.tanh(logarithms - np.log(self.mixed.scales))
         parts = squares[:, None] * (self.mixed.components @ innovation)
-        gradient = squares * (self._flat @ projected.ravel()) - parts @ innovation + shape
-        curvature = 2 * parts @ projected @ parts.T + np.diag(1 - shape**2)
+        alone, dof = self.mixed.alone.T
+        gradient = squares * (self._flat @ projected.ravel()) - parts @ innovation + shape + dof - alone / squares
+        curvature = 2 * parts @ projected @ parts.T + np.diag(1 - shape**2 + 2 * alone / squares)
         evaluated = (-likelihood - self._log_prior(logarithms), gradient, curvature)
         self._last = (logarithms.copy(), evaluated)
         return evaluated

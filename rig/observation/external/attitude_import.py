@@ -136,6 +136,7 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     `find_clock` those of `find_reference_clock`.
     """
     time_s, readings = samples.time_s, samples.readings
+    on_arrival = samples.sampling is not None and samples.sampling.on_arrival
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
     windows = _windows(table)
     all_rows = rows_found = _ReferenceRows(
@@ -165,7 +166,9 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     return PlacedReadings(
         tuple(readings),
         None if rate is None else _rows(time_s, rate, whole),
-        None if rate is None else Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad),
+        None
+        if rate is None
+        else Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad, on_arrival),
         None if set(readings) == {RATE} else or_fault(find),  # a gyroscope needs none
         clock,
         tuple(_list_omitted(all_rows, covered, "not covered by the recording")),

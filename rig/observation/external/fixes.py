@@ -30,6 +30,7 @@ GAP = 2  # missing readings: a cubic through the others bridges one
 MAX_STEP_RAD = 0.35  # between two readings: up to here a cubic through rates is right to microradians
 CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the end of an axis' readings; least range of these
 MOST_HIDDEN_RAD, UNKNOWN_RAD = 0.05, 10.0  # std of a rotation that is no increment any more; of one that nothing tells
+BATCH_S = 0.1  # of readings at rest: colour over a few samples averages out
 FEWEST = 6  # increments in which the body moves: 18 numbers for 12 parameters
 THIN = 0.25  # of a fix's usual number of rows
 
@@ -72,13 +73,16 @@ def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0
     if len(turning.rows_s) < 2:
         raise _too_few(f"{len(turning.rows_s)} attitudes lie within the recording")
     length_s = window_s or _suitable_s(float(turning.rows_s[-1, 1] - turning.rows_s[0, 0]))
-    fixes = _drop_thin(_fixes(*join_rests(turning, clock_s), length_s))
+    rows, still = join_rests(turning, clock_s)
+    fixes = _drop_thin(_fixes(rows, still, length_s))
     joined, blind_rad, left_out = _find_joined(turning, fixes, clock_s)
     moving = fixes.placement[1:] != fixes.placement[:-1]
     moving_count = int((joined & moving).sum())
     if moving_count < FEWEST or moving_count < int((~joined & moving).sum()):
         raise _all_lost(moving_count, int(moving.sum()), left_out)
-    return Gathered(replace(fixes, joined=joined, blind_rad=blind_rad), length_s, left_out)
+    walk = _measure_walk(turning, rows.rows_s[still] + clock_s)
+    fixes = replace(fixes, joined=joined, blind_rad=blind_rad, walk=walk, on_arrival=turning.on_arrival)
+    return Gathered(fixes, length_s, left_out)
 
 
 def _suitable_s(span_s: float) -> float:
@@ -106,6 +110,24 @@ def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes
     std_rad = None if turning.std_rad is None else turning.std_rad[row]
     joined = np.ones(len(keys) - 1, dtype=np.bool_)
     return Fixes(at_s, turning.attitudes[row], fix.reshape(-1), placement, joined, std_rad)
+
+
+def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
+    """Return the sum of squares in rad²/s, and its dof, of the random walk in rests (k, 2) by means of `BATCH_S`.
+
+    Batch means: the readings' noise may be coloured over a few samples.
+    """
+    squares, dof = 0.0, 0.0
+    for start_s, end_s in rests_s.tolist():
+        first, last = np.searchsorted(turning.time_s, [start_s, end_s])
+        size = max(int(np.ceil(BATCH_S * (last - first) / (end_s - start_s))), 1)
+        count = int(last - first) // size
+        if count > 1:
+            batches = turning.readings_rad_s[first : first + count * size].reshape(count, size, 3).mean(axis=1)
+            lasts_s = (end_s - start_s) * size / (last - first)
+            squares += float(np.var(batches, axis=0).sum()) * count * lasts_s
+            dof += 3.0 * (count - 1)
+    return squares, dof
 
 
 def _drop_thin(fixes: Fixes) -> Fixes:

@@ -58,7 +58,7 @@ def test_uncertainties_are_those_of_two_hundred_arm_logs() -> None:
     for quantity in (off[:, :3], off[:, 3:]):
         rms, within = float(np.sqrt(np.mean(quantity**2))), float(np.mean(np.abs(quantity) < 2))
         print(f"RMS of error / u {rms:.2f}, {100 * within:.1f} % within U, worst {np.abs(quantity).max() / 2:.2f} U")
-        assert 0.7 < rms < 1.2 and within > 0.93 and np.abs(quantity).max() < 5
+        assert 0.75 < rms < 1.2 and 0.93 < within < 0.99 and np.abs(quantity).max() < 5
 
 
 def test_rests_in_a_dense_stream_tell_the_bias() -> None:
@@ -66,6 +66,26 @@ def test_rests_in_a_dense_stream_tell_the_bias() -> None:
     found = solved(recorded)
     _, std = errors(found, recorded)
     assert (2 * std[3:] < 5e-4).all()
+
+
+def test_a_bias_is_that_of_the_rests() -> None:
+    recorded = record(CLEAR, 1)
+    moves = np.linalg.norm(recorded.readings - np.median(recorded.readings, axis=0), axis=1) > 0.1
+    apart = replace(recorded, readings=recorded.readings + 2e-3 * moves[:, None])  # as a nonlinear sensor's
+    error, std = errors(solved(apart), recorded)
+    assert (np.abs(error[3:]) < np.maximum(5 * std[3:], 3e-4)).all()
+
+
+def test_readings_lost_behind_stamps_of_arrival_widen_the_scale() -> None:
+    recorded = record(CLEAR, 1)
+    moves = np.flatnonzero(np.linalg.norm(recorded.readings, axis=1) > 1.0)
+    lost = moves[[len(moves) // 5, len(moves) // 2]]
+    readings = np.delete(recorded.readings, lost, axis=0)
+    time_s = np.linspace(recorded.time_s[0], recorded.time_s[-1], len(readings))
+    spoilt = replace(recorded, time_s=time_s, readings=readings)
+    found = solve_turning(replace(turning(spoilt), on_arrival=True), None, any_mounting=False)
+    error, std = errors(found, recorded)
+    assert (np.abs(error[:3]) < 5 * std[:3]).all()
 
 
 def test_a_latency_of_a_tenth_of_a_second_is_found_by_the_increments() -> None:
