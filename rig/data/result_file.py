@@ -51,7 +51,7 @@ SIZE_MAX_BYTES = 16_000_000  # a run of six sweeps with its verification has 66,
 
 def _check_quantity(quantity: str) -> str:
     if quantity not in quantities():
-        raise ValueError(f"is not a quantity of the rig or of a package installed here:  {', '.join(quantities())}")
+        raise ValueError(f"is not a quantity of the rig or of a package installed here: {', '.join(quantities())}")
     return quantity
 
 

@@ -145,7 +145,7 @@ def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
         over_s = steps_s[backward_steps] + period_s
         if ((over_s >= 0) & (over_s <= LONGEST_STEP * period_s)).all() and np.ptp(log.stamps_s) <= period_s:
             stamps_s = unwrap_counter(log.stamps_s, period_s)
-            reason = f"their counter begins anew after {period_s:.10g} s, which are added"
+            reason = f"their counter restarts after {period_s:.10g} s, which are added"
             return log.restamp(stamps_s, stamps_s > log.stamps_s, reason)
     return log
 

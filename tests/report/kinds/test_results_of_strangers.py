@@ -49,7 +49,7 @@ def test_what_texts_hide_is_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.
     [
         ("verified", lambda d: d["provenance"].update(started_utc="never"), "provenance.started_utc: "),
         ("resumed", lambda d: d["provenance"].update(resumed_utc=["x"]), "provenance.resumed_utc.0: "),
-        ("bias_drift", lambda d: d["bias_drift"].update(gyro={"x": d["bias_drift"]["gyro"]["rate"]}), "no quantity"),
+        ("bias_drift", lambda d: d["bias_drift"].update(gyro={"x": d["bias_drift"]["gyro"]["rate"]}), "not a quantity"),
         (
             "six_observation",
             lambda d: d["gyroscopes"]["gyro"]["covariance"][4].__setitem__(4, -1),
