@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.config.files.regular_file import UnfitFile
+from rig.data.processes.forked_reader import load_hdf5
 from rig.data.version import VERSION
 from rig.errors import RigError
 from rig.history.entered.finished_run import EnteredRecording, recording_of
@@ -78,6 +79,7 @@ def _solve(folder: Path, task: Task) -> Answer:
     from rig.report.document import document_of
     from rig.report.kinds.kind_registry import followed
 
+    load_hdf5()  # once, for the processes that read all the recordings
     try:
         recorded = open_run(folder, only=[recording.name for recording in task.recordings])
     except (RigError, OSError) as error:

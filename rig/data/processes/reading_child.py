@@ -1,4 +1,6 @@
-"""The process that reads one file: `python -m rig.data.processes.reading_child`, with a request as JSON on stdin.
+"""The process that reads one file: `python -m rig.data.processes.reading_child`, or a forked one.
+
+The former takes its request as JSON from stdin.
 
 Writes the parts that the reader yields to stdout, for `rig.data.processes.reading_process`: a line of JSON for a dict,
 an array in NumPy's format. A failure ends in one line on stderr and a `Status`.
@@ -17,14 +19,17 @@ from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 
-from rig.data.processes.reading_process import Part, Status
+from rig.data.processes.reading_parts import Part, Status
 from rig.errors import Refused
 
 _SIGNAL_AT_PARENTS_DEATH = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
-def _main() -> NoReturn:
-    request = json.load(sys.stdin)
+def read_and_end(request: Mapping[str, Any]) -> NoReturn:
+    """Read a file, write its parts to stdout, and end this process.
+
+    `request` is that of `rig.data.processes.reading_process.ReadingTask`.
+    """
     limits: Mapping[str, Any] = request["limits"]
     _end_with_parent()
     written_bytes = _limit(limits)
@@ -102,10 +107,9 @@ def _lower(what: int, limit: int) -> int:
 
 def _exit_at_once(status: Status, why: str = "") -> NoReturn:
     """Exit without closing files, because HDF5 may fail to close a file that it failed to open."""
-    sys.stderr.write(why + "\n" if why else "")
-    sys.stderr.flush()
+    os.write(2, f"{why}\n".encode(errors="replace") if why else b"")
     os._exit(status)
 
 
 if __name__ == "__main__":
-    _main()
+    read_and_end(json.load(sys.stdin))

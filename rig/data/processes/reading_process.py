@@ -14,21 +14,21 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
-from enum import IntEnum
 from itertools import islice
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, BinaryIO, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
+from rig.data.processes.forked_reader import HDF5_PLUGINS, ForkedReader, measure_address_space, can_fork
 from rig.data.processes.process_silence import Silence
+from rig.data.processes.reading_parts import Part, Status
 from rig.errors import Refused
 from rig.errors.quoting import printable
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    pass
 
-Part: TypeAlias = "dict[str, Any] | NDArray[Any]"
 Reader = Callable[..., Iterator[Part]]
 
 MOST_FILES = 10_000  # in a folder: a bag is split into one for every minute or gigabyte
@@ -40,21 +40,10 @@ IDLE_TIMES_PROCESSOR = 1.5  # duration in all, on an otherwise idle processor, o
 TICK_S, GONE_S = 0.1, 1.0
 SPARED = 6  # factor on that, at most, if the reading process gets no processor
 # A foreign file must load no plugin of HDF5; and threads for linear algebra would reserve gigabytes of memory.
-ENVIRONMENT = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")} | {"HDF5_PLUGIN_PRELOAD": "::"}
+ENVIRONMENT = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")} | HDF5_PLUGINS
 COMPLAINT_BYTES = 65_536
 LONGEST_REASON = 300  # characters
 OUT_OF_TIME = getattr(signal, "SIGXCPU", None)  # which the system sends to a process that has used up its time
-
-
-class Status(IntEnum):
-    """The exit status of a reading process."""
-
-    READ = 0
-    UNREADABLE = 1
-    NO_ROOM = 2
-    REFUSED = 3
-    NO_MEMORY = 4
-    TOO_LONG = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,21 +131,19 @@ class ReadingTask:
 
     def __init__(self, reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> None:
         request = {"reader": reader, "path": str(path), "arguments": arguments, "limits": asdict(limits)}
-        # Not from the working folder, where any file could pass for a module, but by this process' own search path.
-        command = [sys.executable, "-P", "-m", "rig.data.processes.reading_child"]
         self._path, self._limits = path, limits
         with ExitStack() as stack:
             try:
-                request_file, self._out = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
+                spare, self._out = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
                 room = stack.enter_context(tempfile.TemporaryDirectory(prefix="rig-reads-", ignore_cleanup_errors=True))
-                request_file.write(json.dumps(request).encode())
-                request_file.seek(0)
+                if not (forking := can_fork()):
+                    spare.write(json.dumps(request).encode())
+                    spare.seek(0)
             except OSError as error:
                 raise _no_room(path, str(error)) from error
-            environment = {**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-            environment |= dict.fromkeys(("TMPDIR", "SQLITE_TMPDIR"), room)
-            self._process = subprocess.Popen(
-                command, stdin=request_file, stdout=self._out, stderr=subprocess.PIPE, env=environment
+            environment = ENVIRONMENT | dict.fromkeys(("TMPDIR", "SQLITE_TMPDIR"), room)
+            self._process = (
+                _fork(request, self._out, spare, environment) if forking else _start(spare, self._out, environment)
             )
             stack.callback(_kill, self._process)
             self._ending = stack.pop_all()
@@ -183,9 +170,30 @@ class ReadingTask:
             _kill(self._process)
         if self._process.returncode == Status.NO_ROOM:
             raise _no_room(self._path, complaint.decode(errors="replace").strip())
+        assert self._process.returncode is not None, "it has ended"
         _raise_failure(self._process.returncode, complaint, self._limits)
         self._out.seek(0)
         return list(_parts(self._out))
+
+
+def _start(request: BinaryIO, out: BinaryIO, environment: Mapping[str, str]) -> "subprocess.Popen[bytes]":
+    """Return a new process that reads."""
+    # Not from the working folder, where any file could pass for a module, but by this process' own search path.
+    command = [sys.executable, "-P", "-m", "rig.data.processes.reading_child"]
+    environment = {**os.environ, **environment, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    return subprocess.Popen(command, stdin=request, stdout=out, stderr=subprocess.PIPE, env=environment)
+
+
+def _fork(
+    request: Mapping[str, Any], out: BinaryIO, complaints: BinaryIO, environment: Mapping[str, str]
+) -> ForkedReader:
+    """Return a process forked from this one that reads."""
+    from rig.data.processes.reading_child import read_and_end
+
+    limits = request["limits"]
+    own_bytes = limits["memory_bytes"] + measure_address_space()
+    request = {**request, "limits": {**limits, "memory_bytes": own_bytes}}
+    return ForkedReader(lambda: read_and_end(request), out, complaints, environment)
 
 
 def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> list[Part]:
@@ -194,7 +202,7 @@ def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: Re
         return reading.parts()
 
 
-def _wait_for(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
+def _wait_for(reading: "subprocess.Popen[bytes] | ForkedReader", idle_s: float) -> bytes:
     """Return the process' output on stderr, once it has ended.
 
     Raise TimeoutError. A hanging library may sleep, which uses no processor time, so sleep counts too; waiting for a
@@ -209,7 +217,7 @@ def _wait_for(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
     raise TimeoutError
 
 
-def _kill(reading: "subprocess.Popen[bytes]") -> None:
+def _kill(reading: "subprocess.Popen[bytes] | ForkedReader") -> None:
     """Kill the process, and wait a limited time for its end, because a dead disk may delay that."""
     reading.kill()
     with suppress(subprocess.TimeoutExpired):

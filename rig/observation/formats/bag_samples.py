@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from rig.data.processes.reading_process import Part
+from rig.data.processes.reading_parts import Part
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.recording.motion_file import QUATERNION, TIME
 from rig.errors import Refused

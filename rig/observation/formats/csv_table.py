@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.column_map import TIMES
-from rig.data.processes.reading_process import Part
+from rig.data.processes.reading_parts import Part
 from rig.data.recording.motion_file import LARGEST_NUMBER, TIME, Header
 from rig.errors import Refused
 from rig.errors.quoting import quote

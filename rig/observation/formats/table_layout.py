@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.config.column_map import ALLOWED
 from rig.config.units import TIME, UNITS
-from rig.data.processes.reading_process import Part
+from rig.data.processes.reading_parts import Part
 from rig.data.recording.motion_file import LARGEST_NUMBER
 from rig.errors import Refused
 from rig.observation.formats.csv_cells import is_number, is_value, seconds_of, unit_of

@@ -8,7 +8,8 @@ from typing import Any, cast
 import numpy as np
 
 from rig.config.files.regular_file import UnfitFile
-from rig.data.processes.reading_process import CostlyFile, Part, UnreadableFile, limits_for, read_apart, stored_bytes
+from rig.data.processes.reading_parts import Part
+from rig.data.processes.reading_process import CostlyFile, UnreadableFile, limits_for, read_apart, stored_bytes
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 

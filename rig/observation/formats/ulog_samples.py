@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.data.processes.reading_process import Part
+from rig.data.processes.reading_parts import Part
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.motion_file import TIME
 from rig.errors import Refused

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.data.processes.reading_process import Part
+from rig.data.processes.reading_parts import Part
 
 ZEROS = np.zeros(1_000_000)
 

@@ -1,0 +1,20 @@
+"""What a reading process tells: the parts of a file, and how it ended."""
+
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Part: TypeAlias = "dict[str, Any] | NDArray[Any]"
+
+
+class Status(IntEnum):
+    """The exit status of a reading process."""
+
+    READ = 0
+    UNREADABLE = 1
+    NO_ROOM = 2
+    REFUSED = 3
+    NO_MEMORY = 4
+    TOO_LONG = 5
