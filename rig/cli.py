@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 if "numpy" not in sys.modules:
     for _library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+# No package that extends pydantic changes the rig: to look for one in all that is installed takes 10 ms.
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 # Imported modules live as long as the process: to search them for garbage takes a tenth of a short command, which makes
 # 150,000 containers at most.

@@ -31,7 +31,7 @@ from rig.config.procedures.procedure_sections import (
 )
 from rig.config.procedures.servo_procedure import ServoSixObservationSection
 from rig.config.procedures.servo_section import ServoSection
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault, Refused
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
 from rig.motion.turner_state import Joints

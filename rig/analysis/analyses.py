@@ -12,7 +12,7 @@ from rig.analysis.numeric_errors import solvable
 from rig.analysis.outcome import Outcome
 
 if TYPE_CHECKING:
-    from rig.data.recording.run_file import RunData
+    from rig.data.recording.run_data import RunData
 
 
 @solvable()

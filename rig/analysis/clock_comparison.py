@@ -10,7 +10,6 @@ from itertools import combinations
 
 import numpy as np
 
-from rig.data.recording.provenance import calls_itself_simulated
 from rig.data.recording.settings import Uncertainty
 from rig.observation.consistency.arm_clock import compare_with_computer
 from rig.observation.observed_run import ObservedRun
@@ -94,6 +93,8 @@ class ClockCheck:
 
 def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
     """Return the error of the clock of one recording's controller, by every other clock."""
+    from rig.data.recording.provenance import calls_itself_simulated  # with a tenth of a plan's imports
+
     compared = (_compare_to_computer(recording, uncertainty), _compare_to_crystal(recording, uncertainty))
     pace = ONE_PACE if calls_itself_simulated(recording.run.provenance.arm_software) else np.inf
     far = {BY_COMPUTER: pace, BY_CRYSTAL: np.inf}

@@ -21,7 +21,7 @@ from rig.analysis.outcome import Outcome, origin_of
 from rig.analysis.verdict import acceleration_checks, clock_checks, drift_checks, judge, verification_checks
 from rig.config.judging.judging_keys import DecisionRule
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import Fault
 from rig.errors.attempts import Attempts

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rig.analysis.temperature.bias_drift import Drifts
     from rig.analysis.temperature.over_temperature import Polynomials
     from rig.data.recording.provenance import Provenance
-    from rig.data.recording.run_file import RunData
+    from rig.data.recording.run_data import RunData
     from rig.data.recording.settings import RunSettings
     from rig.data.result_file import StoredCalibrationEntry
     from rig.observation.observed_run import ObservedRun

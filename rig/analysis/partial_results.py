@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.analysis.gyroscope.calibration import solve_vector
 from rig.data.quantity import ACCELERATION, FIELD, RATE
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, all_failed, attempt_each
 from rig.estimation.arrays import Array

@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE, Quantity, Scalar
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.notebook.frames import frame

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.observation.average import Average, Stream, between, build_average
 from rig.observation.motion.arm_motion import ArmMotion

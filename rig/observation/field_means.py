@@ -7,7 +7,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rig.data.quantity import FIELD
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array

@@ -1,6 +1,6 @@
 """The sweeps and dwells that a recording holds from start to end, and their times. Pure."""
 
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.observation.windows import dwelt, swept
 
 

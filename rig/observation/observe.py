@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.data.quantity import RATE, Quantity
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream, convert_stream

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rig.data.recording.recorded_events import BoardObserved
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Sweep

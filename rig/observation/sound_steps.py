@@ -3,7 +3,7 @@
 import numpy as np
 
 from rig.data.quantity import RATE
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.arm_rests import average_rests

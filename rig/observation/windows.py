@@ -15,7 +15,7 @@ from rig.data.recording.recorded_events import (
     SweepFinished,
     SweepStarted,
 )
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.motion.steps import Dwell, Sweep
 

@@ -16,7 +16,7 @@ from rig.data.recording.recorded_events import (
     SweepFinished,
     SweepStarted,
 )
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.result_file import ResultDocument
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep
 from rig.motion.turner_state import ARM_STATE_DTYPE, ArmState, JointState, State

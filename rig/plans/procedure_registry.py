@@ -16,7 +16,7 @@ from rig.analysis.estimator_names import DEFAULT_ESTIMATOR, Estimator
 from rig.analysis.outcome import Outcome
 from rig.config.models import ArmSection, ProcedureSection, TurnerSection
 from rig.config.procedures.procedure_sections import STOCK_SECTIONS
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Refused
 from rig.errors.installed import added
 from rig.motion.steps import Plan

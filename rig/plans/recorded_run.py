@@ -8,7 +8,8 @@ from types import MappingProxyType
 
 from rig.analysis.outcome import Outcome
 from rig.data.processes.reading_process import ReadingTask
-from rig.data.recording.run_file import RunData, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import read_run
 from rig.data.run_folder import SCRIPT, recordings
 from rig.errors import Refused
 from rig.plans.procedure_registry import AnyProcedure, installed

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from rig.analysis.design.candidate_search import ReachedUncertainty, TargetUncertainty
 from rig.analysis.design.reached_uncertainty import assess_reached
-from rig.data.recording.run_file import RunData, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import read_run
 from rig.errors import RigError
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, Sweep, Transfer
 from rig.motion.turner_state import Joints

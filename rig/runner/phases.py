@@ -16,7 +16,8 @@ from rig.analysis.outcome import Outcome
 from rig.board.flash_store import store_calibrations
 from rig.config.load import Loaded
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
-from rig.data.recording.run_file import RunData, make_plain, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import make_plain, read_run
 from rig.data.recording.settings import RunSettings, settings_of
 from rig.data.run_folder import next_recording, recordings, resuming
 from rig.errors import Fault, ProblemError, Refused

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from rig.analysis.consistency.contradictions import disturbed_sweeps
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import Refused
 from rig.observation.onboard_window import find_averaged_sweeps

@@ -8,7 +8,7 @@ import pytest
 
 from rig.analysis.rest_noise import AtRest, at_rest, log_at_rest
 from rig.data.quantity import RATE
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.allan import AllanReading

@@ -10,7 +10,7 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
 from rig.analysis.clock_comparison import check_clock
 from rig.analysis.verdict import clock_checks
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.observation.consistency.arm_clock import find_encoder_noise_rad, state_jitter
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.timebase import NOMINAL_DRIFT

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from rig.analysis.analyses import calibrate, verify_calibration, verify_stored_calibrations
-from rig.data.recording.run_file import RunData, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import read_run
 from rig.errors import Fault, Refused
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import observe_sensor

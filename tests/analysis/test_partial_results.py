@@ -7,7 +7,7 @@ import pytest
 
 from rig.analysis.partial_results import so_far
 from rig.data.recording.recorded_events import SweepFinished
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors.attempts import Attempts
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.observation.average import synchronize_stream

@@ -7,7 +7,8 @@ import h5py
 import pytest
 
 from rig.analysis.analyses import calibrate
-from rig.data.recording.run_file import RunData, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import read_run
 from support.paths import RECORDINGS
 
 RECORDING = RECORDINGS / "six_observation" / "run.h5"

@@ -9,7 +9,7 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.outcome import Outcome
 from rig.analysis.temperature.over_temperature import correct_recordings
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import settings_from_json
 from rig.observation.observed_run import observe_runs
 from rig.observation.windows import Window

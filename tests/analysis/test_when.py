@@ -14,7 +14,7 @@ from rig.analysis.measurement_conditions import of_gyroscope
 from rig.data.quantity import TEMPERATURE
 from rig.data.recording.channel import stated_temperature_channel
 from rig.data.recording.recorded_sensor import RecordedSensor, sensor_of
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.motion.geometry import NOMINAL
 from rig.plans.recorded_run import open_run
 from rig.report.certificate.content import certificate_of

@@ -15,11 +15,11 @@ from support.paths import DEMO, RECORDINGS
 
 # What takes long to load: the recordings' library, the solver's, the arm's client, plots, the page's server.
 SLOW = ("h5py", "scipy", "rtde_control", "rtde_receive", "rtde_io", "matplotlib", "uvicorn", "distributed", "joblib")
-COMMAND = f"""
+COMMAND = """
 import json, sys
 
 def loaded():
-    return sorted(name for name in {SLOW} if name in sys.modules)
+    return sorted(name for name in json.loads(sys.argv[1]) if name in sys.modules)
 
 class Told:
     encoding, first = "utf-8", None
@@ -32,14 +32,14 @@ class Told:
 told, there = Told(), sys.stdout
 sys.stdout = told
 from rig.cli import main
-status = main(sys.argv[1:])
+status = main(sys.argv[2:])
 print(json.dumps([status, told.first, loaded()]), file=there)
 """
 
 
-def loaded(*arguments: str | Path) -> tuple[list[str], list[str]]:
-    """Which of the slow libraries there are at the first line that a command prints, and when it has ended."""
-    command = [sys.executable, "-c", COMMAND, *map(str, arguments)]
+def loaded(*arguments: str | Path, among: tuple[str, ...] = SLOW) -> tuple[list[str], list[str]]:
+    """Which of the slow libraries, or other modules, there are at the first line of a command, and when it has ended."""
+    command = [sys.executable, "-c", COMMAND, json.dumps(among), *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, env=dict(os.environ), check=False)
     assert done.returncode == 0, done.stderr
     status, first, last = json.loads(done.stdout)
@@ -89,3 +89,12 @@ def test_the_process_that_the_arms_client_lives_in_waits_for_no_library_of_confi
     command = f"import rig.turners.ur.child.client_process, sys; print([n for n in {libraries} if n in sys.modules])"
     done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.slow
+def test_a_plan_reads_no_recording_and_a_result_is_shown_without_the_analysis() -> None:
+    unused = ("rig.data.recording.run_file", "rig.data.recording.provenance")
+    assert loaded("plan", DEMO, among=unused) == ([], [])
+    unused = ("rig.data.recording.run_file", "rig.analysis.judging", "rig.observation", "rig.data.recording.settings")
+    assert loaded("show", RECORDINGS / "six_observation", among=unused) == ([], [])
+    assert loaded("solve", RECORDINGS / "six_observation", among=("rig.analysis.external.attitudes",)) == ([], [])

@@ -14,7 +14,8 @@ from rich.live import Live
 from rig.data.quantity import FIELD, PRESSURE, RATE
 from rig.data.recording.channel import Channel, stamp_samples, triad_channel
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData, RunRecorder, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import RunRecorder, read_run
 from rig.errors import Refused
 from rig.motion.steps import Rest
 from rig.observation.observed_run import observe_run

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import RATE
 from rig.data.recording.recorded_events import Event, SweepFinished, SweepStarted
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.observation.onboard_window import revolution_on_the_board
 from rig.observation.windows import swept
 from support.recordings.synthetic_run import Setup, synthetic_run

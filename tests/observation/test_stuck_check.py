@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.observation.observed_run import observe_run
 from rig.observation.reference.dwell_acceleration import DwellReading

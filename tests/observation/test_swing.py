@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.gyroscope.calibration import observe_recordings
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.observation.oscillation import MAX_TRAVEL_AT_REST_RAD, remove_oscillation
 from support.recordings.synthetic_run import Setup, synthetic_run

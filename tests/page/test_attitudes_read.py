@@ -10,7 +10,8 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.partial_results import so_far
 from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.quantity import ACCELERATION
-from rig.data.recording.run_file import RunData, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import read_run
 from rig.data.result_file import ResultDocument, read_result
 from rig.page.about import About
 from rig.page.page_state import PageState

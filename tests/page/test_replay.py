@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.partial_results import so_far
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.page.about import About
 from rig.page.page_state import PageState

@@ -16,7 +16,7 @@ import pytest
 from rig.analysis.design.candidate_search import ReachedUncertainty, TargetUncertainty
 from rig.analysis.design.reached_uncertainty import assess_reached
 from rig.config.load import parse
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.motion.steps import Motion, Plan, Sweep
 from rig.motion.turner_state import Joints
 from rig.plans.motions.six_sweeps import plan_six_observation

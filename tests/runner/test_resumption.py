@@ -12,7 +12,8 @@ from firmware_host.answers import BoardObservation
 from rig.analysis.analyses import calibrate
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.data.recording.recorded_events import BoardObserved, TimedEvent
-from rig.data.recording.run_file import RunData, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import read_run
 from rig.observation.windows import swept
 from rig.plans.script_file import ScriptFile, installed_script
 from rig.runner.resumption import resumption

@@ -6,7 +6,7 @@ from rig.analysis.by_hand.gyroscope import build_hand_result
 from rig.analysis.gyroscope.correction import diagonal_correction, matrix_correction
 from rig.analysis.outcome import Outcome, origin_of
 from rig.analysis.verdict import judge
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Refused
 from rig.estimation.by_hand import solve_by_hand
 from rig.observation.by_hand.rests_and_moves import collect_inputs, session_of

@@ -20,7 +20,7 @@ from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.analysis.gyroscope.segment_table import append_transfers, stack_segments
 from rig.analysis.numeric_errors import solvable
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import RigError
 from rig.estimation.gyroscope.vector_model import VectorSolution

@@ -7,7 +7,7 @@ from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.numeric_errors import solvable
 from rig.data.quantity import RATE
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 
 

@@ -7,7 +7,7 @@ from rig.analysis.external.external_recordings import check_external, solve_exte
 from rig.analysis.outcome import Outcome, origin_of
 from rig.data.quantity import RATE
 from rig.data.recording.motion_file import ReadElsewhere
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 
 
 def calibrate_external(runs: Sequence[RunData], external: ReadElsewhere, estimator: str) -> Outcome:

@@ -13,7 +13,7 @@ from rig.analysis.gyroscope.correction import Correction, CorrectionKind, diagon
 from rig.analysis.gyroscope.vector_inputs import collect_inputs, list_given, list_uncertainties
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault, Refused
 from rig.errors.attempts import attempt
 from rig.estimation.arrays import Array

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rig.analysis.check import Check, fitness
 from rig.data.quantity import RATE
 from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, OfTheBoard
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Accumulator

@@ -14,7 +14,7 @@ from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.analysis.gyroscope.vector_inputs import collect_inputs
 from rig.config.procedures.stage_section import rotation_by
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors.attempts import attempt_each
 from rig.estimation.arrays import Array

@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.analysis.gyroscope.alignment import LinearCalibration, RelativeRotation, collect_mean_rates, fit_rotation
 from rig.analysis.gyroscope.comparison import Comparison, Reference, compare, list_revolutions
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.finished_steps import finished_sweeps

@@ -15,7 +15,7 @@ from rig.station.plain_text import say, say_on_terminal
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.data.recording.run_file import RunData
+    from rig.data.recording.run_data import RunData
     from rig.report.exports.exported_corrections import ExportedCalibrations
 
 

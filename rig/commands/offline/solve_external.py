@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rig.analysis.outcome import Outcome
     from rig.commands.history.remember import CalibrationComparison
     from rig.data.recording.motion_file import Columns
-    from rig.data.recording.run_file import RunData
+    from rig.data.recording.run_data import RunData
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 

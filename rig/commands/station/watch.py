@@ -15,7 +15,7 @@ from rig.errors import Refused, raised_as
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.data.recording.run_file import RunData
+    from rig.data.recording.run_data import RunData
     from rig.data.result_file import ResultDocument
     from rig.page.about import About
     from rig.page.replay import Moment

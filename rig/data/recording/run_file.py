@@ -9,7 +9,7 @@ import json
 import os
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rig.config.section import SensorName
 from rig.data.processes.reading_process import ReadingTask, UnreadableFile
-from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
+from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.extract import reason
 from rig.data.recording.layout import Contents, append, check_rows, empty, lay_out, table_of
 from rig.data.recording.layout_keys import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES
@@ -29,6 +29,7 @@ from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_events import Event, TimedEvent, decode_events, encode_event
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner, check_joints
+from rig.data.recording.run_data import RunData
 from rig.data.recording.run_reading import begin_reading
 from rig.data.recording.settings import RunSettings, settings_from_json
 from rig.data.validation import LARGEST_NUMBER, parse_json, validate
@@ -38,33 +39,6 @@ from rig.motion.turner_state import State
 
 FLUSH_PERIOD_S = 0.25  # half of the promised time, so that a slow flush still keeps the promise
 LARGEST_STATE = 1e12  # of a turner's states, in SI units; times are among them
-
-
-@dataclass(frozen=True, slots=True)
-class RunData:
-    """A run file in memory: `samples` (n,) by name of a sensor, `states` (n,) of its turner, events in order.
-
-    `settings` are those for the judgement; `config` is the configuration's text, for people. External readings
-    (`elsewhere`) have no turner (None); their samples are those of a sensor on a clock of its own.
-    """
-
-    config: str
-    settings: RunSettings
-    provenance: Provenance
-    turner: RecordedTurner | None
-    sensors: dict[str, RecordedSensor]
-    samples: dict[str, NDArray[Any]]
-    states: NDArray[Any]
-    events: tuple[TimedEvent, ...]
-    external: ReadElsewhere | None = None
-
-    def measuring(self, quantity: Quantity | Scalar) -> dict[str, RecordedSensor]:
-        """Return the sensors whose samples hold that quantity, by name."""
-        return {name: sensor for name, sensor in self.sensors.items() if sensor.measures(quantity)}
-
-    def judged_by(self, overrides: Sequence[str]) -> "RunData":
-        """Return the recording under other settings: see `RunSettings.with_overrides`."""
-        return replace(self, settings=self.settings.with_overrides(overrides)) if overrides else self
 
 
 class RunRecorder:

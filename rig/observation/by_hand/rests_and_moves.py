@@ -12,7 +12,7 @@ from rig.data.recording.hand_events import HandBegunAnew, HandMoveRefused, HandR
 from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_events import Event
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import Refused
 from rig.estimation.arrays import Array, axis_of

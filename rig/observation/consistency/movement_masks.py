@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.observation.arm_rests import REST_SETTLING_S
 from rig.observation.windows import Window, rested, swept

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from rig.data.quantity import RATE
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import bound_rounding_variance

@@ -12,7 +12,7 @@ from rig.data.installed_kinds import quantities
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
 from rig.data.recording.motion_file import TIME, Columns, Item, MotionKind, ReadElsewhere
 from rig.data.recording.provenance import Provenance, provenance_of_files
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import Elsewhere, ObservationThresholds, RunSettings, Site
 from rig.errors import Refused
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2

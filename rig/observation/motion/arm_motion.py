@@ -1,13 +1,12 @@
 """The motion of a chain of joints as a function of time, from all the states that were recorded."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.recording.recorded_turner import RecordedTurner
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
@@ -28,6 +27,9 @@ from rig.observation.motion.reference_motion import MIN_RATE_RAD_S, check_span, 
 from rig.observation.motion.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
 from rig.observation.oscillation import FEWEST_OF_SWING, MAX_TRAVEL_AT_REST_RAD, remove_oscillation
 from rig.observation.windows import Window
+
+if TYPE_CHECKING:
+    from rig.data.recording.recorded_turner import RecordedTurner
 
 RATE_STEP_S = 0.008  # the difference of joint angles closer in time shows their encoders' noise more than a rate
 KNOT_S = 0.004  # between the knots of the rate: a ripple too fast for them would alias to a slower one
@@ -247,8 +249,8 @@ def _check_order(time_s: Array) -> None:
         )
 
 
-def turner_of(run: RunData) -> RecordedTurner:
-    """Return the turner of a recording. Raise Refused `recorded_elsewhere` for one made from files."""
+def turner_of(run: RunData) -> "RecordedTurner":
+    """Return the turner of a recording. Raise Refused `recorded_elsewhere` for one from files, which has none."""
     if run.turner is None:
         raise Refused(
             "recorded_elsewhere",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds, Site
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each

@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recording.motion_file import MotionKind
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average

@@ -19,7 +19,7 @@ from firmware_host.protocol import METHODS
 from rig.data.recording.recorded_events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each

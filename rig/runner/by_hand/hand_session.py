@@ -23,7 +23,7 @@ from rig.data.recording.hand_events import (
     OfTheHand,
 )
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import HandSettings
 from rig.errors import Fault
 from rig.estimation.by_hand.progress import SessionProgress, assess_progress

@@ -12,7 +12,7 @@ from rig.analysis.consistency.converter_tests import judge_readings
 from rig.analysis.consistency.false_alarms import FALSE_ALARMS
 from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.consistency.raw_readings import RawReadings

@@ -9,7 +9,7 @@ from rig.analysis.consistency.state_errors import build_reading_patterns
 from rig.analysis.environment import BY_SPLINE, surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.gyroscope.segment_table import Segments, stack_segments
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.observation.consistency.segments import segment_recordings
 from rig.observation.windows import swept
 from support.recordings.synthetic_run import BIAS_RAD_S, SCALE, SENSITIVITY, Setup, synthetic_run

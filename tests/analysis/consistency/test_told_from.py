@@ -11,7 +11,7 @@ from rig.analysis.design.planned_limits import predict_limits
 from rig.analysis.environment import surroundings_of
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.config.load import parse
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.motion.geometry import NOMINAL
 from rig.observation.windows import swept

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.data.quantity import RATE
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.observation.statistics.spectral_lines import LineSearch, find_lines, line_swing, waves
 from support.recordings.checked_runs import check_run, list_failed

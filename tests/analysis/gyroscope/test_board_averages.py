@@ -10,7 +10,7 @@ from firmware_host.answers import BoardObservation
 from rig.analysis.gyroscope.board_averages import LIMIT, board_averages
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.data.recording.recorded_events import BoardObserved, TimedEvent
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.observation.observed_run import ObservedRun
 from support.recordings.synthetic_run import SENSITIVITY, Setup, synthetic_run
 

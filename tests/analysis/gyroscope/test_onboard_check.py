@@ -17,7 +17,7 @@ from rig.data.recording.recorded_events import (
     Event,
     TimedEvent,
 )
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.observation.onboard_window import find_averaged_sweeps
 from rig.observation.windows import swept

@@ -10,7 +10,7 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.quantity import RATE, TEMPERATURE
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.gyroscope.nonlinearity import SQUARE_MISSED

@@ -18,7 +18,7 @@ from rig.analysis.gyroscope.verification import Verification, verify
 from rig.analysis.verdict import verdict, verification_checks
 from rig.config.judging.verdict_limits import Limits
 from rig.data.recording.recorded_events import SweepStarted
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun, observe_runs

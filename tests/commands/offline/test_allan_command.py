@@ -11,7 +11,7 @@ from rig.cli import main
 from rig.data.recording.layout import Contents, lay_out
 from rig.data.recording.layout_keys import EVENTS_DTYPE, SCHEMA
 from rig.data.recording.recorded_events import encode_event
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from support.external.real import unpack
 from support.laboratories.commands import rig_here
 from support.recordings.synthetic_run import UR, Setup, synthetic_run

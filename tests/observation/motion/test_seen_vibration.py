@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.gyroscope.calibration import observe_recordings
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.observation.observe import Observation
 from support.recordings.synthetic_run import BIAS_RAD_S, SCALE, SENSITIVITY, Setup, synthetic_run

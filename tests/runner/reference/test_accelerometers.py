@@ -16,7 +16,8 @@ import yaml
 
 from rig.analysis.analyses import calibrate
 from rig.data.recording.recorded_events import DwellFinished, DwellStarted
-from rig.data.recording.run_file import RunData, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import read_run
 from rig.errors import Fault
 from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
 from support.laboratories.worlds import merge

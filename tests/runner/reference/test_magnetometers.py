@@ -15,7 +15,8 @@ from firmware_host.samples import FIELD_SAMPLE_DTYPE
 from rig.analysis.analyses import calibrate
 from rig.cli import main
 from rig.data.quantity import FIELD, RATE
-from rig.data.recording.run_file import RunData, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import read_run
 from support.laboratories.commands import configuration, rig, rig_here
 from support.laboratories.worlds import merge
 from support.processes.waiting import PATIENCE_S

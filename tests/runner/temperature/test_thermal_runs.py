@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rig.data.quantity import TEMPERATURE
-from rig.data.recording.run_file import RunData, read_run
+from rig.data.recording.run_data import RunData
+from rig.data.recording.run_file import read_run
 from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
 from rig.data.result_file import read_result
 from rig.observation.finished_steps import finished_sweeps

@@ -18,7 +18,7 @@ from rig.config.procedures.stage_section import rotation_by
 from rig.data.recording.recorded_events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted, TimedEvent
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import settings_of
 from rig.estimation.arrays import Array
 from rig.motion.steps import Plan, Rest, Sweep, Transfer

@@ -7,7 +7,7 @@ from rig.analysis.consistency.contradictions import contradictions
 from rig.analysis.consistency.false_alarms import CHECKS, FALSE_ALARMS
 from rig.analysis.environment import Surroundings, surroundings_of
 from rig.analysis.gyroscope.calibration import SensorResult, observe_recordings, solve_observed
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.observation.observed_run import ObservedRun
 
 STATISTICS = len(CHECKS)  # of a gyroscope

@@ -14,7 +14,7 @@ from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.analysis.reference.accelerometer import calibrate_accelerometers
 from rig.analysis.reference.magnetometer import calibrate_magnetometers
 from rig.data.quantity import ACCELERATION, FIELD
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.observation.windows import Window, dwelt, swept
 from rig.plans.recorded_run import open_run

@@ -14,7 +14,7 @@ from rig.config.sensors.sensor_catalogue import PARTS
 from rig.data.quantity import RATE
 from rig.data.recording.channel import thermometer_channel, triad_channel
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from rig.config.load import parse
 from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.config.procedures.stage_section import rotation_by
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.motion.geometry import flange_attitude, flange_pose, flange_rate

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rig.analysis.environment import surroundings_of
 from rig.analysis.estimator_names import DEFAULT_ESTIMATOR, find_estimator
 from rig.analysis.gyroscope.calibration import SensorResult, observe_recordings, solve_observed
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 
 
 def solve_runs(

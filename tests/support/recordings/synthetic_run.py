@@ -21,7 +21,7 @@ from rig.data.recording.provenance import Provenance
 from rig.data.recording.recorded_events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted, TimedEvent
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.recorded_turner import RecordedTurner
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import settings_of
 from rig.estimation.arrays import Array
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_rate

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.gyroscope.alignment import LinearCalibration
-from rig.data.recording.run_file import RunData
+from rig.data.recording.run_data import RunData
 from rig.estimation.arrays import Array
 from support.recordings.recorded import change_channel
 from support.recordings.synthetic_run import (

@@ -1,0 +1,43 @@
+"""A recording in memory. It imports no description of what is in it, as a plan needs only its type."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from rig.data.quantity import Quantity, Scalar
+    from rig.data.recording.motion_file import ReadElsewhere
+    from rig.data.recording.provenance import Provenance
+    from rig.data.recording.recorded_events import TimedEvent
+    from rig.data.recording.recorded_sensor import RecordedSensor
+    from rig.data.recording.recorded_turner import RecordedTurner
+    from rig.data.recording.settings import RunSettings
+
+
+@dataclass(frozen=True, slots=True)
+class RunData:
+    """A run file in memory: `samples` (n,) by name of a sensor, `states` (n,) of its turner, events in order.
+
+    `settings` are those for the judgement; `config` is the configuration's text, for people. External readings
+    (`elsewhere`) have no turner (None); their samples are those of a sensor on a clock of its own.
+    """
+
+    config: str
+    settings: "RunSettings"
+    provenance: "Provenance"
+    turner: "RecordedTurner | None"
+    sensors: "dict[str, RecordedSensor]"
+    samples: dict[str, NDArray[Any]]
+    states: NDArray[Any]
+    events: "tuple[TimedEvent, ...]"
+    external: "ReadElsewhere | None" = None
+
+    def measuring(self, quantity: "Quantity | Scalar") -> "dict[str, RecordedSensor]":
+        """Return the sensors whose samples hold that quantity, by name."""
+        return {name: sensor for name, sensor in self.sensors.items() if sensor.measures(quantity)}
+
+    def judged_by(self, overrides: Sequence[str]) -> "RunData":
+        """Return the recording under other settings: see `RunSettings.with_overrides`."""
+        return replace(self, settings=self.settings.with_overrides(overrides)) if overrides else self
