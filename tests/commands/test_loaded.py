@@ -38,7 +38,7 @@ print(json.dumps([status, told.first, loaded()]), file=there)
 
 
 def loaded(*arguments: str | Path, among: tuple[str, ...] = SLOW) -> tuple[list[str], list[str]]:
-    """Which of the slow libraries, or other modules, there are at the first line of a command, and when it has ended."""
+    """Which of the slow libraries, or other modules, are there at a command's first line, and at its end."""
     command = [sys.executable, "-c", COMMAND, json.dumps(among), *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, env=dict(os.environ), check=False)
     assert done.returncode == 0, done.stderr
@@ -93,7 +93,7 @@ def test_the_process_that_the_arms_client_lives_in_waits_for_no_library_of_confi
 
 @pytest.mark.slow
 def test_a_plan_reads_no_recording_and_a_result_is_shown_without_the_analysis() -> None:
-    unused = ("rig.data.recording.run_file", "rig.data.recording.provenance")
+    unused = ("rig.data.recording.run_file", "rig.data.recording.provenance", "rig.data.result_file")
     assert loaded("plan", DEMO, among=unused) == ([], [])
     unused = ("rig.data.recording.run_file", "rig.analysis.judging", "rig.observation", "rig.data.recording.settings")
     assert loaded("show", RECORDINGS / "six_observation", among=unused) == ([], [])

@@ -172,14 +172,14 @@ def _counts(plan: Plan) -> str:
 
 def _limits_table(what: str, by_sensor: "Mapping[str, Sequence[DetectionLimit]]") -> Table:
     """Return a row for each fault, a column for each sensor; a dash if no check of the sensor detects it."""
-    from rig.report.words.detection_limit_words import detection_limit_entries, size_words
+    from rig.report.words.detection_limit_words import size_words
 
     table = Table(box=SIMPLE)
     table.add_column(f"fault of {what}")
     for name in by_sensor:
         table.add_column(plain(name), justify="right")
     sizes = [
-        {limit.fault: size_words(limit.size, limit.unit) for limit in detection_limit_entries(limits)}
+        {limit.what: size_words(limit.size if math.isfinite(limit.size) else None, limit.unit) for limit in limits}
         for limits in by_sensor.values()
     ]
     for fault in dict.fromkeys(fault for by_fault in sizes for fault in by_fault):
