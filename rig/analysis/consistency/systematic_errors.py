@@ -199,10 +199,12 @@ def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
     """Return the patterns of the arm's angle errors: shared ones, and independent ones of each sweep and transfer."""
     by_angle = np.zeros((len(ANGLES), *segments.means_rad_s.shape))
     repeats = []
+    for chosen, steps in ((segments.sweep > REST, 1), (segments.sweep < REST, STEPS)):
+        parts = np.flatnonzero(chosen).tolist()
+        for motion in {segments.intervals[part].motion for part in parts}:
+            of_motion = [part for part in parts if segments.intervals[part].motion is motion]
+            by_angle[:, of_motion] = rate_errors([segments.intervals[part] for part in of_motion], steps)
     for row, (sweep, interval) in enumerate(zip(segments.sweep, segments.intervals, strict=True)):
-        if sweep == REST:
-            continue
-        by_angle[:, row] = rate_errors(interval, 1 if sweep > REST else STEPS)
         if sweep < REST:
             for ends in _end_patterns(interval):
                 repeats.append(np.zeros(segments.means_rad_s.shape))
@@ -263,20 +265,25 @@ def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
     return patterns_by_mark
 
 
-def rate_errors(interval: MotionInterval, steps: int) -> Array:
-    """Return the errors (17, 3) rad/s of the flange's mean rate in an interval, per radian of each of `ANGLES`."""
-    motion = interval.motion
-    q_rad = motion.angles(np.linspace(interval.start_s, interval.end_s, steps + 1))
-    middle, moved = (q_rad[1:] + q_rad[:-1]) / 2, np.diff(q_rad, axis=0)
+def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
+    """Return the errors (17, n, 3) rad/s of the flange's mean rate, per radian of each of `ANGLES`.
+
+    The n intervals are of one motion, each in as many `steps`.
+    """
+    motion, ends_s = intervals[0].motion, np.array([(interval.start_s, interval.end_s) for interval in intervals])
+    q_rad = motion.angles(np.linspace(ends_s[:, 0], ends_s[:, 1], steps + 1, axis=1))  # (n, steps + 1, joints)
+    middle, moved = (q_rad[:, 1:] + q_rad[:, :-1]) / 2, np.diff(q_rad, axis=1)
     axes = motion.axes(middle)
-    errors = np.zeros((len(ANGLES), 3))
+    errors = np.zeros((len(intervals), len(ANGLES), 3))
     for joint, first in _wave_indices(motion).items():
-        if np.ptp(q_rad[:, joint]) < STANDS_RAD:
+        moving = np.ptp(q_rad[..., joint], axis=1) >= STANDS_RAD
+        if not moving.any():
             continue
-        errors[: len(AXIS_ERRORS)] += np.tensordot(moved[:, joint], motion.axis_errors(middle, joint), axes=1)
-        waves = [wave(times * q_rad[:, joint]) for times in (1, 2) for wave in (np.cos, np.sin)]
-        errors[first : first + len(WAVES)] += np.diff(waves) @ axes[:, :, joint]
-    return errors / (interval.end_s - interval.start_s)
+        by_axis = np.moveaxis(motion.axis_errors(middle[moving], joint), 1, -2)  # (n, 13, steps, 3)
+        errors[moving, : len(AXIS_ERRORS)] += (moved[moving, None, None, :, joint] @ by_axis)[..., 0, :]
+        waves = [wave(times * q_rad[moving, :, joint]) for times in (1, 2) for wave in (np.cos, np.sin)]
+        errors[moving, first : first + len(WAVES)] += np.diff(waves).swapaxes(0, 1) @ axes[moving, :, :, joint]
+    return np.swapaxes(errors / np.diff(ends_s)[:, :, None], 0, 1)
 
 
 def _wave_indices(motion: ArmMotion) -> dict[int, int]:
