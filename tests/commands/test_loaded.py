@@ -93,7 +93,7 @@ def test_the_process_that_the_arms_client_lives_in_waits_for_no_library_of_confi
 
 @pytest.mark.slow
 def test_a_plan_reads_no_recording_and_a_result_is_shown_without_the_analysis() -> None:
-    unused = ("rig.data.recording.run_file", "rig.data.recording.provenance", "rig.data.result_file")
+    unused: tuple[str, ...] = ("rig.data.recording.run_file", "rig.data.recording.provenance", "rig.data.result_file")
     assert loaded("plan", DEMO, among=unused) == ([], [])
     unused = ("rig.data.recording.run_file", "rig.analysis.judging", "rig.observation", "rig.data.recording.settings")
     assert loaded("show", RECORDINGS / "six_observation", among=unused) == ([], [])

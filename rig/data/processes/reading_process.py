@@ -20,7 +20,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
-from rig.data.processes.forked_reader import HDF5_PLUGINS, ForkedReader, measure_address_space, can_fork
+from rig.data.processes.forked_reader import HDF5_PLUGINS, ForkedReader, can_fork, measure_address_space
 from rig.data.processes.process_silence import Silence
 from rig.data.processes.reading_parts import Part, Status
 from rig.errors import Refused
