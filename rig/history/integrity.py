@@ -143,7 +143,7 @@ def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Itera
 
 
 def _names(run: Kept, folder: Path) -> set[str]:
-    """Return the names of the entered files, of those that may be on another computer only the present ones."""
+    """Return the names of the entered files; if their computer may be another one, only of those present here."""
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
 

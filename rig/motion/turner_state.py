@@ -69,7 +69,7 @@ class State(Protocol):
     @property
     def qd_rad_s(self) -> Joints: ...
     def to_record(self) -> Row:
-        """Return the values in the order of `state_dtype`, quickly, as for hundreds of states a second."""
+        """Return the values in the order of `state_dtype`. (Called for hundreds of states a second.)"""
         ...
 
 

@@ -173,7 +173,7 @@ class PageState:
             self.put("parameters", look.parameters)
 
     def _take_once(self, event: RunEvent) -> None:
-        """Update the sections after an event that happens once."""
+        """Update the sections by one of the events that are not repeated many times a second."""
         sections = self.sections
         match event:
             case ArmConnected(report):

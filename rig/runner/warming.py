@@ -167,7 +167,7 @@ class Warming:
             )
 
     def _refuse_fast(self, name: str, read_s: float, temperature_c: float) -> None:
-        """Raise `too_fast`, by the board's time of each reading, because a busy computer receives it late."""
+        """Raise `too_fast`, computed with the board's times, since readings may arrive late on a busy computer."""
         history = self._history.setdefault(name, deque())
         if history and read_s <= history[-1][0]:
             return
