@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 from rig.errors.quoting import printable_lines
-from rig.station.events import Prompt
 from rig.station.plain_text import for_file
 
 Kind = Literal["number", "mount", "go", "doubt", "again"]
@@ -80,6 +79,8 @@ class Terminal:
 
 def question_before(announcement: Sequence[str], to_do: str) -> Question:
     """Return the question before an announced action: `go` lets something start to move, and `yes` anything else."""
+    from rig.station.events import Prompt
+
     if to_do == Prompt(()).to_do:
         return Question("go", f"Type go to {to_do}, or no:", tuple(announcement))
     return Question("doubt", f"Type yes to {to_do}, or no:", tuple(announcement))

@@ -38,7 +38,7 @@ def test_it_ends_within_its_limits_and_is_forked_from_one_thread_only(tmp_path: 
     endings = dict(line.split(" ", 1) for line in done.stdout.splitlines()[:-1])
     assert endings["memory"].startswith("it takes more than") and endings["memory"].endswith("MiB of memory to be read")
     assert endings["processor"] == "it takes more than 1 s of a processor to be read"
-    assert endings["output"] == "what is packed in it is longer than 20 MB"
+    assert endings["output"] == "its unpacked content is longer than 20 MB"
     assert endings["patience"] == "no end of it was found in 1 s"
     assert endings["crash"] == "reading it ended the process that read it"
     assert "words" in endings

@@ -49,7 +49,7 @@ def page(tmp_path: Path) -> Iterator[Callable[..., tuple["subprocess.Popen[str]"
 def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     driver: Chrome, tmp_path: Path, world: World, page: Any
 ) -> None:
-    laboratory = world({"procedure": {"speed_deg_s": 150, "rest_s": 0.5}, "world": {"time_scale": 4}})
+    laboratory = world({"procedure": {"speed_deg_s": 150, "rest_s": 0.5}, "world": {"time_scale": 2}})
     out = tmp_path / "run"
     config = hardware(laboratory.config_path, tmp_path)
     process, url = page("run", config, "--out", out, "--page", "--confirm-on-page")
@@ -64,12 +64,12 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     driver.switch_to.active_element.send_keys(Keys.ENTER)
     wait_for(lambda: kind(driver) in ("moving", "measuring"), "motion")
     wait_for(lambda: re.match(r"\D*([5-9]|\d\d)\b", text(driver, "step-number")), "the fifth step")
+    laboratory.control({"do": "pace", "time_scale": 0.5})  # a sweep lasts five seconds: a slow browser misses none
     rate = driver.find_element(By.CSS_SELECTOR, "#plot-gyro-rate_rad_s canvas").get_attribute("aria-label")
     assert rate is not None and "now x" in rate
     wait_for(lambda: "0." in text(driver, "observations"), "an observation")
     wait_for(lambda: kind(driver) == "measuring", "a sweep")
     picture(driver, "run-moving")
-    laboratory.control({"do": "pace", "time_scale": 0.5})  # the sweep lasts five seconds: it is not to come to its end
     swept = (out / "log.txt").read_text(encoding="utf-8").count("done: sweep")
     driver.find_element(By.ID, "halt").click()
     assert process.wait(PATIENCE_S) == 130

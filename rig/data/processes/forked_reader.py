@@ -23,7 +23,7 @@ def can_fork() -> bool:
 
     HDF5 looks for its plugins when it is loaded, so it must not be loaded here yet, unless by `load_hdf5`.
     """
-    if sys.platform != "linux" or ("h5py" in sys.modules and not load_hdf5()):
+    if sys.platform != "linux" or not hasattr(os, "pidfd_open") or ("h5py" in sys.modules and not load_hdf5()):
         return False
     return len(list(Path("/proc/self/task").iterdir())) == 1
 

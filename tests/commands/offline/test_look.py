@@ -70,7 +70,7 @@ def test_steps_of_a_converter_are_left_to_the_user(tmp_path: Path) -> None:
     log = write(tmp_path / "log.csv", "t,gx,gy,gz", [TIME_S, *np.rint(131 * RATES_DEG_S).T])
     columns = tmp_path / "columns.yaml"
     looked = rig_here("look", log, "--write", columns)
-    assert "UNKNOWN   the unit of the gyroscope: steps of a converter" in looked.stdout
+    assert "UNKNOWN       the unit of the gyroscope: steps of a converter" in looked.stdout
     solved = rig_here("solve", log, "--sweeps", SWEEPS, "--columns", columns)
     assert solved.returncode == 2 and "lsb_per_unit" in solved.stderr, "what is open is refused"
     columns.write_text(columns.read_text(encoding="utf-8").replace("'?'", "131"), encoding="utf-8")

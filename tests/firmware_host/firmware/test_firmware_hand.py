@@ -169,7 +169,7 @@ def test_what_is_missing_in_the_readings_of_the_host_is_named(played: Played) ->
     with pytest.raises(Fault, match="did not arrive") as missing:
         compare_with_board(gappy, played.reports, played.solved)
     assert missing.value.name == "board_unverified"
-    with pytest.raises(Fault, match="taken 12 moves, of which 11 were seen"):
+    with pytest.raises(Fault, match="taken 12 moves, of which this computer received 11"):
         compare_with_board(played.readings, played.reports[1:], played.solved)
     (mxx, mxy, mxz), second, third = played.solved.matrix
     wrong = replace(played.solved, matrix=((mxx * 1.00003, mxy, mxz), second, third))

@@ -13,7 +13,7 @@ HIDDEN = """
 import os, signal, sys
 for name in ("fcntl", "grp", "pty", "pwd", "readline", "resource", "syslog", "termios", "tty"):
     sys.modules[name] = None
-del os.getloadavg, os.O_NOFOLLOW, os.O_NONBLOCK, os.setsid
+del os.getloadavg, os.pidfd_open, os.O_NOFOLLOW, os.O_NONBLOCK, os.setsid
 for name in ("SIGHUP", "SIGQUIT", "SIGTSTP", "SIGUSR1", "SIGALRM", "SIGRTMIN", "pthread_kill", "setitimer"):
     delattr(signal, name)
 """
