@@ -1,48 +1,48 @@
-// How old what the page shows is, and whether it may be trusted. Times by this browser's own clock, ms.
+// The age of the values shown, and whether the rig still sends news. Times are of this browser's own clock, in ms.
 
-const STALE_MS = 2000; // frames come ten times a second while something moves, a sign of life else
+const STALE_MS = 2000; // frames come ten times a second during motion, otherwise signs of life
 export const ENDED = ["passed", "failed", "refused", "fault", "stopped"];
-const TELLING = ["moving", "measuring", "resting"]; // states in which the arm is seen all the time
+const ARM_IS_READ = ["moving", "measuring", "resting"]; // states in which the rig sends the arm's state continually
 
 const now = () => performance.now();
-let heard = now(); // anything
-const came = { arm: null, readings: null }; // when the newest did
-let up = false;
+let lastNews = now(); // of any kind
+const newest = { arm: null, readings: null }; // the times of the newest values
+let connected = false;
 
-/** The line is up or down. */
-export function linked(is) {
-  up = is;
-  if (is) heard = now();
+/** Record whether the page is connected to the rig. */
+export function setConnected(isConnected) {
+  connected = isConnected;
+  if (isConnected) lastNews = now();
 }
 
-/** Something came, if only a sign of life. */
-export function hear() {
-  heard = now();
+/** Record that the rig sent something, if only a sign of life. */
+export function recordSignOfLife() {
+  lastNews = now();
 }
 
-/** Take from a frame the ages of the newest state of the arm and of the newest readings, s, null without any. */
-export function take({ age_s: ages }) {
-  for (const what of Object.keys(came)) came[what] = typeof ages[what] === "number" ? now() - 1000 * ages[what] : null;
+/** Record from a frame the ages of the newest state of the arm and of the newest readings, s; null if there are none. */
+export function recordAges({ age_s: ages }) {
+  for (const key of Object.keys(newest)) newest[key] = typeof ages[key] === "number" ? now() - 1000 * ages[key] : null;
 }
 
-/** What to say of it all: `lost` seconds without news that should have come (0: none), in words how old what is shown is ("": of now). */
-export function age(shown) {
+/** Return `lost`, the seconds for which expected news is overdue (0: none), and `words`, the age of the values shown ("": current). */
+export function assessAge(shown) {
   const kind = shown.state?.kind;
-  if (ENDED.includes(kind)) return { over: true, lost: 0, words: shown.about?.replayed ? "as recorded last" : ended(shown.ended) };
-  const missed = [now() - heard];
-  if (came.arm !== null && TELLING.includes(kind) && !shown.about?.replayed) missed.push(now() - came.arm);
-  const silent = Math.max(...missed);
-  const old = Math.max(0, ...Object.values(came).filter((when) => when !== null).map((when) => now() - when));
+  if (ENDED.includes(kind)) return { over: true, lost: 0, words: shown.about?.replayed ? "as recorded last" : describeEnd(shown.ended) };
+  const silences = [now() - lastNews];
+  if (newest.arm !== null && ARM_IS_READ.includes(kind) && !shown.about?.replayed) silences.push(now() - newest.arm);
+  const silence = Math.max(...silences);
+  const oldest = Math.max(0, ...Object.values(newest).filter((time) => time !== null).map((time) => now() - time));
   return {
     over: false,
-    lost: silent > STALE_MS || (!up && shown.state) ? Math.max(1, Math.floor(silent / 1000)) : 0,
-    words: old > STALE_MS ? `${duration(old)} ago` : "",
+    lost: silence > STALE_MS || (!connected && shown.state) ? Math.max(1, Math.floor(silence / 1000)) : 0,
+    words: oldest > STALE_MS ? `${formatDuration(oldest)} ago` : "",
   };
 }
 
-const ended = (when) => (when?.seen_at ? `as at ${when.seen_at}` : ""); // of nothing seen there is no age
+const describeEnd = (end) => (end?.seen_at ? `as at ${end.seen_at}` : ""); // without readings there is no age
 
-function duration(ms) {
+function formatDuration(ms) {
   const s = Math.floor(ms / 1000);
   return s < 120 ? `${s} s` : `${Math.floor(s / 60)} min`;
 }

@@ -1,7 +1,7 @@
 // Helpers of all canvases.
 
-/** The drawing context of a canvas at the screen's own resolution, cleared, in CSS pixels. */
-export function fresh(canvas) {
+/** Clear a canvas and return its drawing context and size in CSS pixels; it is drawn at the screen's own resolution. */
+export function clearCanvas(canvas) {
   const ratio = window.devicePixelRatio || 1;
   const { clientWidth: width, clientHeight: height } = canvas;
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
@@ -14,8 +14,8 @@ export function fresh(canvas) {
   return { pen, width, height };
 }
 
-/** The page's colours by their names in the style sheet. */
-export function colours() {
+/** Return the page's colours by their names in the style sheet. */
+export function readColours() {
   const style = getComputedStyle(document.documentElement);
   return new Proxy({}, { get: (_, name) => style.getPropertyValue(`--${name}`).trim() });
 }

@@ -1,35 +1,34 @@
-// What the pages of a station and of the floor have in common: words and signs, sections as they come, and whether the line
-// brings any.
+// What the pages of a station and of the floor share: words and signs, the sections as they arrive, and whether any arrive.
 
 import { follow } from "./stream.js";
 
-const STALE_MS = 3000; // the server says something every second
-const by = (id) => document.getElementById(id);
-let heard = performance.now();
+const STALE_MS = 3000; // the server sends something every second
+const $ = (id) => document.getElementById(id);
+let lastNews = performance.now();
 
 export const WORDS = {
   waiting: "◌ waits for a part", checking: "◌ checks", asking: "? asks", running: "◉ runs", solving: "Σ solves", refused: "⊘ refused",
   fault: "⚠ fault", stopped: "■ stopped", ended: "■ the batch has ended", dead: "⚠ no sign of life", unread: "? sends a state that this page cannot read",
 };
 export const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
-export let up = false;
-export const silent = () => performance.now() - heard > STALE_MS;
+export let connected = false;
+export const isSilent = () => performance.now() - lastNews > STALE_MS;
 
-/** Hand every section that comes to `take`, and `tell` of the line again and again, until it is `over()`. */
-export function live(take, tell, over) {
+/** Call `receive` for every section that arrives, and `showConnection` twice a second, until the page's run `isOver()`. */
+export function followSections(receive, showConnection, isOver) {
   follow(
     (name, frame) => {
-      for (const [section, content] of Object.entries(frame)) take(section, content);
-      tell();
+      for (const [section, content] of Object.entries(frame)) receive(section, content);
+      showConnection();
     },
-    (is, why) => {
-      up = is;
-      by("link").dataset.up = is ? "yes" : over() ? "over" : "no";
-      by("link-words").textContent = is ? "connected" : over() ? "the page has ended" : why ?? "not connected";
-      tell();
+    (isConnected, reason) => {
+      connected = isConnected;
+      $("link").dataset.up = connected ? "yes" : isOver() ? "over" : "no";
+      $("link-words").textContent = connected ? "connected" : isOver() ? "the page has ended" : reason ?? "not connected";
+      showConnection();
     },
-    () => { heard = performance.now(); tell(); },
-    over,
+    () => { lastNews = performance.now(); showConnection(); },
+    isOver,
   );
-  setInterval(tell, 500);
+  setInterval(showConnection, 500);
 }

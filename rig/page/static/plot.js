@@ -1,17 +1,17 @@
 // Three components over the last minute. Each has a colour, a line pattern and its letter at the end.
 
-import { colours, fresh, FONT } from "./drawing.js";
+import { clearCanvas, FONT, readColours } from "./drawing.js";
 
 const SPAN_S = 60;
 const DASHES = { x: [], y: [9, 4], z: [2, 3] };
 const LEFT = 62, RIGHT = 26, TOP = 10, BOTTOM = 24;
 
 /** Draw `values` ([x, y, z] or null) at `times` (s), the newest at the right edge, which is called `newest`. */
-export function plot(canvas, times, values, newest) {
-  const { pen, width, height } = fresh(canvas);
-  const paint = colours();
+export function drawPlot(canvas, times, values, newest) {
+  const { pen, width, height } = clearCanvas(canvas);
+  const paint = readColours();
   const now = times.length ? times[times.length - 1] : 0;
-  const [low, high, step] = scale(values);
+  const [low, high, step] = chooseScale(values);
   const across = (time) => LEFT + (1 + (time - now) / SPAN_S) * (width - LEFT - RIGHT);
   const up = (value) => TOP + ((high - value) / (high - low)) * (height - TOP - BOTTOM);
 
@@ -21,18 +21,18 @@ export function plot(canvas, times, values, newest) {
   for (let tick = Math.ceil(low / step) * step; tick <= high + step * 1e-6; tick += step) {
     const zero = Math.abs(tick) < step * 1e-6;
     pen.strokeStyle = zero ? paint.soft : paint.line;
-    line(pen, [LEFT, up(tick)], [width - RIGHT, up(tick)]);
+    drawLine(pen, [LEFT, up(tick)], [width - RIGHT, up(tick)]);
     pen.fillStyle = paint.soft;
     pen.textAlign = "right";
-    pen.fillText(digits(zero ? 0 : tick, step), LEFT - 7, up(tick));
+    pen.fillText(formatTick(zero ? 0 : tick, step), LEFT - 7, up(tick));
   }
   pen.textBaseline = "alphabetic";
   for (let ago = SPAN_S; ago >= 0; ago -= 15) {
-    const at = across(now - ago);
+    const x = across(now - ago);
     pen.strokeStyle = paint.faint;
-    line(pen, [at, TOP], [at, height - BOTTOM]);
+    drawLine(pen, [x, TOP], [x, height - BOTTOM]);
     pen.textAlign = ago === 0 ? "right" : "center";
-    pen.fillText(ago === 0 ? newest : `−${ago} s`, at, height - 6);
+    pen.fillText(ago === 0 ? newest : `−${ago} s`, x, height - 6);
   }
 
   pen.save();
@@ -58,33 +58,33 @@ export function plot(canvas, times, values, newest) {
   }
   pen.restore();
   pen.setLineDash([]);
-  letters(pen, paint, values.findLast((value) => value), up, width, height);
+  drawAxisLetters(pen, paint, values.findLast((value) => value), up, width, height);
 }
 
 /** Draw the letters of the axes at the right end, moved apart if they overlap. */
-function letters(pen, paint, last, up, width, height) {
+function drawAxisLetters(pen, paint, last, up, width, height) {
   if (!last || last.length === 1) return;
-  const places = [..."xyz"].map((axis, i) => ({ axis, at: up(last[i]) })).sort((a, b) => a.at - b.at);
-  for (let i = 1; i < 3; i += 1) places[i].at = Math.max(places[i].at, places[i - 1].at + 16);
-  const over = Math.max(0, places[2].at - (height - BOTTOM));
+  const labels = [..."xyz"].map((axis, i) => ({ axis, y: up(last[i]) })).sort((a, b) => a.y - b.y);
+  for (let i = 1; i < 3; i += 1) labels[i].y = Math.max(labels[i].y, labels[i - 1].y + 16);
+  const overflow = Math.max(0, labels[2].y - (height - BOTTOM));
   pen.font = `bold 15px ${FONT}`;
   pen.textAlign = "left";
   pen.textBaseline = "middle";
-  for (const { axis, at } of places) {
+  for (const { axis, y } of labels) {
     pen.fillStyle = paint[axis];
-    pen.fillText(axis, width - RIGHT + 8, at - over);
+    pen.fillText(axis, width - RIGHT + 8, y - overflow);
   }
 }
 
-function line(pen, from, to) {
+function drawLine(pen, from, to) {
   pen.beginPath();
   pen.moveTo(...from);
   pen.lineTo(...to);
   pen.stroke();
 }
 
-/** Lowest and highest value shown and the step between ticks: about four of them, at round numbers. */
-function scale(values) {
+/** Return the lowest and the highest value shown and the step between ticks: about four of them, at round numbers. */
+function chooseScale(values) {
   let low = 0, high = 0;
   for (const value of values)
     for (const component of value ?? [])
@@ -99,6 +99,6 @@ function scale(values) {
   return [low - 0.08 * span, high + 0.08 * span, step];
 }
 
-function digits(value, step) {
+function formatTick(value, step) {
   return value.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9))).replace("-", "−");
 }

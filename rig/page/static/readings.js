@@ -1,19 +1,19 @@
-// The readings of the last minute: keeps their points and draws a plot for each sensor and quantity.
+// The readings of the last minute: this module keeps them and draws a plot for every sensor and quantity.
 
-import { signed } from "./arm.js";
-import { plot } from "./plot.js";
+import { formatSigned } from "./arm.js";
+import { drawPlot } from "./plot.js";
 
 const $ = (id) => document.getElementById(id);
 const points = { first: 0, times: [], lines: {} };
 const SHOWN_POINTS = 600;
 const UNITS = { rate_rad_s: ["rate", "rad/s", 3], acceleration_m_s2: ["acceleration", "m/s²", 3], field_t: ["magnetic field", "µT", 1] };
 
-let sensors = []; // as the rig has them
-let past = ""; // how old the readings are, in words; "" while they are of now
-let over = false; // the run has ended: the last reading is of a moment of its own, which no number beside the result should tell
+let sensors = []; // in the rig's order
+let ageText = ""; // the age of the readings in words; "" if they are current
+let isOver = false; // after the run the last reading is older than the result, so its label has no number
 
-/** Points that came with a frame. They are counted, so that none is taken twice; points that the rig has dropped are dropped. */
-export function add(frame, news) {
+/** Add the points of a frame. They are counted, so that none is added twice; points that the rig has dropped are dropped here too. */
+export function addPoints(frame, news) {
   if (frame === "all") Object.assign(points, { first: news.first, times: [], lines: {} });
   const end = points.first + points.times.length;
   const skip = Math.max(0, end - news.from);
@@ -33,52 +33,52 @@ export function add(frame, news) {
   }
 }
 
-let due = false;
+let isScheduled = false;
 
-/** Draw the plots, once for all that comes before the next picture: of these sensors, whose readings are so old, of a run that is `ended` or not. */
-export function redraw(of, old, ended) {
-  [sensors, past, over] = [of ?? [], old, ended];
-  if (due) return;
-  due = true;
+/** Draw the plots once before the next repaint. `newAgeText` is the age of the readings in words, "" if they are current. */
+export function redraw(newSensors, newAgeText, hasEnded) {
+  [sensors, ageText, isOver] = [newSensors ?? [], newAgeText, hasEnded];
+  if (isScheduled) return;
+  isScheduled = true;
   requestAnimationFrame(() => {
-    due = false;
-    for (const name of Object.keys(points.lines).sort(inOrder)) draw(name, points.lines[name]);
+    isScheduled = false;
+    for (const name of Object.keys(points.lines).sort(compareNames)) drawReadings(name, points.lines[name]);
   });
 }
 
-/** By sensor as the rig has them, then rate before acceleration before field. */
-function inOrder(one, other) {
+/** Compare names of lines: by sensor in the rig's order, then rate before acceleration before field. */
+function compareNames(one, other) {
   const order = sensors.map((sensor) => sensor.name);
   const [a, b] = [one, other].map((name) => [order.indexOf(name.slice(0, name.lastIndexOf("."))), Object.keys(UNITS).indexOf(name.slice(name.lastIndexOf(".") + 1))]);
   return a[0] - b[0] || a[1] - b[1];
 }
 
-function draw(name, values) {
+function drawReadings(name, values) {
   const id = `plot-${name.replaceAll(/[^A-Za-z0-9_-]/g, "-")}`;
   const [sensor, quantity] = [name.slice(0, name.lastIndexOf(".")), name.slice(name.lastIndexOf(".") + 1)];
-  const about = sensors.find((candidate) => candidate.name === sensor);
-  const [title, unit, digits] = UNITS[quantity] ?? [...(about?.units?.[quantity] ?? [quantity, ""]), 2];
-  if (!$(id)) $("readings").append(panel(id, sensor, title, unit));
-  $(`${id}-about`).textContent = [about?.part, about?.mode === "calibrated" ? "corrected by the board" : ""].filter(Boolean).join(" · ");
+  const description = sensors.find((candidate) => candidate.name === sensor);
+  const [title, unit, digits] = UNITS[quantity] ?? [...(description?.units?.[quantity] ?? [quantity, ""]), 2];
+  if (!$(id)) $("readings").append(makePanel(id, sensor, title, unit));
+  $(`${id}-about`).textContent = [description?.part, description?.mode === "calibrated" ? "corrected by the board" : ""].filter(Boolean).join(" · ");
   const last = values.findLast((value) => value);
   const canvas = $(`${id}-canvas`);
-  const axes = last?.length === 1 ? [["x", ""]] : [..."xyz"].map((axis) => [axis, `${axis} `]); // what has no axes has no letter
+  const axes = last?.length === 1 ? [["x", ""]] : [..."xyz"].map((axis) => [axis, `${axis} `]); // a quantity without axes has no letter
   for (const [i, [axis, letter]] of axes.entries()) {
-    $(`${id}-${axis}`).textContent = `${letter}${last ? signed(last[i], digits).padStart(digits + 4, "\u2007") : "–"}`;
+    $(`${id}-${axis}`).textContent = `${letter}${last ? formatSigned(last[i], digits).padStart(digits + 4, "\u2007") : "–"}`;
   }
-  if (over) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute of the run`);
-  else if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; ${past || "now"} ${axes.map(([, letter], i) => `${letter}${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
-  plot(canvas, points.times, values, past ? "last" : "now");
+  if (isOver) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute of the run`);
+  else if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; ${ageText || "now"} ${axes.map(([, letter], i) => `${letter}${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
+  drawPlot(canvas, points.times, values, ageText ? "last" : "now");
 }
 
-function panel(id, sensor, title, unit) {
+function makePanel(id, sensor, title, unit) {
   const make = (tag, fields, ...children) => {
     const node = Object.assign(document.createElement(tag), fields);
     node.append(...children);
     return node;
   };
   const now = make("span", { className: "now" }, ...[..."xyz"].map((axis) => make("span", { id: `${id}-${axis}`, className: axis })), make("span", { className: "unit", textContent: unit }));
-  const head = make("h2", {}, make("span", { textContent: `${sensor}, ${title}` }), make("small", { id: `${id}-about` }), make("small", { className: "age", textContent: past }), now);
+  const head = make("h2", {}, make("span", { textContent: `${sensor}, ${title}` }), make("small", { id: `${id}-about` }), make("small", { className: "age", textContent: ageText }), now);
   const canvas = make("canvas", { id: `${id}-canvas` });
   canvas.setAttribute("role", "img");
   return make("section", { id, className: "plot" }, head, canvas);

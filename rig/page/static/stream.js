@@ -1,7 +1,7 @@
-// The stream of what is shown, read by fetch because EventSource can carry no token; and requests that act.
+// The event stream, read by fetch because EventSource cannot carry a token, and the requests that make the rig act.
 
-const SILENT_MS = 15000; // the server says something every second; after so long the line is made anew
-const WHY = {
+const SILENT_MS = 15000; // the server sends something every second; after this silence the page connects again
+const REASONS = {
   403: "the address lacks its token: take the one the terminal shows",
   503: "too many browsers look on: close one, or take the address the terminal shows",
 };
@@ -9,42 +9,42 @@ const WHY = {
 export const token = window.location.hash.slice(1);
 const headers = token ? { Authorization: `Bearer ${token}` } : {};
 
-/** Hand every event to `take(name, document)`, tell `hear()` of every sign of life, say to `linked(up, why)` whether the line
- * is up, until the run is `over()`. */
-export async function follow(take, linked, hear, over) {
-  while (!over()) {
+/** Follow the event stream until the run `isOver()`: call `receive(name, document)` for every event, `recordSignOfLife()` for
+ * everything that arrives, and `setConnected(isConnected, reason)` when the connection changes. */
+export async function follow(receive, setConnected, recordSignOfLife, isOver) {
+  while (!isOver()) {
     const silence = new AbortController();
     let timer = null;
     let status = null;
-    const heard = () => {
+    const restartTimer = () => {
       clearTimeout(timer);
       timer = setTimeout(() => silence.abort(), SILENT_MS);
     };
     try {
-      heard();
+      restartTimer();
       const answer = await fetch("events", { headers, signal: silence.signal, cache: "no-store" });
       status = answer.status;
       if (answer.ok) {
-        linked(true);
-        await read(answer.body, take, () => { heard(); hear(); });
+        setConnected(true);
+        await readEvents(answer.body, receive, () => { restartTimer(); recordSignOfLife(); });
       }
     } catch {
-      // The line is down: said below, tried again.
+      // The connection is down: reported below, then tried again.
     }
     clearTimeout(timer);
-    linked(false, WHY[status]);
-    if (status === 403) return; // another token comes with another address, and that loads the page anew
-    if (!over()) await new Promise((again) => setTimeout(again, 1000));
+    setConnected(false, REASONS[status]);
+    if (status === 403) return; // another token comes with another address, which loads the page again
+    if (!isOver()) await new Promise((resolve) => setTimeout(resolve, 1000));
   }
 }
 
-async function read(body, take, heard) {
+async function readEvents(body, receive, recordArrival) {
   const reader = body.pipeThrough(new TextDecoderStream()).getReader();
   let rest = "";
   for (;;) {
     const { value, done } = await reader.read();
     if (done) return;
-    heard();
+    recordArrival();
     rest += value;
     let end = rest.indexOf("\n\n");
     while (end >= 0) {
@@ -52,13 +52,13 @@ async function read(body, take, heard) {
       rest = rest.slice(end + 2);
       const name = event.find((line) => line.startsWith("event: "));
       const data = event.find((line) => line.startsWith("data: "));
-      if (name && data) take(name.slice(7), JSON.parse(data.slice(6)));
+      if (name && data) receive(name.slice(7), JSON.parse(data.slice(6)));
       end = rest.indexOf("\n\n");
     }
   }
 }
 
-/** Ask the server to do something; resolves to null, or to why it did not. */
+/** Request an action of the server. Resolve to null, or to the reason if the server refuses. */
 export async function act(path, document) {
   try {
     const body = document === undefined ? undefined : JSON.stringify(document);

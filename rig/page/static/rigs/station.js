@@ -1,97 +1,97 @@
-// A station: the part in hand, the tray, and the question of the moment, which a scanner or a keyboard answers.
+// A station: the present part, the tray, and the present question, which a scanner or a keyboard answers.
 
-import { live, SIGNS, silent, up, WORDS } from "./live.js";
+import { connected, followSections, isSilent, SIGNS, WORDS } from "./live.js";
 import { act, token } from "./stream.js";
 
 const $ = (id) => document.getElementById(id);
-let asked = null;
-let over = false; // the station has ended, and with it the page's server
+let question = null; // the present one
+let isOver = false; // the station has ended, and with it the page's server
 
-const element = (name, text, set = {}) => Object.assign(document.createElement(name), { textContent: text ?? "" }, set);
+const makeElement = (name, text, set = {}) => Object.assign(document.createElement(name), { textContent: text ?? "" }, set);
 
-function now(of) {
-  $("present").dataset.state = of.state;
-  over = of.over;
-  $("halt").hidden = over || !token;
-  const verdict = !of.part && of.verdict; // it stands until the next part begins
+function showPresent(section) {
+  $("present").dataset.state = section.state;
+  isOver = section.over;
+  $("halt").hidden = isOver || !token;
+  const verdict = !section.part && section.verdict; // it is shown until the next part begins
   $("present").dataset.verdict = verdict ? verdict[1] : "";
-  $("part").textContent = verdict ? verdict[0] : of.part || "–";
+  $("part").textContent = verdict ? verdict[0] : section.part || "–";
   $("verdict").hidden = !verdict;
   $("verdict").textContent = verdict ? `${SIGNS[verdict[1]] ?? "·"} ${verdict[1].toUpperCase()}` : "";
-  $("why").textContent = verdict ? of.why : "";
-  $("truth").hidden = !(verdict && of.truth);
-  $("truth").textContent = of.truth;
-  const running = typeof of.fraction === "number";
+  $("why").textContent = verdict ? section.why : "";
+  $("truth").hidden = !(verdict && section.truth);
+  $("truth").textContent = section.truth;
+  const running = typeof section.fraction === "number";
   $("run").hidden = !running;
-  if (running) $("done").value = of.fraction;
-  $("rates").textContent = running ? [`${Math.round(of.fraction * 100)} %`, `turning at ${of.turn_deg_s} °/s`,
-    ...of.sensors.map(([name, samples, lost]) => `${name}: ${samples} samples, ${lost} lost`)].join(" · ") : "";
-  $("state").textContent = WORDS[of.state] ?? of.state;
-  $("doing").textContent = [of.doing, typeof of.left_s === "number" && `${Math.round(of.left_s)} s left`].filter(Boolean).join(", ");
-  $("who").textContent = [of.operator, of.work_order && `order ${of.work_order}`].filter(Boolean).join(" · ");
-  $("tags").replaceChildren(...(of.simulated ? [element("span", "simulated", { className: "tag" })] : []));
-  $("counts").textContent = Object.entries(of.counts ?? {}).map(([state, count]) => `${count} ${state}`).join(", ");
-  $("tray").replaceChildren(...(of.parts ?? []).map(([serial, state]) => {
-    const cell = element("li");
+  if (running) $("done").value = section.fraction;
+  $("rates").textContent = running ? [`${Math.round(section.fraction * 100)} %`, `turning at ${section.turn_deg_s} °/s`,
+    ...section.sensors.map(([name, samples, lost]) => `${name}: ${samples} samples, ${lost} lost`)].join(" · ") : "";
+  $("state").textContent = WORDS[section.state] ?? section.state;
+  $("doing").textContent = [section.doing, typeof section.left_s === "number" && `${Math.round(section.left_s)} s left`].filter(Boolean).join(", ");
+  $("who").textContent = [section.operator, section.work_order && `order ${section.work_order}`].filter(Boolean).join(" · ");
+  $("tags").replaceChildren(...(section.simulated ? [makeElement("span", "simulated", { className: "tag" })] : []));
+  $("counts").textContent = Object.entries(section.counts ?? {}).map(([state, count]) => `${count} ${state}`).join(", ");
+  $("tray").replaceChildren(...(section.parts ?? []).map(([serial, state]) => {
+    const cell = makeElement("li");
     cell.dataset.is = state;
-    cell.append(element("strong", SIGNS[state] ?? "·"), element("span", ` ${serial} `), element("small", state));
+    cell.append(makeElement("strong", SIGNS[state] ?? "·"), makeElement("span", ` ${serial} `), makeElement("small", state));
     return cell;
   }));
 }
 
-function ask(question) {
-  asked = question;
+function showQuestion(newQuestion) {
+  question = newQuestion;
   $("ask").hidden = !question;
   if (!question) return;
-  $("lines").replaceChildren(...question.lines.map((line) => element("li", line)));
+  $("lines").replaceChildren(...question.lines.map((line) => makeElement("li", line)));
   $("text").textContent = question.text;
   $("said").value = "";
   $("hint").textContent = question.hint;
   $("clear").checked = false;
   $("agree").hidden = question.kind !== "go";
-  $("buttons").replaceChildren(...question.choices.map(({ words, label }, at) => {
-    const button = element("button", label, { type: "button", className: at ? "quiet" : "go" });
-    button.addEventListener("click", () => say(words[0]));
+  $("buttons").replaceChildren(...question.choices.map(({ words, label }, index) => {
+    const button = makeElement("button", label, { type: "button", className: index ? "quiet" : "go" });
+    button.addEventListener("click", () => sendAnswer(words[0]));
     return button;
   }));
-  ready();
-  focus();
+  enableGo();
+  focusField();
 }
 
-/** Whoever presses the button has ticked first; whoever types "go" has typed it. */
-function ready() {
+/** Enable the button only after the tick; an operator who types "go" needs no tick. */
+function enableGo() {
   const go = $("buttons").querySelector(".go");
-  if (asked?.kind === "go" && go) go.disabled = !$("clear").checked;
+  if (question?.kind === "go" && go) go.disabled = !$("clear").checked;
 }
 
-async function say(text) {
-  const question = asked;
-  if (!question) return;
-  const why = await act("say", { number: question.number, text });
-  if (why && asked === question) $("hint").textContent = why;
+async function sendAnswer(text) {
+  const answered = question;
+  if (!answered) return;
+  const reason = await act("say", { number: answered.number, text });
+  if (reason && question === answered) $("hint").textContent = reason;
 }
 
-/** A scanner types where the cursor is: it stays in the field. */
-const focus = () => { if (asked) $("said").focus(); };
+/** Keep the cursor in the field, because a scanner types at the cursor. */
+const focusField = () => { if (question) $("said").focus(); };
 
-function tell() {
-  $("stale").hidden = over || (up && !silent());
+function showConnection() {
+  $("stale").hidden = isOver || (connected && !isSilent());
 }
 
 $("form").addEventListener("submit", (event) => {
   event.preventDefault();
-  say($("said").value.trim());
+  sendAnswer($("said").value.trim());
 });
-$("clear").addEventListener("change", () => { ready(); focus(); });
+$("clear").addEventListener("change", () => { enableGo(); focusField(); });
 document.addEventListener("keydown", (event) => {
-  if (event.target === document.body && event.key.length === 1) focus();
+  if (event.target === document.body && event.key.length === 1) focusField();
 });
-window.addEventListener("focus", focus);
+window.addEventListener("focus", focusField);
 $("halt").hidden = !token;
 $("halt").addEventListener("click", async () => {
-  const why = await act("stop");
-  if (why && !over) $("doing").textContent = why;
+  const reason = await act("stop");
+  if (reason && !isOver) $("doing").textContent = reason;
 });
 
-const SHOW = { now, asked: ask };
-live((section, content) => SHOW[section]?.(content), tell, () => over);
+const SHOW = { now: showPresent, asked: showQuestion };
+followSections((section, content) => SHOW[section]?.(content), showConnection, () => isOver);
