@@ -76,7 +76,7 @@ static enum read_result read_sensor(unsigned sensor, struct reading *reading)
     return drivers[sensor]->read(sensor, setups_of(sensor), reading);
 }
 
-#define TRIES 3u /* a bouncing line is left alone */
+#define TRIES 3u /* more reads would not calm a bouncing line */
 
 /* Discards the conversion from before the start. A part with a level on its line makes no edge until a read lowers it. A part
    with pulses is read only once: an ADIS16465 allows a limited number of words between conversions. */
@@ -103,7 +103,7 @@ static void lower_line(unsigned sensor)
         read_sensor(sensor, &discarded);
 }
 
-static const struct batch_layout *layout_of(const struct setup_payload *setup)
+static const struct batch_layout *get_layout(const struct setup_payload *setup)
 {
     if (setup->range_t > 0.0)
         return &batch_field_samples;
@@ -125,7 +125,7 @@ bool acquisition_start(uint8_t calibrated)
         struct stream *stream = &streams[i];
         stream->conversions = stream->sent = stream->dropped = 0;
         stream->written = stream->read = 0;
-        stream->layout = layout_of(setups_of(i));
+        stream->layout = get_layout(setups_of(i));
         if (is_named(calibrated, i))
             stream->layout = &batch_rates;
         stream->distrust = 0;
@@ -159,8 +159,9 @@ bool acquisition_is_empty(void)
     return true;
 }
 
-/* Conversions since the last one. A line kept high by an unread conversion makes no edges, so the time counts too. */
-static uint32_t conversions_until(const struct stream *stream, uint32_t edges, uint64_t time_us)
+/* Returns the conversions since the last one. A line kept high by an unread conversion makes no edges, so the
+   elapsed time is used too. */
+static uint32_t count_conversions(const struct stream *stream, uint32_t edges, uint64_t time_us)
 {
     if (stream->conversions == 0)
         return edges; /* the first may come late: the part is starting up */
@@ -168,7 +169,7 @@ static uint32_t conversions_until(const struct stream *stream, uint32_t edges, u
     return elapsed > edges ? elapsed : edges;
 }
 
-static bool complain(unsigned sensor, enum error_code code)
+static bool report_error(unsigned sensor, enum error_code code)
 {
     struct error_payload error = {.code = (uint8_t)code, .sensor = (uint8_t)sensor};
     return link_send(MESSAGE_ERROR, &error, sizeof error);
@@ -184,7 +185,7 @@ static void watch_silence(unsigned sensor)
     stream->watched_us = now_us;
     rearm(sensor);
     if (!stream->silence_reported)
-        stream->silence_reported = complain(sensor, ERROR_SENSOR_SILENT);
+        stream->silence_reported = report_error(sensor, ERROR_SENSOR_SILENT);
 }
 
 static void watch_reads(unsigned sensor, enum read_result result)
@@ -203,10 +204,10 @@ static void watch_reads(unsigned sensor, enum read_result result)
     if (stream->distrust < BAD_READS * GOOD_READS)
         stream->distrust += GOOD_READS;
     if (stream->distrust >= BAD_READS * GOOD_READS && !stream->bad_reads_reported)
-        stream->bad_reads_reported = complain(sensor, meaning[result]);
+        stream->bad_reads_reported = report_error(sensor, meaning[result]);
 }
 
-static struct sample *sample_at(const struct stream *stream, uint32_t number)
+static struct sample *get_sample(const struct stream *stream, uint32_t number)
 {
     return &stream->ring[number % stream->ring_size];
 }
@@ -224,25 +225,25 @@ static void acquire(unsigned sensor)
         return;
     }
     uint64_t time_us = clock_at(captured_us);
-    uint32_t conversions = conversions_until(stream, edges - stream->edges_seen, time_us);
+    uint32_t conversions = count_conversions(stream, edges - stream->edges_seen, time_us);
     stream->edges_seen = edges;
     stream->last_us = stream->watched_us = time_us;
 
     const struct sensor_driver *driver = drivers[sensor];
     struct reading reading;
-    uint32_t began_us = port_time_us();
+    uint32_t start_us = port_time_us();
     enum read_result result = read_sensor(sensor, &reading);
     /* After an edge between the check and the latching of the values they may belong to the next conversion, with the time of
        the one before. Then the next reading repeats them. Later edges do not change latched values. */
-    bool again = stream->overtaken && result == READ_STALE;
-    stream->overtaken = stream->edges != edges && (int32_t)(stream->captured_us - began_us) <= driver->latched_within_us;
+    bool is_repeat = stream->overtaken && result == READ_STALE;
+    stream->overtaken = stream->edges != edges && (int32_t)(stream->captured_us - start_us) <= driver->latched_within_us;
     if (driver->holds_line)
         lower_line(sensor);
     if (result == READ_FRESH) {
         stream->good_us = time_us;
         stream->temperature_counts = reading.temperature_counts;
     }
-    if (!again && result != READ_TORN)
+    if (!is_repeat && result != READ_TORN)
         watch_reads(sensor, result);
     if (stream->settling != 0) {
         stream->settling--;
@@ -260,11 +261,11 @@ static void acquire(unsigned sensor)
         stream->dropped++;
         return;
     }
-    *sample_at(stream, stream->written) = (struct sample){time_us, stream->conversions - 1, reading};
+    *get_sample(stream, stream->written) = (struct sample){time_us, stream->conversions - 1, reading};
     stream->written++;
 }
 
-static unsigned batch_max(const struct stream *stream)
+static unsigned get_batch_capacity(const struct stream *stream)
 {
     return (PAYLOAD_MAX - sizeof(struct samples_payload)) / stream->layout->item_size;
 }
@@ -274,12 +275,12 @@ static void send_batch(unsigned sensor)
 {
     struct stream *stream = &streams[sensor];
     const struct batch_layout *layout = stream->layout;
-    const struct sample *first = sample_at(stream, stream->read);
+    const struct sample *first = get_sample(stream, stream->read);
     uint8_t payload[PAYLOAD_MAX];
     size_t size = sizeof(struct samples_payload);
     uint8_t count = 0;
-    while (count < batch_max(stream) && stream->read + count != stream->written) {
-        const struct sample *sample = sample_at(stream, stream->read + count);
+    while (count < get_batch_capacity(stream) && stream->read + count != stream->written) {
+        const struct sample *sample = get_sample(stream, stream->read + count);
         if (sample->sequence != first->sequence + count)
             break;
         layout->write(sample, (uint32_t)(sample->time_us - first->time_us), &stream->correction, &payload[size]);
@@ -305,8 +306,8 @@ static bool batch_is_due(const struct stream *stream)
     uint32_t waiting = stream->written - stream->read;
     if (waiting == 0 || !link_has_room())
         return false;
-    uint64_t age_us = stream->last_us - sample_at(stream, stream->read)->time_us;
-    return waiting >= batch_max(stream) || age_us >= BATCH_AGE_US || !running;
+    uint64_t age_us = stream->last_us - get_sample(stream, stream->read)->time_us;
+    return waiting >= get_batch_capacity(stream) || age_us >= BATCH_AGE_US || !running;
 }
 
 void acquisition_run(void)

@@ -14,7 +14,7 @@
 
 extern volatile uint8_t store_start[FLASH_PAGES][FLASH_PAGE_BYTES]; /* the linker script's */
 
-/* Images up to firmware 0.5 had the last six pages alone: their records are still there. */
+/* Images up to firmware 0.5 had the last six pages alone: their records remain valid. */
 #define FIRST_PAGE (FLASH_PAGES - 6u)
 
 static volatile bool reading, torn;
@@ -32,7 +32,7 @@ static void switch_cache_on(void)
     FLASH_ACR |= FLASH_ACR_DCEN;
 }
 
-static volatile uint8_t *place_of(unsigned page)
+static volatile uint8_t *get_page(unsigned page)
 {
     return store_start[(FIRST_PAGE + page) % FLASH_PAGES];
 }
@@ -60,7 +60,7 @@ static bool finish(void)
 bool port_flash_erase(unsigned page)
 {
     begin();
-    FLASH_CR = FLASH_CR_PER | FLASH_CR_PNB(((uint32_t)place_of(page) - FLASH_START) / FLASH_PAGE_BYTES);
+    FLASH_CR = FLASH_CR_PER | FLASH_CR_PNB(((uint32_t)get_page(page) - FLASH_START) / FLASH_PAGE_BYTES);
     FLASH_CR |= FLASH_CR_START;
     return finish();
 }
@@ -68,7 +68,7 @@ bool port_flash_erase(unsigned page)
 /* Two words in this order start it. The barrier keeps them apart in the write buffer, as ST's own library does. */
 bool port_flash_program(unsigned page, size_t offset, uint64_t doubleword)
 {
-    volatile uint32_t *words = (volatile uint32_t *)(place_of(page) + offset);
+    volatile uint32_t *words = (volatile uint32_t *)(get_page(page) + offset);
     begin();
     FLASH_CR = FLASH_CR_PG;
     words[0] = (uint32_t)doubleword;
@@ -80,7 +80,7 @@ bool port_flash_program(unsigned page, size_t offset, uint64_t doubleword)
 bool port_flash_read(unsigned page, size_t offset, void *bytes, size_t size)
 {
     uint8_t *to = bytes;
-    volatile uint8_t *from = place_of(page) + offset;
+    volatile uint8_t *from = get_page(page) + offset;
     switch_cache_off();
     torn = false;
     reading = true;

@@ -68,7 +68,7 @@ _Noreturn void reset_chip(void)
 
 #define FRAME_WORDS 8 /* r0 r1 r2 r3 r12 lr pc xpsr */
 
-/* Writes down where it happened and starts afresh: a board that answers "fault at …" helps more than one that hangs.
+/* Records the address of the fault and restarts: a board that answers "fault at …" helps more than one that hangs.
    After a stack overflow there is no frame to read, and reading it would fault in here, which stops the core. */
 __attribute__((used)) static void record_fault(const uint32_t *frame)
 {
@@ -78,7 +78,8 @@ __attribute__((used)) static void record_fault(const uint32_t *frame)
     reset_chip();
 }
 
-/* Naked: the stack pointer must still be the exception frame's. It starts anew, for it may have left the stack. */
+/* Naked: the stack pointer must still be the exception frame's. The stack restarts at its top, because the pointer may have left
+   it. */
 __attribute__((naked)) void fault_handler(void)
 {
     __asm volatile("mov r0, sp\n ldr r1, =stack_top\n mov sp, r1\n b record_fault");

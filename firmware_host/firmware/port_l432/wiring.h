@@ -1,4 +1,4 @@
-/* Which pins the sensors' selects and data-ready lines are on, by the table of parts. */
+/* The pins of the sensors' selects and data-ready lines, from the table of parts. */
 #ifndef WIRING_H
 #define WIRING_H
 

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#define EACH(i, from, to) _Pragma("GCC unroll 9") for (unsigned i = (from); i < (to); i++)
+#define UNROLLED_FOR(i, from, to) _Pragma("GCC unroll 9") for (unsigned i = (from); i < (to); i++)
 
 void motion_begin(struct motion *motion)
 {
@@ -25,7 +25,7 @@ void motion_attitude(const float attitude[4], float r[3][3])
 }
 
 /* q becomes q p. One step of Newton's method corrects its length, which would drift by rounding. */
-static void times(float q[4], const float p[4])
+static void multiply(float q[4], const float p[4])
 {
     float w = q[0] * p[0] - q[1] * p[1] - q[2] * p[2] - q[3] * p[3];
     float x = q[0] * p[1] + q[1] * p[0] + q[2] * p[3] - q[3] * p[2];
@@ -43,31 +43,31 @@ static void times(float q[4], const float p[4])
 void motion_add(struct motion *motion, const float matrix[9], const float up[3], const float rate[3], float dt_s, unsigned samples)
 {
     float step[3], square = 0.0f;
-    EACH(i, 0, 3) {
+    UNROLLED_FOR(i, 0, 3) {
         step[i] = (matrix[3 * i] * rate[0] + matrix[3 * i + 1] * rate[1] + matrix[3 * i + 2] * rate[2]) * dt_s;
         square += step[i] * step[i];
-        motion->swept[i] += step[i];
+        motion->rotation_rad[i] += step[i];
     }
     motion->path_rad += __builtin_sqrtf(square);
     motion->duration_s += dt_s;
     motion->samples += samples;
 
     float s = square / 16.0f, half = 0.25f * (1.0f - s / 6.0f); /* half of the step's half angle */
-    float by[4] = {1.0f - s * (0.5f - s / 24.0f), half * step[0], half * step[1], half * step[2]};
+    float half_step[4] = {1.0f - s * (0.5f - s / 24.0f), half * step[0], half * step[1], half * step[2]};
     float r[3][3], vertical[3];
-    times(motion->attitude, by);
+    multiply(motion->attitude, half_step);
     motion_attitude(motion->attitude, r);
-    times(motion->attitude, by);
+    multiply(motion->attitude, half_step);
 
-    EACH(c, 0, 3)
+    UNROLLED_FOR(c, 0, 3)
         vertical[c] = r[0][c] * up[0] + r[1][c] * up[1] + r[2][c] * up[2];
-    EACH(a, 0, 3)
-        EACH(i, 0, 3) {
-            float there = r[a][i] * dt_s;
-            motion->turned[a][i] += there;
-            EACH(c, 0, 3) {
-                motion->by_matrix[a][3 * i + c] += there * rate[c];
-                motion->along[a][3 * i + c] += there * vertical[c];
+    UNROLLED_FOR(a, 0, 3)
+        UNROLLED_FOR(i, 0, 3) {
+            float attitude_dt = r[a][i] * dt_s;
+            motion->attitude_integral[a][i] += attitude_dt;
+            UNROLLED_FOR(c, 0, 3) {
+                motion->matrix_jacobian[a][3 * i + c] += attitude_dt * rate[c];
+                motion->vertical_integral[a][3 * i + c] += attitude_dt * vertical[c];
             }
         }
 }

@@ -5,12 +5,11 @@
 #include <stdint.h>
 
 struct motion {
-    float attitude[4];     /* quaternion, real part first: body now to body at the start */
-    float by_matrix[3][9]; /* derivative of the rotation, a vector in the body at the start, with respect to the matrix C, row
-                              by row */
-    float turned[3][3];    /* integral of the attitude R */
-    float along[3][9];     /* integral of R times the vertical in the body: R(a, s) u(c) at [a][3 s + c] */
-    float swept[3];        /* integral of the angular rate in the body */
+    float attitude[4];             /* quaternion, real part first: body now to body at the start */
+    float matrix_jacobian[3][9];   /* derivative of the rotation, a vector in the body at the start, by the matrix C, row by row */
+    float attitude_integral[3][3]; /* integral of the attitude R */
+    float vertical_integral[3][9]; /* integral of R times the vertical in the body: R(a, s) u(c) at [a][3 s + c] */
+    float rotation_rad[3];         /* integral of the angular rate in the body */
     float path_rad, duration_s;
     uint32_t samples;
 };

@@ -17,8 +17,8 @@ enum { HAND_MATRIX = 0, HAND_GRAVITY = 9, HAND_BIAS = 18, HAND_FACES = 21, HAND_
 
 struct estimate {
     float centre[HAND_UNKNOWNS]; /* C and G row by row, b, two angles of each face */
-    float amiss[HAND_UNKNOWNS];  /* z */
-    bool settled;                /* the centre equals the solution after the last accepted move */
+    float right_side[HAND_UNKNOWNS]; /* z */
+    bool settled; /* the centre equals the solution after the last accepted move */
     float r[HAND_UNKNOWNS * (HAND_UNKNOWNS + 1) / 2]; /* row by row, from the diagonal on */
 };
 

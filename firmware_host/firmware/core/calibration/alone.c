@@ -19,18 +19,18 @@
 #define RANGE_G 8.0f /* a range of every part */
 #define NONE SENSOR_COUNT
 
-static uint64_t up_us; /* time at which the button was last up */
-static bool heard;     /* whether it has been down for long enough since */
+static uint64_t up_us;  /* time at which the button was last up */
+static bool is_handled; /* whether a session has begun for this press */
 
 void alone_reset(void)
 {
     up_us = clock_now();
-    heard = false;
+    is_handled = false;
 }
 
 /* Returns the first gyroscope that streams accelerations too; no stream is changed. If none streams, the first that answers and
    can be configured. */
-static uint8_t gyroscope(void)
+static uint8_t choose_gyroscope(void)
 {
     for (uint8_t i = 0; i < GYROSCOPE_COUNT; i++) {
         struct configure_payload wanted = {.sensor = i, .rate_hz = RATE_HZ, .range_deg_s = RANGE_DEG_S, .range_g = RANGE_G};
@@ -42,11 +42,11 @@ static uint8_t gyroscope(void)
     return NONE;
 }
 
-static void begin(void)
+static void begin_session(void)
 {
     struct port_health health;
     port_health(&health);
-    uint8_t sensor = health.clock_locked ? gyroscope() : NONE; /* readings do not reveal the error of a clock without its
+    uint8_t sensor = health.clock_locked ? choose_gyroscope() : NONE; /* readings do not reveal the error of a clock without its
                                                                   crystal */
     if (sensor == NONE)
         return;
@@ -65,9 +65,9 @@ void alone_run(void)
     port_set_lamp(lit);
     if (lit || !port_button_is_down()) {
         up_us = now_us;
-        heard = heard && lit; /* the lamp is on the button's wire */
-    } else if (!heard && now_us - up_us >= PRESSED_US) {
-        heard = true;
-        begin();
+        is_handled = is_handled && lit; /* the lamp is on the button's wire */
+    } else if (!is_handled && now_us - up_us >= PRESSED_US) {
+        is_handled = true;
+        begin_session();
     }
 }

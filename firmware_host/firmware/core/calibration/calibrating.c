@@ -53,7 +53,7 @@ void calibrating_on_keep(const struct frame *request)
 
 /* Returns the session of a request for one configured sensor; NULL if the request has been answered: refused, or a repetition.
    */
-static struct session *session_of(const struct frame *request)
+static struct session *find_session(const struct frame *request)
 {
     uint8_t sensor = request->payload[0];
     enum error_code error = setups_check(sensor);
@@ -74,7 +74,8 @@ static bool is_next(const struct session *session, uint16_t index)
     return index == 0 || (index == session->accumulator.count && index < UINT16_MAX);
 }
 
-static void take(struct session *session, const struct frame *request, const struct observed_payload *observed, float speed_rad_s)
+static void add_observation(struct session *session, const struct frame *request, const struct observed_payload *observed,
+                            float speed_rad_s)
 {
     float mean_rad_s[3];
     memcpy(mean_rad_s, observed->mean_rad_s, sizeof mean_rad_s);
@@ -96,7 +97,7 @@ void calibrating_on_observe(const struct frame *request)
 {
     struct observe_payload wanted;
     memcpy(&wanted, request->payload, sizeof wanted);
-    struct session *session = session_of(request);
+    struct session *session = find_session(request);
     if (session == NULL)
         return;
     if (!is_next(session, wanted.index) || !is_speed(wanted.speed_rad_s) || wanted.end_us <= wanted.start_us) {
@@ -119,14 +120,14 @@ void calibrating_on_observe(const struct frame *request)
     float per_count = (float)setups_of(wanted.sensor)->sensitivity_rad_s / (float)span.samples;
     for (unsigned axis = 0; axis < 3; axis++)
         observed.mean_rad_s[axis] = (float)span.sums[axis] * per_count;
-    take(session, request, &observed, wanted.speed_rad_s);
+    add_observation(session, request, &observed, wanted.speed_rad_s);
 }
 
 void calibrating_on_recall(const struct frame *request)
 {
     struct recall_payload wanted;
     memcpy(&wanted, request->payload, sizeof wanted);
-    struct session *session = session_of(request);
+    struct session *session = find_session(request);
     if (session == NULL)
         return;
     bool finite = true;
@@ -138,7 +139,7 @@ void calibrating_on_recall(const struct frame *request)
     }
     struct observed_payload observed = {.reply_to = request->sequence, .sensor = wanted.sensor, .index = wanted.index};
     memcpy(observed.mean_rad_s, wanted.mean_rad_s, sizeof observed.mean_rad_s);
-    take(session, request, &observed, wanted.speed_rad_s);
+    add_observation(session, request, &observed, wanted.speed_rad_s);
 }
 
 void calibrating_on_solve(const struct frame *request)

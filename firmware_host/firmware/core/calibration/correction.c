@@ -6,20 +6,20 @@
 
 #define LARGEST 2147483520.0f /* the largest float below 2³¹ */
 
-static float polynomial(const float change[3][3], unsigned axis, float warmer)
+static float evaluate_polynomial(const float change[3][3], unsigned axis, float change_k)
 {
-    return warmer * (change[0][axis] + warmer * (change[1][axis] + warmer * change[2][axis]));
+    return change_k * (change[0][axis] + change_k * (change[1][axis] + change_k * change[2][axis]));
 }
 
-static void work_out(struct correction *correction, float warmer)
+static void update_correction(struct correction *correction, float change_k)
 {
-    correction->warmer_k = warmer;
+    correction->change_k = change_k;
     for (unsigned axis = 0; axis < 3; axis++) {
-        float share = 1.0f + polynomial(correction->scale_change, axis, warmer);
+        float factor = 1.0f + evaluate_polynomial(correction->scale_change, axis, change_k);
         for (unsigned row = 0; row < 3; row++)
-            correction->gain_there_urad_s[row][axis] = correction->gain_urad_s[row][axis] * share;
-        correction->offset_there_counts[axis] =
-            correction->offset_counts[axis] + polynomial(correction->offset_change_counts, axis, warmer);
+            correction->present_gain_urad_s[row][axis] = correction->gain_urad_s[row][axis] * factor;
+        correction->present_offset_counts[axis] =
+            correction->offset_counts[axis] + evaluate_polynomial(correction->offset_change_counts, axis, change_k);
     }
 }
 
@@ -46,11 +46,11 @@ struct correction correction_of(const struct calibration_payload *record, const 
             correction.offset_change_counts[row][axis] = bias_change_rad_s[row][axis] / sensitivity_rad_s;
         }
     }
-    work_out(&correction, 0.0f);
+    update_correction(&correction, 0.0f);
     return correction;
 }
 
-static int32_t rounded(float value)
+static int32_t round_to_int32(float value)
 {
     if (value >= LARGEST)
         return INT32_MAX;
@@ -60,24 +60,24 @@ static int32_t rounded(float value)
 }
 
 /* Returns the difference from the temperature of matrix and bias, limited to the polynomials' range. */
-static float warmer_k(const struct correction *correction, int16_t temperature_counts)
+static float limit_temperature_change(const struct correction *correction, int16_t temperature_counts)
 {
-    float warmer = temperature_counts * correction->kelvin_per_count + correction->kelvin_at_zero;
-    if (warmer > correction->least_k)
-        return warmer < correction->most_k ? warmer : correction->most_k;
+    float change_k = temperature_counts * correction->kelvin_per_count + correction->kelvin_at_zero;
+    if (change_k > correction->least_k)
+        return change_k < correction->most_k ? change_k : correction->most_k;
     return correction->least_k;
 }
 
 void correction_apply(struct correction *correction, const struct reading *reading, int32_t rate_urad_s[3])
 {
-    float warmer = warmer_k(correction, reading->temperature_counts), counts[3];
-    if (warmer != correction->warmer_k)
-        work_out(correction, warmer);
+    float change_k = limit_temperature_change(correction, reading->temperature_counts), counts[3];
+    if (change_k != correction->change_k)
+        update_correction(correction, change_k);
     for (unsigned axis = 0; axis < 3; axis++)
-        counts[axis] = reading->counts[axis] + correction->offset_there_counts[axis];
+        counts[axis] = reading->counts[axis] + correction->present_offset_counts[axis];
     for (unsigned row = 0; row < 3; row++) {
-        const float *gain_urad_s = correction->gain_there_urad_s[row];
+        const float *gain_urad_s = correction->present_gain_urad_s[row];
         rate_urad_s[row] =
-            rounded(counts[0] * gain_urad_s[0] + counts[1] * gain_urad_s[1] + counts[2] * gain_urad_s[2]);
+            round_to_int32(counts[0] * gain_urad_s[0] + counts[1] * gain_urad_s[1] + counts[2] * gain_urad_s[2]);
     }
 }

@@ -14,7 +14,7 @@ struct correction {
     float least_k, most_k;                  /* the polynomials' range */
     float scale_change[3][3], offset_change_counts[3][3]; /* per K, K², K³, by axis */
     /* Cached for the temperature of the last reading, which most readings share. */
-    float warmer_k, gain_there_urad_s[3][3], offset_there_counts[3];
+    float change_k, present_gain_urad_s[3][3], present_offset_counts[3];
 };
 
 /* Prepares the correction for a part with this setup. */

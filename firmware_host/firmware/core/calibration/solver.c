@@ -16,7 +16,7 @@
 #define ALGORITHM_1_TOLERANCE 2e-6f /* of Σ|β|: SIX has 1e-6, absolute, which single precision does not always resolve */
 
 /* Unrolled by the compiler, and small functions inlined: counting and indexing would be two thirds of all instructions. */
-#define EACH(i, from, to) _Pragma("GCC unroll 6") for (unsigned i = (from); i < (to); i++)
+#define UNROLLED_FOR(i, from, to) _Pragma("GCC unroll 6") for (unsigned i = (from); i < (to); i++)
 
 /* X β = ω² − γ for γ as yet unknown. X has the columns [m m²] and is given by its triangle, in blocks of three: [linear mixed;
    0 squares]. The right-hand sides ω² and 1 are rotated alike. */
@@ -31,12 +31,12 @@ void solver_begin(struct accumulator *accumulator)
     memset(accumulator, 0, sizeof *accumulator);
 }
 
-/* Returns the Givens rotation of `b` into `a`; the identity if `b` is negligible in single precision. */
 struct rotation {
     float c, s;
 };
 
-static struct rotation rotation_of(float a, float b)
+/* Returns the Givens rotation of `b` into `a`; the identity if both are negligible in single precision. */
+static struct rotation compute_rotation(float a, float b)
 {
     float square = a * a + b * b;
     if (square < 1e-30f)
@@ -45,10 +45,10 @@ static struct rotation rotation_of(float a, float b)
     return (struct rotation){a * inverse, b * inverse};
 }
 
-static void rotate(struct rotation by, float *a, float *b)
+static void rotate(struct rotation rotation, float *a, float *b)
 {
-    float turned = by.c * *a + by.s * *b;
-    *b = by.c * *b - by.s * *a;
+    float turned = rotation.c * *a + rotation.s * *b;
+    *b = rotation.c * *b - rotation.s * *a;
     *a = turned;
 }
 
@@ -60,9 +60,9 @@ void solver_add(struct accumulator *accumulator, const float mean_rad_s[3], floa
         row[4 + axis] = mean_rad_s[axis] * mean_rad_s[axis];
     }
     for (unsigned i = 0; i < SOLVER_UNKNOWNS; i++) {
-        struct rotation by = rotation_of(accumulator->r[i][i], row[i]);
+        struct rotation rotation = compute_rotation(accumulator->r[i][i], row[i]);
         for (unsigned j = i; j <= SPEED; j++)
-            rotate(by, &accumulator->r[i][j], &row[j]);
+            rotate(rotation, &accumulator->r[i][j], &row[j]);
     }
     accumulator->count++;
 }
@@ -73,7 +73,7 @@ static void reduce(const struct accumulator *accumulator, bool centred, struct d
 {
     const float(*r)[SOLVER_UNKNOWNS + 1u] = accumulator->r;
     float linear[3], squares[3], speed = r[0][SPEED], one = r[0][0], inverse = 1.0f / one;
-    EACH(k, 0, 3) {
+    UNROLLED_FOR(k, 0, 3) {
         design->centre[k] = centred ? r[0][1 + k] * inverse : 0.0f;
         linear[k] = r[0][1 + k];
         squares[k] = r[0][4 + k] - design->centre[k] * r[0][1 + k];
@@ -81,37 +81,37 @@ static void reduce(const struct accumulator *accumulator, bool centred, struct d
         design->speeds[3 + k] = r[4 + k][SPEED];
         design->ones[k] = design->ones[3 + k] = 0.0f;
     }
-    EACH(i, 0, 3) {
-        EACH(k, i, 3) {
+    UNROLLED_FOR(i, 0, 3) {
+        UNROLLED_FOR(k, i, 3) {
             design->linear[i][k] = r[1 + i][1 + k];
             design->squares[i][k] = r[4 + i][4 + k];
         }
-        EACH(k, 0, 3)
+        UNROLLED_FOR(k, 0, 3)
             design->mixed[i][k] = r[1 + i][4 + k] - (k < i ? 0.0f : 2.0f * design->centre[k] * r[1 + i][1 + k]);
     }
     if (!centred)
-        EACH(i, 0, 3) {
-            struct rotation by = rotation_of(design->linear[i][i], linear[i]);
-            EACH(k, i, 3)
-                rotate(by, &design->linear[i][k], &linear[k]);
-            EACH(k, 0, 3)
-                rotate(by, &design->mixed[i][k], &squares[k]);
-            rotate(by, &design->speeds[i], &speed);
-            rotate(by, &design->ones[i], &one);
+        UNROLLED_FOR(i, 0, 3) {
+            struct rotation rotation = compute_rotation(design->linear[i][i], linear[i]);
+            UNROLLED_FOR(k, i, 3)
+                rotate(rotation, &design->linear[i][k], &linear[k]);
+            UNROLLED_FOR(k, 0, 3)
+                rotate(rotation, &design->mixed[i][k], &squares[k]);
+            rotate(rotation, &design->speeds[i], &speed);
+            rotate(rotation, &design->ones[i], &one);
         }
-    EACH(i, 0, 3) {
-        struct rotation by = rotation_of(design->squares[i][i], squares[i]);
-        EACH(k, i, 3)
-            rotate(by, &design->squares[i][k], &squares[k]);
-        rotate(by, &design->speeds[3 + i], &speed);
-        rotate(by, &design->ones[3 + i], &one);
+    UNROLLED_FOR(i, 0, 3) {
+        struct rotation rotation = compute_rotation(design->squares[i][i], squares[i]);
+        UNROLLED_FOR(k, i, 3)
+            rotate(rotation, &design->squares[i][k], &squares[k]);
+        rotate(rotation, &design->speeds[3 + i], &speed);
+        rotate(rotation, &design->ones[3 + i], &one);
     }
 }
 
 /* Inverts a triangle in place. */
 static inline void invert(float r[3][3])
 {
-    EACH(i, 0, 3)
+    UNROLLED_FOR(i, 0, 3)
         r[i][i] = 1.0f / r[i][i];
     float r01 = -r[0][0] * r[0][1] * r[1][1];
     r[0][2] = -(r[0][0] * r[0][2] + r01 * r[1][2]) * r[2][2];
@@ -119,11 +119,11 @@ static inline void invert(float r[3][3])
     r[0][1] = r01;
 }
 
-static inline float norm2_of(float r[3][3])
+static inline float compute_norm2(float r[3][3])
 {
     float sum = 0.0f;
-    EACH(i, 0, 3)
-        EACH(k, i, 3)
+    UNROLLED_FOR(i, 0, 3)
+        UNROLLED_FOR(k, i, 3)
             sum += r[i][k] * r[i][k];
     return sum;
 }
@@ -136,7 +136,7 @@ static inline bool is_well_conditioned(struct design *inverted, float length2, u
 {
     if (!(length2 < MAX_SCALE * MAX_SCALE * speed2 && speed2 < MAX_SCALE * MAX_SCALE * length2))
         return false;
-    float inverse2 = length2 * (norm2_of(inverted->linear) + length2 * norm2_of(inverted->squares));
+    float inverse2 = length2 * (compute_norm2(inverted->linear) + length2 * compute_norm2(inverted->squares));
     return 2.0f * count * inverse2 <= MAX_CONDITION * MAX_CONDITION;
 }
 
@@ -145,57 +145,57 @@ struct line {
     float p[PARAMETERS], q[PARAMETERS];
 };
 
-static inline void solve_for(const struct design *inverted, const float right[PARAMETERS], float found[PARAMETERS])
+static inline void solve_for(const struct design *inverted, const float right_side[PARAMETERS], float solution[PARAMETERS])
 {
-    float rest[3];
-    EACH(i, 0, 3) {
-        found[3 + i] = 0.0f;
-        EACH(k, i, 3)
-            found[3 + i] += inverted->squares[i][k] * right[3 + k];
+    float remainder[3];
+    UNROLLED_FOR(i, 0, 3) {
+        solution[3 + i] = 0.0f;
+        UNROLLED_FOR(k, i, 3)
+            solution[3 + i] += inverted->squares[i][k] * right_side[3 + k];
     }
-    EACH(i, 0, 3) {
-        rest[i] = right[i];
-        EACH(k, 0, 3)
-            rest[i] -= inverted->mixed[i][k] * found[3 + k];
+    UNROLLED_FOR(i, 0, 3) {
+        remainder[i] = right_side[i];
+        UNROLLED_FOR(k, 0, 3)
+            remainder[i] -= inverted->mixed[i][k] * solution[3 + k];
     }
-    EACH(i, 0, 3) {
-        found[i] = 0.0f;
-        EACH(k, i, 3)
-            found[i] += inverted->linear[i][k] * rest[k];
+    UNROLLED_FOR(i, 0, 3) {
+        solution[i] = 0.0f;
+        UNROLLED_FOR(k, i, 3)
+            solution[i] += inverted->linear[i][k] * remainder[k];
     }
 }
 
-static void beta_at(const struct line *line, float gamma, float beta[PARAMETERS])
+static void compute_beta(const struct line *line, float gamma, float beta[PARAMETERS])
 {
-    EACH(i, 0, PARAMETERS)
+    UNROLLED_FOR(i, 0, PARAMETERS)
         beta[i] = line->p[i] - gamma * line->q[i];
 }
 
 /* Γ(β) = Σ β_l² / (4 β_s), which must equal β0. */
-static float gamma_of(const float beta[PARAMETERS])
+static float compute_gamma(const float beta[PARAMETERS])
 {
     float gamma = 0.0f;
-    EACH(axis, 0, 3)
+    UNROLLED_FOR(axis, 0, 3)
         gamma += beta[axis] * beta[axis] / (4.0f * beta[3 + axis]);
     return gamma;
 }
 
 /* Newton on γ = Γ(β(γ)), from the closed form for one speed, which is exact when all speeds are equal. */
-static inline enum solution_status by_newton(const struct line *line, float speed2, float beta[PARAMETERS], uint8_t *steps)
+static inline enum solution_status solve_by_newton(const struct line *line, float speed2, float beta[PARAMETERS], uint8_t *steps)
 {
-    float g = gamma_of(line->q);
+    float g = compute_gamma(line->q);
     float gamma = speed2 * g / (1.0f + g);
     for (*steps = 1; *steps <= NEWTON_LIMIT; ++*steps) {
         float value = -gamma, slope = -1.0f;
-        beta_at(line, gamma, beta);
-        EACH(axis, 0, 3) {
+        compute_beta(line, gamma, beta);
+        UNROLLED_FOR(axis, 0, 3) {
             float bias = beta[axis] / (2.0f * beta[3 + axis]);
             value += beta[3 + axis] * bias * bias;
             slope += bias * (bias * line->q[3 + axis] - line->q[axis]);
         }
         float step = value / slope;
         gamma -= step;
-        beta_at(line, gamma, beta);
+        compute_beta(line, gamma, beta);
         if (__builtin_fabsf(step) <= NEWTON_TOLERANCE * speed2)
             return SOLUTION_SOLVED;
     }
@@ -205,14 +205,14 @@ static inline enum solution_status by_newton(const struct line *line, float spee
 /* SIX, Algorithm 1, as published: γ ← Γ(β), β ← β(γ), from γ = 0, until β converges. Each pass changes β by β0 / (ω² − β0)
    times what the pass before did, so it diverges when β0 > ω²/2. Compared with the first change, not with the last: in a slow
    convergence two neighbours differ by less than rounding. */
-static enum solution_status by_algorithm_1(const struct line *line, float beta[PARAMETERS], uint8_t *passes)
+static enum solution_status solve_by_algorithm_1(const struct line *line, float beta[PARAMETERS], uint8_t *passes)
 {
     float first_change = __builtin_inff();
-    beta_at(line, 0.0f, beta);
+    compute_beta(line, 0.0f, beta);
     for (*passes = 2; *passes < ALGORITHM_1_LIMIT; ++*passes) {
         float improved[PARAMETERS], change = 0.0f, size = 0.0f;
-        beta_at(line, gamma_of(beta), improved);
-        EACH(i, 0, PARAMETERS) {
+        compute_beta(line, compute_gamma(beta), improved);
+        UNROLLED_FOR(i, 0, PARAMETERS) {
             change += __builtin_fabsf(improved[i] - beta[i]);
             size += __builtin_fabsf(improved[i]);
         }
@@ -228,9 +228,9 @@ static enum solution_status by_algorithm_1(const struct line *line, float beta[P
 }
 
 /* k = √β_s and b = β_l / (2 β_s), the last lines of Algorithm 1; false when a square is not one. */
-static bool to_parameters(const float beta[PARAMETERS], const float centre[3], struct solution *solution)
+static bool compute_parameters(const float beta[PARAMETERS], const float centre[3], struct solution *solution)
 {
-    EACH(axis, 0, 3) {
+    UNROLLED_FOR(axis, 0, 3) {
         if (!(beta[3 + axis] > 0.0f))
             return false;
         solution->scale[axis] = __builtin_sqrtf(beta[3 + axis]);
@@ -248,7 +248,7 @@ static enum solution_status solve(const struct accumulator *accumulator, enum so
         return SOLUTION_TOO_FEW_OBSERVATIONS;
     float speed2 = accumulator->r[0][SPEED] / accumulator->r[0][0]; /* the mean of ω² */
     reduce(accumulator, true, &design);
-    float length2 = norm2_of(design.linear) / accumulator->count;
+    float length2 = compute_norm2(design.linear) / accumulator->count;
     invert(design.linear);
     invert(design.squares);
     if (!is_well_conditioned(&design, length2, accumulator->count, speed2))
@@ -261,9 +261,9 @@ static enum solution_status solve(const struct accumulator *accumulator, enum so
     solve_for(&design, design.speeds, line.p);
     solve_for(&design, design.ones, line.q);
     enum solution_status status = method == METHOD_ALGORITHM_1
-                                      ? by_algorithm_1(&line, beta, &solution->iterations)
-                                      : by_newton(&line, speed2, beta, &solution->iterations);
-    if (status == SOLUTION_SOLVED && !to_parameters(beta, design.centre, solution))
+                                      ? solve_by_algorithm_1(&line, beta, &solution->iterations)
+                                      : solve_by_newton(&line, speed2, beta, &solution->iterations);
+    if (status == SOLUTION_SOLVED && !compute_parameters(beta, design.centre, solution))
         return SOLUTION_DEGENERATE;
     return status;
 }

@@ -47,7 +47,7 @@ _Static_assert(sizeof(struct slot) % sizeof(uint64_t) == 0 && offsetof(struct sl
                "the seal is the last doubleword");
 _Static_assert(SLOTS * GYROSCOPE_COUNT <= FLASH_PAGES && sizeof(struct slot) <= FLASH_PAGE_BYTES, "the flash has room");
 
-static unsigned page_of(unsigned sensor, unsigned slot)
+static unsigned get_page(unsigned sensor, unsigned slot)
 {
     return SLOTS * sensor + slot;
 }
@@ -115,7 +115,7 @@ static unsigned find_newest(unsigned sensor, struct calibration_payload *newest)
     struct calibration_payload record;
     unsigned found = SLOTS;
     for (unsigned i = 0; i < SLOTS; i++)
-        if (read_record(page_of(sensor, i), &record) && (found == SLOTS || is_newer(&record, newest))) {
+        if (read_record(get_page(sensor, i), &record) && (found == SLOTS || is_newer(&record, newest))) {
             *newest = record;
             found = i;
         }
@@ -143,15 +143,15 @@ bool store_write(unsigned sensor, struct calibration_payload *record)
     struct calibration_payload newest;
     struct slot written, slot = {.seal = SEAL};
     unsigned found = find_newest(sensor, &newest);
-    unsigned page = page_of(sensor, found == 0 ? 1 : 0);
+    unsigned page = get_page(sensor, found == 0 ? 1 : 0);
     record->sequence = found == SLOTS ? 1 : newest.sequence + 1;
     slot.record = *record;
     slot.crc = frame_crc(0, (const uint8_t *)&slot, offsetof(struct slot, seal));
     bool stored = port_flash_erase(page) && program(page, &slot) && read_sealed(page, &written, sizeof written, SEAL) &&
                   memcmp(&written, &slot, sizeof slot) == 0;
     /* An older image would apply the previous calibration, whose layout it can read. */
-    if (stored && found != SLOTS && read_older(page_of(sensor, found), &newest))
-        port_flash_erase(page_of(sensor, found));
+    if (stored && found != SLOTS && read_older(get_page(sensor, found), &newest))
+        port_flash_erase(get_page(sensor, found));
     return stored;
 }
 
@@ -160,5 +160,5 @@ bool store_erase(unsigned sensor)
 {
     struct calibration_payload newest;
     unsigned newer = find_newest(sensor, &newest) == 1 ? 1 : 0;
-    return port_flash_erase(page_of(sensor, 1 - newer)) && port_flash_erase(page_of(sensor, newer));
+    return port_flash_erase(get_page(sensor, 1 - newer)) && port_flash_erase(get_page(sensor, newer));
 }

@@ -30,26 +30,27 @@ void stored_on_read(const struct frame *request)
 /* Returns whether a matrix is K, or possible for a sensor: its axes are nearer to right angles than to each other. */
 static bool is_usable_matrix(const struct write_calibration_payload *calibration)
 {
-    bool whole = calibration->model == MODEL_MATRIX_TIMES_M_PLUS_B;
-    bool usable = whole || calibration->model == MODEL_K_TIMES_M_PLUS_B;
+    bool is_full_matrix = calibration->model == MODEL_MATRIX_TIMES_M_PLUS_B;
+    bool usable = is_full_matrix || calibration->model == MODEL_K_TIMES_M_PLUS_B;
     for (unsigned row = 0; row < 3; row++) {
-        float on_axis = calibration->matrix[row][row], beside = 0.0f;
+        float diagonal = calibration->matrix[row][row], off_diagonal = 0.0f;
         for (unsigned column = 0; column < 3; column++)
             if (column != row)
-                beside += __builtin_fabsf(calibration->matrix[row][column]);
-        usable = usable && on_axis > 0.0f && on_axis < LARGEST && (whole ? beside < on_axis : beside == 0.0f);
+                off_diagonal += __builtin_fabsf(calibration->matrix[row][column]);
+        usable = usable && diagonal > 0.0f && diagonal < LARGEST &&
+                 (is_full_matrix ? off_diagonal < diagonal : off_diagonal == 0.0f);
     }
     return usable;
 }
 
-/* Returns the largest change of an axis by a polynomial within a distance of temperature. */
-static float most_change(const float change[3][3], unsigned axis, float away_k)
+/* Returns a bound on the change of an axis by a polynomial over a range of temperature. */
+static float compute_largest_change(const float change[3][3], unsigned axis, float range_k)
 {
-    return away_k * (__builtin_fabsf(change[0][axis]) +
-                     away_k * (__builtin_fabsf(change[1][axis]) + away_k * __builtin_fabsf(change[2][axis])));
+    return range_k * (__builtin_fabsf(change[0][axis]) +
+                     range_k * (__builtin_fabsf(change[1][axis]) + range_k * __builtin_fabsf(change[2][axis])));
 }
 
-#define MOST_SCALE_CHANGE 0.5f /* largest change for any sensor over any temperatures */
+#define MAX_SCALE_CHANGE 0.5f /* largest change for any sensor over any temperatures */
 
 /* NaN fails every comparison. */
 static bool is_usable(const struct write_calibration_payload *calibration)
@@ -57,13 +58,13 @@ static bool is_usable(const struct write_calibration_payload *calibration)
     float scale_change[3][3], bias_change_rad_s[3][3], reference_c = calibration->temperature_c;
     memcpy(scale_change, calibration->scale_change, sizeof scale_change);
     memcpy(bias_change_rad_s, calibration->bias_change_rad_s, sizeof bias_change_rad_s);
-    float away_k = calibration->highest_c - calibration->lowest_c;
+    float range_k = calibration->highest_c - calibration->lowest_c;
     bool usable = is_usable_matrix(calibration) && calibration->lowest_c <= reference_c &&
-                  reference_c <= calibration->highest_c && away_k < LARGEST;
+                  reference_c <= calibration->highest_c && range_k < LARGEST;
     for (unsigned axis = 0; axis < 3; axis++)
         usable = usable && __builtin_fabsf(calibration->bias_rad_s[axis]) < LARGEST &&
-                 most_change(scale_change, axis, away_k) < MOST_SCALE_CHANGE &&
-                 most_change(bias_change_rad_s, axis, away_k) < LARGEST;
+                 compute_largest_change(scale_change, axis, range_k) < MAX_SCALE_CHANGE &&
+                 compute_largest_change(bias_change_rad_s, axis, range_k) < LARGEST;
     return usable;
 }
 

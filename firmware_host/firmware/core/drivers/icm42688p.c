@@ -74,7 +74,7 @@ static uint16_t identify(unsigned device)
     return byte_register_read(device, BUS_HZ, WHO_AM_I);
 }
 
-static bool is_told(unsigned device, uint8_t address, uint8_t value)
+static bool register_is(unsigned device, uint8_t address, uint8_t value)
 {
     return byte_register_read(device, BUS_HZ, address) == value;
 }
@@ -83,7 +83,7 @@ static bool is_told(unsigned device, uint8_t address, uint8_t value)
 static void keep_to_spi(unsigned device)
 {
     uint8_t setting = INTF_CONFIG0_FULL_RANGE | INTF_CONFIG0_BIG_ENDIAN | INTF_CONFIG0_I2C_OFF;
-    if (is_told(device, PWR_MGMT0, 0) && !is_told(device, INTF_CONFIG0, setting))
+    if (register_is(device, PWR_MGMT0, 0) && !register_is(device, INTF_CONFIG0, setting))
         byte_register_write(device, BUS_HZ, INTF_CONFIG0, setting);
 }
 
@@ -120,9 +120,9 @@ static bool write_settings(unsigned device, uint8_t rate, uint8_t range, uint8_t
         {ACCEL_CONFIG0, (uint8_t)(acceleration_range << 5 | rate)},
         {PWR_MGMT0, PWR_MGMT0_BOTH_LOW_NOISE},
     };
-    bool taken = byte_registers_write(device, BUS_HZ, settings, COUNT(settings));
+    bool is_written = byte_registers_write(device, BUS_HZ, settings, COUNT(settings));
     port_wait_us(SWITCHING_US);
-    return taken;
+    return is_written;
 }
 
 static enum error_code configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)

@@ -87,10 +87,10 @@ static uint8_t filter_code(double rate_hz)
 static bool wake(unsigned device)
 {
     bool asleep = byte_register_read(device, REGISTERS_HZ, PWR_MGMT_1) & PWR_MGMT_1_SLEEP;
-    bool taken = byte_register_write(device, REGISTERS_HZ, PWR_MGMT_1, PWR_MGMT_1_CLKSEL_BEST);
+    bool is_written = byte_register_write(device, REGISTERS_HZ, PWR_MGMT_1, PWR_MGMT_1_CLKSEL_BEST);
     if (asleep)
         port_wait_us(WAKING_US);
-    return taken;
+    return is_written;
 }
 
 /* Settings of an earlier image, such as an offset or the self-test, are cleared. Interrupts last. The interrupt is a pulse for

@@ -22,7 +22,7 @@ enum error_code sensors_check_gyroscope(uint8_t sensor)
 }
 
 /* An undriven wire reads as all zeros or all ones. */
-static bool is_nobody(uint16_t who_am_i)
+static bool is_undriven(uint16_t who_am_i)
 {
     return who_am_i == 0 || who_am_i == 0xFFu || who_am_i == 0xFFFFu;
 }
@@ -36,5 +36,5 @@ enum error_code sensors_identify(unsigned sensor, uint16_t *who_am_i)
             driver->keep_to_spi(sensor);
         return 0;
     }
-    return is_nobody(*who_am_i) ? ERROR_SENSOR_ABSENT : ERROR_SENSOR_MISMATCH;
+    return is_undriven(*who_am_i) ? ERROR_SENSOR_ABSENT : ERROR_SENSOR_MISMATCH;
 }
