@@ -25,7 +25,7 @@ class Goal:
     """A bound that a figure, or its `ratio` to a peer measured in the same run, is to keep: at `most`, or at least."""
 
     bound: float
-    of: Literal["figure", "ratio"] = "figure"
+    compared: Literal["figure", "ratio"] = "figure"
     most: bool = True
 
 
@@ -77,7 +77,7 @@ def record(what: str, value: float, unit: str, *, peer: str = "", peer_value: fl
 
 def shortfall(figure: Figure, goal: Goal) -> float:
     """Return by which part of its goal a figure misses it; 0 or less where it is met."""
-    value = figure.value if goal.of == "figure" else figure.ratio
+    value = figure.value if goal.compared == "figure" else figure.ratio
     assert value is not None, f"{figure.what} has no peer"
     return value / goal.bound - 1 if goal.most else goal.bound / value - 1
 
@@ -90,7 +90,9 @@ def table(figures: Iterable[Figure]) -> Iterator[str]:
         goal = GOALS[figure.what]
         peer = "" if figure.peer_value is None else f"{figure.peer} {figure.peer_value:.3g} {figure.unit}"
         ratio = "" if figure.ratio is None else f"{figure.ratio:.3g}"
-        bound = f"{'≤' if goal.most else '≥'} {goal.bound:.3g}{' times' if goal.of == 'ratio' else f' {figure.unit}'}"
+        bound = (
+            f"{'≤' if goal.most else '≥'} {goal.bound:.3g}{' times' if goal.compared == 'ratio' else f' {figure.unit}'}"
+        )
         missed = shortfall(figure, goal)
         met = "yes" if missed <= 0 else f"no, by {missed:.0%}"
         yield f"| {figure.what} | {figure.value:.3g} {figure.unit} | {peer} | {ratio} | {bound} | {met} |"

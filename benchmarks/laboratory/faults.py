@@ -36,31 +36,31 @@ Key = tuple[str, str, int]  # fault, procedure, number of the moment
 KILLS = "process: kill -9: the rig or its driver"
 
 
-def moment(key: Key, seed: int) -> tuple[float, int]:
-    """When the fault comes, as a fraction of the procedure, and the seed of what is random in it."""
-    own = crc32(repr((seed, *key)).encode())
-    return Random(own).uniform(0.02, 0.97), own
+def draw_moment(key: Key, seed: int) -> tuple[float, int]:
+    """Return the time of the fault as a fraction of the procedure, and the seed of its random choices."""
+    cell_seed = crc32(repr((seed, *key)).encode())
+    return Random(cell_seed).uniform(0.02, 0.97), cell_seed
 
 
-def done_before(record: Path, *, again: bool) -> dict[Key, dict[str, Any]]:
-    """The cells of earlier calls; with `again`, those that did not deviate."""
+def read_earlier_cells(record: Path, *, again: bool) -> dict[Key, dict[str, Any]]:
+    """Return the cells of earlier calls; with `again`, only those that did not deviate."""
     lines = record.read_text(encoding="utf-8").splitlines() if record.exists() else []
     cells = {(cell["fault"], cell["setup"], cell["number"]): cell for cell in map(json.loads, lines)}
     return {key: cell for key, cell in cells.items() if not (again and cell["deviations"])}
 
 
-def cell_of(key: Key, seed: int, span_s: float, kept: Path) -> dict[str, Any]:
-    """Carry one out; the folder of one that deviates is kept."""
+def run_cell(key: Key, seed: int, span_s: float, kept: Path) -> dict[str, Any]:
+    """Run one cell; keep its folder if it deviates."""
     name, setup, number = key
-    when, own = moment(key, seed)
+    when, cell_seed = draw_moment(key, seed)
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        place = Path(folder) / "cell"
+        cell_folder = Path(folder) / "cell"
         try:
-            cell = carry_out(name, BY_NAME[name], setup, place, moment=when, span_s=span_s, seed=own)
+            cell = carry_out(name, BY_NAME[name], setup, cell_folder, moment=when, span_s=span_s, seed=cell_seed)
         except Exception as error:  # of the bench itself: one cell must not end all the others
             cell = Cell(name, setup, when, deviations=[f"the bench failed: {type(error).__name__}: {error}"])
         if cell.deviations:
-            shutil.copytree(place, kept / f"{crc32(repr(key).encode()):08x}", dirs_exist_ok=True)
+            shutil.copytree(cell_folder, kept / f"{crc32(repr(key).encode()):08x}", dirs_exist_ok=True)
     return {**document(cell), "number": number, "commit": commit()}
 
 
@@ -106,7 +106,7 @@ def main() -> int:
         signal.signal(number, signal.default_int_handler)
     options.out.mkdir(parents=True, exist_ok=True)
     record = options.out / "cells.jsonl"
-    cells = done_before(record, again=options.again)
+    cells = read_earlier_cells(record, again=options.again)
     names = [name for name in BY_NAME if not options.faults or any(text in name for text in options.faults)]
     keys = [
         (name, setup, number)
@@ -117,9 +117,9 @@ def main() -> int:
     ]
     to_do = [key for key in keys if key not in cells]
     if to_do:
-        spans = {setup: undisturbed(setup) for setup in options.procedures}
+        spans = {setup: measure_undisturbed_s(setup) for setup in options.procedures}
         with ThreadPoolExecutor(options.jobs) as pool, record.open("a", encoding="utf-8") as lines:
-            carried = pool.map(lambda key: cell_of(key, options.seed, spans[key[1]], options.out), to_do)
+            carried = pool.map(lambda key: run_cell(key, options.seed, spans[key[1]], options.out), to_do)
             for key, cell in zip(to_do, carried, strict=True):
                 cells[key] = cell
                 lines.write(json.dumps(cell) + "\n")
@@ -128,8 +128,8 @@ def main() -> int:
     return conclude([cells[key] for key in keys], options.out)
 
 
-def undisturbed(setup: str) -> float:
-    """How long the procedure takes, of a run that nothing disturbs and that passes."""
+def measure_undisturbed_s(setup: str) -> float:
+    """Return the duration of the procedure in a run that passes without a fault."""
     with tempfile.TemporaryDirectory() as folder:
         cell, span_s = span(setup, Path(folder) / "cell")
     if cell.deviations:
@@ -162,7 +162,7 @@ def conclude(cells: Sequence[dict[str, Any]], out: Path) -> int:
 
 @cache
 def commit() -> str:
-    """What is measured, as Git describes it: `-dirty` where it is not as committed."""
+    """Return the measured commit as Git describes it, with `-dirty` if the files differ from it."""
     words = ["git", "-C", str(ROOT), "describe", "--always", "--dirty"]
     return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
 

@@ -46,29 +46,29 @@ print(between_s - began_s, time.perf_counter() - between_s)
 """
 
 
-def runs(count: int) -> list[FinishedRun]:
+def make_runs(count: int) -> list[FinishedRun]:
     """`count` runs of `count / OF_EACH` sensors, taken in turn."""
     first = read_finished_run(FIXTURE)
     (sensor,) = first.document.gyroscopes.values()
     slim = sensor.model_copy(update={"observations": (), "rests": ()})
-    found = []
+    results = []
     for i in range(count):
         started = (FIRST + timedelta(hours=i)).isoformat()
-        each = slim.model_copy(update={"serial_number": f"S-{i % (count // OF_EACH)}"})
+        run = slim.model_copy(update={"serial_number": f"S-{i % (count // OF_EACH)}"})
         provenance = first.document.provenance.model_copy(update={"started_utc": started})
-        document = first.document.model_copy(update={"provenance": provenance, "gyroscopes": {"gyro": each}})
-        found.append(replace(first, text=document.text(), document=document))
-    return found
+        document = first.document.model_copy(update={"provenance": provenance, "gyroscopes": {"gyro": run}})
+        results.append(replace(first, text=document.text(), document=document))
+    return results
 
 
-def look_up_s(history: History) -> float:
+def measure_look_up_s(history: History) -> float:
     """Median of many."""
     selection = Selection(serial_number="S-0")
     assert len(history.calibrations(selection)) == OF_EACH
     return float(np.median(timeit.repeat(lambda: history.calibrations(selection), number=1, repeat=200)))
 
 
-def process_s(*arguments: str) -> float:
+def measure_process_s(*arguments: str) -> float:
     """The least of several."""
     least = np.inf
     for _ in range(5):
@@ -83,17 +83,17 @@ def main() -> None:
     parser.add_argument("--calibrations", type=int, default=10_000, metavar="N")
     count = parser.parse_args().calibrations
     with tempfile.TemporaryDirectory() as folder:
-        found = {}
+        results = {}
         for size in (count // 100, count):
             with open_history(str(Path(folder) / f"{size}.sqlite")) as history:
                 began_s = time.perf_counter()
-                for each in runs(size):
-                    history.enter(each)
+                for finished in make_runs(size):
+                    history.enter(finished)
                 entered_s = time.perf_counter() - began_s
-                found[size] = look_up_s(history)
-            told = f"{1e3 * found[size]:.2f} ms to look up {OF_EACH} of one sensor"
-            print(f"{size} calibrations: {1e3 * entered_s / size:.1f} ms to make and enter each, {told}")
-        print(f"ratio {found[count] / found[count // 100]:.2f}")
+                results[size] = measure_look_up_s(history)
+            look_up = f"{1e3 * results[size]:.2f} ms to look up {OF_EACH} of one sensor"
+            print(f"{size} calibrations: {1e3 * entered_s / size:.1f} ms to make and enter each, {look_up}")
+        print(f"ratio {results[count] / results[count // 100]:.2f}")
         run = Path(folder) / "run"
         run.mkdir()
         for file in FIXTURE.iterdir():
@@ -105,9 +105,9 @@ def main() -> None:
             done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True)
             times.append(list(map(float, done.stdout.split())))
     certificate_s, entry_s = np.min(times, axis=0)
-    together = f"both {certificate_s + entry_s:.2f} s"
-    print(f"end of a run: certificate {certificate_s:.2f} s, history {entry_s:.2f} s, {together}")
-    bare_s, help_s = process_s("-c", ""), process_s("-m", "rig", "--help")
+    total = f"both {certificate_s + entry_s:.2f} s"
+    print(f"end of a run: certificate {certificate_s:.2f} s, history {entry_s:.2f} s, {total}")
+    bare_s, help_s = measure_process_s("-c", ""), measure_process_s("-m", "rig", "--help")
     print(f"rig --help {help_s:.2f} s, a Python that imports nothing {bare_s:.2f} s, ratio {help_s / bare_s:.1f}")
 
 

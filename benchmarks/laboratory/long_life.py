@@ -21,20 +21,20 @@ from support.laboratories.long_life import Calibration, Life, complaints, course
 ROOT = Path(__file__).parents[2]
 
 
-def tell(run: Calibration) -> None:
-    """One line of progress."""
+def report(run: Calibration) -> None:
+    """Print one line of progress."""
     kept = " ".join(
-        f"{name} {held.rss / 2**20:.1f} MiB {sum(held.files.values())} files"
-        for name, held in (("world", run.world), ("station", run.station))
-        if held is not None
+        f"{name} {resources.rss / 2**20:.1f} MiB {sum(resources.files.values())} files"
+        for name, resources in (("world", run.world), ("station", run.station))
+        if resources is not None
     )
-    place = "station" if run.in_station else "own process"
-    print(f"{run.number:3} {place}: status {run.status}, {run.wall_s:.1f} s, wraps {run.wraps}; {kept}", flush=True)
+    location = "station" if run.in_station else "own process"
+    print(f"{run.number:3} {location}: status {run.status}, {run.wall_s:.1f} s, wraps {run.wraps}; {kept}", flush=True)
 
 
 def conclude(life: Life, warm_up: int) -> int:
-    """Print what became of everything; 1 when something is not as it should be."""
-    found = complaints(life, warm_up)
+    """Print the results; return 1 if there are defects, else 0."""
+    defects = complaints(life, warm_up)
     passed = [run for run in life.runs if run.status == 0]
     worst_u = max(run.error_u for run in passed)
     print(f"{len(passed)} of {len(life.runs)} runs passed, the worst {worst_u:.1f} U from the truth")
@@ -59,9 +59,9 @@ def conclude(life: Life, warm_up: int) -> int:
     commit = subprocess.run(
         ["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
     )
-    print("\n".join(found) or "nothing grew, nothing drifted, nothing was left open")
+    print("\n".join(defects) or "nothing grew, nothing drifted, nothing was left open")
     print(f"at commit {commit.stdout.strip() or 'unknown'}")
-    return 1 if found else 0
+    return 1 if defects else 0
 
 
 def main() -> int:
@@ -71,10 +71,10 @@ def main() -> int:
     options = parser.parse_args()
     shutil.rmtree(options.out, ignore_errors=True)
     options.out.mkdir(parents=True)
-    for each in live(options.out, options.runs):
-        if isinstance(each, Life):
-            return conclude(each, max(3, options.runs // 10))
-        tell(each)
+    for event in live(options.out, options.runs):
+        if isinstance(event, Life):
+            return conclude(event, max(3, options.runs // 10))
+        report(event)
     return 1
 
 

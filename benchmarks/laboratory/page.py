@@ -36,24 +36,24 @@ PERIOD_S = 0.02  # between two looks at the arm, as in a run
 EVENTS = 3  # in each
 
 
-def asking(url: str) -> socket.socket:
-    """A connection that has asked for the stream."""
-    place = urlsplit(url)
-    connection = socket.create_connection((place.hostname or "", place.port or 0))
-    connection.sendall(f"GET /events HTTP/1.1\r\nHost: {place.netloc}\r\n\r\n".encode())
+def open_stream(url: str) -> socket.socket:
+    """Return a connection that has requested the event stream."""
+    address = urlsplit(url)
+    connection = socket.create_connection((address.hostname or "", address.port or 0))
+    connection.sendall(f"GET /events HTTP/1.1\r\nHost: {address.netloc}\r\n\r\n".encode())
     return connection
 
 
 def browser(url: str, frames: "Synchronized[int]") -> None:
     """A browser that reads all that comes, and counts the frames."""
-    connection = asking(url)
-    while piece := connection.recv(1 << 16):
+    connection = open_stream(url)
+    while chunk := connection.recv(1 << 16):
         with frames.get_lock():
-            frames.value += piece.count(b"event: ")
+            frames.value += chunk.count(b"event: ")
 
 
-def told(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> float:
-    """Tell a run for so long; the longest that one event took, s."""
+def feed_events(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> float:
+    """Hand events to the listener for `seconds`; return the longest time that one event took, s."""
     longest_s, end_s = 0.0, time.monotonic() + seconds
     while time.monotonic() < end_s:
         for event in islice(events, EVENTS):
@@ -64,21 +64,21 @@ def told(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], secon
     return longest_s
 
 
-def run_of(seconds: float) -> Iterator[RunEvent]:
-    """The events of a run that lasts longer than `seconds`, made before they are told."""
+def make_events(seconds: float) -> Iterator[RunEvent]:
+    """Return the events of a run that lasts longer than `seconds`, all made beforehand."""
     return iter([*islice(moving(plan_demo(), 1e9, step_s=PERIOD_S), int(2 * EVENTS * seconds / PERIOD_S))])
 
 
-def measured(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> tuple[float, float]:
-    """The share of a core, %, and the longest wait, s."""
+def measure(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> tuple[float, float]:
+    """Return the load of a core, %, and the longest wait, s."""
     used_s, began_s = time.process_time(), time.monotonic()
-    longest_s = told(events, listener, seconds)
+    longest_s = feed_events(events, listener, seconds)
     return 100 * (time.process_time() - used_s) / (time.monotonic() - began_s), longest_s
 
 
-def with_page(seconds: float, reading: int, stalled: int) -> tuple[float, float, float]:
-    """The share of a core, %, the longest wait, s, and the frames a second that one browser has read."""
-    spawning, feed, events = multiprocessing.get_context("spawn"), Feed(PageState(ABOUT)), run_of(seconds)
+def measure_with_page(seconds: float, reading: int, stalled: int) -> tuple[float, float, float]:
+    """Return the load of a core, %, the longest wait, s, and the frames per second that one browser read."""
+    spawning, feed, events = multiprocessing.get_context("spawn"), Feed(PageState(ABOUT)), make_events(seconds)
     frames = spawning.Value("l", 0)
     for event in before_it_moves(plan_demo()):
         feed.event(event)
@@ -89,34 +89,34 @@ def with_page(seconds: float, reading: int, stalled: int) -> tuple[float, float,
         browsers = [spawning.Process(target=browser, args=(url, frames), daemon=True) for _ in range(reading)]
         for process in browsers:
             process.start()
-        silent = [asking(url) for _ in range(stalled)]
+        silent = [open_stream(url) for _ in range(stalled)]
         while frames.value < reading:  # each has the page
             time.sleep(PERIOD_S)
         before = frames.value
-        share, longest_s = measured(events, feed.event, seconds)
+        core_percent, longest_s = measure(events, feed.event, seconds)
         read = (frames.value - before) / seconds / max(reading, 1)
         for connection in silent:
             connection.close()
         for process in browsers:
             process.terminate()
-    return share, longest_s, read
+    return core_percent, longest_s, read
 
 
 def main() -> None:
     """Print what it takes, without and with the page."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
-    alone, _ = measured(run_of(seconds), lambda event: None, seconds)
-    print(f"{'told to nobody':30} {alone:5.2f} % of a core")
-    for what, reading, stalled in (
+    alone, _ = measure(make_events(seconds), lambda event: None, seconds)
+    print(f"{'without listeners':30} {alone:5.2f} % of a core")
+    for load, reading, stalled in (
         ("a page, nobody looks", 0, 0),
         (f"{BROWSERS} browsers", BROWSERS, 0),
         (f"{BROWSERS} browsers and {STALLED} stalled", BROWSERS, STALLED),
     ):
-        share, longest_s, read = with_page(seconds, reading, stalled)
+        core_percent, longest_s, read = measure_with_page(seconds, reading, stalled)
         if reading and not stalled:
-            record("operator's page, five browsers", share - alone, "% of a core")
-        page = f"the page {share - alone:5.2f} %, {read:4.1f} frames/s read"
-        print(f"{what:30} {share:5.2f} % of a core, {page}, longest wait {1e3 * longest_s:.2f} ms")
+            record("operator's page, five browsers", core_percent - alone, "% of a core")
+        page = f"the page {core_percent - alone:5.2f} %, {read:4.1f} frames/s read"
+        print(f"{load:30} {core_percent:5.2f} % of a core, {page}, longest wait {1e3 * longest_s:.2f} ms")
     print(f"largest memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
 
 

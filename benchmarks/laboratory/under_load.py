@@ -35,10 +35,10 @@ VERDICTS = {0: "pass", 1: "fail"}
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """How one run ended: its verdict, or the name of the error and all it said; its arm states and those missing."""
+    """How one run ended: its verdict, or the name of the error and its message; its arm states and those missing."""
 
     ending: str
-    said: str
+    message: str
     exit_status: int
     wall_s: float
     states: int
@@ -61,15 +61,15 @@ def run_demo(config: Path, folder: Path, keep: Path | None, number: int) -> Demo
     )
     wall_s = time.perf_counter() - began_s
     errors = re.findall(r"^rig: (\w+): (.*)", ended.stderr, re.MULTILINE)
-    name, said = errors[-1] if errors else ("no error", ended.stderr[-200:])
-    ending, said = (VERDICTS[ended.returncode], "") if ended.returncode in VERDICTS else (name, f": {said}")
+    name, message = errors[-1] if errors else ("no error", ended.stderr[-200:])
+    ending, message = (VERDICTS[ended.returncode], "") if ended.returncode in VERDICTS else (name, f": {message}")
     if ending == "fail":
         checks = json.loads((out / "result.json").read_text(encoding="utf-8"))["checks"]
-        said = ": " + ", ".join(f"{check['name']} {check['value']}" for check in checks if not check["passed"])
+        message = ": " + ", ".join(f"{check['name']} {check['value']}" for check in checks if not check["passed"])
     states, missed = count_states(out / "run.h5", load(config).config.arm.state_rate_hz)
     if keep is not None and ending != "pass" and out.exists():
         shutil.move(out, keep / str(number))
-    return Demo(ending, said, ended.returncode, wall_s, states, missed)
+    return Demo(ending, message, ended.returncode, wall_s, states, missed)
 
 
 def count_states(recording: Path, state_rate_hz: float) -> tuple[int, int]:
@@ -110,7 +110,8 @@ def main() -> int:
             for demo in pool.map(run, range(1, options.demos + 1)):
                 demos.append(demo)
                 print(
-                    f"{len(demos):3}: {demo.ending}, {demo.wall_s:.1f} s, {demo.missed} missed{demo.said}", flush=True
+                    f"{len(demos):3}: {demo.ending}, {demo.wall_s:.1f} s, {demo.missed} missed{demo.message}",
+                    flush=True,
                 )
     endings = Counter(demo.ending for demo in demos)
     verdicts = sum(demo.exit_status in VERDICTS for demo in demos)

@@ -1,4 +1,4 @@
-"""15,000 six-observation runs (30 gyroscopes × 500) at once, beside a loop of SciPy's Levenberg–Marquardt.
+"""15,000 six-observation runs (30 gyroscopes × 500) at once, compared with a loop of SciPy's Levenberg–Marquardt.
 
 python benchmarks/solving/batch.py
 
@@ -22,8 +22,8 @@ from goals import record
 EVERY = 30  # of the runs go through the loop
 
 
-def averaged_readings(speed_rad_s: float) -> Array:
-    """(15000, 6, 3) rad/s: SIX, section III-A, at the lower noise level."""
+def simulate_mean_readings(speed_rad_s: float) -> Array:
+    """Return (15000, 6, 3) rad/s: SIX, section III-A, at the lower noise level."""
     rng = np.random.default_rng(1)
     means = []
     for _ in range(sim.SETS):
@@ -33,13 +33,13 @@ def averaged_readings(speed_rad_s: float) -> Array:
     return np.concatenate(means)
 
 
-def by_loop(means: Array, speed_rad_s: float) -> Array:
-    """(n, 6) by one `least_squares` after another."""
+def solve_in_loop(means: Array, speed_rad_s: float) -> Array:
+    """Return (n, 6) parameters by one `least_squares` after another."""
 
     def residuals(parameters: Array, readings: Array) -> Array:
-        turned = parameters[:3] * (readings + parameters[3:])
-        missing: Array = np.sum(turned * turned, axis=1) - speed_rad_s**2
-        return missing
+        corrected = parameters[:3] * (readings + parameters[3:])
+        residual: Array = np.sum(corrected * corrected, axis=1) - speed_rad_s**2
+        return residual
 
     start = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
     return np.array([least_squares(residuals, start, method="lm", args=(m,)).x for m in means])
@@ -49,7 +49,7 @@ def main() -> None:
     """Print times, ratios and differences, at both speeds."""
     print(f"{'15,000 runs':44}{'seconds':>10}{'µs a run':>10}{'times batch':>13}{'largest difference':>20}")
     for speed, name in ((sim.ARM_RAD_S, "60°/s"), (sim.FAST_RAD_S, "3 rad/s")):
-        means = averaged_readings(speed)
+        means = simulate_mean_readings(speed)
         batch_s = np.inf
         for _ in range(5):
             start = time.perf_counter()
@@ -57,25 +57,27 @@ def main() -> None:
             batch_s = min(batch_s, time.perf_counter() - start)
         exact = np.concatenate([solved.scale, solved.bias_rad_s], axis=1)
         assert solved.converged.all()
-        _line(f"closed form, batch, {name}", batch_s, len(means), batch_s, None)
+        _print_line(f"closed form, batch, {name}", batch_s, len(means), batch_s, None)
         start = time.perf_counter()
         published = algorithm_1_batch(means, speed)
         passed = time.perf_counter() - start
-        apart = np.abs(np.concatenate([published.scale, published.bias_rad_s], axis=1) - exact)[published.converged]
-        _line(f"Algorithm 1, batch, {name}", passed, len(means), batch_s, float(apart.max()))
+        differences = np.abs(np.concatenate([published.scale, published.bias_rad_s], axis=1) - exact)[
+            published.converged
+        ]
+        _print_line(f"Algorithm 1, batch, {name}", passed, len(means), batch_s, float(differences.max()))
         start = time.perf_counter()
-        looped = by_loop(means[::EVERY], speed)
+        looped = solve_in_loop(means[::EVERY], speed)
         passed = (time.perf_counter() - start) * EVERY
-        apart = np.abs(looped - exact[::EVERY])
+        differences = np.abs(looped - exact[::EVERY])
         if speed == sim.ARM_RAD_S:
             batch_us, loop_us = (1e6 * seconds / len(means) for seconds in (batch_s, passed))
             record("batch, a run", batch_us, "µs", peer="least_squares, looped", peer_value=loop_us)
-        _line(f'least_squares("lm"), scaled loop, {name}', passed, len(means), batch_s, float(apart.max()))
+        _print_line(f'least_squares("lm"), scaled loop, {name}', passed, len(means), batch_s, float(differences.max()))
 
 
-def _line(name: str, seconds: float, runs: int, batch_s: float, apart: float | None) -> None:
-    shown = "" if apart is None else f"{apart:.1e}"
-    print(f"{name:44}{seconds:10.3f}{seconds / runs * 1e6:10.2f}{seconds / batch_s:13.0f}{shown:>20}")
+def _print_line(name: str, seconds: float, runs: int, batch_s: float, differences: float | None) -> None:
+    largest_difference = "" if differences is None else f"{differences:.1e}"
+    print(f"{name:44}{seconds:10.3f}{seconds / runs * 1e6:10.2f}{seconds / batch_s:13.0f}{largest_difference:>20}")
 
 
 if __name__ == "__main__":

@@ -39,8 +39,8 @@ GRAVITY_M_S2, PART_NAMES = 9.81, {"+": "p", "-": "a"}
 SESSIONS = 200
 
 
-def by_imucal(session: HandRecording) -> Array:
-    """F (3, 3) by the first hold on each face and the turns."""
+def solve_by_imucal(session: HandRecording) -> Array:
+    """Return F (3, 3) from the first hold on each face and the turns."""
     assert session.acceleration is not None
     sections: dict[str, Array] = {}
     for rest in session.rests:
@@ -50,14 +50,14 @@ def by_imucal(session: HandRecording) -> Array:
     for move, rest in zip(session.moves, session.rests, strict=False):
         assert rest.acceleration_m_s2 is not None
         inside = (session.time_s >= move.start_s) & (session.time_s <= move.end_s)
-        swept = np.trapezoid(session.rates[inside] - rest.mean_rad_s, session.time_s[inside], axis=0)
-        if np.linalg.norm(swept) > 5:
-            _add(sections, session, f"{'xyz'[int(np.argmax(np.abs(swept)))]}_rot", (move.start_s, move.end_s))
+        rotation = np.trapezoid(session.rates[inside] - rest.mean_rad_s, session.time_s[inside], axis=0)
+        if np.linalg.norm(rotation) > 5:
+            _add(sections, session, f"{'xyz'[int(np.argmax(np.abs(rotation)))]}_rot", (move.start_s, move.end_s))
     rate_hz = 1 / float(np.median(np.diff(session.time_s)))
-    found = FerrarisCalibration(grav=GRAVITY_M_S2).compute(
+    solution = FerrarisCalibration(grav=GRAVITY_M_S2).compute(
         FerrarisSignalRegions(**sections), rate_hz, from_acc_unit="m/s^2", from_gyr_unit="deg/s"
     )
-    return np.asarray(found.K_g @ found.R_g, dtype=np.float64)
+    return np.asarray(solution.K_g @ solution.R_g, dtype=np.float64)
 
 
 def _axes() -> list[Array]:
@@ -72,24 +72,24 @@ def _add(sections: dict[str, Array], session: HandRecording, name: str, window: 
 
 
 def main(sessions: int) -> None:
-    """Print the RMS errors of scale factors and of what stands off the diagonal of F."""
+    """Print the RMS errors of scale factors and of the off-diagonal elements of F."""
     errors: dict[str, list[tuple[Array, Array]]] = {"imucal, perfectly annotated": [], "graph of rests and moves": []}
-    lasting_s = 0.0
+    duration_s = 0.0
     for seed in range(sessions):
         recorded = handle(SESSION, seed, rest_s=REST_S)
         session = segment_session(recorded.time_s, recorded.rates, recorded.acceleration)
-        lasting_s += float(np.ptp(recorded.time_s)) / sessions
-        found = (by_imucal(session), solve_by_hand(session, SessionConditions(20.0)).turned.matrix)
-        for error, matrix in zip(errors.values(), found, strict=True):
-            off = (matrix - recorded.matrix)[~np.eye(3, dtype=bool)]
-            error.append((scale_of(matrix) - recorded.truth[:3], off))
-    print(f"{sessions} sessions of {lasting_s:.0f} s")
+        duration_s += float(np.ptp(recorded.time_s)) / sessions
+        solution = (solve_by_imucal(session), solve_by_hand(session, SessionConditions(20.0)).turned.matrix)
+        for error, matrix in zip(errors.values(), solution, strict=True):
+            off_diagonal = (matrix - recorded.matrix)[~np.eye(3, dtype=bool)]
+            error.append((scale_of(matrix) - recorded.truth[:3], off_diagonal))
+    print(f"{sessions} sessions of {duration_s:.0f} s")
     rms = {
         name: [float(np.sqrt(np.mean(np.square(part)))) for part in zip(*error, strict=True)]
         for name, error in errors.items()
     }
-    for name, (scale, beside) in rms.items():
-        print(f"{name:30} scale {scale:.2e}, off-diagonals {beside:.2e}")
+    for name, (scale, axes) in rms.items():
+        print(f"{name:30} scale {scale:.2e}, off-diagonals {axes:.2e}")
     theirs, ours = rms.values()
     record("by hand, RMS error of scale", ours[0], "1", peer="imucal", peer_value=theirs[0])
     print(f"better by {theirs[0] / ours[0]:.1f} in scale, {theirs[1] / ours[1]:.1f} in the off-diagonals")

@@ -1,4 +1,4 @@
-/* What hand.c needs of the board, as far as counting its instructions goes: one sensor that is set up, and nobody to tell. */
+/* The functions of the board that hand.c needs for a count of its instructions: one configured sensor, and no host. */
 #include "clock.h"
 #include "hand.h"
 #include "link.h"

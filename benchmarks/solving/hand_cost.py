@@ -33,9 +33,11 @@ SOLVING = 20_000  # no block so many unless it ends a move
 
 def build(folder: Path) -> Path:
     """The program, with the compiler and the flags of the firmware's Makefile."""
-    own = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
+    environment = {
+        name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")
+    }
     show = ["make", "-s", "--no-print-directory", "-C", str(FIRMWARE), "--eval=show: ; @echo $(CC) $(CFLAGS)", "show"]
-    command = subprocess.run(show, check=True, capture_output=True, text=True, env=own).stdout.split()
+    command = subprocess.run(show, check=True, capture_output=True, text=True, env=environment).stdout.split()
     elf = folder / "hand.elf"
     link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--entry=0", f"-Wl,-Ttext={CODE:#x}", f"-Wl,-Tbss={STATE:#x}"]
     subprocess.run([*command, *link, *map(str, SOURCES), "-o", str(elf)], check=True, cwd=FIRMWARE)
@@ -48,11 +50,11 @@ def main() -> int:
     for face in FLIPS:
         now_s = hand.act(FlipAction(face), now_s) + REST_S
     time_s = np.arange(0.0, now_s, 1 / RATE_HZ)
-    felt, rng = hand.motion_at(time_s), np.random.default_rng(1)
-    noisy = felt.rate_rad_s + NOISE_RAD_S * rng.normal(size=felt.rate_rad_s.shape)
+    motion, rng = hand.motion_at(time_s), np.random.default_rng(1)
+    noisy = motion.rate_rad_s + NOISE_RAD_S * rng.normal(size=motion.rate_rad_s.shape)
     rates, forces = (
-        np.round(each / per).astype(np.int16)
-        for each, per in ((noisy, PER_RAD_S), (felt.specific_force_m_s2, PER_M_S2))
+        np.round(quantity / scale).astype(np.int16)
+        for quantity, scale in ((noisy, PER_RAD_S), (motion.specific_force_m_s2, PER_M_S2))
     )
     setup: dict[str, float] = dict.fromkeys((field.name for field in MESSAGE_BY_NAME["setup"].fields), 0)
     setup |= {"rate_hz": RATE_HZ, "range_deg_s": 500.0, "sensitivity_rad_s": PER_RAD_S, "range_m_s2": 40.0}

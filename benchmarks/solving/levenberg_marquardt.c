@@ -10,10 +10,10 @@
 
 #ifdef EXACTLY_SIX
 #define OBSERVATIONS(problem) 6u
-#define EACH(i, from, to) _Pragma("GCC unroll 6") for (unsigned i = (from); i < (to); i++)
+#define UNROLLED_FOR(i, from, to) _Pragma("GCC unroll 6") for (unsigned i = (from); i < (to); i++)
 #else
 #define OBSERVATIONS(problem) ((problem)->count)
-#define EACH(i, from, to) for (unsigned i = (from); i < (to); i++)
+#define UNROLLED_FOR(i, from, to) for (unsigned i = (from); i < (to); i++)
 #endif
 
 /* θ = [k b]: the residuals are ω² − ‖K (m + b)‖², SIX Eqs. (2)–(4). */
@@ -28,9 +28,9 @@ int levenberg_marquardt(const struct problem *problem, float tolerance, float th
 static float cost_of(const struct problem *problem, const float theta[PARAMETERS])
 {
     float cost = 0.0f;
-    EACH(i, 0, OBSERVATIONS(problem)) {
+    UNROLLED_FOR(i, 0, OBSERVATIONS(problem)) {
         float residual = problem->speeds_rad_s[i] * problem->speeds_rad_s[i];
-        EACH(axis, 0, 3) {
+        UNROLLED_FOR(axis, 0, 3) {
             float turned = theta[axis] * (problem->means_rad_s[i][axis] + theta[3 + axis]);
             residual -= turned * turned;
         }
@@ -43,24 +43,24 @@ static float cost_of(const struct problem *problem, const float theta[PARAMETERS
 static void linearise(const struct problem *problem, const float theta[PARAMETERS], float normal[PARAMETERS][PARAMETERS],
                       float gradient[PARAMETERS])
 {
-    EACH(j, 0, PARAMETERS) {
+    UNROLLED_FOR(j, 0, PARAMETERS) {
         gradient[j] = 0.0f;
-        EACH(k, 0, j + 1)
+        UNROLLED_FOR(k, 0, j + 1)
             normal[j][k] = 0.0f;
     }
-    EACH(i, 0, OBSERVATIONS(problem)) {
+    UNROLLED_FOR(i, 0, OBSERVATIONS(problem)) {
         float residual = problem->speeds_rad_s[i] * problem->speeds_rad_s[i];
         float slope[PARAMETERS];
-        EACH(axis, 0, 3) {
+        UNROLLED_FOR(axis, 0, 3) {
             float shifted = problem->means_rad_s[i][axis] + theta[3 + axis];
             float turned = theta[axis] * shifted;
             residual -= turned * turned;
             slope[axis] = 2.0f * turned * shifted;
             slope[3 + axis] = 2.0f * turned * theta[axis];
         }
-        EACH(j, 0, PARAMETERS) {
+        UNROLLED_FOR(j, 0, PARAMETERS) {
             gradient[j] += slope[j] * residual;
-            EACH(k, 0, j + 1)
+            UNROLLED_FOR(k, 0, j + 1)
                 normal[j][k] += slope[j] * slope[k];
         }
     }
@@ -71,10 +71,10 @@ static bool solve_step(const float normal[PARAMETERS][PARAMETERS], const float g
                        float step[PARAMETERS])
 {
     float lower[PARAMETERS][PARAMETERS], inverse[PARAMETERS];
-    EACH(j, 0, PARAMETERS) {
-        EACH(k, 0, j + 1) {
+    UNROLLED_FOR(j, 0, PARAMETERS) {
+        UNROLLED_FOR(k, 0, j + 1) {
             float sum = normal[j][k];
-            EACH(i, 0, k)
+            UNROLLED_FOR(i, 0, k)
                 sum -= lower[j][i] * lower[k][i];
             if (k < j) {
                 lower[j][k] = sum * inverse[k];
@@ -86,15 +86,15 @@ static bool solve_step(const float normal[PARAMETERS][PARAMETERS], const float g
             inverse[j] = 1.0f / __builtin_sqrtf(sum);
         }
     }
-    EACH(j, 0, PARAMETERS) {
+    UNROLLED_FOR(j, 0, PARAMETERS) {
         step[j] = gradient[j];
-        EACH(i, 0, j)
+        UNROLLED_FOR(i, 0, j)
             step[j] -= lower[j][i] * step[i];
         step[j] *= inverse[j];
     }
-    EACH(done, 0, PARAMETERS) {
+    UNROLLED_FOR(done, 0, PARAMETERS) {
         unsigned j = PARAMETERS - 1 - done;
-        EACH(i, j + 1, PARAMETERS)
+        UNROLLED_FOR(i, j + 1, PARAMETERS)
             step[j] -= lower[i][j] * step[i];
         step[j] *= inverse[j];
     }
@@ -120,7 +120,7 @@ int levenberg_marquardt(const struct problem *problem, float tolerance, float th
             float tried_cost = solved ? cost_of(problem, tried) : cost;
             bool better = solved && tried_cost < cost;
             if (better || (solved && largest <= tolerance)) {
-                EACH(j, 0, PARAMETERS)
+                UNROLLED_FOR(j, 0, PARAMETERS)
                     theta[j] = tried[j];
                 cost = tried_cost;
                 lambda *= 0.1f;

@@ -25,12 +25,12 @@ from goals import GOALS, record
 
 Session = dict[str, Array]
 
-RATE_HZ, HELD, TURNED = 100.0, 1000, 600
+RATE_HZ, HOLD_SAMPLES, TURN_SAMPLES = 100.0, 1000, 600
 SCALE = np.array([1.1771, 1.1554, 1.1440])  # SIX, table II: the turntable's LSM9DS1
 BIAS_RAD_S = np.array([0.0077, -0.0100, -0.0051])
 NOISE_RAD_S, ACCELEROMETER_NOISE_M_S2 = 0.035, 0.02
 GRAVITY_M_S2 = 9.81
-SPEED_RAD_S = 2 * np.pi * RATE_HZ / TURNED
+SPEED_RAD_S = 2 * np.pi * RATE_HZ / TURN_SAMPLES
 HOLDS = [f"{axis}_{side}" for axis in "xyz" for side in "pa"]
 UP = {f"{axis}_{side}": sign * np.eye(3)[i] for i, axis in enumerate("xyz") for side, sign in (("p", 1), ("a", -1))}
 RUNS, ROUNDS = 300, 10
@@ -43,12 +43,12 @@ def session(seed: int) -> Session:
     F = sim.build_sensitivity(SCALE, mounting)
     samples = {}
     for hold in HOLDS:
-        samples[f"gyr_{hold}"] = NOISE_RAD_S * rng.normal(size=(HELD, 3)) - BIAS_RAD_S
-        samples[f"acc_{hold}"] = _accelerations(rng, mounting @ UP[hold], HELD)
+        samples[f"gyr_{hold}"] = NOISE_RAD_S * rng.normal(size=(HOLD_SAMPLES, 3)) - BIAS_RAD_S
+        samples[f"acc_{hold}"] = _accelerations(rng, mounting @ UP[hold], HOLD_SAMPLES)
     for i, axis in enumerate("xyz"):
         turn = -SPEED_RAD_S * F[:, i] - BIAS_RAD_S
-        samples[f"gyr_{axis}_rot"] = turn + NOISE_RAD_S * rng.normal(size=(TURNED, 3))
-        samples[f"acc_{axis}_rot"] = _accelerations(rng, mounting @ UP[f"{axis}_p"], TURNED)
+        samples[f"gyr_{axis}_rot"] = turn + NOISE_RAD_S * rng.normal(size=(TURN_SAMPLES, 3))
+        samples[f"acc_{axis}_rot"] = _accelerations(rng, mounting @ UP[f"{axis}_p"], TURN_SAMPLES)
     return samples
 
 
@@ -56,24 +56,24 @@ def _accelerations(rng: np.random.Generator, up: Array, count: int) -> Array:
     return GRAVITY_M_S2 * up + ACCELEROMETER_NOISE_M_S2 * rng.normal(size=(count, 3))
 
 
-def in_degrees(samples: Session) -> Session:
-    """imucal wants °/s."""
+def convert_to_degrees(samples: Session) -> Session:
+    """Convert rates to °/s, the unit of imucal."""
     return {name: np.degrees(data) if name.startswith("gyr") else data for name, data in samples.items()}
 
 
-def by_imucal(samples: Session) -> Array:
-    """(6,) kx ky kz bx by bz; imucal solves the accelerometer on the way."""
+def solve_by_imucal(samples: Session) -> Array:
+    """Return (6,) kx ky kz bx by bz; imucal also solves the accelerometer."""
     regions = FerrarisSignalRegions(**samples)
-    found = FerrarisCalibration(grav=GRAVITY_M_S2).compute(
+    solution = FerrarisCalibration(grav=GRAVITY_M_S2).compute(
         regions, RATE_HZ, from_acc_unit="m/s^2", from_gyr_unit="deg/s"
     )
-    return np.concatenate([1 / np.diag(found.K_g), -np.radians(found.b_g)])
+    return np.concatenate([1 / np.diag(solution.K_g), -np.radians(solution.b_g)])
 
 
-def by_vector_model(samples: Session, *, with_gravity: bool = False) -> Array:
-    """(6,) from the same gyroscope samples, averaged; covariance and every gate included."""
+def solve_by_vector_model(samples: Session, *, with_gravity: bool = False) -> Array:
+    """Return (6,) from the same gyroscope samples, averaged; covariance and every gate included."""
     sections = [samples[f"gyr_{name}"] for name in (*HOLDS, "x_rot", "y_rot", "z_rot")]
-    by_axis = [section.T.copy() for section in sections]  # a sum along what lies side by side is four times as fast
+    by_axis = [section.T.copy() for section in sections]  # a sum over contiguous elements is four times as fast
     means = np.array([readings.mean(axis=1) for readings in by_axis])
     variances = np.array([_mean_squares(section, mean) for section, mean in zip(by_axis, means, strict=True)])
     rates = np.concatenate([np.zeros((6, 3)), -SPEED_RAD_S * np.eye(3)])
@@ -83,9 +83,9 @@ def by_vector_model(samples: Session, *, with_gravity: bool = False) -> Array:
 
 
 def _mean_squares(readings: Array, mean: Array) -> Array:
-    """(3,) variances of the means of readings (3, n)."""
-    away = readings - mean[:, None]
-    squares: Array = np.einsum("in,in->i", away, away) / readings.shape[1] ** 2
+    """Return the (3,) variances of the means of readings (3, n)."""
+    deviations = readings - mean[:, None]
+    squares: Array = np.einsum("in,in->i", deviations, deviations) / readings.shape[1] ** 2
     return squares
 
 
@@ -93,21 +93,24 @@ def main() -> None:
     """Print errors over 300 sessions and the median time of one, taken in turns: a busy computer slows all alike."""
     truth = np.concatenate([SCALE, BIAS_RAD_S])
     sessions = [session(seed) for seed in range(RUNS)]
-    converted = [in_degrees(samples) for samples in sessions]
+    converted = [convert_to_degrees(samples) for samples in sessions]
     solvers: dict[str, tuple[Callable[[Session], Array], list[Session]]] = {
-        "imucal, with its accelerometer": (by_imucal, converted),
-        "vector model with g-sensitivity": (lambda samples: by_vector_model(samples, with_gravity=True), sessions),
-        "vector model": (by_vector_model, sessions),
+        "imucal, with its accelerometer": (solve_by_imucal, converted),
+        "vector model with g-sensitivity": (
+            lambda samples: solve_by_vector_model(samples, with_gravity=True),
+            sessions,
+        ),
+        "vector model": (solve_by_vector_model, sessions),
     }
-    taken_s = np.empty((len(solvers), ROUNDS, RUNS // ROUNDS))
+    durations_s = np.empty((len(solvers), ROUNDS, RUNS // ROUNDS))
     for round_ in range(ROUNDS):
-        for solver, (solve, given) in enumerate(solvers.values()):
-            taken_s[solver, round_] = timeit.repeat(partial(solve, given[0]), number=1, repeat=RUNS // ROUNDS)
-    medians_s = np.median(taken_s, axis=(1, 2))
+        for solver, (solve, inputs) in enumerate(solvers.values()):
+            durations_s[solver, round_] = timeit.repeat(partial(solve, inputs[0]), number=1, repeat=RUNS // ROUNDS)
+    medians_s = np.median(durations_s, axis=(1, 2))
     measured = f"{'RMS scale error':>18}{'RMS bias error rad/s':>23}{'covariance':>12}"
     print(f"{'solver':34}{'median µs':>12}{'ratio':>8}{measured}")
-    for (name, (solve, given)), seconds in zip(solvers.items(), medians_s, strict=True):
-        errors = np.array([solve(samples) for samples in given]) - truth
+    for (name, (solve, inputs)), seconds in zip(solvers.items(), medians_s, strict=True):
+        errors = np.array([solve(samples) for samples in inputs]) - truth
         scale, bias = np.sqrt(np.mean(errors[:, :3] ** 2)), np.sqrt(np.mean(errors[:, 3:] ** 2))
         if name in GOALS:
             record(name, seconds * 1e6, "µs", peer="imucal", peer_value=float(medians_s[0]) * 1e6)

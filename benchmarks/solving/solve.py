@@ -1,4 +1,4 @@
-"""How long one calibration takes to solve, beside Levenberg–Marquardt on the same six averaged readings.
+"""How long one calibration takes to solve, compared with Levenberg–Marquardt on the same six averaged readings.
 
 python benchmarks/solving/solve.py
 """
@@ -25,8 +25,8 @@ BIAS_RAD_S = np.array([0.0077, -0.0100, -0.0051])
 NOISE_RAD_S, SAMPLES = 0.035, 1428
 
 
-def averaged_readings(seed: int) -> Array:
-    """(6, 3) rad/s: one turn at 60°/s, 238 Hz, 5° of mounting error."""
+def simulate_mean_readings(seed: int) -> Array:
+    """Return (6, 3) rad/s: one turn at 60°/s, 238 Hz, 5° of mounting error."""
     x, y, z = np.radians(5) * np.array([1, 1, 1]) / np.sqrt(3)
     mounting = np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     mounting /= np.linalg.norm(mounting, axis=0)
@@ -35,13 +35,13 @@ def averaged_readings(seed: int) -> Array:
     return means
 
 
-def by_closed_form(means: Array) -> Array:
-    """The bare core: one linear solve."""
+def solve_by_closed_form(means: Array) -> Array:
+    """Solve by the core alone: one linear system."""
     return np.concatenate(closed_form(means, SPEED_RAD_S))
 
 
-def by_accumulator(means: Array) -> Array:
-    """The whole path of a run: gates, measured speeds, covariance."""
+def solve_by_accumulator(means: Array) -> Array:
+    """Solve as a run does: gates, measured speeds, covariance."""
     accumulated = Accumulator.empty()
     for mean in means:
         accumulated = accumulated.add(mean, np.full(3, NOISE_RAD_S**2 / SAMPLES), SPEED_RAD_S)
@@ -49,43 +49,45 @@ def by_accumulator(means: Array) -> Array:
     return np.concatenate([solution.scale, solution.bias_rad_s])
 
 
-def by_levenberg_marquardt(means: Array) -> Array:
-    """SciPy's `lm` on ‖K (m + b)‖² − ω², from k = 1, b = 0."""
+def solve_by_levenberg_marquardt(means: Array) -> Array:
+    """Solve by SciPy's `lm` on ‖K (m + b)‖² − ω², from k = 1, b = 0."""
 
     def residuals(parameters: Array) -> Array:
-        turned = parameters[:3] * (means + parameters[3:])
-        missing: Array = np.sum(turned * turned, axis=1) - SPEED_RAD_S**2
-        return missing
+        corrected = parameters[:3] * (means + parameters[3:])
+        residual: Array = np.sum(corrected * corrected, axis=1) - SPEED_RAD_S**2
+        return residual
 
-    found: Array = least_squares(residuals, [1, 1, 1, 0, 0, 0], method="lm").x
-    return found
+    solution: Array = least_squares(residuals, [1, 1, 1, 0, 0, 0], method="lm").x
+    return solution
 
 
-def seconds(solve: Callable[[Array], Array], means: Array) -> float:
-    """The median of many single solves."""
+def measure_seconds(solve: Callable[[Array], Array], means: Array) -> float:
+    """Return the median time of many single solves, s."""
     return float(np.median(timeit.repeat(lambda: solve(means), number=1, repeat=2000)))
 
 
 def main() -> None:
     """Print time and accuracy of each solver, and how many times as long Levenberg–Marquardt takes."""
     solvers = {
-        "closed form": by_closed_form,
-        "accumulator with covariance": by_accumulator,
-        'least_squares(method="lm")': by_levenberg_marquardt,
+        "closed form": solve_by_closed_form,
+        "accumulator with covariance": solve_by_accumulator,
+        'least_squares(method="lm")': solve_by_levenberg_marquardt,
     }
     truth = np.concatenate([SCALE, BIAS_RAD_S])
     times = {}
     print(f"{'solver':30}{'median µs':>12}{'RMS scale error':>18}{'RMS bias error rad/s':>23}")
     for name, solve in solvers.items():
-        errors = np.array([solve(averaged_readings(seed)) for seed in range(200)]) - truth
-        times[name] = seconds(solve, averaged_readings(0))
+        errors = np.array([solve(simulate_mean_readings(seed)) for seed in range(200)]) - truth
+        times[name] = measure_seconds(solve, simulate_mean_readings(0))
         scale, bias = np.sqrt(np.mean(errors[:, :3] ** 2)), np.sqrt(np.mean(errors[:, 3:] ** 2))
         print(f"{name:30}{times[name] * 1e6:12.1f}{scale:18.2e}{bias:23.2e}")
-    apart = np.abs(by_closed_form(averaged_readings(0)) - by_levenberg_marquardt(averaged_readings(0))).max()
+    difference = np.abs(
+        solve_by_closed_form(simulate_mean_readings(0)) - solve_by_levenberg_marquardt(simulate_mean_readings(0))
+    ).max()
     ratio = times['least_squares(method="lm")'] / times["closed form"]
     ours_us, theirs_us = (1e6 * times[name] for name in ("closed form", 'least_squares(method="lm")'))
     record("closed form, a run", ours_us, "µs", peer="least_squares", peer_value=theirs_us)
-    print(f"Levenberg–Marquardt takes {ratio:.0f} times as long; the two answers differ by {apart:.0e} at most.")
+    print(f"Levenberg–Marquardt takes {ratio:.0f} times as long; the two answers differ by {difference:.0e} at most.")
 
 
 if __name__ == "__main__":

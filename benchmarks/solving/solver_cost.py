@@ -5,7 +5,7 @@ python benchmarks/solving/solver_cost.py
 The firmware's own solver.c and a Levenberg–Marquardt in C (benchmarks/solving/levenberg_marquardt.c) are compiled with
 the firmware's compiler and flags and called with the same observations. Counts are instructions, not time.
 
-Same accuracy: every answer is held against the same observations solved in double precision. Levenberg–Marquardt stops
+Same accuracy: every answer is compared with the same observations solved in double precision. Levenberg–Marquardt stops
 after a step below its tolerance, which is the largest power of ten with which its root-mean-square differences, in
 scale and in bias, are within twice those of the closed form: single precision brings neither nearer. It must work for
 any number of observations; the last row is for six only, with every loop written out as the closed form's are.
@@ -83,7 +83,7 @@ class Observations:
     means_rad_s: NDArray[np.float32]
     speeds_rad_s: NDArray[np.float32]
 
-    def in_double_precision(self) -> tuple[Array, Array]:
+    def solve_in_double_precision(self) -> tuple[Array, Array]:
         accumulated = Accumulator.empty()
         for mean, speed in zip(self.means_rad_s, self.speeds_rad_s, strict=True):
             accumulated = accumulated.add(mean, np.ones(3), float(speed), weight=1.0)
@@ -129,19 +129,21 @@ class Core:
         self._engine.write(STACK_TOP - STACK_BYTES, bytes([PAINT]) * STACK_BYTES)
         (number_word,) = struct.unpack("<I", struct.pack("<f", number))
         self._arguments.write([*words, *[0] * (3 - len(words)), number_word, STACK_TOP, RETURN | 1])
-        began = self._timeline.now
+        start = self._timeline.now
         self._engine.run(self._functions[function] & ~1)
         stack = self._engine.read(STACK_TOP - STACK_BYTES, STACK_BYTES)
         waiting = 1  # the instruction it returned to
         used = len(stack.lstrip(bytes([PAINT])))
-        return self._arguments.read()[0], Cost(self._timeline.now - began - waiting, used)
+        return self._arguments.read()[0], Cost(self._timeline.now - start - waiting, used)
 
 
 def build(folder: Path, *defines: str) -> Path:
-    """Both solvers with the compiler and the flags of the firmware's Makefile."""
-    own = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
+    """Compile both solvers with the compiler and the flags of the firmware's Makefile."""
+    environment = {
+        name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")
+    }
     show = ["make", "-s", "--no-print-directory", "-C", str(FIRMWARE), "--eval=show: ; @echo $(CC) $(CFLAGS)", "show"]
-    command = subprocess.run(show, check=True, capture_output=True, text=True, env=own).stdout.split()
+    command = subprocess.run(show, check=True, capture_output=True, text=True, env=environment).stdout.split()
     elf = folder / f"solvers{len(defines)}.elf"
     link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--entry=0", f"-Wl,-Ttext={CODE:#x}"]
     subprocess.run([*command, *defines, *link, *map(str, SOURCES), "-o", str(elf)], check=True, cwd=FIRMWARE)
@@ -159,36 +161,36 @@ def observe(population: Population, seed: int) -> Observations:
     return Observations(means.astype(np.float32), speeds.astype(np.float32))
 
 
-def add_all(core: Core, given: Observations) -> list[Cost]:
-    """Let the board accumulate. Returns what each observation cost."""
+def add_observations(core: Core, observations: Observations) -> list[Cost]:
+    """Let the board accumulate; return the cost of each observation."""
     core.call("solver_begin", ACCUMULATOR)
     costs = []
-    for mean, speed in zip(given.means_rad_s, given.speeds_rad_s, strict=True):
+    for mean, speed in zip(observations.means_rad_s, observations.speeds_rad_s, strict=True):
         core.write(MEANS, mean.tobytes())
         costs.append(core.call("solver_add", ACCUMULATOR, MEANS, number=float(speed))[1])
     return costs
 
 
-def solve(core: Core, given: Observations, method: str) -> Answer:
-    """Everything that is left to do after the last observation: gates, solution, parameters."""
-    add_all(core, given)
+def solve(core: Core, observations: Observations, method: str) -> Answer:
+    """Do all steps after the last observation: gates, solution, parameters."""
+    add_observations(core, observations)
     _, cost = core.call("solver_solve", ACCUMULATOR, METHODS.index(method), SOLUTION)
     status, iterations = core.read(SOLUTION, 2)
     assert status == 0, "not solved"
-    found = core.read_floats(SOLUTION + 4, 6)
-    return Answer(found[:3], found[3:], iterations, cost)
+    parameters = core.read_floats(SOLUTION + 4, 6)
+    return Answer(parameters[:3], parameters[3:], iterations, cost)
 
 
-def levenberg_marquardt(core: Core, given: Observations, tolerance: float) -> Answer:
+def levenberg_marquardt(core: Core, observations: Observations, tolerance: float) -> Answer:
     """From k = 1 and b = 0, the sensor uncalibrated, as in SIX."""
-    core.write(MEANS, given.means_rad_s.tobytes())
-    core.write(SPEEDS, given.speeds_rad_s.tobytes())
-    core.write(PROBLEM, struct.pack("<III", MEANS, SPEEDS, len(given.speeds_rad_s)))
+    core.write(MEANS, observations.means_rad_s.tobytes())
+    core.write(SPEEDS, observations.speeds_rad_s.tobytes())
+    core.write(PROBLEM, struct.pack("<III", MEANS, SPEEDS, len(observations.speeds_rad_s)))
     core.write(THETA, np.array([1, 1, 1, 0, 0, 0], dtype="<f4").tobytes())
     passes, cost = core.call("levenberg_marquardt", PROBLEM, THETA, number=tolerance)
     assert passes < 1 << 31, "not converged"
-    found = core.read_floats(THETA, 6)
-    return Answer(np.abs(found[:3]), found[3:], passes, cost)
+    parameters = core.read_floats(THETA, 6)
+    return Answer(np.abs(parameters[:3]), parameters[3:], passes, cost)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +205,7 @@ class Row:
     bias_difference_rad_s: float
 
     @classmethod
-    def of(cls, name: str, answers: Sequence[Answer], exact: Sequence[tuple[Array, Array]]) -> Self:
+    def summarize(cls, name: str, answers: Sequence[Answer], exact: Sequence[tuple[Array, Array]]) -> Self:
         pairs = list(zip(answers, exact, strict=True))
         return cls(
             name,
@@ -222,17 +224,18 @@ class Row:
 
 
 def compare(population: Population, plain: Core, written_out: Core) -> list[Row]:
-    """The closed form first."""
+    """Return the rows of the solvers, the closed form first."""
     cases = [observe(population, seed) for seed in range(CASES)]
-    exact = [case.in_double_precision() for case in cases]
+    exact = [case.solve_in_double_precision() for case in cases]
     closed_form, algorithm_1 = (
-        Row.of(method.replace("_", " "), [solve(plain, case, method) for case in cases], exact) for method in METHODS
+        Row.summarize(method.replace("_", " "), [solve(plain, case, method) for case in cases], exact)
+        for method in METHODS
     )
     rows = [closed_form, algorithm_1]
     for core, kind in ((plain, ""), (written_out, ", for six only, written out")):
         for tolerance in TOLERANCES:
             answers = [levenberg_marquardt(core, case, tolerance) for case in cases]
-            row = Row.of(f"Levenberg–Marquardt{kind} (step {tolerance:g})", answers, exact)
+            row = Row.summarize(f"Levenberg–Marquardt{kind} (step {tolerance:g})", answers, exact)
             if row.is_as_exact_as(closed_form):
                 rows.append(row)
                 break
@@ -254,7 +257,7 @@ def main() -> None:
                 f"{row.name:62}{row.instructions:13.0f}{row.instructions / rows[0].instructions:7.1f}"
                 f"{row.iterations:8.0f}{row.stack_bytes:9}{row.scale_difference:11.1e}{row.bias_difference_rad_s:11.1e}"
             )
-    costs = add_all(plain, observe(NORMAL, 0))
+    costs = add_observations(plain, observe(NORMAL, 0))
     dearest = max(cost.instructions for cost in costs)
     print(f"\nTo add an observation: {dearest} instructions, {max(cost.stack_bytes for cost in costs)} B of stack.")
 

@@ -1,7 +1,7 @@
 """How long each study takes on one core: `python benchmarks/solving/studies.py [NAME …]`.
 
-Of every study the second of its pieces is timed, by the processor's clock, and taken times their number; what a study
-does beside its pieces is counted as it is. `rig study` lists these durations (rig/study/study_catalogue.py).
+The second segment of every study is timed by the processor's clock and multiplied by their number; the rest of the
+study is timed as it is. `rig study` lists these durations (rig/study/study_catalogue.py).
 """
 
 import sys
@@ -14,28 +14,28 @@ from rig.study.study_catalogue import STUDIES
 from rig.study.study_report import Settings
 
 
-class Enough(Exception):
-    """Two pieces tell how long all of them take."""
+class EnoughTimed(Exception):
+    """Two segments are enough to extrapolate."""
 
 
-def core_s(name: str) -> float:
-    """Processor time of the study, s."""
-    found: list[float] = []
+def measure_core_s(name: str) -> float:
+    """Return the processor time of the study, s."""
+    remaining_s: list[float] = []
 
-    def timed(results: Iterable[Any], total: int) -> Iterable[Any]:
-        pieces = iter(results)
-        yield next(pieces)
+    def time_second_segment(results: Iterable[Any], total: int) -> Iterable[Any]:
+        segments = iter(results)
+        yield next(segments)
         began_s = time.process_time()
-        if next(pieces, None) is not None:
-            found.append((total - 1) * (time.process_time() - began_s))
-            raise Enough
+        if next(segments, None) is not None:
+            remaining_s.append((total - 1) * (time.process_time() - began_s))
+            raise EnoughTimed
 
     began_s = time.process_time()
-    with suppress(Enough):
-        STUDIES[name].run(Settings(progress=timed))
-    return time.process_time() - began_s + sum(found)
+    with suppress(EnoughTimed):
+        STUDIES[name].run(Settings(progress=time_second_segment))
+    return time.process_time() - began_s + sum(remaining_s)
 
 
 if __name__ == "__main__":
     for name in sys.argv[1:] or STUDIES:
-        print(f"{name:18} {core_s(name):7.1f} s", flush=True)
+        print(f"{name:18} {measure_core_s(name):7.1f} s", flush=True)

@@ -2,11 +2,11 @@
 
 Ten million damaged frames to the firmware's receiver, under the sanitizers for addresses and undefined behaviour, and
 ten million to the host's: bits flipped, runs lost, doubled, swapped, overwritten and inserted, ends cut, delimiters
-lost, blocks over-long, a wrong CRC in a frame of the right length, a right CRC around nonsense. Beside each stands a
-receiver written from the protocol's description alone, bit by bit, which says what was to be accepted: the firmware's
-must take the same, block by block, and the board must go on answering; the host's must hear the same frames as from the
-whole blocks alone. A hundred thousand damaged messages of RTDE, dashboard and primary interface each, to the rig's
-readers and to the simulated controller's: no crash, no hang, an end with a name.
+lost, blocks over-long, a wrong CRC in a frame of the right length, a right CRC around nonsense. Each is compared with
+a receiver written from the protocol's description alone, bit by bit, which decides what is to be accepted: the
+firmware's must take the same, block by block, and the board must continue to answer; the host's must hear the same
+frames as from the whole blocks alone. A hundred thousand damaged messages of RTDE, dashboard and primary interface
+each, to the rig's readers and to the simulated controller's: no crash, no hang, an end with a name.
 
 How many wrong frames to expect: damage that leaves a block of sound COBS passes a CRC of 32 bits with a chance of 2⁻³².
 """
@@ -31,55 +31,62 @@ WARM_UP = 2000  # messages, after which memory may not grow
 GROWTH_MAX = 20 * 2**20  # bytes
 
 
-def tell(receiver: str, sent: Sent, spent_s: float) -> list[str]:
-    """What became of the frames sent to a receiver; what should not have."""
+def report(receiver: str, sent: Sent, spent_s: float) -> list[str]:
+    """Print the fate of the frames sent to a receiver; return the defects."""
     print(
         f"{receiver}: {sent.frames} damaged frames, {sent.blocks} blocks between delimiters, {sent.refused} refused, "
-        f"{sent.as_sent} whole all the same, {sent.made} of nonsense with a right CRC, {sent.chance} right by chance "
+        f"{sent.as_sent} intact all the same, {sent.made} of nonsense with a right CRC, {sent.chance} right by chance "
         f"(expected {sent.refused * 2**-32:.1g}); {spent_s:.0f} s",
         flush=True,
     )
     return [f"{receiver}: {sent.chance} damaged blocks passed the CRC"] if sent.chance > 1 else []
 
 
-def frames(number: int, seed: int) -> list[str]:
-    """Damaged frames to both receivers of the serial line."""
+def check_receivers(number: int, seed: int) -> list[str]:
+    """Send damaged frames to both receivers of the serial line; return the defects."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         program = build(folder)
         began_s = time.perf_counter()
         sent = damage_requests(program, number, seed, write_sound(folder / "host", "host", seed))
-        found = tell("the firmware's receiver", sent, time.perf_counter() - began_s)
+        defects = report("the firmware's receiver", sent, time.perf_counter() - began_s)
         print(f"  the board answered {sent.answers} of the accepted, {sent.errors} of them by a refusal", flush=True)
         began_s = time.perf_counter()
-        sent, heard, of_whole = damage_answers(program, number, seed, write_sound(folder / "board", "board", seed))
-        found += tell("the host's receiver", sent, time.perf_counter() - began_s)
-    print(f"  it accepted {heard.accepted}, of them {heard.repeated} as repeated, and refused {heard.damaged}")
-    if (heard.frames, heard.digest, heard.repeated) != (of_whole.frames, of_whole.digest, of_whole.repeated):
-        found.append(f"the host heard other frames than came whole: {heard}, {of_whole}")
-    if heard.accepted + heard.damaged != sent.blocks:
-        found.append(f"the host took {heard.accepted} blocks and refused {heard.damaged}: {sent}")
-    return found
+        sent, received, received_intact = damage_answers(
+            program, number, seed, write_sound(folder / "board", "board", seed)
+        )
+        defects += report("the host's receiver", sent, time.perf_counter() - began_s)
+    print(f"  it accepted {received.accepted}, of them {received.repeated} as repeated, and refused {received.damaged}")
+    if (received.frames, received.digest, received.repeated) != (
+        received_intact.frames,
+        received_intact.digest,
+        received_intact.repeated,
+    ):
+        defects.append(f"the host heard other frames than came whole: {received}, {received_intact}")
+    if received.accepted + received.damaged != sent.blocks:
+        defects.append(f"the host took {received.accepted} blocks and refused {received.damaged}: {sent}")
+    return defects
 
 
-def messages(side: str, carry: Callable[[str, int, int], Counter[str]], number: int, seed: int) -> list[str]:
-    """Damaged messages of the controller's protocols to one side of them."""
-    found: list[str] = []
+def check_readers(side: str, carry: Callable[[str, int, int], Counter[str]], number: int, seed: int) -> list[str]:
+    """Send damaged messages of the controller's protocols to one side; return the defects."""
+    defects: list[str] = []
     for name in readers():
         carry(name, min(number, WARM_UP), seed + 1)
-        before, began_s = rss(), time.perf_counter()
+        before, began_s = read_resident_bytes(), time.perf_counter()
         ends = carry(name, number, seed)
-        grown, spent_s = rss() - before, time.perf_counter() - began_s
-        told = ", ".join(f"{end} {count}" for end, count in ends.most_common())
+        growth, spent_s = read_resident_bytes() - before, time.perf_counter() - began_s
+        endings = ", ".join(f"{end} {count}" for end, count in ends.most_common())
         print(
-            f"{side}, {name}: {number} damaged messages: {told}; {grown / 2**20:+.1f} MiB, {spent_s:.0f} s", flush=True
+            f"{side}, {name}: {number} damaged messages: {endings}; {growth / 2**20:+.1f} MiB, {spent_s:.0f} s",
+            flush=True,
         )
-        if grown > GROWTH_MAX:
-            found.append(f"{side}, {name}: memory has grown by {grown / 2**20:.0f} MiB")
-    return found
+        if growth > GROWTH_MAX:
+            defects.append(f"{side}, {name}: memory has grown by {growth / 2**20:.0f} MiB")
+    return defects
 
 
-def rss() -> int:
+def read_resident_bytes() -> int:
     """Resident memory of this process, bytes."""
     return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize()
 
@@ -93,12 +100,14 @@ def main() -> int:
     commit = subprocess.run(
         ["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
     )
-    found = frames(options.frames, options.seed)
-    found += messages("the simulated controller", carry_to_world, options.messages, options.seed)
-    found += messages("the rig", carry_to_rig, options.messages, options.seed)
-    print("\n".join(found) or "no crash, no hang, every end has its name, and nothing was accepted that should not be")
+    defects = check_receivers(options.frames, options.seed)
+    defects += check_readers("the simulated controller", carry_to_world, options.messages, options.seed)
+    defects += check_readers("the rig", carry_to_rig, options.messages, options.seed)
+    print(
+        "\n".join(defects) or "no crash, no hang, every end has its name, and nothing was accepted that should not be"
+    )
     print(f"at commit {commit.stdout.strip() or 'unknown'}")
-    return 1 if found else 0
+    return 1 if defects else 0
 
 
 if __name__ == "__main__":

@@ -36,14 +36,14 @@ LIMIT_MB_S = 20.0
 CHUNK = 4096  # what a read from the port brings at most
 RECORDED_S = 4.0
 ROUNDS = 3
-SLOW_SHARE = 0.05  # of the stream is enough for the decoders beside ours
+SLOW_FRACTION = 0.05  # of the stream is enough for the other decoders
 
 _SAMPLES = next(message for message in MESSAGES if message.name == "samples")
 _CRC_OF_BYTE = [crc32(bytes((value,)), 0xFFFF_FFFF) ^ 0xFFFF_FFFF for value in range(256)]
 
 
-def recorded(rates_hz: dict[str, float]) -> bytes:
-    """What the board sends while these parts stream."""
+def record_stream(rates_hz: dict[str, float]) -> bytes:
+    """Return the bytes that the board sends while these parts stream."""
     session = Session(parts=list(rates_hz))
     session.run(0.2)
     for part, rate_hz in rates_hz.items():
@@ -55,7 +55,7 @@ def recorded(rates_hz: dict[str, float]) -> bytes:
 
 
 def read(once: bytes) -> Iterator[list[Frame]]:
-    """The frames of each chunk that the port brings, to a reader that knows no frame yet."""
+    """The frames of each chunk that the port brings, to a new reader."""
     reader = FrameReader()
     return (reader.feed(once[i : i + CHUNK]) for i in range(0, len(once), CHUNK))
 
@@ -79,18 +79,18 @@ def batches_without_compiler(once: bytes) -> int:
 
 def byte_loop(once: bytes) -> int:
     """Samples by a decoder as a small controller has it: COBS and CRC byte by byte, then the integers."""
-    samples, body, left, crc = 0, bytearray(), -1, 0xFFFF_FFFF
+    samples, body, remaining, crc = 0, bytearray(), -1, 0xFFFF_FFFF
     for byte in once:
         if byte == 0:
             if crc == 0xDEBB_20E3 and body[0] == _SAMPLES.code:
                 samples += len(_counts(body))
-            body, left, crc = bytearray(), -1, 0xFFFF_FFFF
+            body, remaining, crc = bytearray(), -1, 0xFFFF_FFFF
             continue
-        if left > 0:
+        if remaining > 0:
             value = byte
-            left -= 1
+            remaining -= 1
         else:
-            first, left = left < 0, byte - 1
+            first, remaining = remaining < 0, byte - 1
             if first:
                 continue
             value = 0
@@ -102,11 +102,11 @@ def byte_loop(once: bytes) -> int:
 def _counts(body: bytearray) -> list[list[int]]:
     """x, y, z and temperature of every sample in a decoded `samples` frame."""
     items = range(2 + _SAMPLES.head.size, len(body) - 4, _SAMPLES.item_dtype.itemsize)
-    return [[body[at + k] | body[at + k + 1] << 8 for k in range(4, 12, 2)] for at in items]
+    return [[body[offset + k] | body[offset + k + 1] << 8 for k in range(4, 12, 2)] for offset in items]
 
 
-def mavlink_of(samples: int) -> bytes:
-    """So many RAW_IMU messages."""
+def make_mavlink_stream(samples: int) -> bytes:
+    """Return `samples` RAW_IMU messages."""
     sender = mavlink.MAVLink(None)
     messages = (
         mavlink.MAVLink_raw_imu_message(4202 * k, 0, 0, 0, k % 400, -k % 400, 7, 0, 0, 0) for k in range(samples)
@@ -114,7 +114,7 @@ def mavlink_of(samples: int) -> bytes:
     return b"".join(message.pack(sender) for message in messages)
 
 
-def by_pymavlink(once: bytes) -> int:
+def pymavlink(once: bytes) -> int:
     """Messages in the stream."""
     receiver = mavlink.MAVLink(None)
     return sum(len(receiver.parse_buffer(once[i : i + CHUNK]) or ()) for i in range(0, len(once), CHUNK))
@@ -136,24 +136,24 @@ def main(megabytes: float) -> int:
     slow = []
     print(f"package cobs has its compiled part: {stuffing.unstuff is stuffing.unstuff_by_package}")
     for name, rates_hz in STREAMS.items():
-        once = recorded(rates_hz)
+        once = record_stream(rates_hz)
         samples = frames(once)
-        told, speeds_mb_s = mavlink_of(samples), dict[str, float]()
+        mavlink_stream, speeds_mb_s = make_mavlink_stream(samples), dict[str, float]()
         print(f"{name}: {' + '.join(f'{rate_hz:g}' for rate_hz in rates_hz.values())} Hz, {samples} samples at a time")
-        for decode, stream, share in (
+        for decode, stream, fraction in (
             (frames, once, 1.0),
             (batches, once, 1.0),
             (batches_without_compiler, once, 1.0),
-            (byte_loop, once, SLOW_SHARE),
-            (by_pymavlink, told, SLOW_SHARE),
+            (byte_loop, once, SLOW_FRACTION),
+            (pymavlink, mavlink_stream, SLOW_FRACTION),
         ):
-            mb_s = measure(decode, stream, samples, share * megabytes)
+            mb_s = measure(decode, stream, samples, fraction * megabytes)
             print(f"  {decode.__name__:26}{mb_s:7.1f} MB/s {mb_s * samples / len(stream):6.2f} million samples/s")
-            if share == 1.0 and mb_s < LIMIT_MB_S:
+            if fraction == 1.0 and mb_s < LIMIT_MB_S:
                 slow.append(f"{decode.__name__} of {name}")
             speeds_mb_s[decode.__name__] = mb_s
-        what, loop_mb_s = f"decode to batches, {name}", speeds_mb_s["byte_loop"]
-        record(what, speeds_mb_s["batches"], "MB/s", peer="byte loop", peer_value=loop_mb_s)
+        figure, loop_mb_s = f"decode to batches, {name}", speeds_mb_s["byte_loop"]
+        record(figure, speeds_mb_s["batches"], "MB/s", peer="byte loop", peer_value=loop_mb_s)
     if slow:
         print(f"under {LIMIT_MB_S:g} MB/s: {', '.join(slow)}")
     return 1 if slow else 0

@@ -19,23 +19,25 @@ FAULTS_PER_FRAME = (0.01, 0.1, 1.0)
 ROUND = 50_000  # frames at a time
 
 
-def complaints(outcome: Outcome) -> list[str]:
-    """What should not have happened."""
-    found = []
+def list_defects(outcome: Outcome) -> list[str]:
+    """Return the deviations of both receivers from the frames sent."""
+    defects = []
     for name, receiver in (("host", outcome.host), ("firmware", outcome.firmware)):
         if receiver.wrong:
-            found.append(f"the {name} accepted {receiver.wrong} frames that were not sent")
+            defects.append(f"the {name} accepted {receiver.wrong} frames that were not sent")
         if receiver.missed:
-            found.append(f"the {name} missed {receiver.missed} frames that nothing had touched")
+            defects.append(f"the {name} missed {receiver.missed} frames that nothing had touched")
         if receiver.accepted != outcome.intact:
-            found.append(f"the {name} accepted {receiver.accepted} frames, {outcome.intact} came as they were sent")
+            defects.append(f"the {name} accepted {receiver.accepted} frames, {outcome.intact} came as they were sent")
         if receiver.refused != outcome.damaged:
-            found.append(f"the {name} counted {receiver.refused} damaged blocks, there were {outcome.damaged}")
+            defects.append(f"the {name} counted {receiver.refused} damaged blocks, there were {outcome.damaged}")
     if outcome.frames_lost_by_sequence != outcome.frames_lost:
-        found.append(f"{outcome.frames_lost} frames were lost, by their sequence {outcome.frames_lost_by_sequence}")
+        defects.append(f"{outcome.frames_lost} frames were lost, by their sequence {outcome.frames_lost_by_sequence}")
     if outcome.samples_lost_by_sequence != outcome.samples_lost:
-        found.append(f"{outcome.samples_lost} samples were lost, by their sequence {outcome.samples_lost_by_sequence}")
-    return found
+        defects.append(
+            f"{outcome.samples_lost} samples were lost, by their sequence {outcome.samples_lost_by_sequence}"
+        )
+    return defects
 
 
 def main(frames: int) -> int:
@@ -43,7 +45,7 @@ def main(frames: int) -> int:
     for faults_per_frame in FAULTS_PER_FRAME:
         began_s = time.perf_counter()
         rounds = [carry(seed, ROUND, round(ROUND * faults_per_frame)) for seed in range(max(1, round(frames / ROUND)))]
-        found = [complaint for outcome in rounds for complaint in complaints(outcome)]
+        defects = [defect for outcome in rounds for defect in list_defects(outcome)]
         faults, damaged = sum(o.faults for o in rounds), sum(o.damaged for o in rounds)
         lost = sum(o.frames_lost for o in rounds)
         print(
@@ -53,8 +55,8 @@ def main(frames: int) -> int:
             f"expected {damaged * 2**-32:.1g} (with 16 bits {damaged * 2**-16:.1g}); "
             f"{time.perf_counter() - began_s:.0f} s"
         )
-        print("\n".join(found) or "  every loss counted, nothing wrong, nothing missed")
-        failed = failed or bool(found)
+        print("\n".join(defects) or "  every loss counted, nothing wrong, nothing missed")
+        failed = failed or bool(defects)
     return 1 if failed else 0
 
 

@@ -40,8 +40,8 @@ def measure(name: Format, stream: bytes, size: int) -> float:
     for _ in range(ROUNDS):
         reader, counter = MessageReader(), MessageCounter("kvh", 1000.0, timed=name == "B")
         began_s = time.process_time()
-        for at in range(0, len(stream), size):
-            counter.count(reader.feed(stream[at : at + size]).messages)
+        for offset in range(0, len(stream), size):
+            counter.count(reader.feed(stream[offset : offset + size]).messages)
         best_s = min(best_s, time.process_time() - began_s)
     return len(stream) / best_s * 1e-6
 

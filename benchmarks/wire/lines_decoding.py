@@ -1,6 +1,6 @@
 """How fast the host decodes lines: `python benchmarks/wire/lines_decoding.py [megabytes]`.
 
-Beside the loop that one writes at once, `readline().split()`: from a serial port by pyserial, as it would be used, and
+Compared with the obvious loop, `readline().split()`: from a serial port by pyserial, as it would be used, and
 from memory. Fails under 5 MB/s, and where the loop on a port is more than a fifth as fast.
 """
 
@@ -24,7 +24,7 @@ from goals import record
 
 LIMIT_MB_S, LIMIT_RATIO = 5.0, 5.0
 READS = (65536, 4096)
-PORT_SHARE = 50  # of all that is decoded, so much goes through a port for the loop
+PORT_FRACTION = 50  # one part in so many of the stream goes through a port for the loop
 SECTION = LinesSection.model_validate(
     {
         "columns": ["time", "gx", "gy", "gz", "ax", "ay", "az"],
@@ -36,23 +36,23 @@ SECTION = LinesSection.model_validate(
 )
 
 
-def sent(megabytes: float) -> bytes:
-    """So much of a stream at 1000 Hz."""
+def make_stream(megabytes: float) -> bytes:
+    """Return this many megabytes of a stream at 1000 Hz."""
     rows = np.random.default_rng(1).normal(0, 50, (round(megabytes * 1e6 / 56), 6))
     form = "%d,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f\r\n"
     return b"0\n" + "".join(form % (1000 * number, *row) for number, row in enumerate(rows)).encode()
 
 
-def decoded(stream: bytes, size: int) -> float:
+def measure_decoding(stream: bytes, size: int) -> float:
     """Megabytes a second of processor time, decoded, numbered and timed."""
     reader, stamper = LineReader(SECTION), Stamper(SECTION, 1000.0, "sensors.imu")
     began_s = time.process_time()
-    for at in range(0, len(stream), size):
-        stamper.stamp(reader.feed(stream[at : at + size]).values, 0, 0.0)
+    for offset in range(0, len(stream), size):
+        stamper.stamp(reader.feed(stream[offset : offset + size]).values, 0, 0.0)
     return len(stream) / (time.process_time() - began_s) * 1e-6
 
 
-def split(source: io.RawIOBase | io.BytesIO | serial.Serial, size: int) -> float:
+def measure_split(source: io.RawIOBase | io.BytesIO | serial.Serial, size: int) -> float:
     """Megabytes a second of the thread's processor time by the plain loop, of so many bytes."""
     read, began_s = 0, time.thread_time()
     while read < size:
@@ -62,36 +62,36 @@ def split(source: io.RawIOBase | io.BytesIO | serial.Serial, size: int) -> float
     return read / (time.thread_time() - began_s) * 1e-6
 
 
-def split_from_a_port(stream: bytes) -> float:
+def measure_split_at_port(stream: bytes) -> float:
     """The plain loop at a pseudo-terminal that is filled as fast as it is read."""
     master, slave = os.openpty()
     tty.setraw(slave)
 
     def fill() -> None:
-        for at in range(0, len(stream), 2000):
-            os.write(master, stream[at : at + 2000])
+        for offset in range(0, len(stream), 2000):
+            os.write(master, stream[offset : offset + 2000])
 
     filling = threading.Thread(target=fill, daemon=True)
     with serial.Serial(os.ttyname(slave), 921600) as port:
         filling.start()  # not before: what has come when it opens is thrown away
-        found = split(port, len(stream))
+        speed_mb_s = measure_split(port, len(stream))
     filling.join()
     os.close(slave)
     os.close(master)
-    return found
+    return speed_mb_s
 
 
 def main(megabytes: float) -> int:
-    stream = sent(megabytes)
-    fast = {size: decoded(stream, size) for size in READS}
+    stream = make_stream(megabytes)
+    fast = {size: measure_decoding(stream, size) for size in READS}
     for size, mb_s in fast.items():
         print(f"rig, {size:6} bytes a read:            {mb_s:6.1f} MB/s")
-    at_a_port = split_from_a_port(stream[: len(stream) // PORT_SHARE].rpartition(b"\n")[0] + b"\n")
-    print(f"readline().split() at a port:       {at_a_port:6.2f} MB/s")
-    print(f"readline().split() from memory:     {split(io.BytesIO(stream), len(stream)):6.1f} MB/s")
+    port_mb_s = measure_split_at_port(stream[: len(stream) // PORT_FRACTION].rpartition(b"\n")[0] + b"\n")
+    print(f"readline().split() at a port:       {port_mb_s:6.2f} MB/s")
+    print(f"readline().split() from memory:     {measure_split(io.BytesIO(stream), len(stream)):6.1f} MB/s")
     slowest = min(fast.values())
-    record("decode lines", slowest, "MB/s", peer="readline() at a port", peer_value=at_a_port)
-    if slowest < LIMIT_MB_S or slowest < LIMIT_RATIO * at_a_port:
+    record("decode lines", slowest, "MB/s", peer="readline() at a port", peer_value=port_mb_s)
+    if slowest < LIMIT_MB_S or slowest < LIMIT_RATIO * port_mb_s:
         print(f"under {LIMIT_MB_S:g} MB/s, or under {LIMIT_RATIO:g} times the loop at a port")
         return 1
     return 0

@@ -1,8 +1,8 @@
 """What a slow reader costs the simulated laboratory: `python benchmarks/wire/slow_reader.py [--pace N] [--reads N]`.
 
-Starts the demonstration's world at N times real time. A prompt reader of the arm's states measures how fast the world's
-time passes, in turns alone and beside a client that reads N times a second, so that both see the same machine. Prints
-both paces, what the slow client changes, and the longest time in which the prompt reader got nothing.
+Starts the demonstration's world at N times real time. A prompt reader of the arm's states measures how fast the
+world's time passes, in turns alone and together with a client that reads N times a second, so that both see the same
+machine. Prints both paces, what the slow client changes, and the longest time in which the prompt reader got nothing.
 """
 
 import argparse
@@ -34,26 +34,28 @@ def reader(host: str) -> socket.socket:
     return client
 
 
-def measured(
+def measure_pace(
     prompt: socket.socket, slow: socket.socket | None, reads_hz: float, duration_s: float
 ) -> tuple[float, float]:
     """The world's seconds in a wall second, over `duration_s`, and the longest wait for a state (wall time)."""
-    heard_s, stamps_s, read_s = [time.monotonic()], [], time.monotonic()
-    while heard_s[-1] - heard_s[0] < duration_s:
+    times_s, stamps_s, read_s = [time.monotonic()], [], time.monotonic()
+    while times_s[-1] - times_s[0] < duration_s:
         stamps_s.append(STATE.unpack(prompt.recv(STATE.size, socket.MSG_WAITALL))[3])
-        heard_s.append(time.monotonic())
-        if slow is not None and heard_s[-1] - read_s > 1.0 / reads_hz:
-            read_s = heard_s[-1]
+        times_s.append(time.monotonic())
+        if slow is not None and times_s[-1] - read_s > 1.0 / reads_hz:
+            read_s = times_s[-1]
             slow.recv(1 << 22)
-    longest_s = max(after - before for before, after in pairwise(heard_s))
-    return (stamps_s[-1] - stamps_s[0]) / (heard_s[-1] - heard_s[1]), longest_s
+    longest_s = max(after - before for before, after in pairwise(times_s))
+    return (stamps_s[-1] - stamps_s[0]) / (times_s[-1] - times_s[1]), longest_s
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pace", type=float, default=4.0, metavar="N", help="how many times as fast as real")
     parser.add_argument("--reads", type=float, default=1.0, metavar="N", help="how often a second the client reads")
-    parser.add_argument("--turns", type=int, default=3, metavar="N", help="turns of ten seconds, alone and beside")
+    parser.add_argument(
+        "--turns", type=int, default=3, metavar="N", help="turns of ten seconds, alone and with a slow reader"
+    )
     options = parser.parse_args()
     command = [sys.executable, "-m", "rig.world", str(DEMO), "--until-eof"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as world:
@@ -63,16 +65,16 @@ def main() -> int:
         with socket.create_connection((host, int(port)), 10.0) as control:
             control.sendall(json.dumps({"do": "pace", "time_scale": options.pace}).encode() + b"\n")
             control.recv(4096)
-        alone, beside = [], []
+        alone, with_slow_reader = [], []
         with reader(ready["arm"]) as prompt:
             for _ in range(options.turns):
-                alone.append(measured(prompt, None, options.reads, 10.0))
+                alone.append(measure_pace(prompt, None, options.reads, 10.0))
                 with reader(ready["arm"]) as slow:
-                    beside.append(measured(prompt, slow, options.reads, 10.0))
+                    with_slow_reader.append(measure_pace(prompt, slow, options.reads, 10.0))
         world.stdin.close()
-    for name, turns in (("alone", alone), ("beside", beside)):
+    for name, turns in (("alone", alone), ("with a slow reader", with_slow_reader)):
         print(f"{name}: {median(t[0] for t in turns):.3f} times real, longest wait {max(t[1] for t in turns):.3f} s")
-    change = median(after[0] / before[0] for before, after in zip(alone, beside, strict=True)) - 1.0
+    change = median(after[0] / before[0] for before, after in zip(alone, with_slow_reader, strict=True)) - 1.0
     print(f"a client that reads {options.reads:g} times a second changes the pace by {change:+.2%}")
     return 0
 

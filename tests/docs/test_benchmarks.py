@@ -34,7 +34,7 @@ SHORT = {
 }
 LONGER = {
     "again": ("--recordings", "3"),
-    "arm_beside_logs": (),
+    "arm_against_logs": (),
     "commands": ("--rounds", "1"),
     "efficiency": (),
     "end_of_run": ("--rounds", "1"),

@@ -36,7 +36,7 @@ from rig.plans.shortest_run import find_search, plan_of, shortest_run
 from rig.turners import turner_registry as turners
 from rig.world.hand.habits import Action, FlipAction, TurnAction
 from support.external.handled_body import Part, handle
-from support.motions.drawn_servo import KNOWN as OF_DRAWN
+from support.motions.drawn_servo import GIVEN_UNCERTAINTIES as OF_DRAWN
 from support.motions.drawn_servo import drawn_servo
 from support.motions.drawn_servo import load_servo as servo_loaded
 from support.paths import CONFIGS

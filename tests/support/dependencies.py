@@ -37,7 +37,7 @@ def _list_required(package: Distribution, extra: str) -> Iterator[tuple[str, str
 
 
 def licence(package: Distribution) -> str:
-    """What it says of its licence: an SPDX expression, else classifiers, else the first line of its text; may be ""."""
+    """Return its licence: an SPDX expression, else classifiers, else the first line of its text; may be ""."""
     metadata = package.metadata
     if "License-Expression" in metadata:
         return str(metadata["License-Expression"])

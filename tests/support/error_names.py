@@ -58,7 +58,7 @@ def find_errors_in(source: str, file: Path) -> list[Raised]:
 
 
 def kind_of(raised: Sequence[Raised]) -> str:
-    """How the catalogue calls it when an error is made in all these places."""
+    """Return the catalogue's kind of an error that is raised in all these places."""
     kinds = {error.kind for error in raised}
     return kinds.pop() if len(kinds) == 1 else "either"
 
@@ -99,7 +99,7 @@ class _Module:
                     yield call, MAKERS[maker]
 
     def names(self, expression: ast.expr, call: ast.Call) -> set[str | None]:
-        """What the first argument of `call` can be; nothing for `problem.name`, an error made elsewhere."""
+        """Return the possible first arguments of `call`; none for `problem.name`, an error from elsewhere."""
         match expression:
             case ast.Constant(value=str(name)):
                 return {name}

@@ -178,7 +178,7 @@ def test_what_is_damaged_is_named_or_does_not_matter(name: str, thorough: bool) 
 def wandering(seen: Readings, rate: float) -> Readings:
     """With a bias that walks by `rate` rad/s per √s."""
     steps = seen.rng.normal(size=seen.counts.shape) * rate / np.sqrt(seen.setup.sample_rate_hz)
-    return seen.feeling(seen.felt() + np.cumsum(steps, axis=0))
+    return seen.feeling(seen.compute_rates() + np.cumsum(steps, axis=0))
 
 
 @pytest.mark.thorough

@@ -6,7 +6,7 @@ import pytest
 from firmware_host.emulator.chip.spi_device import Fault
 from firmware_host.frames import Frame, encode
 from firmware_host.protocol import BATCH_AGE_US, ERRORS
-from support.board.emulated_session import BESIDE, PARTS, Session, samples
+from support.board.emulated_session import OTHER_PARTS, PARTS, Session, samples
 
 NAMES = list(PARTS)
 BATCH_AGE_S = BATCH_AGE_US / 1e6
@@ -15,7 +15,7 @@ RATES_HZ = {"lsm9ds1": 952.0, "mpu9250": 1000.0, "adis16465": 1000.0}
 
 def started(rates_hz: dict[str, float]) -> Session:
     """A board whose sensors have just been told to stream."""
-    session = Session(parts=[*NAMES, *BESIDE], noise_rad_s=0.0)
+    session = Session(parts=[*NAMES, *OTHER_PARTS], noise_rad_s=0.0)
     session.run(0.2)  # until it has started
     for name, rate_hz in rates_hz.items():
         session.configure(name, rate_hz, 245.0)

@@ -38,7 +38,7 @@ def magnetometer(motion_at: Callable[[float], Sequence[float]], *_truth: Any, se
 
 # The gyroscopes, in the order of the board's sensor table
 PARTS: dict[str, Callable[..., SpiDevice]] = {name: part.register_model for name, part in GYROSCOPES.items()}
-BESIDE = {"lsm9ds1_magnetometer": magnetometer}
+OTHER_PARTS = {"lsm9ds1_magnetometer": magnetometer}
 RANGE_G = 8.0  # which every part has
 RATES_AND_RANGES = {
     name: (usual.default_rate_hz, usual.default_range_deg_s)
@@ -76,7 +76,7 @@ class Session:
         truth = replace(TRUTH, noise_rad_s=noise_rad_s)
         self.readings = dict.fromkeys(parts, 0)
         self.sensors: dict[str, SpiDevice] = {
-            part: (PARTS | BESIDE)[part](
+            part: (PARTS | OTHER_PARTS)[part](
                 self._counted(part, rate_at), truth, acceleration=ACCELERATION, temperature_c=temperature_c, seed=seed
             )
             for part in parts

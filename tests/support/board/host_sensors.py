@@ -56,7 +56,7 @@ class ByteRegisters:
         return bytes(len(data))
 
     def write(self, address: int, value: int) -> None:
-        """What the part does with a byte that is written."""
+        """Handle a byte that is written to the part."""
         self.values[address] = value
 
     def read(self, address: int, size: int) -> bytes:

@@ -27,7 +27,7 @@ PLACES = [
 
 
 def schema_faults(xml: bytes) -> list[str]:
-    """What the schema refuses; the test is skipped, by name, where there is none."""
+    """Return the errors by the schema; skip the test, by name, if there is no schema."""
     folder = next((candidate for candidate in PLACES if (candidate / MAIN).is_file()), None)
     if folder is None:
         pytest.skip("PTB's schemas are not here: set RIG_DCC_SCHEMAS to their folder")

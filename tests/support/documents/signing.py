@@ -115,8 +115,8 @@ def revocation_list(by: Holder, *revoked: Holder, days: tuple[int, int] = (-1, 7
     """Return an authority's revocation list in PEM, valid for these days: these holders were revoked an hour ago."""
     begin, end = (datetime.now(UTC) + timedelta(days=day) for day in days)
     builder = x509.CertificateRevocationListBuilder(by.chain[0].subject, last_update=begin, next_update=end)
-    for each in revoked:
-        entry = x509.RevokedCertificateBuilder(each.chain[0].serial_number, datetime.now(UTC) - timedelta(hours=1))
+    for holder in revoked:
+        entry = x509.RevokedCertificateBuilder(holder.chain[0].serial_number, datetime.now(UTC) - timedelta(hours=1))
         builder = builder.add_revoked_certificate(entry.build())
     return builder.sign(by.key, hashes.SHA256()).public_bytes(Encoding.PEM)
 

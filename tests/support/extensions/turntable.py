@@ -105,7 +105,7 @@ class Turntable:
         self._held = False
 
     def report(self) -> TableReport:
-        """How it stands."""
+        """Return the state of the table."""
         return TableReport(self._section.serial_port, self.latest)
 
     def check(self) -> None:
@@ -149,12 +149,12 @@ def connect(section: TurntableSection, on_state: OnState, log: Path) -> Iterator
 
 
 def look(section: TurntableSection) -> TableReport:
-    """How it stands."""
+    """Return the state of the table."""
     return Turntable(section, lambda state: None).report()
 
 
 def problems(plans: Sequence[Plan], section: TurntableSection, report: TableReport | None) -> list[Problem]:
-    """What is too fast for it."""
+    """Return the motions that are too fast for the table."""
     fast = {motion.name for plan in plans for motion in plan.motions if motion.speed_rad_s > FASTEST_RAD_S}
     return [Problem("joint_speed", f"{name} is too fast for the table", "Turn more slowly") for name in sorted(fast)]
 
@@ -209,7 +209,7 @@ def plan(
 
 
 def carry_out(rig: Verbs) -> None:
-    """What the plan says, step by step."""
+    """Carry out the plan, step by step."""
     for step in rig.plan.steps:
         match step:
             case Rest():
@@ -221,7 +221,7 @@ def carry_out(rig: Verbs) -> None:
 
 
 def analyse(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
-    """Whether the gyroscope reads the table's speed along z to a tenth."""
+    """Check whether the gyroscope reads the table's speed along z to a tenth."""
     recordings = observe_runs(runs)
     turns = [turn for recording in recordings for turn in recording.sensors["gyro"].revolutions]
     error = max(abs(turn.axis_flange[2] * turn.average.mean_rad_s[2] / turn.speed_rad_s - 1) for turn in turns)

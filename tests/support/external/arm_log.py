@@ -99,18 +99,20 @@ def record(log: ArmLog, seed: int) -> Recorded:
     bias = 0.03 * rng.normal(size=3)
     walk_rad, bias_walk, g_sensitivity = NOISES[log.noise]
     taken_s = np.arange(0.2, time_s[-1] - 0.2, 1 / log.readings_hz)
-    at = np.interp(taken_s, time_s, np.arange(len(time_s))).round().astype(int)
-    body = attitudes[at]
-    felt = (rates[at] + body.inv().apply(EARTH_RAD_S)) @ matrix.T + bias
-    wander = np.cumsum(rng.normal(size=felt.shape), axis=0) * bias_walk / np.sqrt(log.readings_hz)
+    indices = np.interp(taken_s, time_s, np.arange(len(time_s))).round().astype(int)
+    body = attitudes[indices]
+    readings = (rates[indices] + body.inv().apply(EARTH_RAD_S)) @ matrix.T + bias
+    wander = np.cumsum(rng.normal(size=readings.shape), axis=0) * bias_walk / np.sqrt(log.readings_hz)
     wander += body.inv().apply(GRAVITY) @ (g_sensitivity * rng.normal(size=(3, 3))).T
-    felt += wander + rng.normal(size=felt.shape) * walk_rad * np.sqrt(log.readings_hz)
+    readings += wander + rng.normal(size=readings.shape) * walk_rad * np.sqrt(log.readings_hz)
     kept = np.ones(len(taken_s), dtype=bool)
     for start in rng.uniform(2, taken_s[-1] - 2, size=log.gaps):
         kept &= (taken_s < start) | (taken_s > start + 0.1)
     stamped_s = np.sort(taken_s + log.reading_jitter_s * rng.uniform(-1, 1, size=len(taken_s)))
-    stamps_s, told = _reports(log, time_s, joints, attitudes, rng)
-    return Recorded(stamped_s[kept], felt[kept], stamps_s, told, matrix, bias + wander.mean(axis=0), log.latency_s)
+    stamps_s, reported = _reports(log, time_s, joints, attitudes, rng)
+    return Recorded(
+        stamped_s[kept], readings[kept], stamps_s, reported, matrix, bias + wander.mean(axis=0), log.latency_s
+    )
 
 
 def _joints(log: ArmLog, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -151,27 +153,29 @@ def _reports(
 ) -> tuple[Array, Array]:
     phase = rng.uniform(0, 1)
     taken_s = np.arange(0.5 + phase / log.poses_hz, time_s[-1] - 0.5, 1 / log.poses_hz)
-    at: NDArray[np.intp] = (taken_s * TRUE_HZ).round().astype(int)
+    indices: NDArray[np.intp] = (taken_s * TRUE_HZ).round().astype(int)
     stamps_s = taken_s - log.latency_s + log.jitter_s * rng.normal(size=len(taken_s))
     stamps_s = np.maximum.accumulate(stamps_s)  # a report that overtakes another waits for it
     waiting = np.concatenate([[False], np.diff(stamps_s) <= 0])
     first = np.maximum.accumulate(np.where(waiting, 0, np.arange(len(stamps_s))))
     stamps_s = stamps_s + 1e-5 * (np.arange(len(stamps_s)) - first)
-    told = _told(log, joints, attitudes, at, rng)
+    reported = _compute_reported(log, joints, attitudes, indices, rng)
     return stamps_s, np.asarray(
-        (Rotation.from_rotvec(rng.normal(size=(len(at), 3)) * log.report_rad) * told).as_matrix()
+        (Rotation.from_rotvec(rng.normal(size=(len(indices), 3)) * log.report_rad) * reported).as_matrix()
     )
 
 
-def _told(log: ArmLog, joints: Array, attitudes: Rotation, at: NDArray[np.intp], rng: np.random.Generator) -> Rotation:
+def _compute_reported(
+    log: ArmLog, joints: Array, attitudes: Rotation, indices: NDArray[np.intp], rng: np.random.Generator
+) -> Rotation:
     """Return the reported attitudes, whose errors less what is alike everywhere have the RMS `error_rad`."""
-    true = attitudes[at]
+    true = attitudes[indices]
     if log.form in ("joint zeros", "joint gains"):
         sizes = rng.normal(size=6)
 
         def report(scale: float) -> Rotation:
-            wrong = scale * sizes if log.form == "joint zeros" else joints[at] * scale * sizes / 3
-            return _forward(joints[at] + wrong)
+            wrong = scale * sizes if log.form == "joint zeros" else joints[indices] * scale * sizes / 3
+            return _forward(joints[indices] + wrong)
     else:
         lengths = {"rough": 0.7, "wide": 2.0, "body": 1.0, "table": 1.0}[log.form]
         matrices = true.as_matrix().reshape(-1, 9)

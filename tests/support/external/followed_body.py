@@ -86,7 +86,7 @@ class _Swings:
         self._sizes = world.swing_rad * rng.dirichlet([2, 2, 2], size=3)
 
     def at(self, time_s: Array) -> tuple[Array, Array]:
-        """Attitudes (n, 3, 3), body to room, and rates (n, 3) in body coordinates."""
+        """Return attitudes (n, 3, 3), body to room, and rates (n, 3) in body coordinates."""
         phases = self._paces * time_s[:, None, None] + self._phases
         yaw, pitch, roll = np.sum(self._sizes * np.sin(phases), axis=2).T
         yaw_rate, pitch_rate, roll_rate = np.sum(self._sizes * self._paces * np.cos(phases), axis=2).T

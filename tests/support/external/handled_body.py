@@ -14,7 +14,7 @@ from support.external.csv_tables import write_table
 TWELVE: tuple[Action, ...] = tuple(FlipAction(face) for face in FLIPS)
 SIX_TURNS: tuple[Action, ...] = (
     TurnAction(1),
-    *(each for face in ("+x", "+y", "-z", "-x", "-y") for each in (FlipAction(face), TurnAction(1))),
+    *(action for face in ("+x", "+y", "-z", "-x", "-y") for action in (FlipAction(face), TurnAction(1))),
 )
 # Three faces, a turn either way on each.
 BOTH_WAYS: tuple[Action, ...] = (

@@ -48,9 +48,9 @@ def schema(number: int = 1, name: str = IMU, definition: str | bytes = "") -> by
     return record(3, struct.pack("<H", number) + text(name) + text("ros2msg" if definition else "") + text(definition))
 
 
-def channel(topic: str | bytes, number: int = 1, qos: str | None = None, of: int = 1) -> bytes:
+def channel(topic: str | bytes, number: int = 1, qos: str | None = None, schema_number: int = 1) -> bytes:
     profile = b"" if qos is None else text("offered_qos_profiles") + text(qos)
-    return record(4, struct.pack("<HH", number, of) + text(topic) + text("cdr") + text(profile))
+    return record(4, struct.pack("<HH", number, schema_number) + text(topic) + text("cdr") + text(profile))
 
 
 def message(data: bytes, time_ns: int = 1, number: int = 1) -> bytes:
@@ -88,7 +88,9 @@ def make_indexed(*chunks: bytes) -> Makes:
 
 
 def topics(count: int, definition: bytes = b"") -> Makes:
-    records = [schema(n, f"my_msgs/msg/T{n}", definition) + channel(f"/t{n}", n, of=n) for n in range(1, count + 1)]
+    records = [
+        schema(n, f"my_msgs/msg/T{n}", definition) + channel(f"/t{n}", n, schema_number=n) for n in range(1, count + 1)
+    ]
     return mcap(*records, offers=[f"/t{n}" for n in range(count)])
 
 

@@ -57,9 +57,9 @@ def make_log(seed: int = SEED) -> RobotLog:
     rates = (true[:-1].inv() * true[1:]).as_rotvec() / 1e-3
     time_s = np.arange(0.1, end_s - 0.1, 1 / RATE_HZ)
     sensed = np.degrees(np.column_stack([np.interp(time_s, fine_s[:-1] + 5e-4, axis) for axis in rates.T]))
-    at = true[np.rint(time_s / 1e-3).astype(int)]
+    attitudes = true[np.rint(time_s / 1e-3).astype(int)]
     readings = sensed @ MATRIX.T + BIAS_DEG_S + rng.normal(0, NOISE_DEG_S, sensed.shape)
-    forces = at.inv().apply(GRAVITY_G) + rng.normal(0, NOISE_G, sensed.shape)
+    forces = attitudes.inv().apply(GRAVITY_G) + rng.normal(0, NOISE_G, sensed.shape)
     last = np.minimum((np.arange(len(time_s)) // BURST + 1) * BURST - 1, len(time_s) - 1)
     arrived_s = time_s[last] + LATE_S + rng.uniform(0, 0.004, len(time_s) // BURST + 1)[np.arange(len(time_s)) // BURST]
     time_ms = np.floor(1e3 * arrived_s) + np.arange(len(time_s)) % BURST
@@ -71,7 +71,7 @@ def make_log(seed: int = SEED) -> RobotLog:
     reported = Rotation.from_rotvec(errors + noise) * posed
     x, y, z, w = reported.inv().as_quat().T
     rests_s = np.column_stack([starts_s, starts_s + REST_S])
-    return RobotLog(time_ms, readings, forces, pose_s, np.column_stack([w, x, y, z]), time_s, at, rests_s)
+    return RobotLog(time_ms, readings, forces, pose_s, np.column_stack([w, x, y, z]), time_s, attitudes, rests_s)
 
 
 def attitudes_at(time_s: np.ndarray, starts_s: np.ndarray, stops: Rotation) -> Rotation:

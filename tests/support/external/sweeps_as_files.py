@@ -8,5 +8,5 @@ from rig.observation.external.csv_samples import read_samples
 
 
 def average_files(samples: Path, sweeps: Path) -> ExternalData:
-    """What the two files tell. Raises Refused and Fault as `rig solve --sweeps` does."""
+    """Return the averages of the two files. Raise Refused and Fault as `rig solve --sweeps` does."""
     return average_sweeps(read_samples(samples, [RATE]), read_sweeps(sweeps))

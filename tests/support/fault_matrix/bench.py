@@ -92,7 +92,7 @@ class Bench:
         return not self.running
 
     def said(self, command: str) -> str:
-        """What `rig COMMAND` has written on stderr."""
+        """Return the text that `rig COMMAND` has written on stderr."""
         return (self.config.parent / f"{command}.txt").read_text(encoding="utf-8", errors="replace")
 
     # -- the laboratory ----------------------------------------------------------------------------------------------
@@ -121,7 +121,7 @@ def children(pid: int) -> list[int]:
 
 
 def alive(pid: int) -> bool:
-    """Whether a process runs or hangs; one that has ended and was not waited for does not."""
+    """Return whether a process runs or hangs; one that has ended and was not waited for does not."""
     with suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     return False

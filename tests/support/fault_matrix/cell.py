@@ -125,7 +125,7 @@ def _companions(rig_bench: Bench, cell: Cell) -> None:
 
 
 def _account(rig_bench: Bench, fault: Fault | None, cell: Cell, *, fault_s: float, fault_wall_s: float) -> None:
-    """How the run ended, when the arm came to rest, and whether the file holds what was received."""
+    """Record the end of the run, the time of the arm's rest, and whether the file has all that was received."""
     assert rig_bench.process is not None
     output = rig_bench.said("run")
     cell.status = rig_bench.process.poll()
@@ -150,7 +150,7 @@ def _account(rig_bench: Bench, fault: Fault | None, cell: Cell, *, fault_s: floa
 
 
 def _came_late(rig_bench: Bench, fault_s: float) -> bool:
-    """Whether all was recorded by then that a calibration is found from."""
+    """Return whether all data for a calibration were already recorded."""
     run = read_run(recordings(rig_bench.out, "raw")[0])
     windows = [sweep.window for sweep in swept(run)] + [dwell.window for dwell in dwelt(run)]
     return all(window.end_s <= fault_s for window in windows)

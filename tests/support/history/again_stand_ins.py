@@ -12,9 +12,9 @@ from rig.history.recompute.result_comparison import Answer, RecomputedResult
 DEADLY, WAITING = "deadly", "waiting"
 
 
-def task(key: str, *places: Path) -> Task:
+def task(key: str, *folders: Path) -> Task:
     """Return a task without recordings, named by its answer."""
-    return Task(key, (), tuple(("bench", str(place)) for place in places), (), None)
+    return Task(key, (), tuple(("bench", str(folder)) for folder in folders), (), None)
 
 
 def answer_at_once(task: Task) -> Answer:

@@ -17,9 +17,9 @@ CALIBRATION = RECORDINGS / "six_observation"  # the quickest to solve: a twentie
 Change = Callable[[ResultDocument], ResultDocument]
 
 
-def keep(history: History, folder: Path, of: Path = CALIBRATION, change: Change | None = None) -> FinishedRun:
+def keep(history: History, folder: Path, source: Path = CALIBRATION, change: Change | None = None) -> FinishedRun:
     """Copy recordings to `folder` and enter the result beside them, changed if so, as if begun a day after the last."""
-    shutil.copytree(of, folder)
+    shutil.copytree(source, folder)
     run = read_finished_run(folder)
     document = _later(run.document, len(list(history.kept())))
     document = document if change is None else change(document)

@@ -38,7 +38,7 @@ SENSOR = RecordedSensor("lsm9ds1", "LSM9DS1-HAND", RATE_HZ, CHANNELS)
 MATRIX = np.array([[0.85, 0.003, -0.002], [0.001, 0.865, 0.004], [0.002, -0.001, 0.874]])  # F of m = F ω + c
 OFFSET, NOISE = np.array([0.0077, -0.01, -0.005]), 1.0e-3
 CREEP_RAD_S = np.radians([0.2, -0.15, 0.1])
-TOLD = SessionConditions(50.0, "the board's crystal")
+CONDITIONS = SessionConditions(50.0, "the board's crystal")
 LIST = HandSettings(flips=12, turns=3, rest_s=1.0, box_rad=float(np.radians(0.2)), closure_rad=float(np.radians(0.3)))
 
 
@@ -67,7 +67,7 @@ class Table:
         self.acquisition = Acquisition()
         self.acquisition.expect("gyro", SENSOR)
         self.session = HandSession(
-            self.acquisition, self._note, lambda event: None, self.settings, "gyro", SENSOR, TOLD, wait=self._pass
+            self.acquisition, self._note, lambda event: None, self.settings, "gyro", SENSOR, CONDITIONS, wait=self._pass
         )
 
     def sit(self) -> None:
@@ -86,7 +86,7 @@ class Table:
     @property
     def solution(self) -> HandSolution:
         """Return the solution of the session."""
-        return solve_by_hand(self.handled, TOLD)
+        return solve_by_hand(self.handled, CONDITIONS)
 
     @property
     def again(self) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from support.processes.waiting import wait_for
 from support.processes.warm import start_module
 
-TOLD = "page: "
+ADDRESS_PREFIX = "page: "
 
 
 @contextmanager
@@ -25,6 +25,7 @@ def start_with_page(log: Path, *words: str | Path) -> Iterator[tuple["subprocess
 
 
 def _address(log: Path) -> str:
-    """What stands behind the first `TOLD`; empty where nothing is told yet."""
-    lines = [line for line in log.read_text(encoding="utf-8").splitlines(keepends=True) if line.startswith(TOLD)]
-    return lines[0].removeprefix(TOLD).strip() if lines and lines[0].endswith("\n") else ""
+    """Return the text behind the first `ADDRESS_PREFIX`; empty if there is none yet."""
+    text = log.read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines(keepends=True) if line.startswith(ADDRESS_PREFIX)]
+    return lines[0].removeprefix(ADDRESS_PREFIX).strip() if lines and lines[0].endswith("\n") else ""

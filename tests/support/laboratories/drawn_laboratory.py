@@ -134,7 +134,7 @@ def truth(
 
 
 def bias_at_0_g(document: Mapping[str, Any], name: str, windows_s: Iterable[tuple[float, float]]) -> np.ndarray:
-    """(3,) what the accelerometer in a sensor reads without noise where it feels nothing, as a mean over such times."""
+    """(3,) the mean reading of a sensor's accelerometer without noise and without specific force."""
     return _simulated(document).bias_m_s2(name, [*windows_s])
 
 

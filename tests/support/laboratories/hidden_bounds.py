@@ -11,13 +11,13 @@ CHANCE = 0.005  # either way
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Between which bounds the RMS of error over u, and the share within U, must lie."""
+    """Bounds of the RMS of error over u, and of the fraction within U."""
 
     rms: tuple[float, float]
     within: tuple[float, float]
 
     def kept(self, rms: float, within: float) -> bool:
-        """Whether they do."""
+        """Return whether both are within their bounds."""
         return self.rms[0] <= rms <= self.rms[1] and self.within[0] <= within <= self.within[1]
 
 

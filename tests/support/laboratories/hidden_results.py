@@ -122,7 +122,7 @@ def _split(part: str, names: Sequence[str], error: np.ndarray, budget: Budget) -
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """How what was stated of one kind of parameter holds: what a line of the table says."""
+    """Agreement of the stated values of one kind of parameter with the truth: a line of the table."""
 
     values: int
     rms: float

@@ -43,8 +43,8 @@ ACCELEROMETERS = {  # how far scale and bias (m/s²) may be off
     "lsm9ds1": (0.03, 0.8), "mpu9250": (0.03, 0.8), "adis16465": (0.003, 0.02), "kvh1775": (1e-3, 0.01),
     "mavlink": (0.03, 0.5),
     **{
-        name: (1e-2 * (off.acceleration_scale_percent or 1.0), MILLI_G_M_S2 * (off.acceleration_bias_mg or 0.0))
-        for name, off in ((name, PARTS[name].delivered) for name in BY_SHEET)
+        name: (1e-2 * (errors.acceleration_scale_percent or 1.0), MILLI_G_M_S2 * (errors.acceleration_bias_mg or 0.0))
+        for name, errors in ((name, PARTS[name].delivered) for name in BY_SHEET)
     },
 }  # fmt: skip
 TIMEOUT_S = 3000.0
@@ -319,7 +319,7 @@ def _drive(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _arm(rng: np.random.Generator) -> dict[str, Any]:
-    seen = draw_visible_vibration(rng)
+    vibration = draw_visible_vibration(rng)
     separate = rng.spawn(1)[0]  # what is drawn after it is what it was without
     drive, has_rough_ripple = _drive(separate), bool(separate.random() < 0.3)
     rough = float(rng.uniform(0, 0.05))
@@ -330,7 +330,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
         "vibration_fraction": rough if has_rough_ripple else 0.0,
         "vibration_rms_rad_s": float(rng.uniform(0, 0.004)),
         "vibration_hz": float(rng.uniform(8, 30)),
-        **seen,
+        **vibration,
         "settling_rad": 5.0e-5,
         "settling_hz": 12,
         "settling_decay_s": 0.15,

@@ -22,7 +22,7 @@ OF_A_SENSOR = {
 
 
 def ideal_document(path: Path) -> dict[str, Any]:
-    """What a file and its bases say, but for the imperfections in its `world:` section."""
+    """Return a file with its bases, without the imperfections in its `world:` section."""
     return deepcopy(_ideal_document(path))
 
 

@@ -56,7 +56,7 @@ class Footprint:
     files: Counter[str]
 
     @classmethod
-    def of(cls, pid: int) -> Self:
+    def measure(cls, pid: int) -> Self:
         """Return the footprint of a running process."""
         process = Path("/proc") / str(pid)
         memory = (process / "smaps_rollup").read_text().splitlines()
@@ -77,7 +77,7 @@ class Calibration:
     in_station: bool
     status: int
     wall_s: float
-    found: tuple[float, ...] = ()
+    solution: tuple[float, ...] = ()
     std: tuple[float, ...] = ()
     error_u: float = 0.0
     board_us: tuple[int, int] = (0, 0)
@@ -202,12 +202,12 @@ def _run(bench: Bench, number: int) -> Calibration:
     bench.world.state()  # it has heard by now that the rig has hung up
     return Calibration(
         number, in_station, status, wall_s,
-        found=(*gyro.scale, *gyro.bias_rad_s),
+        solution=(*gyro.scale, *gyro.bias_rad_s),
         std=tuple(np.sqrt(np.diag(np.array(gyro.covariance))).tolist()),
         error_u=errors_in_u(out),
         board_us=(int(times_us.min()), int(times_us.max())),
-        world=Footprint.of(bench.world.process.pid),
-        station=Footprint.of(bench.station.pid),
+        world=Footprint.measure(bench.world.process.pid),
+        station=Footprint.measure(bench.station.pid),
     )  # fmt: skip
 
 
@@ -235,7 +235,7 @@ class Course:
 def courses(runs: Sequence[Calibration]) -> list[Course]:
     """Return the course of every parameter over the passed runs; the slope's uncertainty is that of their scatter."""
     number = np.array([run.number for run in runs], float)
-    measured, std = np.array([run.found for run in runs]), np.array([run.std for run in runs])
+    measured, std = np.array([run.solution for run in runs]), np.array([run.std for run in runs])
     deviation = number - number.mean()
     courses = []
     for index, name in enumerate(PARAMETERS):

@@ -20,7 +20,7 @@ class Scanner:
     def __init__(self, process: "subprocess.Popen[bytes]", terminal: int) -> None:
         self.process = process
         self._terminal = terminal
-        self._told = ""
+        self._output = ""
         self._read = 0  # what was waited for already ends here
         self._over = False  # it says no more
         self._more = threading.Condition()
@@ -39,24 +39,24 @@ class Scanner:
         with self._more:
             self._more.wait_for(lambda: self._end(words) >= 0 or self._over, PATIENCE_S)
             end = self._end(words)
-            assert end >= 0, f"{words!r} not said after:\n{self._told[max(0, self._read - 2000) :]}"
+            assert end >= 0, f"{words!r} not said after:\n{self._output[max(0, self._read - 2000) :]}"
             return end
 
     def said(self, words: str) -> bool:
         """Return whether these words were ever printed."""
         with self._more:
-            return words in self._told
+            return words in self._output
 
     def _end(self, words: str) -> int:
         """Return the end of the words behind the reading position; -1 if they are not there."""
-        position = self._told.find(words, self._read)
+        position = self._output.find(words, self._read)
         return position + len(words) if position >= 0 else -1
 
     def _listen(self) -> None:
         assert self.process.stderr is not None
         while data := os.read(self.process.stderr.fileno(), 65536):
             with self._more:
-                self._told += data.decode(errors="replace")
+                self._output += data.decode(errors="replace")
                 self._more.notify_all()
         with self._more:
             self._over = True

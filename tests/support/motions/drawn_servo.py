@@ -36,8 +36,10 @@ from support.paths import ROOT
 from support.recordings.synthetic_run import PROVENANCE, SENSITIVITY, SENSOR
 
 # What else is known of the part is left out: it is not drawn.
-KNOWN = ("g_sensitivity_deg_s_g=0.1", "non_orthogonality_deg=0.5", "nonlinearity_percent=0", "bias_deg_s_k=0",
-         "scale_ppm_k=0", "bias_instability_deg_h=0")  # fmt: skip
+GIVEN_UNCERTAINTIES = (
+    "g_sensitivity_deg_s_g=0.1", "non_orthogonality_deg=0.5", "nonlinearity_percent=0", "bias_deg_s_k=0",
+    "scale_ppm_k=0", "bias_instability_deg_h=0",
+)  # fmt: skip
 CONFIG = (ROOT / "configs" / "servo.yaml").read_text(encoding="utf-8")
 BEGINS_S, SETTLES_S = 100.0, 0.25
 STAMPED_S = 0.6e-3  # half a transaction's length, which is not always alike
@@ -103,7 +105,7 @@ def drawn_servo(
     `mounting_deg`, the item's in each stage by `adapter_deg`, in random directions.
     """
     rng = np.random.default_rng([seed, 43])
-    configuration = load_servo((*(f"uncertainty.{key}" for key in KNOWN), *overrides))
+    configuration = load_servo((*(f"uncertainty.{key}" for key in GIVEN_UNCERTAINTIES), *overrides))
     config = configuration.config
     assert isinstance(config.turner, ServoSection) and isinstance(config.procedure, ServoSixObservationSection)
     plan = plan_servo_six_observation(config.turner, config.procedure)

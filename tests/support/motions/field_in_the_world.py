@@ -33,7 +33,7 @@ ARM = np.radians([0.0, -90.0, 90.0])
 
 @dataclass(frozen=True)
 class Seen:
-    """The true parameters of a `solution` from attitudes, and whether the field looked `uniform`."""
+    """The true parameters of a `solution` from attitudes, and whether the field appeared `uniform`."""
 
     bias_t: np.ndarray
     matrix: np.ndarray

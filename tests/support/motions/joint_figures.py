@@ -50,11 +50,11 @@ class SpeedRipple:
 
     def peaks(self, count: int) -> list[int]:
         """Return the strongest orders, at least ten apart from each other."""
-        found: list[int] = []
+        orders: list[int] = []
         for order in ORDERS[np.argsort(self.amplitudes_rad_s)[::-1]]:
-            if all(abs(order - other) > 10 for other in found):
-                found.append(int(order))
-        return found[:count]
+            if all(abs(order - other) > 10 for other in orders):
+                orders.append(int(order))
+        return orders[:count]
 
 
 def speed_ripple(q_rad: Array, qd_rad_s: Array, smooth_rad_s: Array) -> SpeedRipple:
@@ -76,9 +76,9 @@ def band_rms(q_rad: Array, residuals_rad_s: Array, orders: Sequence[int]) -> flo
     """Return the RMS of what all `orders` together explain of the rates' residuals, less what noise would explain."""
     waves = np.column_stack([wave(order * q_rad) for order in orders for wave in (np.cos, np.sin)])
     fitted = waves @ np.linalg.lstsq(waves, residuals_rad_s, rcond=None)[0]
-    left = residuals_rad_s - fitted
+    residuals = residuals_rad_s - fitted
     n, p = waves.shape
-    noise = p * float(left @ left) / (n - p)
+    noise = p * float(residuals @ residuals) / (n - p)
     return float(np.sqrt(max(0.0, float(fitted @ fitted) - noise) / n))
 
 
@@ -108,10 +108,10 @@ def settling(time_s: Array, target_qd_rad_s: Array, qd_rad_s: Array, rest_rad_s:
     """Return how a joint settles after the last moment in which its target moves."""
     last = int(np.flatnonzero(np.abs(target_qd_rad_s) > 1e-6)[-1])
     after = slice(last + 1, None)
-    along = qd_rad_s[after] * np.sign(target_qd_rad_s[last])
-    restless = np.flatnonzero(np.abs(along) > rest_rad_s)
+    directed_rad_s = qd_rad_s[after] * np.sign(target_qd_rad_s[last])
+    restless = np.flatnonzero(np.abs(directed_rad_s) > rest_rad_s)
     duration_s = float(time_s[after][restless[-1]] - time_s[last + 1]) if len(restless) else 0.0
-    return Settling(float(along.min()), duration_s)
+    return Settling(float(directed_rad_s.min()), duration_s)
 
 
 @dataclass(frozen=True)

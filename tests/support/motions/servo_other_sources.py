@@ -65,7 +65,7 @@ def sample_lines(
             yield printer.take_sent()
         ended.set()
 
-    collected = _Taken()
+    collected = _SampleSink()
     with pty_printing(printed(), 0.001) as (port, _):
         at_port = wanted.model_copy(update={"serial": wanted.serial.model_copy(update={"port": port})})
         with lines("gyro", at_port, collected) as source:
@@ -88,7 +88,7 @@ def sample_autopilot(
         return motion(STILL_S + (max(time_s - begun_s[0], 0.0) if begun_s else 0.0))
 
     offsets = {f"INS_GYROFFS_{axis}": float(rng.uniform(-0.05, 0.05)) for axis in "XYZ"}
-    collected = _Taken()
+    collected = _SampleSink()
     with autopilot_on_a_wire(
         "ardupilot", offsets, motion_at, pace=PACE, simulated=_errors(model, until), clock_ppm=-1e6 * drift
     ) as wire:
@@ -101,7 +101,7 @@ def sample_autopilot(
             )
 
 
-class _Taken:
+class _SampleSink:
     """What a source handed on."""
 
     def __init__(self) -> None:

@@ -53,7 +53,7 @@ class Drawn:
         return np.concatenate([powers @ self.scale, powers @ self.bias])
 
 
-PLACES = np.array([each for axis in np.eye(3) for each in (axis, 0 * axis, -axis, 0 * axis)]) * SPEED_RAD_S
+POSE_RATES = np.array([rate for axis in np.eye(3) for rate in (axis, 0 * axis, -axis, 0 * axis)]) * SPEED_RAD_S
 
 
 def drawn(
@@ -73,7 +73,7 @@ def drawn(
     return Drawn(
         scale, bias, hysteresis * rng.uniform(-1, 1, 3), lag_s * rng.uniform(-1, 1),
         (gradient_k * rng.uniform(-1, 1), gradient_k * rng.uniform(-1, 1)),
-        rng.normal(0, 3e-4, PLACES.shape), noise, walk,
+        rng.normal(0, 3e-4, POSE_RATES.shape), noise, walk,
     )  # fmt: skip
 
 
@@ -82,7 +82,7 @@ class Session:
     """Sets of sweeps and rests: `windows_s` (N, 2), `felt` (N, 3), the thermometer's `temperature_c` (N,)."""
 
     windows_s: Array
-    felt: Array
+    true_rates: Array
     places: NDArray[np.intp]
     temperature_c: Array
     warming_k_s: Array
@@ -90,14 +90,14 @@ class Session:
 
 def session(repeats: int = 14, *, both_directions: bool = True) -> Session:
     """Return a session from 20 to 60 °C and, if `both_directions`, back again."""
-    rates = np.tile(PLACES, (repeats, 1))
+    rates = np.tile(POSE_RATES, (repeats, 1))
     lasted = np.where(rates.any(axis=1), SWEPT_S, RESTED_S)
     ends = np.cumsum(lasted + BETWEEN_S)
     windows = np.column_stack([ends - lasted, ends])
     middle = windows.mean(axis=1)
     done = (middle - middle[0]) / (middle[-1] - middle[0])
     temperature_c = FROM_C + (TO_C - FROM_C) * (1 - np.abs(1 - 2 * done) if both_directions else done)
-    places = np.tile(np.arange(len(PLACES)), repeats)
+    places = np.tile(np.arange(len(POSE_RATES)), repeats)
     return Session(windows, rates, places, temperature_c, np.gradient(temperature_c, middle))
 
 
@@ -108,12 +108,13 @@ def readings(sensor: Drawn, course: Session, rng: np.random.Generator) -> Array:
     within = (course.temperature_c - FROM_C) / (TO_C - FROM_C)
     loop = np.outer(np.sign(course.warming_k_s) * 4 * within * (1 - within), sensor.hysteresis)
     wandered = np.cumsum(
-        rng.normal(0, 1, course.felt.shape) * np.sqrt(np.diff(course.windows_s[:, 0], prepend=0.0))[:, None], axis=0
+        rng.normal(0, 1, course.true_rates.shape) * np.sqrt(np.diff(course.windows_s[:, 0], prepend=0.0))[:, None],
+        axis=0,
     )
     wandered -= wandered.mean(axis=0)  # a bias is that of the whole run
-    white = rng.normal(0, 1, course.felt.shape) * sensor.noise
+    white = rng.normal(0, 1, course.true_rates.shape) * sensor.noise
     noisy: Array = (
-        course.felt / (powers @ sensor.scale) + powers @ sensor.bias + loop
+        course.true_rates / (powers @ sensor.scale) + powers @ sensor.bias + loop
         + sensor.leaning[course.places] + sensor.walk * wandered + white
     )  # fmt: skip
     return noisy
@@ -122,7 +123,7 @@ def readings(sensor: Drawn, course: Session, rng: np.random.Generator) -> Array:
 def repeat_means(means: Array, course: Session, noise: float) -> RepeatedMeans:
     """Return the estimator's input."""
     return RepeatedMeans(
-        means, np.full(means.shape, noise**2), course.felt, course.places, course.windows_s, course.temperature_c
+        means, np.full(means.shape, noise**2), course.true_rates, course.places, course.windows_s, course.temperature_c
     )
 
 
@@ -138,8 +139,8 @@ def write_files(
     samples, sweeps = folder / "samples.csv", folder / "sweeps.csv"
     header = "time_s,x_rad_s,y_rad_s,z_rad_s,temperature_c"
     np.savetxt(samples, np.vstack(rows), fmt="%.10g", delimiter=",", header=header, comments="")
-    speeds = np.linalg.norm(course.felt, axis=1)
-    axes = np.where(speeds[:, None] > 0, course.felt / np.maximum(speeds, 1e-9)[:, None], np.eye(3)[0])
+    speeds = np.linalg.norm(course.true_rates, axis=1)
+    axes = np.where(speeds[:, None] > 0, course.true_rates / np.maximum(speeds, 1e-9)[:, None], np.eye(3)[0])
     header = "start_s,end_s,axis_x,axis_y,axis_z,speed_rad_s"
     table = np.column_stack([course.windows_s, axes, speeds])
     np.savetxt(sweeps, table, fmt="%.12g", delimiter=",", header=header, comments="")
@@ -166,10 +167,10 @@ def external(means: Array, course: Session, noise: float) -> ExternalData:
             0,
             average,
         )
-        for row, (rate, average) in enumerate(zip(course.felt, averages, strict=True), start=1)
+        for row, (rate, average) in enumerate(zip(course.true_rates, averages, strict=True), start=1)
         if rate.any()
     ]
-    rests = [average for rate, average in zip(course.felt, averages, strict=True) if not rate.any()]
+    rests = [average for rate, average in zip(course.true_rates, averages, strict=True) if not rate.any()]
     return ExternalData(tuple(sweeps), tuple(rests))
 
 

@@ -98,7 +98,7 @@ def browser(size: tuple[int, int] = TABLET, *, dark: bool = False) -> Iterator[C
 
 
 def set_theme(driver: Chrome, *, dark: bool) -> None:
-    """What the system is said to prefer."""
+    """Set the colour scheme that the system prefers."""
     wish = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": wish})
 
@@ -115,7 +115,7 @@ def screen(driver: Chrome, width: int, height: int) -> Iterator[None]:
 
 
 def picture(driver: Chrome, name: str, *, whole: bool = False) -> Path:
-    """What the window shows, or the `whole` page, as build/page/NAME.png."""
+    """Save the window, or the `whole` page, as build/page/NAME.png."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     path = PICTURES / f"{name}.png"
     if not whole:
@@ -134,7 +134,7 @@ def legible(driver: Chrome) -> None:
 
 
 def text(driver: Chrome, element: str) -> str:
-    """What is to be read of the element of that id."""
+    """Return the visible text of the element of that id."""
     return driver.find_element(By.ID, element).text
 
 
@@ -149,7 +149,7 @@ def kind(driver: Chrome) -> str:
 
 
 def severe(driver: Chrome) -> list[str]:
-    """What the console holds of errors since it was asked last."""
+    """Return the console's errors since the last call."""
     entries: list[dict[str, Any]] = driver.get_log("browser")  # type: ignore[no-untyped-call]
     return [entry["message"] for entry in entries if entry["level"] == "SEVERE"]
 

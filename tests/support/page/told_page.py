@@ -81,7 +81,7 @@ class Telling:
 
 
 def goes_on(state: ArmSeen | HandSeen) -> bool:
-    """Whether more is to come: the program of an arm plays, a servo is held, a hand always may move."""
+    """Return whether more is to come: the program of an arm runs, a servo is held, a hand may always move."""
     return not (
         isinstance(state, ArmSeen)
         and isinstance(state.state, ArmState)

@@ -133,7 +133,7 @@ def listening() -> socket.socket:
 
 
 def address_of(orders: socket.socket) -> str:
-    """Where it listens, as it is written in JSON."""
+    """Return the address at which it listens, as written in JSON."""
     return bytes(orders.getsockname()).hex()
 
 
@@ -167,7 +167,7 @@ def serve_orders(orders: socket.socket) -> Order | None:
 
 
 def _tell_status(process: int, channel: int) -> None:
-    """How it ended, where somebody still wants to know."""
+    """Send its exit status if the client still waits for it."""
     _, status = os.waitpid(process, 0)
     with suppress(BrokenPipeError):
         os.write(channel, status.to_bytes(4, "little"))

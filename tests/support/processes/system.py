@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def resident_kb(process: int) -> int:
-    """How much memory it has in use, kB."""
+    """Return the memory that it uses, kB."""
     status = Path(f"/proc/{process}/status").read_text(encoding="ascii")
     return int(status.split("VmRSS:")[1].split()[0])
 

@@ -31,7 +31,7 @@ class _Nursery:
         self.closed = False  # nothing is forked: all are processes that the system starts
 
     def address(self, module: str) -> str:
-        """Where orders for processes of that module are taken; one of the tests' own needs what the command does."""
+        """Return the address that takes orders for processes of that module; modules of tests share one."""
         with self._starting:
             if self._addresses is None:
                 self._addresses = self._begun()

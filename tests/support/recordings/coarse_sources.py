@@ -92,7 +92,7 @@ def record(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -> 
 
 
 def state_solution(recording: Drawn) -> Stated:
-    """What is solved of a recording, held against its truth."""
+    """Return the solution of a recording, compared with its truth."""
     recordings = observe_recordings([recording.run])
     surroundings = surroundings_of(recordings, recording.run.settings)
     results = solve_observed(recording.run.sensors, recordings, surroundings=surroundings)

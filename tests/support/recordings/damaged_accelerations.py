@@ -38,7 +38,7 @@ class Readings:
     count: float
 
     @property
-    def felt(self) -> Array:
+    def values(self) -> Array:
         """(n, 3) m/s² or T."""
         return np.asarray(self.counts * self.count, dtype=np.float64)
 
@@ -130,17 +130,17 @@ def find_contradictions(run: RunData) -> Told:
 
 
 def offset(by: float, where: Callable[[Readings], Mask]) -> Damage:
-    return lambda readings: readings.feeling(readings.felt + by * ASKEW * where(readings)[:, None])
+    return lambda readings: readings.feeling(readings.values + by * ASKEW * where(readings)[:, None])
 
 
 def bent(change: Callable[[Array], Array]) -> Damage:
     """Add to each axis a function of its reading."""
-    return lambda readings: readings.feeling(readings.felt + change(readings.felt))
+    return lambda readings: readings.feeling(readings.values + change(readings.values))
 
 
 def scale(by: float, where: Callable[[Readings], Mask], axes: Sequence[int] = (0, 1, 2)) -> Damage:
     def damage(readings: Readings) -> Readings:
-        forces = readings.felt
+        forces = readings.values
         forces[np.ix_(where(readings), np.array(axes))] *= by
         return readings.feeling(forces)
 
@@ -149,7 +149,7 @@ def scale(by: float, where: Callable[[Readings], Mask], axes: Sequence[int] = (0
 
 def rotate(angle_deg: float, where: Callable[[Readings], Mask]) -> Damage:
     def damage(readings: Readings) -> Readings:
-        forces, chosen = readings.felt, where(readings)
+        forces, chosen = readings.values, where(readings)
         forces[chosen] = forces[chosen] @ Rotation.from_rotvec(np.radians(angle_deg) * AXIS).as_matrix().T
         return readings.feeling(forces)
 
@@ -161,12 +161,12 @@ def convert(change: Callable[[NDArray[np.int64]], NDArray[np.int64]]) -> Damage:
     return lambda readings: replace(readings, counts=change(readings.counts))
 
 
-def stuck(axis: int, where: Callable[[Readings], Mask], at: float | None = None) -> Damage:
+def stuck(axis: int, where: Callable[[Readings], Mask], value: float | None = None) -> Damage:
     """Hold an axis at a value, or at its first reading."""
 
     def damage(readings: Readings) -> Readings:
         counts, chosen = readings.counts.copy(), where(readings)
-        counts[chosen, axis] = counts[chosen, axis][0] if at is None else round(at / readings.count)
+        counts[chosen, axis] = counts[chosen, axis][0] if value is None else round(value / readings.count)
         return replace(readings, counts=counts)
 
     return damage
@@ -177,7 +177,7 @@ def spike(by: float, where: Callable[[Readings], Mask]) -> Damage:
 
     def damage(readings: Readings) -> Readings:
         chosen = np.flatnonzero(where(readings))
-        forces = readings.felt
+        forces = readings.values
         forces[chosen[len(chosen) // 2]] += by * ASKEW
         return readings.feeling(forces)
 

@@ -65,7 +65,7 @@ class Readings:
         chosen: Mask = self.rng.random(len(self.counts)) < share
         return chosen
 
-    def felt(self) -> Array:
+    def compute_rates(self) -> Array:
         """Return the sensed rates (n, 3) in rad/s, before the bias is added."""
         return np.asarray(self.counts * SENSITIVITY + np.array(self.setup.bias_rad_s), dtype=np.float64)
 
@@ -96,7 +96,7 @@ def readings_of(setup: Setup) -> Readings:
 
 def scale(by: float, where: Callable[[Readings], Mask], axes: tuple[int, ...] = (0, 1, 2)) -> Damage:
     def damage(readings: Readings) -> Readings:
-        rates = readings.felt()
+        rates = readings.compute_rates()
         rates[np.ix_(where(readings), np.array(axes))] *= by
         return readings.feeling(rates)
 
@@ -110,7 +110,7 @@ def rotate(angle_deg: float, where: Callable[[Readings], Mask]) -> Damage:
         from scipy.spatial.transform import Rotation
 
         direction = np.array([0.6, -0.48, 0.64])
-        rates, chosen = readings.felt(), where(readings)
+        rates, chosen = readings.compute_rates(), where(readings)
         rates[chosen] = rates[chosen] @ Rotation.from_rotvec(np.radians(angle_deg) * direction).as_matrix().T
         return readings.feeling(rates)
 
@@ -118,11 +118,11 @@ def rotate(angle_deg: float, where: Callable[[Readings], Mask]) -> Damage:
 
 
 def offset(by_rad_s: float, where: Callable[[Readings], NDArray[Any]]) -> Damage:
-    return lambda raw: raw.feeling(raw.felt() + by_rad_s * np.array([1.0, -0.7, 0.5]) * where(raw)[:, None])
+    return lambda raw: raw.feeling(raw.compute_rates() + by_rad_s * np.array([1.0, -0.7, 0.5]) * where(raw)[:, None])
 
 
 def bend(change: Callable[[Array], Array]) -> Damage:
-    return lambda raw: raw.feeling(raw.felt() + change(raw.felt()))
+    return lambda raw: raw.feeling(raw.compute_rates() + change(raw.compute_rates()))
 
 
 def convert(change: Callable[[NDArray[np.int64]], NDArray[np.int64]], share: float = 1.0) -> Damage:
@@ -142,14 +142,15 @@ def wrap(at_rad_s: float) -> Damage:
 
 def drifting(by_rad_s: float) -> Damage:
     return lambda readings: readings.feeling(
-        readings.felt() + by_rad_s * np.linspace(-0.5, 0.5, len(readings.counts))[:, None] * np.array([1.0, -0.7, 0.5])
+        readings.compute_rates()
+        + by_rad_s * np.linspace(-0.5, 0.5, len(readings.counts))[:, None] * np.array([1.0, -0.7, 0.5])
     )
 
 
 def spiky(share: float, size_rad_s: float, *, one_sided: bool = False) -> Damage:
     def damage(readings: Readings) -> Readings:
         sizes = size_rad_s * readings.rng.uniform(0.3 if one_sided else -1, 1, readings.counts.shape)
-        return readings.feeling(readings.felt() + sizes * readings.some(share)[:, None])
+        return readings.feeling(readings.compute_rates() + sizes * readings.some(share)[:, None])
 
     return damage
 
@@ -222,7 +223,7 @@ def late(by_s: float, where: Callable[[Readings], Mask]) -> Damage:
 
 def noisier(by_rad_s: float, where: Callable[[Readings], Mask]) -> Damage:
     return lambda readings: readings.feeling(
-        readings.felt() + by_rad_s * readings.rng.normal(size=readings.counts.shape) * where(readings)[:, None]
+        readings.compute_rates() + by_rad_s * readings.rng.normal(size=readings.counts.shape) * where(readings)[:, None]
     )
 
 

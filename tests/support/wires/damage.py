@@ -80,7 +80,7 @@ FAULTS: tuple[Fault, ...] = (_flip, _flip, _cut, _lose, _double, _overwrite, _in
 
 @contextmanager
 def ending_by_name(bad: bytes) -> Iterator[None]:
-    """What is raised here goes on with the bytes that did it; so does an alarm where nothing ends."""
+    """Attach to an exception raised here the bytes that caused it; likewise to an alarm if nothing ends."""
 
     def hung(*_: object) -> None:
         raise AssertionError("it hangs")

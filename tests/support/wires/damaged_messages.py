@@ -74,7 +74,7 @@ class Controller:
         return HOSTS[self._turn % len(HOSTS)]
 
     def done(self) -> None:
-        """That client has gone."""
+        """Note that a client has disconnected."""
         self._turn += 1
 
     def close(self) -> None:

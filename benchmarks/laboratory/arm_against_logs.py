@@ -1,10 +1,10 @@
-"""The simulated arm's joints beside logs of real ones: `python benchmarks/laboratory/arm_beside_logs.py LOG...`.
+"""Compare the simulated arm's joints with logs of real ones: `python benchmarks/laboratory/arm_against_logs.py LOG...`.
 
 A LOG is a CSV file: as the maker's RTDE recorder writes it (a heading, spaces between), or one without a heading from
 `jointwise_motion` of github.com/shamilmamedov/dynamic_calibration (time, angles, rates, …), in which the joint that its
 name ends with swings. Prints the same figures for each log and for the simulated arm, by the functions that
 tests/world/ur10e/test_measured_joints.py tests it with (tests/support/motions/joint_figures.py).
-docs/simulated-arm.md says which logs there are, and what came out.
+docs/simulated-arm.md says which logs there are, and the results.
 """
 
 import argparse
@@ -40,19 +40,19 @@ CRUISE_ROWS = 40
 SWING_S, PERIOD_S = 50.0, 10.0  # of the swings in dynamic_calibration
 
 
-def read(path: Path) -> Log:
+def read_log(path: Path) -> Log:
     """Return the columns (n,) or (n, 6) of a log with a heading."""
     with path.open(encoding="utf-8") as file:
         names = file.readline().replace(",", " ").split()
         rows = np.loadtxt(file, delimiter="," if "," in file.readline() else None, ndmin=2)
     columns = dict(zip(names, rows.T, strict=False))
-    whole = {name.rpartition("_")[0] for name in names if name.endswith("_5")}
-    joints = {name: np.column_stack([columns[f"{name}_{joint}"] for joint in range(JOINTS)]) for name in whole}
+    complete = {name.rpartition("_")[0] for name in names if name.endswith("_5")}
+    joints = {name: np.column_stack([columns[f"{name}_{joint}"] for joint in range(JOINTS)]) for name in complete}
     return {**columns, **joints}
 
 
-def intervals(mask: NDArray[np.bool_]) -> Iterator[slice]:
-    """Yield the stretches in which `mask` (n,) holds."""
+def find_intervals(mask: NDArray[np.bool_]) -> Iterator[slice]:
+    """Yield the intervals in which `mask` (n,) is true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         yield slice(int(begin), int(end))
@@ -62,7 +62,7 @@ def describe(log: Log) -> Iterator[str]:
     """Yield lines about a log with targets."""
     time_s, speed = log["timestamp"], log["target_qd"]
     still = np.abs(speed).max(axis=1) < 1e-6
-    for rest in intervals(still):
+    for rest in find_intervals(still):
         rows = slice(rest.start + 6, rest.stop)
         if rest.stop - rows.start >= REST_TICKS:
             noises = [rest_noise(log["actual_q"][rows, joint]) for joint in range(JOINTS)]
@@ -87,7 +87,7 @@ def describe_joint(log: Log, joint: int) -> Iterator[str]:
     if not moving.any():
         return
     yield f"late by {1e3 * following_lag_s(q[moving], target[moving], speed[moving], change[moving]):.2f} ms"
-    for move in intervals(np.abs(speed) > 1e-6):
+    for move in find_intervals(np.abs(speed) > 1e-6):
         cruise = (np.abs(change[move]) < 1e-6) & (np.abs(speed[move]) > 0.05)
         if cruise.sum() > CRUISE_ROWS:
             ripple = speed_ripple(q[move][cruise], qd[move][cruise], speed[move][cruise])
@@ -134,7 +134,7 @@ def describe_swing(path: Path) -> Iterator[str]:
     )
 
 
-def simulated() -> Log:
+def log_simulated_arm() -> Log:
     """Return a log of the simulated arm: a rest of 10 s, then a turn of each joint at 60 °/s."""
     arm = LoggedArm(["arm.home_deg=[-180, -180, -180, -180, -180, -180]"])
     arm.log(5000)
@@ -153,10 +153,10 @@ def main() -> None:
         with path.open(encoding="utf-8") as file:
             has_heading = "timestamp" in file.readline()
         print(f"\n{path.name}")
-        for line in describe(read(path)) if has_heading else describe_swing(path):
+        for line in describe(read_log(path)) if has_heading else describe_swing(path):
             print(f"  {line}")
     print("\nsimulated")
-    for line in describe(simulated()):
+    for line in describe(log_simulated_arm()):
         print(f"  {line}")
 
 
