@@ -53,12 +53,12 @@ def test_uncertainties_of_a_few_arm_logs_hold() -> None:
 @pytest.mark.thorough
 @pytest.mark.proof
 def test_uncertainties_are_those_of_two_hundred_arm_logs() -> None:
-    off, refused = figures(range(200))
+    off, refused = figures(range(200, 400))  # none of them was looked at while the method was made
     assert refused.total() <= 20, refused
     for quantity in (off[:, :3], off[:, 3:]):
         rms, within = float(np.sqrt(np.mean(quantity**2))), float(np.mean(np.abs(quantity) < 2))
         print(f"RMS of error / u {rms:.2f}, {100 * within:.1f} % within U, worst {np.abs(quantity).max() / 2:.2f} U")
-        assert 0.75 < rms < 1.2 and 0.93 < within < 0.99 and np.abs(quantity).max() < 5
+        assert 0.8 < rms < 1.2 and 0.93 < within < 0.98 and np.abs(quantity).max() < 5
 
 
 def test_rests_in_a_dense_stream_tell_the_bias() -> None:
