@@ -59,7 +59,8 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
 def parse_json(content: str | bytes, most: int = MOST_RECORDED) -> Any:
     """Return the value of a JSON text from any source, with printable texts.
 
-    Raise ValueError for a number that cannot be measured, a duplicate key, or more than `most` values; RecursionError.
+    Raise ValueError for a number that cannot be measured, a duplicate key, or more than `most` values. Raise
+    RecursionError for values that are nested too deeply.
     """
     content = content.encode() if isinstance(content, str) else content
     if sum(map(content.count, SEPARATORS)) > most:

@@ -37,7 +37,7 @@ class MotionSource(Protocol):
         ...
 
     def rate_at(self, time_s: float) -> Components:
-        """Return the angular rate of the body with the sensors, in its own frame, rad/s, if `ideal`."""
+        """Return the angular rate, rad/s, of the body with the sensors, in its own frame. Only for `ideal` sources."""
         ...
 
     def motion_at(self, time_s: float) -> BodyMotion:

@@ -74,7 +74,7 @@ class Equations:
 
     @property
     def placed(self) -> Placed:
-        """The readings in their attitudes, of a sensor of a constant reference of known size."""
+        """The mean readings with their attitudes, against a constant reference of known size."""
         std_rad = np.zeros(len(self.means)) if self.std_rad is None else self.std_rad
         nothing = np.zeros_like(self.means)
         return Placed(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)

@@ -211,7 +211,7 @@ def _budget_of(
 
 
 def _add_earth_rate(inputs: VectorInputs, earth_rate: EarthRate | None) -> VectorInputs:
-    """Return the inputs with the estimated Earth's rate, else with the rate at the stated site, if any."""
+    """Return the inputs with the estimated rate of the Earth; unchanged if none was estimated."""
     return inputs if earth_rate is None else replace(inputs, earth_rate_rad_s=earth_rate.rate_rad_s)
 
 

@@ -65,7 +65,7 @@ def verify(
     return Verification(
         sensor,
         reference,
-        _reference_error(after, reference),
+        _find_reference_error(after, reference),
         rotation,
         compare(before, sensor, reference, rotation.matrix) if before else None,
         compare(after, sensor, reference, rotation.matrix, _gravity_difference(gravity_rad_s, rotation.matrix)),
@@ -108,8 +108,8 @@ def _check_complete(runs: Sequence[RunData]) -> None:
         )
 
 
-def _reference_error(recordings: Sequence[ObservedRun], reference: Reference) -> float:
-    """Return the reference's largest error against the arm; of magnitudes, so its mounting does not matter."""
+def _find_reference_error(recordings: Sequence[ObservedRun], reference: Reference) -> float:
+    """Return the largest difference of the reference's speed from the arm's; speeds do not depend on mountings."""
     turns = list_revolutions(reference.name, recordings)
     rates_rad_s = np.linalg.norm(collect_mean_rates(turns, reference).rate_rad_s, axis=1)
     in_sweeps = rates_rad_s - [turn.speed_rad_s for turn in turns]

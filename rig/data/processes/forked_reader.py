@@ -59,7 +59,7 @@ class ForkedReader:
         self.stderr = stderr
         self.pid = os.fork()
         if self.pid == 0:
-            _begin(read, out.fileno(), self.stderr.fileno(), environment)
+            _run_forked(read, out.fileno(), self.stderr.fileno(), environment)
         self._ended = os.pidfd_open(self.pid)
 
     def communicate(self, timeout: float) -> tuple[None, bytes]:
@@ -83,8 +83,8 @@ class ForkedReader:
             os.kill(self.pid, signal.SIGKILL)
 
 
-def _begin(read: Callable[[], NoReturn], out: int, complaints: int, environment: Mapping[str, str]) -> NoReturn:
-    """Take up the life of a forked process."""
+def _run_forked(read: Callable[[], NoReturn], out: int, complaints: int, environment: Mapping[str, str]) -> NoReturn:
+    """Redirect the files and signals of a forked process, then call `read`, which ends it."""
     try:
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(out, 1)

@@ -131,7 +131,7 @@ def _gamma_at_one_speed(q: list[float], square: float) -> float:
 
 
 def negative_square(axis: int) -> Fault:
-    """Return the error for readings that no scale factor of that axis (0, 1 or 2) explains."""
+    """Return the error of an axis (0, 1 or 2) whose readings give no positive square of its scale factor."""
     return Fault(
         "negative_square",
         f"the squared scale factor of {'xyz'[axis]} is zero, negative or not a number",

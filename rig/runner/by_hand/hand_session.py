@@ -151,7 +151,7 @@ class HandSession:
             wrong = wrong or Fault(
                 "not_flat", "it does not lie on any of its six sides", "Lay it down on a side, and let go"
             )
-        counts = wrong is None or self._wrong(wrong, move, rest)
+        counts = wrong is None or self._refuse_move(wrong, move, rest)
         face = None if read is None else self._face(read)
         if face is None or not counts:
             last = Instruction("lay", FACES[0]) if self._request is None else self._request.instruction
@@ -202,11 +202,11 @@ class HandSession:
         self._accepted.append(HandMove(kind, before, face, turns if kind == "turn" else 0))
         self.note(HandMoveTaken(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
-    def _wrong(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
-        """Omit a faulty move, a rest, or everything before; return whether the rest counts.
+    def _refuse_move(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
+        """Omit what a fault concerns: the move, the rest, or everything before it. Return whether the rest counts.
 
-        A changed bias at one rest may be a creep, so that rest is omitted. At the next rest too, it is a new bias.
-        Raise the Fault that no move can correct.
+        If the bias has changed at one rest, the item may have crept, so that rest is omitted. If it has changed at the
+        next rest too, the bias is a new one. Raise the fault if no move can correct it.
         """
         self._refused += 1
         if wrong.name not in MENDED_BY_HAND:
