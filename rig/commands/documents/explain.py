@@ -45,7 +45,7 @@ def _explain_check(name: str) -> Iterator[str]:
     if (words := words_of_name(name)) is not None:
         yield f"{words.name}: a check of the verdict. It fails when {words.means}."
         yield f"What to do: {words.remedy.replace('`', '').rstrip('.')}."
-        yield "More: docs/checks.md, docs/method.md"
+        yield _refer_to("docs/checks.md, docs/method.md")
 
 
 def _explain_limit(name: str) -> Iterator[str]:
@@ -57,7 +57,7 @@ def _explain_limit(name: str) -> Iterator[str]:
         kind = "a property of the sensor" if row.kind == "conformity" else "how good the measurement is"
         unit = "" if row.unit == "1" else f", in {row.unit}"
         yield f"limits.{key}: a limit on {kind}: {Limits.model_fields[key].description}{unit}."
-        yield "More: docs/configuration.md"
+        yield _refer_to("docs/configuration.md")
 
 
 def _explain_error(name: str) -> Iterator[str]:
@@ -67,7 +67,7 @@ def _explain_error(name: str) -> Iterator[str]:
         if entry.name == name:
             yield f"{entry.name}: an error. It occurs when {entry.when}."
             yield from _explain_remedies(name, entry.remedy)
-            yield "More: docs/errors.md"
+            yield _refer_to("docs/errors.md")
 
 
 def _explain_remedies(name: str, usual: str) -> Iterator[str]:
@@ -110,7 +110,7 @@ def _explain_word(name: str) -> Iterator[str]:
     for word in words:
         yield f"{word.names}: {word.plain_meaning}"
     if words:
-        yield "More: docs/glossary.md"
+        yield _refer_to("docs/glossary.md")
 
 
 def _list_names() -> list[str]:
@@ -121,3 +121,9 @@ def _list_names() -> list[str]:
 
     words = (name for word in glossary() for name in word.synonyms)
     return [*check_words(), *LIMITS, *(entry.name for entry in catalogue()), *words]
+
+
+def _refer_to(pages: str) -> str:
+    """Return the line that names further pages, and where they are if the program was installed without them."""
+    clone = Path(__file__).parents[3] / "docs"
+    return f"More: {pages}{'' if clone.is_dir() else ', in a clone of the program'}"
