@@ -2,7 +2,8 @@
 
 A verified run (by default the frozen one that the tests have) is observed and solved, and then judged, compared and
 written as a run's end does it, in turn, each in a process of its own. Printed is processor time, user and system, child
-processes included: the least of all rounds, and the ratio. Matplotlib is loaded by the end alone.
+processes included: the least of all rounds, and the ratio. Both have loaded SciPy's special functions before, as a run
+has; matplotlib is loaded by the end alone.
 """
 
 import argparse
@@ -22,6 +23,7 @@ END = "list(write_outcome(folder, verify_calibration(calibrate(runs), repeated))
 MEASURE = """
 import resource, sys
 from pathlib import Path
+import scipy.special
 import rig.cli
 from rig.analysis.analyses import calibrate, verify_calibration
 from rig.data.recording.run_file import read_run

@@ -178,11 +178,11 @@ def _fit(
     if prior.repeatability_rad > 0:
         arm_errors.append(prior.repeatability_rad * _tilt_sweeps(inputs.turns_rad_s))
     rate_errors = np.concatenate([*arm_errors, PRIOR_STD_RAD_S * np.moveaxis(inputs.attitudes @ directions.T, -1, 0)])
-    several, own_patterns = len(inputs.speeds_rad_s) > 1, inputs.build_own_patterns()
+    several = len(inputs.speeds_rad_s) > 1
 
     def effects(matrix: Array) -> Array:
         curved = [curvature(matrix, inputs.rates_rad_s)] if several else []
-        return np.concatenate([*curved, own_patterns(matrix), rate_errors @ matrix.T])
+        return np.concatenate([*curved, inputs.own_patterns(matrix), rate_errors @ matrix.T])
 
     solve = solver(inputs, mounting, gravity, speed_std, effects)
     solution, errors = solve(None)

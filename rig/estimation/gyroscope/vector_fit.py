@@ -115,31 +115,17 @@ class VectorInputs:
         return np.concatenate([none, *(kind for kind in kinds if kind is not None)])
 
     def own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
-        """Return the sensor's errors outside the model, for that F (3, 3)."""
-        return (*self._stated_errors(matrix), *self._find_roundings())
-
-    def build_own_patterns(self) -> Callable[[Array], Array]:
-        """Return a function of F (3, 3) to the effects (P, N, 3) of one standard deviation of each own error.
-
-        The roundings are found once, as they do not depend on F.
-        """
-        none, roundings = np.zeros((0, *self.means_rad_s.shape)), self._find_roundings()
-
-        def find_patterns(matrix: Array) -> Array:
-            errors = (*self._stated_errors(matrix), *roundings)
-            return np.concatenate([none, *(own_error.patterns / np.sqrt(3) for own_error in errors)])
-
-        return find_patterns
-
-    def _stated_errors(self, matrix: Array) -> tuple[OwnError, ...]:
+        """Return the sensor's errors that the model does not contain, for F (3, 3)."""
         if self.sensor is None:
             return ()
-        return tuple(own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s))
+        rounded = rounding_errors(self.means_rad_s, self.roundings_rad_s, self.variances_rad2_s2)
+        stated = own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s)
+        return (*stated, *rounded)
 
-    def _find_roundings(self) -> tuple[OwnError, ...]:
-        if self.sensor is None:
-            return ()
-        return tuple(rounding_errors(self.means_rad_s, self.roundings_rad_s, self.variances_rad2_s2))
+    def own_patterns(self, matrix: Array) -> Array:
+        """Return the effects (P, N, 3) of one standard deviation of each of the sensor's own errors."""
+        none = np.zeros((0, *self.means_rad_s.shape))
+        return np.concatenate([none, *(own_error.patterns / np.sqrt(3) for own_error in self.own_errors(matrix))])
 
     def centripetal_m_s2(self, lever_arm_m: Array) -> Array:
         """Return the acceleration (N, 3), flange's frame, at a lever arm (3,) or (N, 3) from the rotation axis."""
@@ -225,7 +211,7 @@ def _explain(
     inputs: VectorInputs, mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None
 ) -> Explained:
     several = len(inputs.speeds_rad_s) > 1
-    arm_errors, own_patterns = inputs.arm_errors_rad_s, inputs.build_own_patterns()
+    arm_errors = inputs.arm_errors_rad_s
 
     def arm_and_speed_patterns(matrix: Array) -> Array:
         """Return the effects (P, N, 3) on the readings, of one standard deviation each."""
@@ -233,11 +219,11 @@ def _explain(
         return np.concatenate([arm_errors @ matrix.T, *curved])
 
     def effects(matrix: Array) -> Array:
-        return np.concatenate([arm_and_speed_patterns(matrix), own_patterns(matrix)])
+        return np.concatenate([arm_and_speed_patterns(matrix), inputs.own_patterns(matrix)])
 
     solve = solver(inputs, mounting, gravity_m_s2, inputs.speed_std_rad_s, effects)
     steady, errors = solve(None)
-    patterns, of_sensor = arm_and_speed_patterns(steady.matrix), own_patterns(steady.matrix)
+    patterns, of_sensor = arm_and_speed_patterns(steady.matrix), inputs.own_patterns(steady.matrix)
     speed_squares = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, steady.matrix) ** 2
     bias = process or bias_process(
         design_matrix(inputs.rates_rad_s, gravity_m_s2),
