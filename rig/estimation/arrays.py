@@ -24,23 +24,10 @@ def perpendicular_unit_vectors(axis: Array) -> Array:
 
 
 def rotation_vectors(matrices: Array) -> Array:
-    """Return the rotation vectors (…, 3) in rad of rotations (…, 3, 3).
+    """Return the rotation vectors (…, 3) in rad of rotations (…, 3, 3)."""
+    from scipy.spatial.transform import Rotation
 
-    By the quaternion q, whose products 4 q qᵀ are sums of a matrix' elements; of their columns the one of the largest
-    element of q is the most precise (Shepperd, J. Guid. Control 1 (1978) 223).
-    """
-    rotations = np.asarray(matrices, dtype=np.float64)
-    transposed, trace = np.swapaxes(rotations, -1, -2), np.trace(rotations, axis1=-2, axis2=-1)[..., None, None]
-    products = np.empty((*rotations.shape[:-2], 4, 4))
-    products[..., :1, :1] = 1 + trace
-    products[..., 1:, 1:] = rotations + transposed + (1 - trace) * np.eye(3)
-    products[..., 0, 1:] = products[..., 1:, 0] = (rotations - transposed)[..., [2, 0, 1], [1, 2, 0]]
-    largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)[..., None, None]
-    column = np.take_along_axis(products, largest, axis=-1)[..., 0]
-    cosine, sine = np.abs(column[..., :1]), np.linalg.norm(column[..., 1:], axis=-1, keepdims=True)
-    axis = np.copysign(1.0, column[..., :1]) * column[..., 1:] / np.where(sine > 0, sine, 1.0)
-    vectors: Array = 2 * np.arctan2(sine, cosine) * axis
-    return vectors
+    return np.asarray(Rotation.from_matrix(matrices).as_rotvec(), dtype=np.float64)
 
 
 def axis_of(name: str) -> Array:

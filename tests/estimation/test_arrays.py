@@ -1,4 +1,4 @@
-"""Rotation vectors beside SciPy's, which is the oracle here."""
+"""Rotation vectors of stacks of rotations, from the smallest angle to half a turn."""
 
 import numpy as np
 import pytest

@@ -68,10 +68,12 @@ def collect_mean_rates(observations: Sequence[Observation], calibration: LinearC
 def fit_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -> RelativeRotation:
     """Return the rotation R that minimises Σ ‖sensor − R reference‖²; `nominal` (3, 3) is R by the nominal mountings.
 
-    Solution of Wahba's problem (Kabsch 1976). To first order the sensor reads R r + δθ × R r, so δθ is a
-    linear least-squares estimate with the noise of both sensors. Errors of scale are parallel to the axes of rotation
-    and biases cancel between the two directions, so neither changes R. Raise Fault `rank_deficient`.
+    Wahba's problem, solved by SciPy (Kabsch 1976). To first order the sensor reads R r + δθ × R r, so δθ is a linear
+    least-squares estimate with the noise of both sensors. Errors of scale are parallel to the axes of rotation and
+    biases cancel between the two directions, so neither changes R. Raise Fault `rank_deficient`.
     """
+    from scipy.spatial.transform import Rotation
+
     v = reference.rate_rad_s
     information = np.sum(v**2) * np.eye(3) - v.T @ v
     least, _, greatest = np.linalg.eigvalsh(information)
@@ -82,9 +84,7 @@ def fit_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -> Rel
             "is not known",
             "Sweep about at least two different axes",
         )
-    first, _, second = np.linalg.svd(sensor.rate_rad_s.T @ v)
-    first[:, 2] *= np.linalg.det(first @ second)  # a rotation, no reflection
-    matrix = first @ second
+    matrix = Rotation.align_vectors(sensor.rate_rad_s, v)[0].as_matrix()
     expected = reference.rotate(matrix)
     by_rotation = np.cross(
         np.eye(3), expected.rate_rad_s[:, None, :]
