@@ -185,8 +185,7 @@ class Board:
             if self._link.frame_count != self._last_check[0]:
                 self._last_check = self._link.frame_count, clock_s
             silent_s = min(silent_s, clock_s - self._last_check[1])
-        limit_s = min(self._timeout_s, _SILENCE_S)
-        if self._streaming and silent_s > limit_s and silent_s > limit_s * computer_load.crowding():
+        if self._streaming and computer_load.exceeds(silent_s, min(self._timeout_s, _SILENCE_S)):
             raise BoardError(
                 "board_link_lost",
                 f"no readable frame from the board on {self._link.port} for {silent_s:.1f} s while it should stream",

@@ -6,6 +6,11 @@ from pathlib import Path
 CROWDED = 5.0  # largest factor on a limit: the number of runnable programs per processor
 
 
+def exceeds(delay: float, limit: float) -> bool:
+    """Return whether a delay exceeds a limit that the crowding stretches; that is read only beyond the limit itself."""
+    return delay > limit and delay > limit * crowding()
+
+
 def crowding() -> float:
     """Return the number of programs per processor of this machine, 1 to CROWDED, by which a delay may be stretched.
 

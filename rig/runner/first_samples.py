@@ -33,7 +33,7 @@ class FirstSamples:
         waited_s = self._looks * self.look_s
         if clock_s is not None and self._clock_began_s is not None:
             waited_s = min(waited_s, clock_s - self._clock_began_s)
-        if waited_s > TIMEOUT_S and waited_s > TIMEOUT_S * computer_load.crowding():
+        if computer_load.exceeds(waited_s, TIMEOUT_S):
             raise Fault(
                 "no_samples",
                 f"no sample from {', '.join(silent)} within {waited_s:.1f} s of the start",

@@ -267,7 +267,7 @@ class Servo:
     def _thread_problem(self, link: ServoLink) -> Problem | None:
         """Return the problem of a link whose thread has ended."""
         silent_s = self._clock.now_s() - link.turned_s
-        if not link.alive or silent_s < HUNG_S * computer_load.crowding():
+        if not link.alive or not computer_load.exceeds(silent_s, HUNG_S):
             return None
         return problems.driver_hung(silent_s)
 
@@ -282,7 +282,7 @@ class Servo:
             self._fail(error.problem)
         except Exception as error:
             self._fail(problems.state_not_taken(error))
-        if self._moving and self._clock.now_s() - self._looked_s > UNWATCHED_S * computer_load.crowding():
+        if self._moving and computer_load.exceeds(self._clock.now_s() - self._looked_s, UNWATCHED_S):
             self._fail(problems.move_unsupervised(UNWATCHED_S, self._doing))
         with self._changed:
             self._changed.notify_all()

@@ -202,7 +202,7 @@ class ServoLink:
         self._lost += 1
         self._damaged += damaged
         silent_s = self._clock.now_s() - self._heard_s
-        if self._lost > LOST_MOST and silent_s > SILENCE_S and silent_s > SILENCE_S * computer_load.crowding():
+        if self._lost > LOST_MOST and computer_load.exceeds(silent_s, SILENCE_S):
             self._fail(problems.silent(silent_s, mostly_damaged=2 * self._damaged > self._lost))
         try:
             self._bus.settle()
