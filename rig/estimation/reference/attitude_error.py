@@ -168,41 +168,31 @@ def maximise_likelihood(
     basis = np.linalg.qr(slopes if nuisance is None else np.column_stack([slopes, nuisance]))[0]
     projected = residuals - basis @ (basis.T @ residuals)
 
-    def negative_log(log_delta: float) -> float:
-        weights = 1 / (1 + np.exp(2 * log_delta) * growth)
-        weighted = basis * weights[:, None]
+    def negative_logs(log_deltas: Array) -> Array:
+        """Return the negative log-likelihoods (m,) at log δ (m,)."""
+        weights = 1 / (1 + np.exp(2 * log_deltas)[:, None] * growth)
         try:
-            lower = np.linalg.cholesky(basis.T @ weighted)
-        except np.linalg.LinAlgError:  # δ so far above the noise that rounding dominates
-            return float("inf")
-        explained = np.linalg.solve(lower, projected @ weighted)
-        chi_square = projected**2 @ weights - explained @ explained
-        return float(0.5 * (chi_square - np.log(weights).sum()) + np.log(np.diag(lower)[:count]).sum())
+            lower = np.linalg.cholesky((basis.T * weights[:, None, :]) @ basis)
+        except np.linalg.LinAlgError:  # some δ is so far above the noise that rounding dominates
+            if len(log_deltas) == 1:
+                return np.array([np.inf])
+            return np.concatenate([negative_logs(log_delta) for log_delta in log_deltas[:, None]])
+        explained = np.linalg.solve(lower, ((projected * weights) @ basis)[..., None])[..., 0]
+        chi_square = weights @ projected**2 - np.sum(explained**2, axis=1)
+        log_determinant = np.log(np.diagonal(lower, axis1=1, axis2=2)[:, :count]).sum(axis=1)
+        return np.asarray(0.5 * (chi_square - np.log(weights).sum(axis=1)) + log_determinant)
+
+    def negative_log(log_delta: float) -> float:
+        return float(negative_logs(np.array([log_delta]))[0])
 
     grid = np.linspace(np.log(SMALLEST_RAD), np.log(LARGEST_RAD), GRID)
-    try:
-        values = _negative_logs(grid, growth, projected, basis, count)
-    except np.linalg.LinAlgError:
-        values = np.array([negative_log(log_delta) for log_delta in grid])
+    values = negative_logs(grid)
     best = int(np.argmin(values))
     if best == 0 or values[0] - values[best] < 1e-6:
         return 0.0, negative_log(-np.inf)  # exact attitudes are as likely
     bounds = grid[best - 1], grid[min(best + 1, GRID - 1)]
     minimum = minimize_scalar(negative_log, bounds=bounds, method="bounded", options={"xatol": 1e-5})
     return float(np.exp(minimum.x)), float(minimum.fun)
-
-
-def _negative_logs(grid: Array, growth: Array, projected: Array, basis: Array, count: int) -> Array:
-    """Return the negative log-likelihoods (G,) at all log δ of a grid (G,), which takes a tenth of one after another.
-
-    Raise LinAlgError if one of them has no Cholesky decomposition.
-    """
-    weights = 1 / (1 + np.exp(2 * grid)[:, None] * growth)
-    lower = np.linalg.cholesky((basis.T * weights[:, None, :]) @ basis)
-    explained = np.linalg.solve(lower, ((projected * weights) @ basis)[..., None])[..., 0]
-    chi_square = weights @ projected**2 - np.sum(explained**2, axis=1)
-    log_determinant = np.log(np.diagonal(lower, axis1=1, axis2=2)[:, :count]).sum(axis=1)
-    return np.asarray(0.5 * (chi_square - np.log(weights).sum(axis=1)) + log_determinant)
 
 
 def _find_uncertainty(delta: float, fit: Array, rotations: Array) -> float:
