@@ -6,6 +6,7 @@ rate then finds the offset to a fraction of a millisecond. The delay of the sens
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -296,15 +297,11 @@ def _fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kn
     different filters. If it leaves the finest fit without an optimum, the clock is that of the slow parts, with its own
     uncertainty. Raise Fault `time_base_not_found`.
     """
-    is_first = True
-    for stage in _list_stages(clock, board_time_s, readings, motion):
-        try:
+    first, *finer = _list_stages(clock, board_time_s, readings, motion)
+    clock = _iterate_clock(clock, *first)
+    with suppress(Fault):
+        for stage in finer:
             clock = _iterate_clock(clock, *stage)
-        except Fault:
-            if is_first:
-                raise
-            break
-        is_first = False
     return clock
 
 

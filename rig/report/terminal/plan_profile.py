@@ -74,4 +74,4 @@ def profile_csv(plan: Plan) -> Iterator[str]:
     """Yield the lines of the profile as CSV, headings first."""
     yield ",".join(HEADINGS)
     for point in profile(plan):
-        yield f"{point.axis},{point.at_s:.4f},{round(point.angle_deg, 4) + 0.0:.4f},{point.rate_deg_s:.6g},{point.what}"
+        yield f"{point.axis},{point.at_s:.4f},{point.angle_deg:z.4f},{point.rate_deg_s:.6g},{point.what}"

@@ -34,7 +34,7 @@ def _read_report(section: ArmSection) -> "ArmReport":
 
 
 def _stance(report: "ArmReport") -> str:
-    angles = " ".join(f"{round(degrees(angle), 1) + 0.0:.1f}" for angle in report.state.q_rad)  # no −0.0
+    angles = " ".join(f"{degrees(angle):z.1f}" for angle in report.state.q_rad)
     return f"arm joints: {angles} °, speed slider {100 * report.state.target_speed_fraction:.0f} %"
 
 
