@@ -31,4 +31,4 @@ def test_all_that_was_said_to_be_entered_is_there(place: tuple[str, str], tmp_pa
         of_one.carry_out(this)
     print(f"{kind}: {len(of_one.entered)} calibrations entered")
     print(f"not remembered: {of_one.not_remembered}; refused: {of_one.refused}")
-    assert of_one.entered and not of_one.not_remembered
+    assert of_one.entered and not of_one.not_remembered and not of_one.refused
