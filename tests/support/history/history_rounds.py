@@ -69,7 +69,7 @@ def drawn(seed: int) -> Round:
 class Rounds:
     """Rounds on the history at `place`, with all that was said to be entered in them so far, by calibration number.
 
-    `refused` has what a whole station said that did not measure all its parts: no fault of the history.
+    `refused` has what a whole station said that did not measure all its parts: no fault of the history, so the rounds go on.
     """
 
     def __init__(self, address: str, folder: Path) -> None:
