@@ -69,7 +69,8 @@ def drawn(seed: int) -> Round:
 class Rounds:
     """Rounds on the history at `place`, with all that was said to be entered in them so far, by calibration number.
 
-    `refused` has what a whole station said that did not measure all its parts: no fault of the history, so the rounds go on.
+    `refused` has what a whole station said that did not measure all its parts.
+    That is no fault of the history, so the rounds go on.
     """
 
     def __init__(self, address: str, folder: Path) -> None:
