@@ -36,12 +36,12 @@ PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n $(AT_A_TIME) --dist $(DIST)
 AT_A_TIME := 2
 DIST := worksteal
 
-# Linear algebra rounds by its kernel, which is chosen by the processor: what is reckoned is tested by another's too, that
-# of every processor without AVX-512, and in `make proof` by that of one without AVX, of before 2011. `make test` has one
-# recording for each kind of fit, and leaves out what only reads the numbers of others.
-NUMERIC := -n 0 -m "kernels or not (slow or proof)" tests/estimation $(wildcard tests/*/test_recordings*.py)
+# Linear algebra rounds by its kernel, which is chosen by the processor. `make test` solves one recording for each kind of
+# fit by another kernel too, that of every processor without AVX-512; `make proof` runs all numeric tests by it and by that
+# of processors without AVX, from before 2011.
+FROZEN := -n 0 -m "kernels or not (slow or proof)" $(wildcard tests/*/test_recordings*.py)
 EACH_FIT := six_observation or earth_rate or imu or thermal or by_hand
-ALL_NUMERIC := $(NUMERIC) tests/notebook tests/history/test_store.py
+NUMERIC := $(FROZEN) tests/estimation tests/notebook tests/history/test_store.py
 
 system:
 	requirements/system.sh test
@@ -70,13 +70,13 @@ whole: build/collected.txt $(VENV)/dev.installed
 	$(MAKE) -C firmware_host/firmware coverage_table COVERED=$(CURDIR)/build/coverage PYTHON=$(CURDIR)/$(BIN)/python
 
 kernels: lint build/collected.txt
-	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(NUMERIC) -k "not frozen_recording or $(EACH_FIT)"
+	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(FROZEN) -k "$(EACH_FIT)"
 
 proof: AT_A_TIME := 4
 proof: system $(VENV)/dev.installed
 	$(PYTEST) -m "proof or thorough or one_in" --proof -rP
-	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(ALL_NUMERIC)
-	OPENBLAS_CORETYPE=Prescott $(PYTEST) $(ALL_NUMERIC)
+	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(NUMERIC)
+	OPENBLAS_CORETYPE=Prescott $(PYTEST) $(NUMERIC)
 
 lint: $(VENV)/dev.installed
 	$(BIN)/ruff check .
